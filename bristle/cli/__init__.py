@@ -1,0 +1,62 @@
+"""The command line: a thin layer that names the command, prints the answer, sets the exit code.
+
+Every command is a module of this package with `HELP`, `add_arguments(parser)` and
+`main(arguments) -> int`. Modules import what is heavy inside `main`, so that `--help` answers
+at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import pkgutil
+import sys
+from collections.abc import Sequence
+
+from ..errors import BristleError
+
+_NAMES = {"list_": "list"}
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """Return the parser with one subcommand per module of this package."""
+    parser = argparse.ArgumentParser(
+        prog="bristle",
+        description="Simulate base-isolated buildings with MR dampers as FMUs.",
+        epilog="Exit codes: 0 done, 1 the run failed on its way, 2 the input is wrong, 130 interrupted.",
+    )
+    parser.add_argument("--version", action="version", version=_version())
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for found in pkgutil.iter_modules(__path__):
+        if found.name.startswith("_"):
+            continue
+        module = importlib.import_module(f"{__name__}.{found.name}")
+        name = _NAMES.get(found.name, found.name)
+        sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
+        sub.add_argument("--debug", action="store_true", help="show the traceback of an error")
+        module.add_arguments(sub)
+        sub.set_defaults(main=module.main)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command; return its exit code (0, 1, 2 or 130) and never a traceback."""
+    arguments = build_parser().parse_args(argv)
+    try:
+        return int(arguments.main(arguments))
+    except BristleError as error:
+        if arguments.debug:
+            raise
+        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        if arguments.debug:
+            raise
+        print("interrupted", file=sys.stderr)
+        return 130
+
+
+def _version() -> str:
+    from .. import __version__
+
+    return f"bristle {__version__}"

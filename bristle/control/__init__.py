@@ -1,0 +1,1 @@
+"""Control laws at run time: pure functions in the standard library, bundled in every FMU."""

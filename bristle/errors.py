@@ -1,0 +1,42 @@
+"""What can go wrong, one class per layer, each with the exit code of the command line."""
+
+
+class BristleError(Exception):
+    """Base of every error that bristle raises on purpose.
+
+    The text says where, what, and what would be right; it is printed as it is, without a
+    traceback. `exit_code` is what the command line returns: 2 for wrong input, 1 for a run
+    that failed on its way.
+    """
+
+    exit_code = 2
+
+
+class UnitError(BristleError):
+    """A unit that is not known, or two units of different dimension."""
+
+
+class PhysicsError(BristleError):
+    """A parameter, effect, law or building that cannot be."""
+
+
+class RecordError(BristleError):
+    """A ground motion or measurement that cannot be read or must not be trusted."""
+
+
+class FmuError(BristleError):
+    """An FMU file that cannot or must not be opened."""
+
+
+class BuildError(BristleError):
+    """An FMU that cannot be built from its component."""
+
+
+class ScenarioError(BristleError):
+    """A scenario file that is wrong; the text lists every mistake found, with lines."""
+
+
+class RunError(BristleError):
+    """A run that started and failed; the text says what is kept, and where."""
+
+    exit_code = 1

@@ -1,0 +1,251 @@
+"""Builds components into standalone FMUs, the same bytes for the same source.
+
+What an FMU carries is a package whose name holds the digest of its content, and a script whose
+name does too: Python modules are global to a process, so two builds must not share names.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+import sys
+import tempfile
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+from uuid import UUID, uuid5
+
+from ..errors import BuildError
+from ..resources import fmus_folder
+from . import catalogue
+from .slave import BAKED
+
+_PACKAGE = Path(__file__).resolve().parent.parent
+_BUNDLED = (
+    "errors.py", "units.py", "physics/**/*.py", "control/**/*.py",
+    "fmu/slave.py", "fmu/source.py", "fmu/damper.py",
+)  # fmt: skip
+_NAMESPACE = UUID("7c0b8c8e-3d0f-5d0a-9b55-62726973746c")
+_OPTIONS = {
+    "needsExecutionTool": False,
+    "canHandleVariableCommunicationStepSize": True,
+    "canGetAndSetFMUstate": True,
+    "canSerializeFMUstate": True,
+}
+_EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything that decides an FMU's bytes.
+
+    `name` is the model's name, `component` its source; `baked` goes into the FMU as JSON, `files`
+    as resources; `effects` are effect files of the user's own, bundled beside the library's.
+    """
+
+    name: str
+    component: Path
+    baked: Mapping[str, Any] = field(default_factory=dict)
+    files: Mapping[str, Path] = field(default_factory=dict)
+    effects: tuple[Path, ...] = ()
+
+    def digest(self) -> str:
+        """Return the digest of the content, 12 hexadecimal digits."""
+        content = hashlib.sha256()
+        for part in (_library_digest(), self.name, json.dumps(self.baked, sort_keys=True)):
+            content.update(part.encode())
+        named = [(self.component.name, self.component), *sorted(self.files.items())]
+        for name, path in [*named, *((path.name, path) for path in sorted(self.effects))]:
+            content.update(name.encode())
+            content.update(path.read_bytes())
+        return content.hexdigest()[:12]
+
+    def guid(self) -> str:
+        """Return the guid that follows from the content."""
+        return str(uuid5(_NAMESPACE, self.digest()))
+
+
+@cache
+def _library_files() -> tuple[tuple[str, Path], ...]:
+    paths = {path for pattern in _BUNDLED for path in _PACKAGE.glob(pattern)}
+    return tuple(sorted((path.relative_to(_PACKAGE).as_posix(), path) for path in paths))
+
+
+@cache
+def _library_digest() -> str:
+    import pythonfmu
+
+    content = hashlib.sha256(pythonfmu.__version__.encode())
+    for name, path in _library_files():
+        content.update(name.encode())
+        content.update(path.read_bytes())
+    return content.hexdigest()
+
+
+def plan(
+    component: str,
+    *,
+    name: str | None = None,
+    building: Path | None = None,
+    record: Path | None = None,
+    starts: Mapping[str, Any] | None = None,
+    effects: Iterable[Path] = (),
+) -> Plan:
+    """Return what to build.
+
+    Parameters
+    ----------
+    component : str
+        A built-in component.
+    name : str, optional
+        The model's name; else the component's.
+    building : path, optional
+        Building file, for a Structure.
+    record : path, optional
+        Ground motion in any format that `records` reads, for a GroundMotion.
+    starts : mapping, optional
+        Start values of parameters that differ from the component's.
+    effects : iterable of path
+        Files with effects of the user's own.
+
+    Raises
+    ------
+    BuildError, PhysicsError, RecordError
+        If a name or a file is wrong.
+    """
+    path = catalogue.source(component)
+    kind = catalogue.component_class(path)
+    chosen = name or component
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", chosen):
+        raise BuildError(f'"{chosen}" is no model name: letters, digits and _ are right.')
+    baked: dict[str, Any] = {"name": chosen}
+    files = {Path(file).name: _PACKAGE / file for file in getattr(kind, "files", ())}
+    if building is not None:
+        _only("Structure", component, "a building")
+        baked["building"] = catalogue.read_building_data(building)
+    if record is not None:
+        _only("GroundMotion", component, "a record")
+        from ..records import ground_motion_file
+
+        stem = re.sub(r"[^A-Za-z0-9_]", "_", record.stem)
+        files[f"{stem}.csv"] = Path(ground_motion_file(str(record), Path.cwd()))
+        baked["record"] = stem
+    if starts:
+        known = catalogue.describe(component, building).variables
+        for key in starts:
+            if key not in known:
+                raise BuildError(f'{component} has no parameter "{key}".')
+        baked["starts"] = dict(starts)
+    return Plan(chosen, path, baked, files, tuple(effects))
+
+
+def _only(right: str, component: str, what: str) -> None:
+    if component != right:
+        raise BuildError(f"{what} goes into {right}, not into {component}.")
+
+
+def build(what: Plan, folder: Path) -> Path:
+    """Build an FMU into a folder, unless the same one stands there; return its path.
+
+    Raises
+    ------
+    BuildError
+        If the folder cannot be written or pythonfmu fails.
+    """
+    from filelock import FileLock
+
+    target = folder / f"{what.name}.fmu"
+    guid = what.guid()
+    if built_guid(target) == guid:
+        return target
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with FileLock(folder / ".lock"):
+            if built_guid(target) != guid:
+                with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
+                    loose = _build_loose(what, guid, Path(temporary))
+                    _pack(loose, target)
+    except OSError as error:
+        raise BuildError(f"{target}: cannot be written ({error.strerror or error}).") from error
+    return target
+
+
+def built_guid(path: Path) -> str | None:
+    """Return the guid of an FMU file, None where there is no readable one."""
+    try:
+        with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+            found = re.search(rb'guid="([^"]*)"', file.read(4096))
+    except (OSError, KeyError, zipfile.BadZipFile):
+        return None
+    return found.group(1).decode() if found else None
+
+
+def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
+    """Lay the sources out, let pythonfmu build; return its FMU, still with times in it."""
+    from pythonfmu.builder import FmuBuilder
+
+    digest = what.digest()
+    package = folder / f"bristle_{digest}"
+    for name, path in _library_files():
+        target = package / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, target)
+    for inner in (package, package / "fmu"):
+        (inner / "__init__.py").write_text("", encoding="utf-8")
+    for path in what.effects:
+        shutil.copyfile(path, package / "physics" / "effects" / path.name)
+    source = what.component.read_text(encoding="utf-8")
+    script = folder / f"{what.component.stem}_{digest}.py"
+    script.write_text(
+        re.sub(r"^from bristle\.", f"from {package.name}.", source, flags=re.MULTILINE),
+        encoding="utf-8",
+    )
+    (folder / BAKED).write_text(
+        json.dumps({**what.baked, "guid": guid}, sort_keys=True), encoding="utf-8"
+    )
+    extra = [folder / BAKED]
+    for name, path in what.files.items():
+        extra.append(Path(shutil.copyfile(path, folder / name)))
+    out = folder / "out"
+    before = list(sys.path)
+    try:
+        return Path(
+            FmuBuilder.build_FMU(script, dest=out, project_files={package, *extra}, **_OPTIONS)
+        )
+    except (ImportError, SyntaxError, TypeError, ValueError, AssertionError) as error:
+        raise BuildError(f"{what.component}: pythonfmu cannot build it: {error}") from error
+    finally:
+        sys.path[:] = before
+        for module in [name for name in sys.modules if digest in name]:
+            del sys.modules[module]
+
+
+def _pack(loose: Path, target: Path) -> None:
+    """Write the FMU again, in order and without times, and rename it into place."""
+    part = target.with_suffix(".part")
+    with zipfile.ZipFile(loose) as old, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in sorted(old.namelist()):
+            entry = zipfile.ZipInfo(name, _EPOCH)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = 0o644 << 16
+            new.writestr(entry, old.read(name))
+    part.replace(target)
+
+
+def ensure(component: str, building: Path | None = None) -> Path:
+    """Return a built-in component's FMU, built on first use and reused while its digest holds."""
+    if building is None:
+        return build(plan(component), fmus_folder())
+    named = hashlib.sha256(json.dumps(catalogue.read_building_data(building), sort_keys=True).encode())
+    name = f"{component}_{named.hexdigest()[:8]}"
+    return build(plan(component, name=name, building=building), fmus_folder())
+
+
+def build_all(folder: Path, only: Iterable[str] = ()) -> list[Path]:
+    """Build the built-in components, or those of `only`, into a folder; return their paths."""
+    return [build(plan(name), folder) for name in (list(only) or catalogue.component_names())]

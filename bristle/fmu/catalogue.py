@@ -1,0 +1,146 @@
+"""The built-in components: their names, their classes, and their ports without building an FMU."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+import tomllib
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from .. import units
+from ..errors import BuildError
+from ..resources import components_folder
+from .description import Description, Variable
+from .slave import Slave
+
+
+@cache
+def sources() -> dict[str, Path]:
+    """Return the source file of each built-in component by the component's name."""
+    found = {}
+    for path in sorted(components_folder().glob("*.py")):
+        if not path.stem.startswith("_"):
+            found[component_class(path).__name__] = path
+    return found
+
+
+def component_names() -> list[str]:
+    """Return the names of the built-in components."""
+    return sorted(sources())
+
+
+def source(name: str) -> Path:
+    """Return the source file of a component.
+
+    Raises
+    ------
+    BuildError
+        If there is no component of that name; the text names the nearest.
+    """
+    try:
+        return sources()[name]
+    except KeyError:
+        near = get_close_matches(name, component_names(), 1)
+        hint = f' Did you mean "{near[0]}"?' if near else ""
+        raise BuildError(
+            f'no component is named "{name}". There are: {", ".join(component_names())}.{hint}'
+        ) from None
+
+
+@cache
+def component_class(path: Path) -> type[Slave]:
+    """Return the component class that a source file defines.
+
+    Raises
+    ------
+    BuildError
+        If the file defines none, or more than one.
+    """
+    module = _load(path)
+    classes = [
+        value
+        for value in vars(module).values()
+        if isinstance(value, type) and issubclass(value, Slave) and value.__module__ == module.__name__
+    ]
+    if len(classes) != 1:
+        raise BuildError(f"{path}: {len(classes)} component classes; one per file is right.")
+    return classes[0]
+
+
+def _load(path: Path) -> ModuleType:
+    name = f"_bristle_component_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def instantiate(name: str, building: Path | None = None, instance: str = "") -> Slave:
+    """Return a component as a Python object, as an FMU's binary would make it."""
+    baked: dict[str, Any] = {"building": read_building_data(building)} if building else {}
+    return component_class(source(name))(baked=baked, instance_name=instance or name)
+
+
+def read_building_data(path: Path) -> dict[str, Any]:
+    """Return the checked data of a building file, to be baked into a Structure."""
+    from ..physics.building import read_building
+
+    read_building(path)
+    with path.open("rb") as file:
+        return tomllib.load(file)
+
+
+def describe(name: str, building: Path | None = None) -> Description:
+    """Return the ports and parameters of a built-in component; no FMU is needed for it.
+
+    Parameters
+    ----------
+    name : str
+        A name of `component_names()`.
+    building : path, optional
+        The building file of a Structure.
+
+    Raises
+    ------
+    BuildError, PhysicsError
+        If there is no such component; if the building is wrong.
+    """
+    slave = instantiate(name, building)
+    variables = {}
+    for index, declared in slave.vars.items():
+        key = declared.name
+        low, high, nominal = slave._bounds.get(key, (None, None, None))
+        variables[key] = Variable(
+            name=key,
+            kind=type(declared).__name__,
+            causality=declared.causality.name,
+            variability=declared.variability.name,
+            reference=index,
+            unit=slave._units.get(key),
+            start=None if key in slave._depends else slave[key],
+            minimum=low,
+            maximum=high,
+            nominal=nominal,
+            description=declared.description or "",
+            dependencies=slave._depends.get(key),
+            optional=key in slave._optional,
+        )
+    return Description(
+        name=name,
+        guid=str(slave.guid),
+        identifier=name,
+        description=slave.description or "",
+        variables=variables,
+        capabilities={},
+    )
+
+
+def unit_of(variable: Variable) -> units.Unit | None:
+    """Return the parsed unit of a variable, None where it has none."""
+    return units.parse(variable.unit) if variable.unit else None

@@ -1,0 +1,271 @@
+"""What an FMU says of itself: its variables with units, starts and dependencies."""
+
+from __future__ import annotations
+
+import math
+import re
+import xml.etree.ElementTree as ElementTree
+from collections import Counter
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from xml.parsers import expat
+
+from ..errors import FmuError
+from .archive import (
+    DESCRIPTION,
+    MAX_DESCRIPTION,
+    check_library,
+    extract,
+    open_archive,
+    read_member,
+)
+
+__all__ = ["Description", "Value", "Variable", "extract", "read_description"]
+
+Value = float | int | bool | str
+
+_KINDS = ("Real", "Integer", "Boolean", "String", "Enumeration")
+_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One scalar variable of an FMU.
+
+    `kind` is "Real", "Integer", "Boolean", "String" or "Enumeration"; `unit` is None where the
+    FMU gives none ("1" for a dimensionless real that says so). `dependencies` are the names of
+    the inputs that the output follows directly, None where the FMU does not say.
+    """
+
+    name: str
+    kind: str
+    causality: str
+    variability: str | None
+    reference: int
+    unit: str | None = None
+    start: Value | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    description: str = ""
+    dependencies: tuple[str, ...] | None = None
+    optional: bool = False
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a scenario needs to know of a component before it runs."""
+
+    name: str
+    guid: str
+    identifier: str
+    description: str = ""
+    variables: dict[str, Variable] = field(default_factory=dict)
+    capabilities: dict[str, str] = field(default_factory=dict)
+
+    def of(self, causality: str) -> list[Variable]:
+        """Return the variables of one causality ("input", "output", "parameter"), in order."""
+        return [v for v in self.variables.values() if v.causality == causality]
+
+
+def read_description(path: Path | str, *, any_platform: bool = False) -> Description:
+    """Return what an FMI 2.0 co-simulation FMU says of itself.
+
+    Parameters
+    ----------
+    path : Path or str
+        The .fmu file. Nothing is unpacked and no code of it runs.
+    any_platform : bool
+        Accept an FMU that has no binary for this platform.
+
+    Returns
+    -------
+    Description
+        All variables in the order of the file; units spelled as the file spells them.
+
+    Raises
+    ------
+    FmuError
+        If the file cannot or must not be opened (see `bristle.fmu.archive.open_archive`), is
+        not FMI 2.0 for co-simulation, has no binary for this platform, or contradicts itself.
+    """
+    path = Path(path)
+    root = read_root(path, any_platform=any_platform)
+    try:
+        return describe(root)
+    except FmuError as error:
+        raise FmuError(f"{path} {DESCRIPTION}: {error}") from None
+
+
+def read_root(path: Path, *, any_platform: bool = False) -> ElementTree.Element:
+    """Return the XML root of an FMU that may be opened; FmuError says why it may not."""
+    with open_archive(path) as archive:
+        root = _parse(path, read_member(path, archive, DESCRIPTION, MAX_DESCRIPTION))
+        identifier = _check_kind(path, root)
+        if not any_platform:
+            check_library(path, archive, identifier)
+    return root
+
+
+def describe(root: ElementTree.Element) -> Description:
+    """Return the description in an XML tree that `read_root` let through."""
+    slave = root.find("CoSimulation")
+    assert slave is not None  # read_root refuses what has none
+    types = {
+        name: child
+        for simple in root.iterfind("TypeDefinitions/SimpleType")
+        if (name := simple.get("name"))
+        for child in simple
+    }
+    listed = [_variable(e, types) for e in root.iterfind("ModelVariables/ScalarVariable")]
+    variables = {v.name: v for v in listed}
+    if len(variables) != len(listed):
+        twice = sorted(n for n, times in Counter(v.name for v in listed).items() if times > 1)
+        raise FmuError(f"variables defined twice: {', '.join(twice)}.")
+    _add_dependencies(root, listed, variables)
+    _mark_optional(root, variables)
+    return Description(
+        name=root.get("modelName", ""),
+        guid=root.get("guid", ""),
+        identifier=slave.get("modelIdentifier", ""),
+        description=root.get("description", ""),
+        variables=variables,
+        capabilities={k: v for k, v in slave.attrib.items() if k != "modelIdentifier"},
+    )
+
+
+def _parse(path: Path, data: bytes) -> ElementTree.Element:
+    def refuse(name: str, *_: object) -> None:
+        raise FmuError(
+            f"{path}: {DESCRIPTION} has a document type declaration ({name}): refused, "
+            "since entities can expand without bound. FMI needs none."
+        )
+
+    # ElementTree expands entities, so a first pass refuses every declaration of one.
+    scout = expat.ParserCreate()
+    scout.StartDoctypeDeclHandler = refuse
+    try:
+        scout.Parse(data, True)
+        return ElementTree.fromstring(data)
+    except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
+        raise FmuError(f"{path}: {DESCRIPTION} is not well-formed XML: {error}.") from None
+
+
+def _check_kind(path: Path, root: ElementTree.Element) -> str:
+    """Return the model identifier of an FMI 2.0 co-simulation FMU, or raise FmuError."""
+    if root.tag != "fmiModelDescription":
+        raise FmuError(f"{path}: the root of {DESCRIPTION} is <{root.tag}>, not FMI's.")
+    version = root.get("fmiVersion", "")
+    if version != "2.0":
+        raise FmuError(
+            f"{path}: FMI version {version or 'not given'}; only FMI 2.0 for co-simulation is read."
+        )
+    slave = root.find("CoSimulation")
+    if slave is None:
+        only = " (model exchange only)" if root.find("ModelExchange") is not None else ""
+        raise FmuError(f"{path}: not for co-simulation{only}; bristle runs co-simulation FMUs.")
+    identifier = slave.get("modelIdentifier", "")
+    if not _IDENTIFIER.fullmatch(identifier):
+        raise FmuError(
+            f"{path}: the model identifier {identifier!r} is no name that C could use, "
+            "and its library cannot be found by it."
+        )
+    return identifier
+
+
+def _variable(
+    element: ElementTree.Element, types: dict[str, ElementTree.Element]
+) -> Variable:  # fmt: skip
+    name = element.get("name")
+    if not name:
+        raise FmuError("a variable has no name.")
+    value = next((child for child in element if child.tag in _KINDS), None)
+    if value is None:
+        raise FmuError(f'variable "{name}" has no type (one of {", ".join(_KINDS)}).')
+    declared = types.get(value.get("declaredType", ""))
+    inherited = dict(declared.attrib) if declared is not None else {}
+    own = inherited | value.attrib
+    return Variable(
+        name=name,
+        kind=value.tag,
+        causality=element.get("causality", "local"),
+        variability=element.get("variability", "continuous" if value.tag == "Real" else None),
+        reference=_reference(name, element.get("valueReference")),
+        unit=own.get("unit"),
+        start=_start(name, value.tag, value.get("start")),
+        minimum=_number(name, "min", own.get("min")),
+        maximum=_number(name, "max", own.get("max")),
+        nominal=_number(name, "nominal", own.get("nominal")),
+        description=element.get("description", ""),
+    )
+
+
+def _reference(name: str, text: str | None) -> int:
+    number = _unsigned(text)
+    if number is None or number >= 2**32:
+        raise FmuError(f'variable "{name}": the value reference {text!r} is no unsigned integer.')
+    return number
+
+
+def _unsigned(text: str | None) -> int | None:
+    digits = (text or "").strip()
+    return int(digits) if digits.isdecimal() and len(digits) <= 10 else None
+
+
+def _number(name: str, attribute: str, text: str | None) -> float | None:
+    if text is None:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        raise FmuError(f'variable "{name}": {attribute} is {text!r}, not a number.') from None
+    if math.isnan(number):
+        raise FmuError(f'variable "{name}": {attribute} is not a number.')
+    return number
+
+
+def _start(name: str, kind: str, text: str | None) -> Value | None:
+    if text is None or kind == "String":
+        return text
+    try:
+        if kind == "Real":
+            return float(text)
+        if kind == "Boolean":
+            return {"true": True, "1": True, "false": False, "0": False}[text.strip()]
+        return int(text)
+    except (ValueError, KeyError):
+        raise FmuError(f'variable "{name}": the start {text!r} is no {kind}.') from None
+
+
+def _add_dependencies(
+    root: ElementTree.Element, listed: list[Variable], variables: dict[str, Variable]
+) -> None:
+    for unknown in root.iterfind("ModelStructure/Outputs/Unknown"):
+        output = _indexed(listed, unknown.get("index"))
+        text = unknown.get("dependencies")
+        if text is None:
+            continue
+        causes = [_indexed(listed, index) for index in text.split()]
+        names = tuple(v.name for v in causes if v.causality == "input")
+        variables[output.name] = replace(variables[output.name], dependencies=names)
+
+
+def _indexed(listed: list[Variable], text: str | None) -> Variable:
+    number = _unsigned(text)
+    if number is None or not 1 <= number <= len(listed):
+        raise FmuError(
+            f"ModelStructure names variable {text!r}; the variables are 1 to {len(listed)}."
+        )
+    return listed[number - 1]
+
+
+def _mark_optional(root: ElementTree.Element, variables: dict[str, Variable]) -> None:
+    for tool in root.iterfind("VendorAnnotations/Tool"):
+        if tool.get("name") != "bristle":
+            continue
+        for name in tool.findtext("optional", "").split():
+            if name not in variables or variables[name].causality != "input":
+                raise FmuError(
+                    f'the annotation calls "{name}" optional, but no input has that name.'
+                )
+            variables[name] = replace(variables[name], optional=True)

@@ -1,0 +1,491 @@
+"""The base of every component: what pythonfmu leaves out.
+
+Units, bounds, dependencies and InitialUnknowns in the model description; a call order; faults that
+never raise (an exception would poison the FMU's binary); the whole state in get, set and
+serialise; outputs that follow their inputs as soon as these are set.
+
+This module is bundled in every FMU: standard library and pythonfmu only.
+"""
+
+from __future__ import annotations
+
+import json
+from math import isfinite
+from pathlib import Path
+from typing import Any, Dict, Iterable, List, Optional, Tuple
+from xml.etree.ElementTree import Element, SubElement
+
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Integer, Real, String
+from pythonfmu.enums import Fmi2Status
+
+from .. import units
+from ..physics.effect import Parameter, effects_of
+
+BAKED = "baked.json"
+"""Name of the resource with what a build fixes: model name, start values, building."""
+
+NOT_FINITE_INPUT, BAD_STEP, WRONG_MODE, BAD_STATE, BAD_PARAMETER = 1, 2, 3, 4, 5
+FAULTS = {
+    NOT_FINITE_INPUT: "an input is not finite",
+    BAD_STEP: "the step is not positive or not finite",
+    WRONG_MODE: "a step outside step mode",
+    BAD_STATE: "a state or output is not finite or out of bounds",
+    BAD_PARAMETER: "a parameter or record is wrong",
+}
+
+_INSTANTIATED, _INITIALISING, _STEPPING, _TERMINATED = range(4)
+
+
+class _Slot:
+    """A variable as an attribute of the component; its value lives in the flat list."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __get__(self, slave: "Slave | None", _owner: Any = None) -> Any:
+        if slave is None:
+            return self
+        return slave._values[slave._index[self.name]]
+
+    def __set__(self, slave: "Slave", value: Any) -> None:
+        slave._values[slave._index[self.name]] = value
+
+
+class Slave(Fmi2Slave):  # type: ignore[misc]
+    """A component: declares its ports in `declare`, and fills three methods.
+
+    `configure()` builds the model from the parameters, `advance(time, step)` moves it over one
+    step, `refresh()` computes the outputs from inputs and state. None of them returns a status: what
+    they raise becomes a fault, with the outputs held at their last finite values.
+
+    `get_inner` and `set_inner` hand out and take back the model's state, made of lists, numbers and
+    texts.
+    """
+
+    def __init__(self, baked: "Dict[str, Any] | None" = None, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self._values: List[Any] = []
+        self._index: Dict[str, int] = {}
+        self._units: Dict[str, str] = {}
+        self._bounds: Dict[str, Tuple[Optional[float], Optional[float], Optional[float]]] = {}
+        self._depends: Dict[str, Tuple[str, ...]] = {}
+        self._optional: List[str] = []
+        self._inputs: List[int] = []
+        self._outputs: List[int] = []
+        self._parameters: "set[int]" = set()
+        self._set: "set[int]" = set()
+        self._mode = _INSTANTIATED
+        self._stale = True
+        self._unbuilt = True
+        self._warned: "set[str]" = set()
+        self.baked = self._read_baked() if baked is None else baked
+        self.modelName = self.baked.get("name", type(self).__name__)
+        self.guid = self.baked.get("guid", self.guid)
+        self.description = (type(self).__doc__ or "").strip().split("\n")[0]
+        self.declare()
+        self.add_output("fault", None, "0, or why the component stopped: 1 input, 2 step, 3 mode, 4 state, 5 parameter")
+        for name, value in self.baked.get("starts", {}).items():
+            self._values[self._index[name]] = value
+
+    # -- what a component fills in
+
+    def declare(self) -> None:
+        """Declare inputs, outputs and parameters."""
+        raise NotImplementedError
+
+    def configure(self) -> None:
+        """Build the model from the parameters; raise what is wrong with them."""
+
+    def advance(self, time: float, step: float) -> None:
+        """Move the model from `time` [s] over `step` [s]."""
+
+    def refresh(self) -> None:
+        """Compute the outputs from inputs and state, without moving the model."""
+
+    def get_inner(self) -> Any:
+        """Return a copy of the model's state."""
+        return None
+
+    def set_inner(self, state: Any) -> None:
+        """Take a copy of the model's state."""
+
+    # -- declaring
+
+    def add_input(
+        self, name: str, unit: str, text: str, *, start: float = 0.0, optional: bool = False
+    ) -> None:
+        """Declare a Real input; an optional one may stay unconnected."""
+        if optional:
+            self._optional.append(name)
+        self._inputs.append(
+            self._add(Real(name, causality=Fmi2Causality.input, variability=Fmi2Variability.continuous, description=text), float(start), unit)
+        )
+
+    def add_output(
+        self,
+        name: str,
+        unit: "str | None",
+        text: str,
+        *,
+        depends: Iterable[str] = (),
+        bounds: Tuple[Optional[float], Optional[float]] = (None, None),
+        nominal: "float | None" = None,
+    ) -> None:
+        """Declare a Real output, or an Integer one where `unit` is None.
+
+        `depends` names the inputs that it follows as soon as they are set.
+        """
+        common = {"causality": Fmi2Causality.output, "description": text, "initial": Fmi2Initial.calculated}
+        if unit is None:
+            variable = Integer(name, variability=Fmi2Variability.discrete, **common)
+        else:
+            variable = Real(name, variability=Fmi2Variability.continuous, **common)
+        self._depends[name] = tuple(depends)
+        self._bounds[name] = (bounds[0], bounds[1], nominal)
+        index = self._add(variable, 0 if unit is None else 0.0, unit)
+        if unit is not None:
+            self._outputs.append(index)
+
+    def add_parameter(
+        self,
+        name: str,
+        value: Any,
+        unit: "str | None",
+        text: str,
+        bounds: Tuple[Optional[float], Optional[float]] = (None, None),
+    ) -> None:
+        """Declare a fixed parameter, of the type of its value."""
+        common = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed, "description": text}
+        kind = {bool: Boolean, int: Integer, str: String}.get(type(value), Real)
+        if kind in (Real, Integer):
+            self._bounds[name] = (bounds[0], bounds[1], None)
+        self._parameters.add(self._add(kind(name, **common), value, unit))
+
+    def _add(self, variable: Any, value: Any, unit: "str | None") -> int:
+        name = variable.name
+        index = len(self._values)
+        self._values.append(value)
+        self._index[name] = index
+        if unit:
+            self._units[name] = units.canonical(unit)
+        if name.isidentifier():
+            if not isinstance(getattr(type(self), name, _Slot(name)), _Slot):
+                raise TypeError("{}: {!r} is taken.".format(type(self).__name__, name))
+            setattr(type(self), name, _Slot(name))
+        variable.getter = lambda: self._values[index]
+        variable.setter = lambda value: self._put(index, value)
+        self.register_variable(variable, nested=False)
+        return index
+
+    def __getitem__(self, name: str) -> Any:
+        """Return the value of a variable by its full name ("gas_spring.k")."""
+        return self._values[self._index[name]]
+
+    def was_set(self, name: str) -> bool:
+        """Return whether the host has ever set this variable."""
+        return self._index[name] in self._set
+
+    # -- the life of an instance
+
+    def enter_initialization_mode(self) -> None:
+        if self._mode != _INSTANTIATED:
+            self._stop(WRONG_MODE, "initialisation entered twice; reset the instance first.")
+            return
+        self._mode = _INITIALISING
+
+    def exit_initialization_mode(self) -> None:
+        if self._mode != _INITIALISING:
+            self._stop(WRONG_MODE, "initialisation left without being entered.")
+            return
+        self._unbuilt = self._stale = True
+        self._follow(final=True)
+        self._mode = _STEPPING
+
+    def terminate(self) -> None:
+        self._mode = _TERMINATED
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        if self.fault:
+            return False
+        if self._mode != _STEPPING:
+            return self._stop(WRONG_MODE, "doStep belongs between initialisation and terminate.")
+        if not (step_size > 0.0 and isfinite(step_size) and isfinite(current_time)):
+            return self._stop(BAD_STEP, "time {!r} s, step {!r} s.".format(current_time, step_size))
+        values = self._values
+        for index in self._inputs:
+            if not isfinite(values[index]):
+                return self._stop(
+                    NOT_FINITE_INPUT, "{} = {!r}.".format(self.vars[index].name, values[index])
+                )
+        held = [values[index] for index in self._outputs]
+        try:
+            self.advance(current_time, step_size)
+            self.refresh()
+            wrong = self._not_finite()
+        except Exception as error:  # an exception would poison the binary: it becomes a fault
+            wrong = "{}: {}".format(type(error).__name__, error)
+        if wrong:
+            for index, value in zip(self._outputs, held):
+                values[index] = value
+            return self._stop(BAD_STATE, wrong)
+        self._stale = False
+        return True
+
+    def _not_finite(self) -> str:
+        values = self._values
+        total = 0.0
+        for index in self._outputs:
+            total += values[index]
+        if isfinite(total):
+            return ""
+        names = [self.vars[i].name for i in self._outputs if not isfinite(values[i])]
+        return "not finite: {}.".format(", ".join(names) or "the sum of the outputs")
+
+    def _stop(self, code: int, text: str) -> bool:
+        if not self.fault:
+            self.fault = code
+            self.log(
+                "{}: fault {}, {}: {}".format(self.instance_name, code, FAULTS[code], text),
+                Fmi2Status.discard,
+            )
+        return False
+
+    def warn_once(self, text: str) -> None:
+        """Log a warning, the first time only."""
+        if text not in self._warned:
+            self._warned.add(text)
+            self.log("{}: {}".format(self.instance_name, text), Fmi2Status.warning)
+
+    def _follow(self, final: bool = False) -> None:
+        """Bring the outputs up to date with inputs, parameters and state."""
+        self._stale = False
+        if self.fault or self._mode == _TERMINATED:
+            return
+        values = self._values
+        held = [values[index] for index in self._outputs]
+        try:
+            if self._unbuilt:
+                self._check_parameters()
+                self.configure()
+                self._unbuilt = False
+            if all(isfinite(values[index]) for index in self._inputs):
+                self.refresh()
+            wrong = self._not_finite()
+        except Exception as error:  # an exception would poison the binary: it becomes a fault
+            wrong = "{}".format(error) or type(error).__name__
+        if wrong:
+            for index, value in zip(self._outputs, held):
+                values[index] = value
+            if final:
+                self._stop(BAD_PARAMETER, wrong)
+
+    def _check_parameters(self) -> None:
+        for index in self._parameters:
+            name, value = self.vars[index].name, self._values[index]
+            low, high, _ = self._bounds.get(name, (None, None, None))
+            if isinstance(value, float) and not isfinite(value):
+                raise ValueError("{} = {!r} is not finite.".format(name, value))
+            if (low is not None and value < low) or (high is not None and value > high):
+                raise ValueError("{} = {!r} lies outside [{!r}, {!r}].".format(name, value, low, high))
+
+    # -- values in and out
+
+    def _put(self, index: int, value: Any) -> None:
+        if index in self._parameters:
+            if self._mode in (_STEPPING, _TERMINATED):
+                if value != self._values[index]:
+                    self.warn_once(
+                        "{} is fixed after initialisation and keeps {!r}.".format(
+                            self.vars[index].name, self._values[index]
+                        )
+                    )
+                return
+            self._unbuilt = True
+        elif index not in self._inputs:
+            self.warn_once("{} cannot be set.".format(self.vars[index].name))
+            return
+        self._values[index] = value
+        self._set.add(index)
+        self._stale = True
+
+    def _known(self, vrs: List[int]) -> List[int]:
+        """Return the references with unknown ones replaced by `fault`'s, and say so."""
+        if all(0 <= vr < len(self._values) for vr in vrs):
+            return vrs
+        self.warn_once("no variable has one of the value references {}.".format(list(vrs)))
+        return [vr if 0 <= vr < len(self._values) else self._index["fault"] for vr in vrs]
+
+    def get_real(self, vrs: List[int]) -> List[float]:
+        if self._stale:
+            self._follow()
+        values = self._values
+        try:
+            return [float(values[vr]) for vr in vrs]
+        except (IndexError, ValueError):
+            return [0.0 if isinstance(values[vr], str) else float(values[vr]) for vr in self._known(vrs)]
+
+    def get_integer(self, vrs: List[int]) -> List[int]:
+        if self._stale:
+            self._follow()
+        values = self._values
+        try:
+            return [int(values[vr]) for vr in vrs]
+        except (IndexError, ValueError, OverflowError):
+            return [int(self._values[self._index["fault"]]) for _ in self._known(vrs)]
+
+    def get_boolean(self, vrs: List[int]) -> List[bool]:
+        return [bool(self._values[vr]) for vr in self._known(vrs)]
+
+    def get_string(self, vrs: List[int]) -> List[str]:
+        return [str(self._values[vr]) for vr in self._known(vrs)]
+
+    def set_real(self, vrs: List[int], values: List[float]) -> None:
+        if self._mode == _STEPPING:
+            inputs, store = self._inputs, self._values
+            for vr, value in zip(vrs, values):
+                if vr in inputs:
+                    store[vr] = value
+                    self._set.add(vr)
+                else:
+                    self._set_any([vr], [value], float)
+            self._stale = True
+        else:
+            self._set_any(vrs, values, float)
+
+    def set_integer(self, vrs: List[int], values: List[int]) -> None:
+        self._set_any(vrs, values, int)
+
+    def set_boolean(self, vrs: List[int], values: List[bool]) -> None:
+        self._set_any(vrs, values, bool)
+
+    def set_string(self, vrs: List[int], values: List[str]) -> None:
+        self._set_any(vrs, values, str)
+
+    def _set_any(self, vrs: List[int], values: Iterable[Any], kind: type) -> None:
+        for vr, value in zip(vrs, values):
+            if not 0 <= vr < len(self._values):
+                self.warn_once("no variable has the value reference {}.".format(vr))
+            elif type(self._values[vr]) is not kind:
+                self.warn_once("{} is not of type {}.".format(self.vars[vr].name, kind.__name__))
+            else:
+                self._put(vr, kind(value))
+
+    # -- the whole state
+
+    def _get_fmu_state(self) -> Dict[str, Any]:
+        if self._stale:
+            self._follow()
+        return {
+            "values": list(self._values),
+            "set": sorted(self._set),
+            "mode": self._mode,
+            "unbuilt": self._unbuilt,
+            "warned": sorted(self._warned),
+            "inner": None if self._unbuilt else self.get_inner(),
+        }
+
+    def _set_fmu_state(self, state: Dict[str, Any]) -> None:
+        self._values[:] = state["values"]
+        self._set = set(state["set"])
+        self._mode = state["mode"]
+        self._warned = set(state["warned"])
+        self._unbuilt = state["unbuilt"]
+        self._stale = self._unbuilt
+        if not self._unbuilt:
+            # The state may come from another instance, with other parameters.
+            outputs = list(self._values)
+            self.configure()
+            self._values[:] = outputs
+            self.set_inner(state["inner"])
+
+    # -- the model description
+
+    def to_xml(self, model_options: "Dict[str, str] | None" = None) -> Element:
+        """Return pythonfmu's description with what it leaves out."""
+        self._follow()
+        root = super().to_xml(model_options or {})
+        del root.attrib["generationDateAndTime"]  # two builds of one source are identical
+        root.insert(1, self._unit_definitions())
+        variables = root.find("ModelVariables")
+        structure = root.find("ModelStructure")
+        assert variables is not None and structure is not None
+        for node in variables:
+            self._complete(node)
+        if self._optional:
+            annotations = Element("VendorAnnotations")
+            tool = SubElement(annotations, "Tool", name="bristle")
+            SubElement(tool, "optional").text = " ".join(self._optional)
+            root.insert(list(root).index(variables), annotations)
+        self._structure(structure)
+        return root
+
+    def _complete(self, node: Element) -> None:
+        name = node.attrib["name"]
+        value = node[0]
+        if name in self._units:
+            value.set("unit", self._units[name])
+        low, high, nominal = self._bounds.get(name, (None, None, None))
+        for key, number in (("min", low), ("max", high), ("nominal", nominal)):
+            if number is not None and isfinite(number):
+                value.set(key, repr(number))
+
+    def _unit_definitions(self) -> Element:
+        definitions = Element("UnitDefinitions")
+        for name in sorted(set(self._units.values())):
+            unit = units.parse(name)
+            exponents = {
+                base: str(power) for base, power in zip(units.DIMENSIONS, unit.dimension) if power
+            }
+            if unit.factor != 1.0:
+                exponents["factor"] = repr(unit.factor)
+            SubElement(SubElement(definitions, "Unit", name=name), "BaseUnit", exponents)
+        return definitions
+
+    def _structure(self, structure: Element) -> None:
+        outputs = structure.find("Outputs")
+        if outputs is None:
+            return
+        unknowns = SubElement(structure, "InitialUnknowns")
+        parameters = sorted(index + 1 for index in self._parameters)
+        for node in outputs:
+            name = self.vars[int(node.attrib["index"]) - 1].name
+            inputs = [self._index[other] + 1 for other in self._depends[name]]
+            node.set("dependencies", " ".join(str(index) for index in sorted(inputs)))
+            known = " ".join(str(index) for index in sorted(inputs + parameters))
+            SubElement(unknowns, "Unknown", index=node.attrib["index"], dependencies=known)
+
+    def _read_baked(self) -> Dict[str, Any]:
+        path = Path(self.resources or ".") / BAKED
+        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+    def resource(self, name: str) -> Path:
+        """Return the path of a file that was bundled with the component."""
+        return Path(self.resources or ".") / name
+
+
+class EffectSlave(Slave):
+    """A component that offers the effects of its site, each with a switch and its parameters."""
+
+    def add_effects(self, site: str, law: str = "") -> None:
+        """Declare `EFFECT.on`, `EFFECT.PARAMETER` and `EFFECT.STATE_0` for every effect of a site."""
+        self._effects = effects_of(site, law)
+        for effect in self._effects:
+            self.add_parameter(effect.name + ".on", False, None, effect.first_line())
+            for name, parameter in effect.parameters.items():
+                self.add_physical(effect.name + "." + name, parameter)
+            for name, unit in effect.states.items():
+                text = "start value of the state {}".format(name)
+                self.add_parameter("{}.{}_0".format(effect.name, name), 0.0, unit, text)
+
+    def add_physical(self, name: str, parameter: Parameter) -> None:
+        """Declare a parameter of a law or effect."""
+        self.add_parameter(name, parameter.value, parameter.unit, parameter.text, parameter.bounds)
+
+    def effects_on(self) -> List[str]:
+        """Return the names of the effects that are switched on."""
+        return [effect.name for effect in self._effects if self[effect.name + ".on"]]
+
+    def numbers(self) -> Dict[str, float]:
+        """Return every Real parameter by its full name."""
+        names = ((self.vars[index].name, self._values[index]) for index in self._parameters)
+        return {name: value for name, value in names if isinstance(value, float)}

@@ -1,0 +1,306 @@
+"""A building as masses, damping and stiffness: the data behind a Structure."""
+
+from __future__ import annotations
+
+from math import isfinite, pi
+from pathlib import Path
+from typing import Any, Dict, List, NamedTuple, Tuple
+
+from ..errors import PhysicsError
+from .linear import cholesky
+
+MAX_FLOORS = 20
+
+Matrix = Tuple[Tuple[float, ...], ...]
+
+
+class Building(NamedTuple):
+    """Matrices of M q'' + C q' + K q = Gamma f - M Lambda a_g, relative to the ground.
+
+    `M`, `C`, `K` (n, n) in kg, N s/m, N/m; the base comes first when `isolated`. The damper acts on
+    the first mass. `stiffnesses` (n,) N/m are those below each mass (for effects of a storey).
+    """
+
+    name: str
+    M: Matrix
+    C: Matrix
+    K: Matrix
+    isolated: bool
+    stiffnesses: Tuple[float, ...]
+
+    @property
+    def size(self) -> int:
+        """Number of degrees of freedom."""
+        return len(self.M)
+
+    def levels(self) -> List[str]:
+        """Return the names of the masses: "base" where isolated, then "floor1", ..."""
+        floors = self.size - 1 if self.isolated else self.size
+        return (["base"] if self.isolated else []) + ["floor%d" % (i + 1) for i in range(floors)]
+
+    def with_attached_mass(self, mass: float) -> "Building":
+        """Return the building with `mass` [kg] more on its first level."""
+        M = [list(row) for row in self.M]
+        M[0][0] += mass
+        return self._replace(M=_freeze(M))
+
+
+def paper_building() -> Building:
+    """Return the base-isolated two-storey model of Shirazi et al. (2012).
+
+    Masses and stiffnesses follow uniquely from the natural frequencies 2.1, 5.48, 9 Hz and the
+    isolation stiffness 1057 N/m of the text; Rayleigh damping of 1 % in modes 1 and 3.
+    """
+    return from_data(
+        {
+            "schema": 1,
+            "name": "base-isolated two-storey model",
+            "masses": [1.96935633694460, 1.23224427177553, 1.23224427177553],
+            "stiffnesses": [1057.0, 1366.48048703339, 1366.48048703339],
+            "base": "isolated",
+            "rayleigh": {"alpha": 0.213967932082332, "beta": 2.86765663228640e-4},
+        }
+    )
+
+
+def from_data(data: Dict[str, Any], where: str = "building") -> Building:
+    """Return the building that a table of a building file describes.
+
+    Raises
+    ------
+    PhysicsError
+        For an unknown key, a wrong shape, a mass or stiffness that is not positive, matrices that
+        are not symmetric or not positive definite.
+    """
+    known = {"schema", "name", "masses", "stiffnesses", "base", "damping_ratio", "modal"}
+    known |= {"rayleigh", "M", "C", "K"}
+    for key in data:
+        if key not in known:
+            raise PhysicsError("{}: unknown key {!r}; there are {}.".format(where, key, sorted(known)))
+    if data.get("schema") != 1:
+        raise PhysicsError("{}: schema = {!r}; this version reads 1.".format(where, data.get("schema")))
+    base = data.get("base", "isolated")
+    if base not in ("isolated", "fixed"):
+        raise PhysicsError('{}: base = {!r}; "isolated" or "fixed" is right.'.format(where, base))
+    name = str(data.get("name", "building"))
+    if "M" in data or "C" in data or "K" in data:
+        building = _from_matrices(data, name, base == "isolated", where)
+    else:
+        building = _from_chain(data, name, base == "isolated", where)
+    for letter, matrix in (("M", building.M), ("K", building.K)):
+        if cholesky([value for row in matrix for value in row], building.size) is None:
+            raise PhysicsError("{}: {} is not positive definite.".format(where, letter))
+    return building
+
+
+def _from_matrices(data: Dict[str, Any], name: str, isolated: bool, where: str) -> Building:
+    for key in ("masses", "stiffnesses", "damping_ratio", "modal", "rayleigh"):
+        if key in data:
+            raise PhysicsError("{}: give either M, C, K or {}, not both.".format(where, key))
+    M, C, K = (_matrix(data, key, where) for key in ("M", "C", "K"))
+    if not len(M) == len(C) == len(K):
+        raise PhysicsError("{}: M, C and K differ in size.".format(where))
+    n = len(M)
+    # A storey's stiffness is what couples it to the level below; the lowest one carries the rest.
+    below = [sum(K[i][j] for j in range(n)) if i == 0 else -K[i][i - 1] for i in range(n)]
+    return Building(name, M, C, K, isolated, tuple(below))
+
+
+def _matrix(data: Dict[str, Any], key: str, where: str) -> Matrix:
+    rows = data.get(key)
+    if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
+        raise PhysicsError("{}: {} must be a square matrix, a list of rows.".format(where, key))
+    n = len(rows)
+    if n > MAX_FLOORS + 1 or any(len(row) != n for row in rows):
+        raise PhysicsError(
+            "{}: {} must be square with at most {} rows.".format(where, key, MAX_FLOORS + 1)
+        )
+    values = [[_number(value, key, where) for value in row] for row in rows]
+    largest = max(abs(value) for row in values for value in row)
+    if any(abs(values[i][j] - values[j][i]) > 1e-9 * largest for i in range(n) for j in range(i)):
+        raise PhysicsError("{}: {} is not symmetric.".format(where, key))
+    return _freeze(values)
+
+
+def _from_chain(data: Dict[str, Any], name: str, isolated: bool, where: str) -> Building:
+    masses, stiffnesses = (_positives(data, key, where) for key in ("masses", "stiffnesses"))
+    n = len(masses)
+    if len(stiffnesses) != n:
+        raise PhysicsError(
+            "{}: {} masses need as many stiffnesses, found {}.".format(where, n, len(stiffnesses))
+        )
+    if n > MAX_FLOORS + isolated:
+        raise PhysicsError("{}: at most {} floors, found {}.".format(where, MAX_FLOORS, n - isolated))
+    M = [[masses[i] if i == j else 0.0 for j in range(n)] for i in range(n)]
+    K = [[0.0] * n for _ in range(n)]
+    for i, k in enumerate(stiffnesses):
+        K[i][i] += k
+        if i > 0:
+            K[i - 1][i - 1] += k
+            K[i][i - 1] -= k
+            K[i - 1][i] -= k
+    C = _damping(data, M, K, where)
+    return Building(name, _freeze(M), _freeze(C), _freeze(K), isolated, tuple(stiffnesses))
+
+
+def _damping(
+    data: Dict[str, Any], M: List[List[float]], K: List[List[float]], where: str
+) -> List[List[float]]:
+    """Return C: Rayleigh, or of given ratios in every mode: C = M (sum 2 zeta w phi phi^T) M."""
+    n = len(M)
+    ways = [key for key in ("damping_ratio", "modal", "rayleigh") if key in data]
+    if len(ways) != 1:
+        raise PhysicsError(
+            "{}: give one of damping_ratio, modal, rayleigh; found {}.".format(where, ways or "none")
+        )
+    if ways == ["rayleigh"]:
+        alpha, beta = _rayleigh(data["rayleigh"], M, K, where)
+        return [[alpha * M[i][j] + beta * K[i][j] for j in range(n)] for i in range(n)]
+    if ways == ["damping_ratio"]:
+        ratios = [_ratio(data["damping_ratio"], "damping_ratio", where)] * n
+    else:
+        given = data["modal"]
+        if not isinstance(given, list) or len(given) != n:
+            raise PhysicsError("{}: modal needs one ratio for each of {} modes.".format(where, n))
+        ratios = [_ratio(value, "modal", where) for value in given]
+    C = [[0.0] * n for _ in range(n)]
+    for (omega, shape), zeta in zip(modes(M, K), ratios):
+        weighted = [M[i][i] * shape[i] for i in range(n)]
+        for i in range(n):
+            for j in range(n):
+                C[i][j] += 2.0 * zeta * omega * weighted[i] * weighted[j]
+    return C
+
+
+def _rayleigh(
+    table: Any, M: List[List[float]], K: List[List[float]], where: str
+) -> Tuple[float, float]:
+    if isinstance(table, dict) and set(table) == {"alpha", "beta"}:
+        alpha, beta = (_number(table[key], "rayleigh." + key, where) for key in ("alpha", "beta"))
+        if alpha < 0.0 or beta < 0.0:
+            raise PhysicsError("{}: rayleigh alpha and beta must not be negative.".format(where))
+        return alpha, beta
+    if isinstance(table, dict) and set(table) == {"ratio", "modes"}:
+        zeta = _ratio(table["ratio"], "rayleigh.ratio", where)
+        numbers = table["modes"]
+        omegas = [omega for omega, _ in modes(M, K)]
+        if (
+            isinstance(numbers, list)
+            and len(numbers) == 2
+            and all(isinstance(m, int) and 1 <= m <= len(omegas) for m in numbers)
+            and numbers[0] != numbers[1]
+        ):
+            first, second = omegas[numbers[0] - 1], omegas[numbers[1] - 1]
+            return 2.0 * zeta * first * second / (first + second), 2.0 * zeta / (first + second)
+        raise PhysicsError(
+            "{}: rayleigh.modes must be two different numbers of 1 to {}.".format(where, len(omegas))
+        )
+    raise PhysicsError(
+        "{}: rayleigh = {{ ratio, modes = [1, 3] }} or {{ alpha, beta }}.".format(where)
+    )
+
+
+def modes(M: Any, K: Any) -> List[Tuple[float, List[float]]]:
+    """Return the undamped modes by frequency: omega [rad/s] and mass-normalised shape (n,).
+
+    Jacobi's rotations on L^-1 K L^-T with M = L L^T (Golub & Van Loan 2013, section 8.5).
+    """
+    n = len(M)
+    low = cholesky([M[i][j] for i in range(n) for j in range(n)], n)
+    if low is None:
+        raise PhysicsError("the mass matrix is not positive definite.")
+
+    def forward(column: List[float]) -> List[float]:
+        out: List[float] = []
+        for i in range(n):
+            out.append((column[i] - sum(low[i * n + k] * out[k] for k in range(i))) / low[i * n + i])
+        return out
+
+    half = [forward([K[i][j] for i in range(n)]) for j in range(n)]  # rows: (L^-1 K)^T
+    A = [forward([half[j][i] for j in range(n)]) for i in range(n)]
+    V = [[1.0 if i == j else 0.0 for j in range(n)] for i in range(n)]
+    for _ in range(100):
+        off = sum(A[i][j] ** 2 for i in range(n) for j in range(i))
+        if off <= 1e-30 * sum(A[i][i] ** 2 for i in range(n)):
+            break
+        for i in range(n):
+            for j in range(i):
+                _rotate(A, V, i, j, n)
+    shapes = []
+    for m in range(n):
+        shape = [0.0] * n
+        for i in range(n - 1, -1, -1):  # back substitution with L^T
+            rest = sum(low[k * n + i] * shape[k] for k in range(i + 1, n))
+            shape[i] = (V[i][m] - rest) / low[i * n + i]
+        shapes.append((max(A[m][m], 0.0) ** 0.5, shape))
+    return sorted(shapes, key=lambda pair: pair[0])
+
+
+def _rotate(A: List[List[float]], V: List[List[float]], i: int, j: int, n: int) -> None:
+    if A[i][j] == 0.0:
+        return
+    theta = (A[j][j] - A[i][i]) / (2.0 * A[i][j])
+    t = (1.0 if theta >= 0.0 else -1.0) / (abs(theta) + (theta * theta + 1.0) ** 0.5)
+    c = 1.0 / (t * t + 1.0) ** 0.5
+    s = t * c
+    for k in range(n):
+        A[k][i], A[k][j] = c * A[k][i] - s * A[k][j], s * A[k][i] + c * A[k][j]
+    for k in range(n):
+        A[i][k], A[j][k] = c * A[i][k] - s * A[j][k], s * A[i][k] + c * A[j][k]
+        V[k][i], V[k][j] = c * V[k][i] - s * V[k][j], s * V[k][i] + c * V[k][j]
+
+
+def frequencies(building: Building) -> List[float]:
+    """Return the undamped natural frequencies [Hz], ascending."""
+    return [omega / (2.0 * pi) for omega, _ in modes(building.M, building.K)]
+
+
+def read_building(path: "str | Path") -> Building:
+    """Return the building of a TOML file (schema 1).
+
+    Raises
+    ------
+    PhysicsError
+        Naming the file, the key and what would be right.
+    """
+    import tomllib  # not in Python 3.9, where FMUs may run; they carry the data, not the file
+
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            data = tomllib.load(file)
+    except OSError as error:
+        raise PhysicsError("{}: cannot be read ({}).".format(path, error.strerror)) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise PhysicsError("{}: not valid TOML: {}.".format(path, error)) from error
+    return from_data(data, str(path))
+
+
+def _number(value: Any, key: str, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+        raise PhysicsError("{}: {} must be a finite number, found {!r}.".format(where, key, value))
+    return float(value)
+
+
+def _positives(data: Dict[str, Any], key: str, where: str) -> List[float]:
+    values = data.get(key)
+    if not isinstance(values, list) or not values:
+        raise PhysicsError("{}: {} must be a list of numbers.".format(where, key))
+    numbers = [_number(value, key, where) for value in values]
+    for i, number in enumerate(numbers):
+        if number <= 0.0:
+            raise PhysicsError(
+                "{}: {}[{}] = {!r} must be positive.".format(where, key, i, number)
+            )
+    return numbers
+
+
+def _ratio(value: Any, key: str, where: str) -> float:
+    number = _number(value, key, where)
+    if not 0.0 <= number < 1.0:
+        raise PhysicsError("{}: {} = {!r} must lie in [0, 1).".format(where, key, number))
+    return number
+
+
+def _freeze(rows: List[List[float]]) -> Matrix:
+    return tuple(tuple(row) for row in rows)

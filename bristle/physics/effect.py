@@ -1,0 +1,154 @@
+"""A physical effect: one class in one file, which registers itself and takes part everywhere.
+
+An effect joins a site (`damper`, `structure`, `sensor`) through hooks, pure functions of three
+named tuples: `q` the motion and whatever else the site offers (`Q`), `z` the effect's states and
+`p` its parameters. A hook uses `math`, arithmetic and `if`, never containers, so that one source
+runs in plain Python and under numba.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from typing import Any, Callable, ClassVar, Dict, NamedTuple, Tuple
+
+from ..errors import PhysicsError
+
+SITES = ("damper", "structure", "sensor")
+
+# In the order in which an evaluation calls them.
+HOOKS = (
+    "voltage",
+    "motion",
+    "yield_factor",
+    "viscous_factor",
+    "yield_force",
+    "force",
+    "spring",
+    "factor",
+    "halt",
+    "reaction",
+    "rate",
+    "advance",
+    "channel",
+)
+
+
+class Q(NamedTuple):
+    """What a hook may ask for. Damper: motion across the fluid; structure: motion of the base.
+
+    `rod_x`, `rod_v` are the damper's motion before any `motion` hook. `force` is the force of this
+    same evaluation (`rate`, `advance`), `halt` the force that would bring the motion to rest within
+    the step (what a stuck contact carries), `stiffness` the linear stiffness of the storey at hand,
+    `storey` its number (1 above the base), `value` the signal that an instrument is about to show.
+    """
+
+    x: float  # m
+    v: float  # m/s
+    a: float  # m/s2
+    V: float  # V
+    dt: float  # s
+    drift: float  # m
+    drift_rate: float  # m/s
+    energy: float  # J, dissipated so far
+    force: float  # N
+    rod_x: float  # m
+    rod_v: float  # m/s
+    halt: float  # N
+    stiffness: float  # N/m
+    storey: float  # 1
+    value: float  # unit of the channel
+
+
+class Parameter(NamedTuple):
+    """A number of a law or effect: default value, SI unit, bounds of what is physical, meaning."""
+
+    value: float
+    unit: str
+    bounds: Tuple[float, float]
+    text: str
+
+
+EFFECTS: Dict[str, "type[Effect]"] = {}
+
+
+class Effect:
+    """Base of every physical effect; defining a subclass with a `name` registers it.
+
+    Class data
+    ----------
+    name, site, laws
+        `laws` names the damper laws that the effect can join.
+    needs
+        Names of the signals in `q` that the hooks use.
+    states, parameters
+        `{name: unit}` and `{name: Parameter}`; start values of states are zero.
+    passive, zero_at_rest, excludes, source, expect
+        See each effect; conformance tests hold the first two.
+    """
+
+    name: ClassVar[str] = ""
+    site: ClassVar[str] = "damper"
+    laws: ClassVar[Tuple[str, ...]] = ("bingham", "lugre")
+    needs: ClassVar[Tuple[str, ...]] = ()
+    states: ClassVar[Dict[str, str]] = {}
+    parameters: ClassVar[Dict[str, Parameter]] = {}
+    passive: ClassVar[bool] = False
+    zero_at_rest: ClassVar[bool] = True
+    excludes: ClassVar[Tuple[str, ...]] = ()
+    source: ClassVar[str] = ""
+    expect: ClassVar[str] = ""
+    State: ClassVar[Any]
+    Values: ClassVar[Any]
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if cls.name:
+            cls.State = namedtuple("State", tuple(cls.states))  # type: ignore[misc]
+            cls.Values = namedtuple("Values", tuple(cls.parameters))  # type: ignore[misc]
+            _check(cls)
+            EFFECTS[cls.name] = cls
+
+    @classmethod
+    def hooks(cls) -> Dict[str, Callable[..., Any]]:
+        """Return the hooks that this effect defines, in the order of `HOOKS`."""
+        return {hook: getattr(cls, hook) for hook in HOOKS if hasattr(cls, hook)}
+
+    @classmethod
+    def first_line(cls) -> str:
+        """Return the first line of the docstring, which users read."""
+        return (cls.__doc__ or "").strip().splitlines()[0]
+
+
+def _check(effect: "type[Effect]") -> None:
+    """Refuse an effect whose class data could not work, when it is defined."""
+    where = "effect {!r} ({}.{})".format(effect.name, effect.__module__, effect.__qualname__)
+    if effect.site not in SITES:
+        raise PhysicsError("{}: site {!r} is none of {}.".format(where, effect.site, SITES))
+    if not effect.name.isidentifier():
+        raise PhysicsError("{}: a name is one word of letters, digits and _.".format(where))
+    unknown = [need for need in effect.needs if need not in Q._fields]
+    if unknown:
+        raise PhysicsError("{}: needs {}; q offers {}.".format(where, unknown, list(Q._fields)))
+    if not effect.hooks():
+        raise PhysicsError("{}: defines no hook; there are {}.".format(where, list(HOOKS)))
+    if "rate" in effect.hooks() and "advance" in effect.hooks():
+        raise PhysicsError("{}: its states move by `rate` or by `advance`, not both.".format(where))
+    if effect.states and not ("rate" in effect.hooks() or "advance" in effect.hooks()):
+        raise PhysicsError("{}: has states and neither `rate` nor `advance`.".format(where))
+    if not (effect.__doc__ or "").strip():
+        raise PhysicsError("{}: a first docstring line tells users what it is.".format(where))
+    for name, parameter in effect.parameters.items():
+        low, high = parameter.bounds
+        if not low <= parameter.value <= high:
+            raise PhysicsError(
+                "{}: {} = {} lies outside {}.".format(where, name, parameter.value, (low, high))
+            )
+
+
+def effects_of(site: str, law: str = "") -> "tuple[type[Effect], ...]":
+    """Return the registered effects of a site by name, those that can join `law` if one is given."""
+    return tuple(
+        effect
+        for _, effect in sorted(EFFECTS.items())
+        if effect.site == site and (not law or law in effect.laws)
+    )

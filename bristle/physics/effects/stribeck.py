@@ -1,0 +1,32 @@
+"""The drop of the yield force when sliding sets in."""
+
+from math import exp
+
+from ..effect import Effect, Parameter
+
+
+class Stribeck(Effect):
+    """Stribeck effect: the yield force is larger at creeping speed and drops as sliding sets in.
+
+        yield factor = 1 + rise exp(-(|v|/v_s)^shape)
+
+    Leaves out memory of the sliding (rebuilding at rest): doubt it when the first breakaway after a
+    long rest is larger than the next ones.
+    """
+
+    name = "stribeck"
+    site = "damper"
+    needs = ("v",)
+    passive = True
+    zero_at_rest = True
+    source = "Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30(7), 1083-1138, eq. 4"
+    expect = "excess force in the direction of motion at the lowest speeds, gone at higher speed"
+    parameters = {
+        "rise": Parameter(0.3, "1", (0.0, 5.0), "excess of the yield force as v -> 0"),
+        "v_s": Parameter(0.01, "m/s", (1e-4, 1.0), "speed over which the excess dies out"),
+        "shape": Parameter(2.0, "1", (0.5, 2.0), "exponent: 2 Gaussian, 1 exponential"),
+    }
+
+    @staticmethod
+    def yield_factor(q, z, p):
+        return 1.0 + p.rise * exp(-((abs(q.v) / p.v_s) ** p.shape))

@@ -1,0 +1,129 @@
+"""Test signals: what a source gives at time t, and how fast it changes.
+
+`value` and `rate` are one source for both paths: the numbers come as a flat sequence in the order
+of `PARAMETERS`, the samples of the kinds "steps" and "csv" as two sequences.
+"""
+
+from __future__ import annotations
+
+from math import cos, isfinite, pi, sin
+from typing import Dict, List, Sequence, Tuple
+
+from ..errors import PhysicsError
+from .effect import Parameter
+from .record import interpolate
+
+CONSTANT = 0
+SINE = 1
+CHIRP = 2
+STEPS = 3
+HALF_SINE = 4
+CSV = 5
+KINDS = {
+    "constant": CONSTANT,
+    "sine": SINE,
+    "chirp": CHIRP,
+    "steps": STEPS,
+    "half_sine": HALF_SINE,
+    "csv": CSV,
+}
+
+_ANY = (-1e12, 1e12)
+PARAMETERS: Dict[str, Parameter] = {
+    "level": Parameter(0.0, "", _ANY, "value of the kind constant"),
+    "amplitude": Parameter(1.0, "", _ANY, "amplitude of sine, chirp and half_sine"),
+    "frequency": Parameter(1.0, "Hz", (0.0, 1e6), "frequency; of a chirp at its start"),
+    "phase": Parameter(0.0, "rad", _ANY, "phase of sine and chirp at `start`"),
+    "offset": Parameter(0.0, "", _ANY, "value about which sine, chirp and half_sine move"),
+    "start": Parameter(0.0, "s", _ANY, "time at which the signal begins; before it, `offset`"),
+    "duration": Parameter(1.0, "s", (1e-9, 1e9), "length of a chirp and of a half_sine"),
+    "frequency_end": Parameter(10.0, "Hz", (0.0, 1e6), "frequency of a chirp at its end"),
+}
+
+
+def value(kind: int, t: float, p: Sequence[float], times: Sequence[float], values: Sequence[float]) -> float:
+    """Return the signal at time t [s].
+
+    `times`, `values` (n,): samples, held from each to the next for "steps", linear between for
+    "csv". A half sine lasts for `duration`, a chirp sweeps linearly and ends with it.
+    """
+    if kind == CONSTANT:
+        return p[0]
+    if kind == STEPS:
+        held = 0.0
+        for i in range(len(times)):
+            if times[i] > t:
+                break
+            held = values[i]
+        return held
+    if kind == CSV:
+        return interpolate(t, times, values)
+    s = t - p[5]
+    if s < 0.0:
+        return p[4]
+    if kind == SINE:
+        return p[4] + p[1] * sin(2.0 * pi * p[2] * s + p[3])
+    if s >= p[6]:
+        return p[4]
+    if kind == HALF_SINE:
+        return p[4] + p[1] * sin(pi * s / p[6])
+    return p[4] + p[1] * sin(2.0 * pi * (p[2] + 0.5 * (p[7] - p[2]) * s / p[6]) * s + p[3])
+
+
+def rate(kind: int, t: float, p: Sequence[float], times: Sequence[float], values: Sequence[float]) -> float:
+    """Return the rate of the signal at time t [1/s]; between the samples of "csv", their slope."""
+    if kind == CONSTANT or kind == STEPS:
+        return 0.0
+    if kind == CSV:
+        last = len(times) - 1
+        if not times[0] <= t < times[last]:
+            return 0.0
+        low, high = 0, last
+        while high - low > 1:
+            middle = (low + high) // 2
+            if times[middle] <= t:
+                low = middle
+            else:
+                high = middle
+        return (values[low + 1] - values[low]) / (times[low + 1] - times[low])
+    s = t - p[5]
+    if s < 0.0:
+        return 0.0
+    if kind == SINE:
+        return p[1] * 2.0 * pi * p[2] * cos(2.0 * pi * p[2] * s + p[3])
+    if s >= p[6]:
+        return 0.0
+    if kind == HALF_SINE:
+        return p[1] * pi / p[6] * cos(pi * s / p[6])
+    sweep = (p[7] - p[2]) / p[6]
+    angle = 2.0 * pi * (p[2] + 0.5 * sweep * s) * s + p[3]
+    return p[1] * 2.0 * pi * (p[2] + sweep * s) * cos(angle)
+
+
+def read_steps(text: str) -> Tuple[List[float], List[float]]:
+    """Return times [s] and values of the text "0:0 1.5:4 3:0", time:value pairs in order.
+
+    Raises
+    ------
+    PhysicsError
+        If a pair is not two finite numbers or a time does not follow the one before.
+    """
+    times: List[float] = []
+    values: List[float] = []
+    for pair in text.split():
+        time, _, level = pair.partition(":")
+        try:
+            numbers = float(time), float(level)
+        except ValueError:
+            numbers = float("nan"), float("nan")
+        if not (isfinite(numbers[0]) and isfinite(numbers[1])):
+            raise PhysicsError(
+                'steps: "{}" is not TIME:VALUE, two finite numbers; such as "0:0 1.5:4 3:0".'.format(pair)
+            )
+        if times and numbers[0] <= times[-1]:
+            raise PhysicsError("steps: the time {:g} s does not follow {:g} s.".format(numbers[0], times[-1]))
+        times.append(numbers[0])
+        values.append(numbers[1])
+    if not times:
+        raise PhysicsError('steps: no pair; give TIME:VALUE pairs such as "0:0 1.5:4 3:0".')
+    return times, values

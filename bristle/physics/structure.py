@@ -1,0 +1,311 @@
+"""A building under ground motion and device forces: an exact linear step, split around effects.
+
+The step is exact for ground acceleration linear in time and forces held or linear in time; the
+forces of effects enter as linear in time and are iterated. One source for both paths: flat lists
+inside FMUs, arrays under numba.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Dict, List, NamedTuple, Tuple
+
+from . import effects as _effects  # noqa: F401  (importing it registers the effects)
+from .building import Building
+from .linear import inverse, multiply, phi_functions
+from .weave import Layout, switched, weave
+
+EFFECT_STEP = 5e-4
+"""Longest substep [s] of a structure with effects."""
+
+SWEEPS = 3
+"""How often the forces of effects are iterated in a substep."""
+
+
+class StepMatrices(NamedTuple):
+    """Exact step of x = [q, q'] over h: x_1 = phi x_0 + held (f, a_g)_0 + ramp ((f, a_g)_1 - (f, a_g)_0).
+
+    `phi` (2n, 2n); `held`, `ramp` (2n, n + 1): columns for a force on each level [N, positive
+    against +x] and for the ground acceleration [m/s2]. All flat, row-major.
+    """
+
+    h: float
+    phi: Any
+    held: Any
+    ramp: Any
+
+
+class Matrices(NamedTuple):
+    """Flat matrices of a building, as the laws use them.
+
+    `M_inverse`, `C`, `K` (n, n), `stiffnesses` (n,), `mass` the first level's mass [kg].
+    """
+
+    n: int
+    M_inverse: Any
+    C: Any
+    K: Any
+    stiffnesses: Any
+    mass: float
+    isolated: bool
+
+
+def matrices(building: Building) -> Matrices:
+    """Return the building's matrices, flat."""
+    n = building.size
+    flat = [[value for row in matrix for value in row] for matrix in building[1:4]]
+    return Matrices(
+        n, inverse(flat[0], n), flat[1], flat[2], list(building.stiffnesses), flat[0][0],
+        building.isolated,
+    )  # fmt: skip
+
+
+def step_matrices(m: Matrices, h: float) -> StepMatrices:
+    """Return the exact step over h [s]."""
+    n = m.n
+    size = 2 * n
+    minus_k = multiply(m.M_inverse, m.K, n, n, n)
+    minus_c = multiply(m.M_inverse, m.C, n, n, n)
+    a = [0.0] * (size * size)
+    b = [0.0] * (size * (n + 1))
+    for i in range(n):
+        a[i * size + n + i] = h
+        for j in range(n):
+            a[(n + i) * size + j] = -h * minus_k[i * n + j]
+            a[(n + i) * size + n + j] = -h * minus_c[i * n + j]
+            b[(n + i) * (n + 1) + j] = -h * m.M_inverse[i * n + j]
+        b[(n + i) * (n + 1) + n] = -h
+    phi_0, phi_1, phi_2 = phi_functions(a, size)
+    return StepMatrices(
+        h, phi_0, multiply(phi_1, b, size, size, n + 1), multiply(phi_2, b, size, size, n + 1)
+    )
+
+
+def free_step(n, phi, held, ramp, x0, a0, a1, x1):  # type: ignore[no-untyped-def]
+    """Fill x1 with the state after a step under ground motion alone, a_g from a0 to a1 [m/s2]."""
+    size = 2 * n
+    for i in range(size):
+        total = held[i * (n + 1) + n] * a0 + ramp[i * (n + 1) + n] * (a1 - a0)
+        for j in range(size):
+            total += phi[i * size + j] * x0[j]
+        x1[i] = total
+
+
+def add_force(n, held, ramp, level, f0, f1, x1):  # type: ignore[no-untyped-def]
+    """Add to x1 what a force on a level does that goes linearly from f0 to f1 [N]."""
+    for i in range(2 * n):
+        x1[i] += held[i * (n + 1) + level] * f0 + ramp[i * (n + 1) + level] * (f1 - f0)
+
+
+def accelerations(n, M_inverse, C, K, x, forces, out):  # type: ignore[no-untyped-def]
+    """Fill `out` (n,) with q'' + a_g [m/s2], the absolute accelerations, under `forces` (n,) [N]."""
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            load = forces[j]
+            for k in range(n):
+                load += K[j * n + k] * x[k] + C[j * n + k] * x[n + k]
+            total -= M_inverse[i * n + j] * load
+        out[i] = total
+
+
+def holding_force(n, C, K, mass, x, a_g, others):  # type: ignore[no-untyped-def]
+    """Return the force on the first level [N] at which its acceleration relative to the ground is 0.
+
+    `others` is the sum of all other forces on that level [N]. With a full mass matrix the coupling
+    to the other levels' accelerations is left out (a chain has none).
+    """
+    total = -mass * a_g - others
+    for j in range(n):
+        total -= K[j] * x[j] + C[j] * x[n + j]
+    return total
+
+
+_SHARED = {"dt": "dt", "energy": "energy", "halt": "halt"}
+_BASE = {"x": "x[0]", "v": "x[n]", **_SHARED}
+_STOREY = {
+    "drift": "drift",
+    "drift_rate": "drift_rate",
+    "stiffness": "stiffnesses[i]",
+    "storey": "storey",
+    **_SHARED,
+}
+
+
+def _forces_source(layout: Layout) -> str:
+    spring = ["    " + line for line in switched(layout, "spring", "pull += {call}", **_STOREY)]
+    lines = [
+        "def effect_forces(n, isolated, stiffnesses, x, dt, energy, halt, z, p, on, forces):",
+        "    for i in range(n):",
+        "        forces[i] = 0.0",
+        *switched(layout, "force", "forces[0] += {call}", **_BASE),
+        "    for i in range(1 if isolated else 0, n):",
+        "        drift = x[i] - (x[i - 1] if i > 0 else 0.0)",
+        "        drift_rate = x[n + i] - (x[n + i - 1] if i > 0 else 0.0)",
+        "        storey = float(i if isolated else i + 1)",
+        "        pull = 0.0",
+        *spring,
+        "        forces[i] += pull",
+        "        if i > 0:",
+        "            forces[i - 1] -= pull",
+    ]
+    return "\n".join(lines)
+
+
+def _advance_source(layout: Layout) -> str:
+    lines = [
+        "def advance_effects(n, x, dt, energy, halt, force, z, p, on, z_next):",
+        *switched(layout, "rate", "{z_next}= {call}", force="force", **_BASE),
+        *(
+            "    if on[{0}]:\n        z_next[{1}] = z[{1}] + dt * z_next[{1}]".format(
+                layout.switches[effect.name], layout.states[effect.name + "." + state]
+            )
+            for effect in layout.effects
+            if "rate" in effect.hooks()
+            for state in effect.states
+        ),
+        *switched(layout, "advance", "{z_next}= {call}", force="force", **_BASE),
+        "    return",
+    ]
+    return "\n".join(lines)
+
+
+def reweave() -> None:
+    """Weave the structure's functions anew; call it after effects were registered late."""
+    global LAYOUT, effect_forces, advance_effects
+    LAYOUT = Layout("structure", 0, 0)
+    effect_forces = weave("effect_forces", _forces_source(LAYOUT), LAYOUT)
+    advance_effects = weave("advance_effects", _advance_source(LAYOUT), LAYOUT)
+
+
+LAYOUT: Layout
+effect_forces: Any
+advance_effects: Any
+reweave()
+
+
+def step(
+    n, isolated, stiffnesses, phi, held, ramp, h, x0, a0, a1, f0, f1, energy, z0, p, on, active,
+    x1, z1, work,
+):  # type: ignore[no-untyped-def]  # fmt: skip
+    """Advance a structure over one step h [s] with its effects.
+
+    Parameters
+    ----------
+    x0, x1 : (2n,) state [m, m/s] at begin (kept) and end (filled)
+    a0, a1 : float, ground acceleration [m/s2]
+    f0, f1 : float, force of the devices on the first level [N], linear between
+    active : bool, whether any effect is on
+    z0, z1 : states of the effects; p, on : their parameters and switches
+    work : room for `work_size(n)` floats
+    """
+    free_step(n, phi, held, ramp, x0, a0, a1, x1)
+    add_force(n, held, ramp, 0, f0, f1, x1)
+    if not active:
+        return
+    size = 2 * n
+    g0, g1 = work[0:n], work[n : 2 * n]
+    free = work[size : 2 * size]
+    for i in range(size):
+        free[i] = x1[i]
+    # A stuck contact carries what brings the first level to rest within the step.
+    gain = held[n * (n + 1)]
+    effect_forces(n, isolated, stiffnesses, x0, h, energy, 0.0, z0, p, on, g0)
+    for i in range(n):
+        g1[i] = g0[i]
+    for _ in range(SWEEPS):
+        for i in range(size):
+            x1[i] = free[i]
+        for i in range(n):
+            add_force(n, held, ramp, i, g0[i], g1[i], x1)
+        halt = g1[0] - x1[n] / gain
+        advance_effects(n, x1, h, energy, halt, g1[0], z0, p, on, z1)
+        effect_forces(n, isolated, stiffnesses, x1, h, energy, halt, z1, p, on, g1)
+
+
+def work_size(n: int) -> int:
+    """Return how many floats `step` needs as room to work."""
+    return 4 * n
+
+
+def default_building() -> Building:
+    """Return the building of a Structure that names none."""
+    from .building import paper_building
+
+    return paper_building()
+
+
+def read_building(path: Any) -> Building:
+    """Return the building of a TOML file; see `building.read_building`."""
+    from .building import read_building as read
+
+    return read(path)
+
+
+class StructureModel:
+    """A building and its state, ready to step in plain Python."""
+
+    def __init__(
+        self, building: Building, values: "Dict[str, float] | None" = None, effects: "List[str] | None" = None
+    ) -> None:
+        values, effects = values or {}, effects or []
+        self.m = matrices(building)
+        self.x = [0.0] * (2 * self.m.n)
+        self.on = [effect.name in effects for effect in LAYOUT.effects]
+        self.active = any(self.on)
+        self.p = [0.0] * LAYOUT.p_size
+        for effect in LAYOUT.effects:
+            for name, parameter in effect.parameters.items():
+                key = effect.name + "." + name
+                self.p[LAYOUT.parameters[key]] = values.get(key, parameter.value)
+        self.z = [values.get(name + "_0", 0.0) for name in LAYOUT.states]
+        self._step: Dict[float, Tuple[int, StepMatrices]] = {}
+        self._forces = [0.0] * self.m.n
+
+    def step(self, dt: float, a0: float, a1: float, force: float) -> None:
+        """Advance over dt [s]: a_g linear from a0 to a1 [m/s2], the devices' force [N] held."""
+        m = self.m
+        count, s = self._matrices(dt)
+        room = [0.0] * work_size(m.n)
+        for k in range(count):
+            begin, end = a0 + (a1 - a0) * k / count, a0 + (a1 - a0) * (k + 1) / count
+            x1, z1 = [0.0] * len(self.x), list(self.z)
+            step(
+                m.n, m.isolated, m.stiffnesses, s.phi, s.held, s.ramp, s.h, self.x, begin, end,
+                force, force, 0.0, self.z, self.p, self.on, self.active, x1, z1, room,
+            )  # fmt: skip
+            self.x, self.z = x1, z1
+
+    def _matrices(self, dt: float) -> "Tuple[int, StepMatrices]":
+        """Return how many substeps dt takes and the matrices of one; kept for the last few dt."""
+        known = self._step.get(dt)
+        if known is None:
+            count = max(1, int(dt / EFFECT_STEP + 0.999999)) if self.active else 1
+            if len(self._step) >= 8:  # a host with ever new steps must not fill the memory
+                self._step.clear()
+            known = self._step[dt] = (count, step_matrices(self.m, dt / count))
+        return known
+
+    def effect_forces(self, dt: float) -> "List[float]":
+        """Return the forces of the effects on the levels (n,) [N] at the present state."""
+        if self.active:
+            m = self.m
+            effect_forces(
+                m.n, m.isolated, m.stiffnesses, self.x, dt, 0.0, 0.0, self.z, self.p, self.on,
+                self._forces,
+            )  # fmt: skip
+        return self._forces
+
+    def absolute_accelerations(self, force: float) -> "List[float]":
+        """Return q'' + a_g (n,) [m/s2] under the devices' force [N] on the first level."""
+        loads = list(self.effect_forces(0.0))
+        loads[0] += force
+        m = self.m
+        out = [0.0] * m.n
+        accelerations(m.n, m.M_inverse, m.C, m.K, self.x, loads, out)
+        return out
+
+    def holding_force(self, a_g: float, others: float) -> float:
+        """Return the damper force [N] at which the first level does not accelerate on the ground."""
+        m = self.m
+        others += self.effect_forces(0.0)[0]
+        return holding_force(m.n, m.C, m.K, m.mass, self.x, a_g, others)  # type: ignore[no-any-return]

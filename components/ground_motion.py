@@ -1,0 +1,47 @@
+"""FMU: the ground shakes as recorded."""
+
+from bristle.fmu.slave import Slave
+from bristle.physics.record import Motion, read_two_column
+
+BUILT_IN = ("el_centro_1940_ns",)
+
+
+class GroundMotion(Slave):
+    """Ground acceleration from a record, scaled to a peak and by a factor."""
+
+    files = ("records/data/el_centro_1940_ns.csv",)
+
+    def declare(self):
+        record = self.baked.get("record", "el_centro_1940_ns")
+        text = "a name baked in, or the path of a CSV `time [s],acceleration [m/s2]`"
+        self.add_parameter("record", record, None, text)
+        text = "scales the record to this peak; 0: as recorded"
+        self.add_parameter("peak", 0.0, "m/s2", text, (0.0, 1e4))
+        self.add_parameter("factor", 1.0, "1", "multiplies the record, also after scaling", (-1e6, 1e6))
+        self.add_parameter("start", 0.0, "s", "time at which the record begins", (-1e9, 1e9))
+        self.add_output("ground_acceleration", "m/s2", "acceleration of the ground, positive along +x")
+        self.time = 0.0
+
+    def configure(self):
+        record = self.record
+        baked = (*BUILT_IN, self.baked.get("record"))
+        path = self.resource(record + ".csv") if record in baked else record
+        self.motion = Motion(*read_two_column(path))
+        if self.peak > 0.0 and self.motion.peak == 0.0:
+            raise ValueError("record {!r} is zero all along and has no peak to scale.".format(record))
+        self.scale = self.factor * (self.peak / self.motion.peak if self.peak > 0.0 else 1.0)
+
+    def advance(self, time, step):
+        self.time = time + step
+
+    def refresh(self):
+        self.ground_acceleration = self.scale * self.motion(self.time - self.start)
+
+    def setup_experiment(self, start_time, stop_time=None, tolerance=None):
+        self.time = start_time
+
+    def get_inner(self):
+        return self.time
+
+    def set_inner(self, state):
+        self.time = state
