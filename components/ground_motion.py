@@ -20,7 +20,6 @@ class GroundMotion(Slave):
         self.add_parameter("factor", 1.0, "1", "multiplies the record, also after scaling", (-1e6, 1e6))
         self.add_parameter("start", 0.0, "s", "time at which the record begins", (-1e9, 1e9))
         self.add_output("ground_acceleration", "m/s2", "acceleration of the ground, positive along +x")
-        self.time = 0.0
 
     def configure(self):
         record = self.record
@@ -31,17 +30,5 @@ class GroundMotion(Slave):
             raise ValueError("record {!r} is zero all along and has no peak to scale.".format(record))
         self.scale = self.factor * (self.peak / self.motion.peak if self.peak > 0.0 else 1.0)
 
-    def advance(self, time, step):
-        self.time = time + step
-
     def refresh(self):
         self.ground_acceleration = self.scale * self.motion(self.time - self.start)
-
-    def setup_experiment(self, start_time, stop_time=None, tolerance=None):
-        self.time = start_time
-
-    def get_inner(self):
-        return self.time
-
-    def set_inner(self, state):
-        self.time = state

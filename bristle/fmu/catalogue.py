@@ -17,6 +17,8 @@ from ..resources import components_folder
 from .description import Description, Variable
 from .slave import Slave
 
+_PACKAGE = Path(__file__).resolve().parent.parent
+
 
 @cache
 def sources() -> dict[str, Path]:
@@ -64,7 +66,9 @@ def component_class(path: Path) -> type[Slave]:
     classes = [
         value
         for value in vars(module).values()
-        if isinstance(value, type) and issubclass(value, Slave) and value.__module__ == module.__name__
+        if isinstance(value, type)
+        and issubclass(value, Slave)
+        and value.__module__ == module.__name__
     ]
     if len(classes) != 1:
         raise BuildError(f"{path}: {len(classes)} component classes; one per file is right.")
@@ -84,7 +88,10 @@ def _load(path: Path) -> ModuleType:
 def instantiate(name: str, building: Path | None = None, instance: str = "") -> Slave:
     """Return a component as a Python object, as an FMU's binary would make it."""
     baked: dict[str, Any] = {"building": read_building_data(building)} if building else {}
-    return component_class(source(name))(baked=baked, instance_name=instance or name)
+    kind = component_class(source(name))
+    files: tuple[str, ...] = getattr(kind, "files", ())
+    resources = str((_PACKAGE / files[0]).parent) if files else None
+    return kind(baked=baked, instance_name=instance or name, resources=resources)
 
 
 def read_building_data(path: Path) -> dict[str, Any]:

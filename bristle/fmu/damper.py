@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf, isfinite
 from typing import Any, ClassVar
 
 from ..physics.damper import LAWS, DamperModel
@@ -41,13 +42,13 @@ class DamperSlave(EffectSlave):
 
     def configure(self) -> None:
         self.model = DamperModel(self.law, self.numbers(), self.effects_on())
-        self.step_before = 0.0
+        self.step_before = inf  # no step yet
         self.difference = 0.0  # of velocity over the last step
         self.before = [0.0, 0.0]  # velocity and force at the end of the last step
         self.energy = 0.0
         self.started = False
 
-    def _motion(self, step: float) -> "tuple[float, float, float, float, float, bool]":
+    def _motion(self, step: float) -> tuple[float, float, float, float, float, bool]:
         """Return x, v, a, V within its limits, and the halting force and whether it is known."""
         x, v, V = self["displacement"], self["velocity"], self["voltage"]
         if not 0.0 <= V <= self["v_max"]:
@@ -57,8 +58,8 @@ class DamperSlave(EffectSlave):
             )
         a = self["acceleration"] if self.was_set("acceleration") else self.difference
         mass = self["moving_mass"]
-        halts = mass > 0.0 and (step > 0.0 or v == 0.0)
-        halt = self["holding_force"] + (mass * v / step if step > 0.0 else 0.0) if halts else 0.0
+        halts = mass > 0.0 and (isfinite(step) or v == 0.0)
+        halt = self["holding_force"] + mass * v / step if halts else 0.0
         return x, v, a, V, halt, halts
 
     def advance(self, time: float, step: float) -> None:

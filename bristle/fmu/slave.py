@@ -10,12 +10,22 @@ This module is bundled in every FMU: standard library and pythonfmu only.
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from math import isfinite
 from pathlib import Path
-from typing import Any, Dict, Iterable, List, Optional, Tuple
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Integer, Real, String
+from pythonfmu import (
+    Boolean,
+    Fmi2Causality,
+    Fmi2Initial,
+    Fmi2Slave,
+    Fmi2Variability,
+    Integer,
+    Real,
+    String,
+)
 from pythonfmu.enums import Fmi2Status
 
 from .. import units
@@ -42,19 +52,19 @@ class _Slot:
     def __init__(self, name: str) -> None:
         self.name = name
 
-    def __get__(self, slave: "Slave | None", _owner: Any = None) -> Any:
+    def __get__(self, slave: Slave | None, _owner: Any = None) -> Any:
         if slave is None:
             return self
         return slave._values[slave._index[self.name]]
 
-    def __set__(self, slave: "Slave", value: Any) -> None:
+    def __set__(self, slave: Slave, value: Any) -> None:
         slave._values[slave._index[self.name]] = value
 
 
 class Slave(Fmi2Slave):  # type: ignore[misc]
     """A component: declares its ports in `declare`, and fills three methods.
 
-    `configure()` builds the model from the parameters, `advance(time, step)` moves it over one
+    `self.time` [s] is where the component stands. `configure()` builds the model from the parameters, `advance(time, step)` moves it over one
     step, `refresh()` computes the outputs from inputs and state. None of them returns a status: what
     they raise becomes a fault, with the outputs held at their last finite values.
 
@@ -62,28 +72,33 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     texts.
     """
 
-    def __init__(self, baked: "Dict[str, Any] | None" = None, **kwargs: Any) -> None:
+    def __init__(self, baked: dict[str, Any] | None = None, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self._values: List[Any] = []
-        self._index: Dict[str, int] = {}
-        self._units: Dict[str, str] = {}
-        self._bounds: Dict[str, Tuple[Optional[float], Optional[float], Optional[float]]] = {}
-        self._depends: Dict[str, Tuple[str, ...]] = {}
-        self._optional: List[str] = []
-        self._inputs: List[int] = []
-        self._outputs: List[int] = []
-        self._parameters: "set[int]" = set()
-        self._set: "set[int]" = set()
+        self._values: list[Any] = []
+        self._index: dict[str, int] = {}
+        self._units: dict[str, str] = {}
+        self._bounds: dict[str, tuple[float | None, float | None, float | None]] = {}
+        self._depends: dict[str, tuple[str, ...]] = {}
+        self._optional: list[str] = []
+        self._inputs: list[int] = []
+        self._outputs: list[int] = []
+        self._parameters: set[int] = set()
+        self._set: set[int] = set()
         self._mode = _INSTANTIATED
         self._stale = True
         self._unbuilt = True
-        self._warned: "set[str]" = set()
+        self._warned: set[str] = set()
+        self.time = 0.0
         self.baked = self._read_baked() if baked is None else baked
         self.modelName = self.baked.get("name", type(self).__name__)
         self.guid = self.baked.get("guid", self.guid)
         self.description = (type(self).__doc__ or "").strip().split("\n")[0]
         self.declare()
-        self.add_output("fault", None, "0, or why the component stopped: 1 input, 2 step, 3 mode, 4 state, 5 parameter")
+        self.add_output(
+            "fault",
+            None,
+            "0, or why the component stopped: 1 input, 2 step, 3 mode, 4 state, 5 parameter",
+        )
         for name, value in self.baked.get("starts", {}).items():
             self._values[self._index[name]] = value
 
@@ -118,24 +133,37 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if optional:
             self._optional.append(name)
         self._inputs.append(
-            self._add(Real(name, causality=Fmi2Causality.input, variability=Fmi2Variability.continuous, description=text), float(start), unit)
+            self._add(
+                Real(
+                    name,
+                    causality=Fmi2Causality.input,
+                    variability=Fmi2Variability.continuous,
+                    description=text,
+                ),
+                float(start),
+                unit,
+            )
         )
 
     def add_output(
         self,
         name: str,
-        unit: "str | None",
+        unit: str | None,
         text: str,
         *,
         depends: Iterable[str] = (),
-        bounds: Tuple[Optional[float], Optional[float]] = (None, None),
-        nominal: "float | None" = None,
+        bounds: tuple[float | None, float | None] = (None, None),
+        nominal: float | None = None,
     ) -> None:
         """Declare a Real output, or an Integer one where `unit` is None.
 
         `depends` names the inputs that it follows as soon as they are set.
         """
-        common = {"causality": Fmi2Causality.output, "description": text, "initial": Fmi2Initial.calculated}
+        common = {
+            "causality": Fmi2Causality.output,
+            "description": text,
+            "initial": Fmi2Initial.calculated,
+        }
         if unit is None:
             variable = Integer(name, variability=Fmi2Variability.discrete, **common)
         else:
@@ -150,18 +178,22 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self,
         name: str,
         value: Any,
-        unit: "str | None",
+        unit: str | None,
         text: str,
-        bounds: Tuple[Optional[float], Optional[float]] = (None, None),
+        bounds: tuple[float | None, float | None] = (None, None),
     ) -> None:
         """Declare a fixed parameter, of the type of its value."""
-        common = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.fixed, "description": text}
+        common = {
+            "causality": Fmi2Causality.parameter,
+            "variability": Fmi2Variability.fixed,
+            "description": text,
+        }
         kind = {bool: Boolean, int: Integer, str: String}.get(type(value), Real)
         if kind in (Real, Integer):
             self._bounds[name] = (bounds[0], bounds[1], None)
         self._parameters.add(self._add(kind(name, **common), value, unit))
 
-    def _add(self, variable: Any, value: Any, unit: "str | None") -> int:
+    def _add(self, variable: Any, value: Any, unit: str | None) -> int:
         name = variable.name
         index = len(self._values)
         self._values.append(value)
@@ -170,7 +202,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             self._units[name] = units.canonical(unit)
         if name.isidentifier():
             if not isinstance(getattr(type(self), name, _Slot(name)), _Slot):
-                raise TypeError("{}: {!r} is taken.".format(type(self).__name__, name))
+                raise TypeError(f"{type(self).__name__}: {name!r} is taken.")
             setattr(type(self), name, _Slot(name))
         variable.getter = lambda: self._values[index]
         variable.setter = lambda value: self._put(index, value)
@@ -186,6 +218,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return self._index[name] in self._set
 
     # -- the life of an instance
+
+    def setup_experiment(
+        self,
+        start_time: float,
+        stop_time: float | None = None,
+        tolerance: float | None = None,
+    ) -> None:
+        self.time = start_time
+        self._stale = True
 
     def enter_initialization_mode(self) -> None:
         if self._mode != _INSTANTIATED:
@@ -210,23 +251,26 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if self._mode != _STEPPING:
             return self._stop(WRONG_MODE, "doStep belongs between initialisation and terminate.")
         if not (step_size > 0.0 and isfinite(step_size) and isfinite(current_time)):
-            return self._stop(BAD_STEP, "time {!r} s, step {!r} s.".format(current_time, step_size))
+            return self._stop(BAD_STEP, f"time {current_time!r} s, step {step_size!r} s.")
         values = self._values
         for index in self._inputs:
             if not isfinite(values[index]):
                 return self._stop(
-                    NOT_FINITE_INPUT, "{} = {!r}.".format(self.vars[index].name, values[index])
+                    NOT_FINITE_INPUT, f"{self.vars[index].name} = {values[index]!r}."
                 )
         held = [values[index] for index in self._outputs]
+        before = self.time
+        self.time = current_time + step_size
         try:
             self.advance(current_time, step_size)
             self.refresh()
             wrong = self._not_finite()
         except Exception as error:  # an exception would poison the binary: it becomes a fault
-            wrong = "{}: {}".format(type(error).__name__, error)
+            wrong = f"{type(error).__name__}: {error}"
         if wrong:
             for index, value in zip(self._outputs, held):
                 values[index] = value
+            self.time = before
             return self._stop(BAD_STATE, wrong)
         self._stale = False
         return True
@@ -245,7 +289,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if not self.fault:
             self.fault = code
             self.log(
-                "{}: fault {}, {}: {}".format(self.instance_name, code, FAULTS[code], text),
+                f"{self.instance_name}: fault {code}, {FAULTS[code]}: {text}",
                 Fmi2Status.discard,
             )
         return False
@@ -254,7 +298,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """Log a warning, the first time only."""
         if text not in self._warned:
             self._warned.add(text)
-            self.log("{}: {}".format(self.instance_name, text), Fmi2Status.warning)
+            self.log(f"{self.instance_name}: {text}", Fmi2Status.warning)
 
     def _follow(self, final: bool = False) -> None:
         """Bring the outputs up to date with inputs, parameters and state."""
@@ -272,7 +316,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
                 self.refresh()
             wrong = self._not_finite()
         except Exception as error:  # an exception would poison the binary: it becomes a fault
-            wrong = "{}".format(error) or type(error).__name__
+            wrong = f"{error}" or type(error).__name__
         if wrong:
             for index, value in zip(self._outputs, held):
                 values[index] = value
@@ -284,9 +328,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             name, value = self.vars[index].name, self._values[index]
             low, high, _ = self._bounds.get(name, (None, None, None))
             if isinstance(value, float) and not isfinite(value):
-                raise ValueError("{} = {!r} is not finite.".format(name, value))
+                raise ValueError(f"{name} = {value!r} is not finite.")
             if (low is not None and value < low) or (high is not None and value > high):
-                raise ValueError("{} = {!r} lies outside [{!r}, {!r}].".format(name, value, low, high))
+                raise ValueError(
+                    f"{name} = {value!r} lies outside [{low!r}, {high!r}]."
+                )
 
     # -- values in and out
 
@@ -295,36 +341,36 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             if self._mode in (_STEPPING, _TERMINATED):
                 if value != self._values[index]:
                     self.warn_once(
-                        "{} is fixed after initialisation and keeps {!r}.".format(
-                            self.vars[index].name, self._values[index]
-                        )
+                        f"{self.vars[index].name} is fixed after initialisation and keeps {self._values[index]!r}."
                     )
                 return
             self._unbuilt = True
         elif index not in self._inputs:
-            self.warn_once("{} cannot be set.".format(self.vars[index].name))
+            self.warn_once(f"{self.vars[index].name} cannot be set.")
             return
         self._values[index] = value
         self._set.add(index)
         self._stale = True
 
-    def _known(self, vrs: List[int]) -> List[int]:
+    def _known(self, vrs: list[int]) -> list[int]:
         """Return the references with unknown ones replaced by `fault`'s, and say so."""
         if all(0 <= vr < len(self._values) for vr in vrs):
             return vrs
-        self.warn_once("no variable has one of the value references {}.".format(list(vrs)))
+        self.warn_once(f"no variable has one of the value references {list(vrs)}.")
         return [vr if 0 <= vr < len(self._values) else self._index["fault"] for vr in vrs]
 
-    def get_real(self, vrs: List[int]) -> List[float]:
+    def get_real(self, vrs: list[int]) -> list[float]:
         if self._stale:
             self._follow()
         values = self._values
         try:
             return [float(values[vr]) for vr in vrs]
         except (IndexError, ValueError):
-            return [0.0 if isinstance(values[vr], str) else float(values[vr]) for vr in self._known(vrs)]
+            return [
+                0.0 if isinstance(values[vr], str) else float(values[vr]) for vr in self._known(vrs)
+            ]
 
-    def get_integer(self, vrs: List[int]) -> List[int]:
+    def get_integer(self, vrs: list[int]) -> list[int]:
         if self._stale:
             self._follow()
         values = self._values
@@ -333,13 +379,13 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         except (IndexError, ValueError, OverflowError):
             return [int(self._values[self._index["fault"]]) for _ in self._known(vrs)]
 
-    def get_boolean(self, vrs: List[int]) -> List[bool]:
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
         return [bool(self._values[vr]) for vr in self._known(vrs)]
 
-    def get_string(self, vrs: List[int]) -> List[str]:
+    def get_string(self, vrs: list[int]) -> list[str]:
         return [str(self._values[vr]) for vr in self._known(vrs)]
 
-    def set_real(self, vrs: List[int], values: List[float]) -> None:
+    def set_real(self, vrs: list[int], values: list[float]) -> None:
         if self._mode == _STEPPING:
             inputs, store = self._inputs, self._values
             for vr, value in zip(vrs, values):
@@ -352,42 +398,44 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         else:
             self._set_any(vrs, values, float)
 
-    def set_integer(self, vrs: List[int], values: List[int]) -> None:
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
         self._set_any(vrs, values, int)
 
-    def set_boolean(self, vrs: List[int], values: List[bool]) -> None:
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
         self._set_any(vrs, values, bool)
 
-    def set_string(self, vrs: List[int], values: List[str]) -> None:
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
         self._set_any(vrs, values, str)
 
-    def _set_any(self, vrs: List[int], values: Iterable[Any], kind: type) -> None:
+    def _set_any(self, vrs: list[int], values: Iterable[Any], kind: type) -> None:
         for vr, value in zip(vrs, values):
             if not 0 <= vr < len(self._values):
-                self.warn_once("no variable has the value reference {}.".format(vr))
+                self.warn_once(f"no variable has the value reference {vr}.")
             elif type(self._values[vr]) is not kind:
-                self.warn_once("{} is not of type {}.".format(self.vars[vr].name, kind.__name__))
+                self.warn_once(f"{self.vars[vr].name} is not of type {kind.__name__}.")
             else:
                 self._put(vr, kind(value))
 
     # -- the whole state
 
-    def _get_fmu_state(self) -> Dict[str, Any]:
+    def _get_fmu_state(self) -> dict[str, Any]:
         if self._stale:
             self._follow()
         return {
             "values": list(self._values),
             "set": sorted(self._set),
             "mode": self._mode,
+            "time": self.time,
             "unbuilt": self._unbuilt,
             "warned": sorted(self._warned),
             "inner": None if self._unbuilt else self.get_inner(),
         }
 
-    def _set_fmu_state(self, state: Dict[str, Any]) -> None:
+    def _set_fmu_state(self, state: dict[str, Any]) -> None:
         self._values[:] = state["values"]
         self._set = set(state["set"])
         self._mode = state["mode"]
+        self.time = state["time"]
         self._warned = set(state["warned"])
         self._unbuilt = state["unbuilt"]
         self._stale = self._unbuilt
@@ -400,7 +448,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     # -- the model description
 
-    def to_xml(self, model_options: "Dict[str, str] | None" = None) -> Element:
+    def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """Return pythonfmu's description with what it leaves out."""
         self._follow()
         root = super().to_xml(model_options or {})
@@ -454,7 +502,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             known = " ".join(str(index) for index in sorted(inputs + parameters))
             SubElement(unknowns, "Unknown", index=node.attrib["index"], dependencies=known)
 
-    def _read_baked(self) -> Dict[str, Any]:
+    def _read_baked(self) -> dict[str, Any]:
         path = Path(self.resources or ".") / BAKED
         return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
 
@@ -474,18 +522,18 @@ class EffectSlave(Slave):
             for name, parameter in effect.parameters.items():
                 self.add_physical(effect.name + "." + name, parameter)
             for name, unit in effect.states.items():
-                text = "start value of the state {}".format(name)
-                self.add_parameter("{}.{}_0".format(effect.name, name), 0.0, unit, text)
+                text = f"start value of the state {name}"
+                self.add_parameter(f"{effect.name}.{name}_0", 0.0, unit, text)
 
     def add_physical(self, name: str, parameter: Parameter) -> None:
         """Declare a parameter of a law or effect."""
         self.add_parameter(name, parameter.value, parameter.unit, parameter.text, parameter.bounds)
 
-    def effects_on(self) -> List[str]:
+    def effects_on(self) -> list[str]:
         """Return the names of the effects that are switched on."""
         return [effect.name for effect in self._effects if self[effect.name + ".on"]]
 
-    def numbers(self) -> Dict[str, float]:
+    def numbers(self) -> dict[str, float]:
         """Return every Real parameter by its full name."""
         names = ((self.vars[index].name, self._values[index]) for index in self._parameters)
         return {name: value for name, value in names if isinstance(value, float)}

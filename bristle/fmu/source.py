@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, List, Optional
-
 from ..physics.record import read_two_column
 from ..physics.signals import CSV, KINDS, PARAMETERS, STEPS, read_steps
 from .slave import Slave
 
 
 class SignalSlave(Slave):
-    """Parameters of a test signal, and the time."""
+    """Parameters of a test signal, and what follows from them."""
 
     def declare_signal(self, unit: str) -> None:
         """Declare the parameters of a signal in this unit."""
@@ -21,29 +19,14 @@ class SignalSlave(Slave):
         self.add_parameter("steps", "0:0", None, "TIME:VALUE pairs of the kind steps")
         text = "two-column CSV of the kind csv, its header `time [s],NAME [UNIT]`"
         self.add_parameter("file", "", None, text)
-        self.time = 0.0
 
     def configure(self) -> None:
         if self["kind"] not in KINDS:
             raise ValueError("kind {!r} is none of {}.".format(self["kind"], ", ".join(KINDS)))
         self.code = KINDS[self["kind"]]
-        self.numbers: List[float] = [self[name] for name in PARAMETERS]
+        self.numbers: list[float] = [self[name] for name in PARAMETERS]
         self.times, self.samples = [0.0], [0.0]
         if self.code == STEPS:
             self.times, self.samples = read_steps(self["steps"])
         elif self.code == CSV:
             self.times, self.samples = read_two_column(self["file"], header=None)
-
-    def advance(self, time: float, step: float) -> None:
-        self.time = time + step
-
-    def setup_experiment(
-        self, start_time: float, stop_time: Optional[float] = None, tolerance: Optional[float] = None
-    ) -> None:
-        self.time = start_time
-
-    def get_inner(self) -> Any:
-        return self.time
-
-    def set_inner(self, state: Any) -> None:
-        self.time = state

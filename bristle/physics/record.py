@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import isfinite
 
 from ..errors import PhysicsError
@@ -153,14 +153,17 @@ def read_text(path: str | os.PathLike[str], encoding: str = "utf-8-sig") -> str:
         if not stat.S_ISREG(status.st_mode):
             kind = "a folder" if stat.S_ISDIR(status.st_mode) else "no regular file"
             raise PhysicsError(f"{name}: this is {kind}. A record is one text file.")
-        if status.st_size > LARGEST:
+        size = status.st_size
+        content = b""
+        if size <= LARGEST:
+            with open(path, "rb") as file:  # noqa: PTH123
+                content = file.read(LARGEST + 1)
+            size = len(content)  # of a file that another process is writing, too
+        if size > LARGEST:
             raise PhysicsError(
-                f"{name}: {status.st_size / 1024**2:.0f} MB are more than the limit of "
+                f"{name}: {size / 1024**2:.0f} MB are more than the limit of "
                 f"{LARGEST // 1024**2} MB for one record. Cut it, or sample it more coarsely."
             )
-        with open(path, "rb") as file:  # noqa: PTH123
-            # One byte above the limit shows a file that grew since.
-            content = file.read(LARGEST + 1)
     except FileNotFoundError:
         raise PhysicsError(f"{name}: there is no such file.") from None
     except (OSError, ValueError) as error:
@@ -180,15 +183,17 @@ def read_text(path: str | os.PathLike[str], encoding: str = "utf-8-sig") -> str:
         ) from None
 
 
-def rows(text: str) -> list[tuple[int, str]]:
-    """Return the lines that are neither empty nor comments (`#`), each with its number from 1."""
+def rows(text: str) -> Iterator[tuple[int, str]]:
+    """Yield the lines that are neither empty nor comments (`#`), each with its number from 1."""
     lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    stripped = ((number, line.strip()) for number, line in enumerate(lines, 1))
-    return [(number, line) for number, line in stripped if line and not line.startswith("#")]
+    for number, line in enumerate(lines, 1):
+        stripped = line.strip()
+        if stripped and not stripped.startswith("#"):
+            yield number, stripped
 
 
-def number(field: str, name: str, line: int) -> float:
-    """Return one finite number of a file.
+def number(field: str, name: str, line: int, factor: float = 1.0) -> float:
+    """Return factor times one number of a file, finite.
 
     Raises
     ------
@@ -201,7 +206,7 @@ def number(field: str, name: str, line: int) -> float:
     try:
         if "_" in field:  # float() reads 1_000
             raise ValueError
-        value = float(field)
+        value = factor * float(field)
     except ValueError:
         raise PhysicsError(f'{name}, line {line}: "{shown}" is not a number.') from None
     if not isfinite(value):
@@ -267,7 +272,8 @@ def shortened(text: str) -> str:
 
 def is_two_column(text: str) -> bool:
     """Return whether a text has the header of the file that an FMU reads."""
-    return any(_columns(row) == HEADER.split(",") for _, row in rows(text)[:1])
+    _, first = next(rows(text), (0, ""))
+    return _columns(first) == _columns(HEADER)
 
 
 def _columns(row: str) -> list[str]:

@@ -7,6 +7,7 @@ inside FMUs, arrays under numba.
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any, Dict, List, NamedTuple, Tuple
 
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
@@ -297,7 +298,7 @@ class StructureModel:
 
     def absolute_accelerations(self, force: float) -> "List[float]":
         """Return q'' + a_g (n,) [m/s2] under the devices' force [N] on the first level."""
-        loads = list(self.effect_forces(0.0))
+        loads = list(self.effect_forces(inf))
         loads[0] += force
         m = self.m
         out = [0.0] * m.n
@@ -307,5 +308,5 @@ class StructureModel:
     def holding_force(self, a_g: float, others: float) -> float:
         """Return the damper force [N] at which the first level does not accelerate on the ground."""
         m = self.m
-        others += self.effect_forces(0.0)[0]
+        others += self.effect_forces(inf)[0]
         return holding_force(m.n, m.C, m.K, m.mass, self.x, a_g, others)  # type: ignore[no-any-return]

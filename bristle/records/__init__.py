@@ -1,0 +1,21 @@
+"""Ground motions: built in, from an extra package, or from the user's AT2 and CSV files."""
+
+from __future__ import annotations
+
+from .listing import Listing
+from .motion import (
+    GroundMotion,
+    baked_in,
+    ground_motion_file,
+    list_ground_motions,
+    read_ground_motion,
+)
+
+__all__ = [
+    "GroundMotion",
+    "Listing",
+    "baked_in",
+    "ground_motion_file",
+    "list_ground_motions",
+    "read_ground_motion",
+]

@@ -1,0 +1,128 @@
+"""PEER AT2 files: four title lines, then accelerations in rows, evenly spaced in time.
+
+The layout is that of the PEER strong-motion database, in both of its ages:
+`NPTS=   5372, DT=   .0100 SEC` and `4000    0.0100    NPTS, DT`.
+"""
+
+from __future__ import annotations
+
+import re
+
+from ..errors import PhysicsError, UnitError
+from ..physics.record import number, shortened
+from ..units import Unit
+from ..units import parse as parse_unit
+
+_TITLE_LINES = 10  # at most; four in the files of the database
+_SHORTEST = 1e-6  # s; times are rounded to a thousandth of it
+_NUMBER = r"([-+]?[0-9]*\.?[0-9]+(?:[ED][-+]?[0-9]+)?)"
+_COUNT = re.compile(rf"NPTS\s*=?\s*{_NUMBER}", re.IGNORECASE)
+_STEP = re.compile(rf"\bDT\s*=?\s*{_NUMBER}", re.IGNORECASE)
+_BOTH_BEFORE = re.compile(rf"^\s*{_NUMBER}\s+{_NUMBER}\s+NPTS\b.*\bDT\b", re.IGNORECASE)
+_UNITS = re.compile(r"UNITS?\s*(?:OF|[:=])\s*([A-Z/0-9^*.]+)", re.IGNORECASE)
+
+
+def looks_like(text: str) -> bool:
+    """Return whether a text is AT2 whatever its file is called."""
+    return any(
+        _BOTH_BEFORE.search(line) or (_COUNT.search(line) and _STEP.search(line))
+        for line in _lines(text)[:_TITLE_LINES]
+        if not line.startswith("#")
+    )
+
+
+def parse(text: str, name: str) -> tuple[list[float], list[float]]:
+    """Return times [s] from 0 and accelerations [m/s2] of the text of an AT2 file.
+
+    Parameters
+    ----------
+    text : str
+        The whole file.
+    name : str
+        The file, for messages.
+
+    Raises
+    ------
+    PhysicsError
+        If the title lines give no NPTS, DT or unit, the unit is not that of an acceleration, a
+        value is no finite number, or their count is not NPTS.
+    """
+    lines = _lines(text)
+    if not any(line.strip() for line in lines):
+        raise PhysicsError(f"{name}: the file is empty. AT2 has four title lines, then values.")
+    last = next((k for k, line in enumerate(lines[:_TITLE_LINES]) if "NPTS" in line.upper()), None)
+    if last is None:
+        raise PhysicsError(
+            f"{name}, line {min(4, len(lines))}: no NPTS and DT in the title lines. "
+            'AT2 says there, for example, "NPTS=   5372, DT=   .0100 SEC".'
+        )
+    count, step = _count_and_step(lines[last], name, last + 1)
+    unit = _unit(lines[: last + 1], name)
+    values = [
+        number(field.upper().replace("D", "E"), name, line, unit.factor)
+        for line, row in enumerate(lines[last + 1 :], last + 2)
+        for field in row.split()
+    ]
+    if len(values) != count:
+        raise PhysicsError(
+            f"{name}, line {last + 1}: NPTS announces {count} values, and {len(values)} follow. "
+            "The file is cut or has been edited; fetch it again."
+        )
+    if count < 2:
+        raise PhysicsError(f"{name}: {count} sample. A record has two at least.")
+    # Rounded, so that 7 steps of 0.01 s are at 0.07 s, as in any table of the record.
+    return [round(k * step, 9) for k in range(count)], values
+
+
+def _lines(text: str) -> list[str]:
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def _count_and_step(row: str, name: str, line: int) -> tuple[int, float]:
+    before = _BOTH_BEFORE.search(row)
+    if before:
+        fields = before.groups()
+    else:
+        count, step = _COUNT.search(row), _STEP.search(row)
+        if count is None or step is None:
+            raise PhysicsError(
+                f'{name}, line {line}: "{shortened(row.strip())}" does not give both NPTS and DT, '
+                'as in "NPTS=   5372, DT=   .0100 SEC".'
+            )
+        fields = (count[1], step[1])
+    points, spacing = (number(field.upper().replace("D", "E"), name, line) for field in fields)
+    if points != int(points) or points < 1 or spacing < _SHORTEST:
+        raise PhysicsError(
+            f"{name}, line {line}: NPTS = {fields[0]} and DT = {fields[1]} s. NPTS is a count, "
+            f"and DT is {_SHORTEST:g} s at least."
+        )
+    return int(points), spacing
+
+
+def _unit(titles: list[str], name: str) -> Unit:
+    """Return the unit of the values, which the title lines must name."""
+    for line, title in enumerate(titles, 1):
+        found = _UNITS.search(title)
+        if not found:
+            continue
+        unit = _read_unit(found[1].rstrip("."), f"{name}, line {line}")
+        if unit.dimension != parse_unit("m/s2").dimension:
+            raise PhysicsError(
+                f"{name}, line {line}: the values are in {found[1]}, which is no acceleration. "
+                "Take the AT2 file of the record, not VT2 or DT2."
+            )
+        return unit
+    raise PhysicsError(
+        f"{name}, lines 1 to {len(titles)}: the title lines name no unit. AT2 says, for example, "
+        '"ACCELERATION TIME SERIES IN UNITS OF G".'
+    )
+
+
+def _read_unit(spelled: str, where: str) -> Unit:
+    """Return a unit spelled as it should be, or in capitals as title lines are."""
+    for text in (spelled, spelled.lower(), spelled.capitalize()):
+        try:
+            return parse_unit(text)
+        except UnitError:
+            continue
+    raise PhysicsError(f'{where}: the unit "{spelled}" is not known. AT2 has G, or CM/S2.')
