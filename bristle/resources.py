@@ -1,4 +1,4 @@
-"""Where things are: the checkout that the package runs from, or the installed wheel and the cache."""
+"""Where things are: the checkout that the package runs from, or the wheel and the cache."""
 
 from __future__ import annotations
 
@@ -37,6 +37,8 @@ def cache_folder() -> Path:
 def fmus_folder() -> Path:
     """Return where built FMUs are kept: fmus/ of a checkout, else the cache."""
     checkout = root()
-    return checkout / "fmus" if checkout and not os.environ.get("BRISTLE_CACHE") else (
-        cache_folder() / "fmus"
+    return (
+        checkout / "fmus"
+        if checkout and not os.environ.get("BRISTLE_CACHE")
+        else (cache_folder() / "fmus")
     )

@@ -4,7 +4,7 @@ from bristle.fmu.damper import DamperSlave
 
 
 class BinghamDamper(DamperSlave):
-    """MR damper, modified Bingham law: a yield force and a viscous part that dies out with speed."""
+    """MR damper, modified Bingham law: a yield force, a viscous part that fades with speed."""
 
     law = "bingham"
 

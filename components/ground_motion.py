@@ -17,9 +17,13 @@ class GroundMotion(Slave):
         self.add_parameter("record", record, None, text)
         text = "scales the record to this peak; 0: as recorded"
         self.add_parameter("peak", 0.0, "m/s2", text, (0.0, 1e4))
-        self.add_parameter("factor", 1.0, "1", "multiplies the record, also after scaling", (-1e6, 1e6))
+        self.add_parameter(
+            "factor", 1.0, "1", "multiplies the record, also after scaling", (-1e6, 1e6)
+        )
         self.add_parameter("start", 0.0, "s", "time at which the record begins", (-1e9, 1e9))
-        self.add_output("ground_acceleration", "m/s2", "acceleration of the ground, positive along +x")
+        self.add_output(
+            "ground_acceleration", "m/s2", "acceleration of the ground, positive along +x"
+        )
 
     def configure(self):
         record = self.record
@@ -27,7 +31,7 @@ class GroundMotion(Slave):
         path = self.resource(record + ".csv") if record in baked else record
         self.motion = Motion(*read_two_column(path))
         if self.peak > 0.0 and self.motion.peak == 0.0:
-            raise ValueError("record {!r} is zero all along and has no peak to scale.".format(record))
+            raise ValueError(f"record {record!r} is zero all along and has no peak to scale.")
         self.scale = self.factor * (self.peak / self.motion.peak if self.peak > 0.0 else 1.0)
 
     def refresh(self):

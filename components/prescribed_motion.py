@@ -15,7 +15,9 @@ class PrescribedMotion(SignalSlave):
     def configure(self):
         super().configure()
         if self.code == STEPS:
-            raise ValueError("kind 'steps' jumps: no velocity fits it. Take csv with ramps instead.")
+            raise ValueError(
+                "kind 'steps' jumps: no velocity fits it. Take csv with ramps instead."
+            )
 
     def refresh(self):
         signal = self.numbers, self.times, self.samples

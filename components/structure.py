@@ -6,13 +6,15 @@ from bristle.physics.structure import StructureModel
 
 
 class Structure(EffectSlave):
-    """Building, base isolated or fixed, under ground motion and the forces of one or two devices."""
+    """Building, isolated or fixed, under ground motion and the forces of one or two devices."""
 
     def declare(self):
         data = self.baked.get("building")
         self.building = from_data(data) if data else paper_building()
         forces = ["damper_force", "extra_force"]
-        self.add_input("ground_acceleration", "m/s2", "acceleration of the ground, positive along +x")
+        self.add_input(
+            "ground_acceleration", "m/s2", "acceleration of the ground, positive along +x"
+        )
         self.add_input("damper_force", "N", "force of the damper, positive against +x")
         text = "force of a second device, positive against +x"
         self.add_input("extra_force", "N", text, optional=True)
@@ -27,7 +29,9 @@ class Structure(EffectSlave):
         first = 1 if self.building.isolated else 0
         for i in range(first, len(levels)):
             self.add_output(f"drift{i + 1 - first}", "m", "storey drift", nominal=0.01)
-        text = "damper force at which the damper's level would not accelerate relative to the ground"
+        text = (
+            "damper force at which the damper's level would not accelerate relative to the ground"
+        )
         depends = ["ground_acceleration", "extra_force"]
         self.add_output("holding_force", "N", text, depends=depends)
         self.add_parameter("attached_mass", 0.0, "kg", "adds to the damper's level", (0.0, 1e9))

@@ -241,7 +241,9 @@ def ensure(component: str, building: Path | None = None) -> Path:
     """Return a built-in component's FMU, built on first use and reused while its digest holds."""
     if building is None:
         return build(plan(component), fmus_folder())
-    named = hashlib.sha256(json.dumps(catalogue.read_building_data(building), sort_keys=True).encode())
+    named = hashlib.sha256(
+        json.dumps(catalogue.read_building_data(building), sort_keys=True).encode()
+    )
     name = f"{component}_{named.hexdigest()[:8]}"
     return build(plan(component, name=name, building=building), fmus_folder())
 

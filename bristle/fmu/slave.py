@@ -64,13 +64,17 @@ class _Slot:
 class Slave(Fmi2Slave):  # type: ignore[misc]
     """A component: declares its ports in `declare`, and fills three methods.
 
-    `self.time` [s] is where the component stands. `configure()` builds the model from the parameters, `advance(time, step)` moves it over one
-    step, `refresh()` computes the outputs from inputs and state. None of them returns a status: what
-    they raise becomes a fault, with the outputs held at their last finite values.
+    `configure()` builds the model from the parameters, `advance(time, step)` moves it over one
+    step, `refresh()` computes the outputs from inputs and state; `self.time` [s] is where the
+    component stands. None of them returns a status: what they raise becomes a fault, with the
+    outputs held at their last finite values.
 
     `get_inner` and `set_inner` hand out and take back the model's state, made of lists, numbers and
     texts.
     """
+
+    guid: Any
+    fault: int
 
     def __init__(self, baked: dict[str, Any] | None = None, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -255,9 +259,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         values = self._values
         for index in self._inputs:
             if not isfinite(values[index]):
-                return self._stop(
-                    NOT_FINITE_INPUT, f"{self.vars[index].name} = {values[index]!r}."
-                )
+                return self._stop(NOT_FINITE_INPUT, f"{self.vars[index].name} = {values[index]!r}.")
         held = [values[index] for index in self._outputs]
         before = self.time
         self.time = current_time + step_size
@@ -330,9 +332,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             if isinstance(value, float) and not isfinite(value):
                 raise ValueError(f"{name} = {value!r} is not finite.")
             if (low is not None and value < low) or (high is not None and value > high):
-                raise ValueError(
-                    f"{name} = {value!r} lies outside [{low!r}, {high!r}]."
-                )
+                raise ValueError(f"{name} = {value!r} lies outside [{low!r}, {high!r}].")
 
     # -- values in and out
 
@@ -340,9 +340,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if index in self._parameters:
             if self._mode in (_STEPPING, _TERMINATED):
                 if value != self._values[index]:
-                    self.warn_once(
-                        f"{self.vars[index].name} is fixed after initialisation and keeps {self._values[index]!r}."
-                    )
+                    kept = f"{self.vars[index].name} keeps {self._values[index]!r}"
+                    self.warn_once(f"{kept}: it is fixed after initialisation.")
                 return
             self._unbuilt = True
         elif index not in self._inputs:
@@ -451,12 +450,13 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         """Return pythonfmu's description with what it leaves out."""
         self._follow()
-        root = super().to_xml(model_options or {})
+        root: Element = super().to_xml(model_options or {})
         del root.attrib["generationDateAndTime"]  # two builds of one source are identical
         root.insert(1, self._unit_definitions())
         variables = root.find("ModelVariables")
         structure = root.find("ModelStructure")
-        assert variables is not None and structure is not None
+        assert variables is not None
+        assert structure is not None
         for node in variables:
             self._complete(node)
         if self._optional:
@@ -515,7 +515,7 @@ class EffectSlave(Slave):
     """A component that offers the effects of its site, each with a switch and its parameters."""
 
     def add_effects(self, site: str, law: str = "") -> None:
-        """Declare `EFFECT.on`, `EFFECT.PARAMETER` and `EFFECT.STATE_0` for every effect of a site."""
+        """Declare `EFFECT.on`, `EFFECT.PARAMETER`, `EFFECT.STATE_0` for the effects of a site."""
         self._effects = effects_of(site, law)
         for effect in self._effects:
             self.add_parameter(effect.name + ".on", False, None, effect.first_line())

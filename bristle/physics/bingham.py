@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import exp
-from typing import Any, ClassVar, Dict
+from typing import Any, ClassVar
 
 from .effect import Parameter
 
@@ -28,12 +28,12 @@ EXPONENT = Parameter(
 class Bingham:
     """Modified Bingham damper: f = (f_c + f_v V) sgn(v) + (c_0 + c_v V) v exp(-|v|/v_n).
 
-    A form reconstructed from the prose of Shirazi et al. (2012), IEEE TCST 20(5), eq. (1); valid for
+    Reconstructed from the prose of Shirazi et al. (2012), IEEE TCST 20(5), eq. (1); valid for
     v != 0. While stuck, the yield force is whatever holds the motion, up to f_c + f_v V.
     """
 
     name: ClassVar[str] = "bingham"
-    parameters: ClassVar[Dict[str, Parameter]] = {
+    parameters: ClassVar[dict[str, Parameter]] = {
         "f_c": Parameter(1.3, "N", (0.0, 1e5), "yield force without voltage"),
         "f_v": Parameter(0.83, "N/V", (0.0, 1e5), "yield force per volt"),
         "c_0": Parameter(100.0, "N.s/m", (0.0, 1e7), "viscous coefficient without voltage"),

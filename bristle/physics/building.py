@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from math import isfinite, pi
 from pathlib import Path
-from typing import Any, Dict, List, NamedTuple, Tuple
+from typing import Any, NamedTuple
 
 from ..errors import PhysicsError
 from .linear import cholesky
 
 MAX_FLOORS = 20
 
-Matrix = Tuple[Tuple[float, ...], ...]
+Matrix = tuple[tuple[float, ...], ...]
 
 
 class Building(NamedTuple):
@@ -26,19 +26,19 @@ class Building(NamedTuple):
     C: Matrix
     K: Matrix
     isolated: bool
-    stiffnesses: Tuple[float, ...]
+    stiffnesses: tuple[float, ...]
 
     @property
     def size(self) -> int:
         """Number of degrees of freedom."""
         return len(self.M)
 
-    def levels(self) -> List[str]:
+    def levels(self) -> list[str]:
         """Return the names of the masses: "base" where isolated, then "floor1", ..."""
         floors = self.size - 1 if self.isolated else self.size
-        return (["base"] if self.isolated else []) + ["floor%d" % (i + 1) for i in range(floors)]
+        return (["base"] if self.isolated else []) + [f"floor{i + 1}" for i in range(floors)]
 
-    def with_attached_mass(self, mass: float) -> "Building":
+    def with_attached_mass(self, mass: float) -> Building:
         """Return the building with `mass` [kg] more on its first level."""
         M = [list(row) for row in self.M]
         M[0][0] += mass
@@ -63,7 +63,7 @@ def paper_building() -> Building:
     )
 
 
-def from_data(data: Dict[str, Any], where: str = "building") -> Building:
+def from_data(data: dict[str, Any], where: str = "building") -> Building:
     """Return the building that a table of a building file describes.
 
     Raises
@@ -76,12 +76,14 @@ def from_data(data: Dict[str, Any], where: str = "building") -> Building:
     known |= {"rayleigh", "M", "C", "K"}
     for key in data:
         if key not in known:
-            raise PhysicsError("{}: unknown key {!r}; there are {}.".format(where, key, sorted(known)))
+            raise PhysicsError(f"{where}: unknown key {key!r}; there are {sorted(known)}.")
     if data.get("schema") != 1:
-        raise PhysicsError("{}: schema = {!r}; this version reads 1.".format(where, data.get("schema")))
+        raise PhysicsError(
+            "{}: schema = {!r}; this version reads 1.".format(where, data.get("schema"))
+        )
     base = data.get("base", "isolated")
     if base not in ("isolated", "fixed"):
-        raise PhysicsError('{}: base = {!r}; "isolated" or "fixed" is right.'.format(where, base))
+        raise PhysicsError(f'{where}: base = {base!r}; "isolated" or "fixed" is right.')
     name = str(data.get("name", "building"))
     if "M" in data or "C" in data or "K" in data:
         building = _from_matrices(data, name, base == "isolated", where)
@@ -89,48 +91,46 @@ def from_data(data: Dict[str, Any], where: str = "building") -> Building:
         building = _from_chain(data, name, base == "isolated", where)
     for letter, matrix in (("M", building.M), ("K", building.K)):
         if cholesky([value for row in matrix for value in row], building.size) is None:
-            raise PhysicsError("{}: {} is not positive definite.".format(where, letter))
+            raise PhysicsError(f"{where}: {letter} is not positive definite.")
     return building
 
 
-def _from_matrices(data: Dict[str, Any], name: str, isolated: bool, where: str) -> Building:
+def _from_matrices(data: dict[str, Any], name: str, isolated: bool, where: str) -> Building:
     for key in ("masses", "stiffnesses", "damping_ratio", "modal", "rayleigh"):
         if key in data:
-            raise PhysicsError("{}: give either M, C, K or {}, not both.".format(where, key))
+            raise PhysicsError(f"{where}: give either M, C, K or {key}, not both.")
     M, C, K = (_matrix(data, key, where) for key in ("M", "C", "K"))
     if not len(M) == len(C) == len(K):
-        raise PhysicsError("{}: M, C and K differ in size.".format(where))
+        raise PhysicsError(f"{where}: M, C and K differ in size.")
     n = len(M)
     # A storey's stiffness is what couples it to the level below; the lowest one carries the rest.
     below = [sum(K[i][j] for j in range(n)) if i == 0 else -K[i][i - 1] for i in range(n)]
     return Building(name, M, C, K, isolated, tuple(below))
 
 
-def _matrix(data: Dict[str, Any], key: str, where: str) -> Matrix:
+def _matrix(data: dict[str, Any], key: str, where: str) -> Matrix:
     rows = data.get(key)
     if not isinstance(rows, list) or not rows or not all(isinstance(row, list) for row in rows):
-        raise PhysicsError("{}: {} must be a square matrix, a list of rows.".format(where, key))
+        raise PhysicsError(f"{where}: {key} must be a square matrix, a list of rows.")
     n = len(rows)
     if n > MAX_FLOORS + 1 or any(len(row) != n for row in rows):
-        raise PhysicsError(
-            "{}: {} must be square with at most {} rows.".format(where, key, MAX_FLOORS + 1)
-        )
+        raise PhysicsError(f"{where}: {key} must be square with at most {MAX_FLOORS + 1} rows.")
     values = [[_number(value, key, where) for value in row] for row in rows]
     largest = max(abs(value) for row in values for value in row)
     if any(abs(values[i][j] - values[j][i]) > 1e-9 * largest for i in range(n) for j in range(i)):
-        raise PhysicsError("{}: {} is not symmetric.".format(where, key))
+        raise PhysicsError(f"{where}: {key} is not symmetric.")
     return _freeze(values)
 
 
-def _from_chain(data: Dict[str, Any], name: str, isolated: bool, where: str) -> Building:
+def _from_chain(data: dict[str, Any], name: str, isolated: bool, where: str) -> Building:
     masses, stiffnesses = (_positives(data, key, where) for key in ("masses", "stiffnesses"))
     n = len(masses)
     if len(stiffnesses) != n:
         raise PhysicsError(
-            "{}: {} masses need as many stiffnesses, found {}.".format(where, n, len(stiffnesses))
+            f"{where}: {n} masses need as many stiffnesses, found {len(stiffnesses)}."
         )
     if n > MAX_FLOORS + isolated:
-        raise PhysicsError("{}: at most {} floors, found {}.".format(where, MAX_FLOORS, n - isolated))
+        raise PhysicsError(f"{where}: at most {MAX_FLOORS} floors, found {n - isolated}.")
     M = [[masses[i] if i == j else 0.0 for j in range(n)] for i in range(n)]
     K = [[0.0] * n for _ in range(n)]
     for i, k in enumerate(stiffnesses):
@@ -144,14 +144,16 @@ def _from_chain(data: Dict[str, Any], name: str, isolated: bool, where: str) -> 
 
 
 def _damping(
-    data: Dict[str, Any], M: List[List[float]], K: List[List[float]], where: str
-) -> List[List[float]]:
+    data: dict[str, Any], M: list[list[float]], K: list[list[float]], where: str
+) -> list[list[float]]:
     """Return C: Rayleigh, or of given ratios in every mode: C = M (sum 2 zeta w phi phi^T) M."""
     n = len(M)
     ways = [key for key in ("damping_ratio", "modal", "rayleigh") if key in data]
     if len(ways) != 1:
         raise PhysicsError(
-            "{}: give one of damping_ratio, modal, rayleigh; found {}.".format(where, ways or "none")
+            "{}: give one of damping_ratio, modal, rayleigh; found {}.".format(
+                where, ways or "none"
+            )
         )
     if ways == ["rayleigh"]:
         alpha, beta = _rayleigh(data["rayleigh"], M, K, where)
@@ -161,7 +163,7 @@ def _damping(
     else:
         given = data["modal"]
         if not isinstance(given, list) or len(given) != n:
-            raise PhysicsError("{}: modal needs one ratio for each of {} modes.".format(where, n))
+            raise PhysicsError(f"{where}: modal needs one ratio for each of {n} modes.")
         ratios = [_ratio(value, "modal", where) for value in given]
     C = [[0.0] * n for _ in range(n)]
     for (omega, shape), zeta in zip(modes(M, K), ratios):
@@ -173,12 +175,12 @@ def _damping(
 
 
 def _rayleigh(
-    table: Any, M: List[List[float]], K: List[List[float]], where: str
-) -> Tuple[float, float]:
+    table: Any, M: list[list[float]], K: list[list[float]], where: str
+) -> tuple[float, float]:
     if isinstance(table, dict) and set(table) == {"alpha", "beta"}:
         alpha, beta = (_number(table[key], "rayleigh." + key, where) for key in ("alpha", "beta"))
         if alpha < 0.0 or beta < 0.0:
-            raise PhysicsError("{}: rayleigh alpha and beta must not be negative.".format(where))
+            raise PhysicsError(f"{where}: rayleigh alpha and beta must not be negative.")
         return alpha, beta
     if isinstance(table, dict) and set(table) == {"ratio", "modes"}:
         zeta = _ratio(table["ratio"], "rayleigh.ratio", where)
@@ -193,14 +195,12 @@ def _rayleigh(
             first, second = omegas[numbers[0] - 1], omegas[numbers[1] - 1]
             return 2.0 * zeta * first * second / (first + second), 2.0 * zeta / (first + second)
         raise PhysicsError(
-            "{}: rayleigh.modes must be two different numbers of 1 to {}.".format(where, len(omegas))
+            f"{where}: rayleigh.modes must be two different numbers of 1 to {len(omegas)}."
         )
-    raise PhysicsError(
-        "{}: rayleigh = {{ ratio, modes = [1, 3] }} or {{ alpha, beta }}.".format(where)
-    )
+    raise PhysicsError(f"{where}: rayleigh = {{ ratio, modes = [1, 3] }} or {{ alpha, beta }}.")
 
 
-def modes(M: Any, K: Any) -> List[Tuple[float, List[float]]]:
+def modes(M: Any, K: Any) -> list[tuple[float, list[float]]]:
     """Return the undamped modes by frequency: omega [rad/s] and mass-normalised shape (n,).
 
     Jacobi's rotations on L^-1 K L^-T with M = L L^T (Golub & Van Loan 2013, section 8.5).
@@ -210,10 +210,12 @@ def modes(M: Any, K: Any) -> List[Tuple[float, List[float]]]:
     if low is None:
         raise PhysicsError("the mass matrix is not positive definite.")
 
-    def forward(column: List[float]) -> List[float]:
-        out: List[float] = []
+    def forward(column: list[float]) -> list[float]:
+        out: list[float] = []
         for i in range(n):
-            out.append((column[i] - sum(low[i * n + k] * out[k] for k in range(i))) / low[i * n + i])
+            out.append(
+                (column[i] - sum(low[i * n + k] * out[k] for k in range(i))) / low[i * n + i]
+            )
         return out
 
     half = [forward([K[i][j] for i in range(n)]) for j in range(n)]  # rows: (L^-1 K)^T
@@ -236,7 +238,7 @@ def modes(M: Any, K: Any) -> List[Tuple[float, List[float]]]:
     return sorted(shapes, key=lambda pair: pair[0])
 
 
-def _rotate(A: List[List[float]], V: List[List[float]], i: int, j: int, n: int) -> None:
+def _rotate(A: list[list[float]], V: list[list[float]], i: int, j: int, n: int) -> None:
     if A[i][j] == 0.0:
         return
     theta = (A[j][j] - A[i][i]) / (2.0 * A[i][j])
@@ -250,12 +252,12 @@ def _rotate(A: List[List[float]], V: List[List[float]], i: int, j: int, n: int) 
         V[k][i], V[k][j] = c * V[k][i] - s * V[k][j], s * V[k][i] + c * V[k][j]
 
 
-def frequencies(building: Building) -> List[float]:
+def frequencies(building: Building) -> list[float]:
     """Return the undamped natural frequencies [Hz], ascending."""
     return [omega / (2.0 * pi) for omega, _ in modes(building.M, building.K)]
 
 
-def read_building(path: "str | Path") -> Building:
+def read_building(path: str | Path) -> Building:
     """Return the building of a TOML file (schema 1).
 
     Raises
@@ -270,37 +272,35 @@ def read_building(path: "str | Path") -> Building:
         with path.open("rb") as file:
             data = tomllib.load(file)
     except OSError as error:
-        raise PhysicsError("{}: cannot be read ({}).".format(path, error.strerror)) from error
+        raise PhysicsError(f"{path}: cannot be read ({error.strerror}).") from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise PhysicsError("{}: not valid TOML: {}.".format(path, error)) from error
+        raise PhysicsError(f"{path}: not valid TOML: {error}.") from error
     return from_data(data, str(path))
 
 
 def _number(value: Any, key: str, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-        raise PhysicsError("{}: {} must be a finite number, found {!r}.".format(where, key, value))
+        raise PhysicsError(f"{where}: {key} must be a finite number, found {value!r}.")
     return float(value)
 
 
-def _positives(data: Dict[str, Any], key: str, where: str) -> List[float]:
+def _positives(data: dict[str, Any], key: str, where: str) -> list[float]:
     values = data.get(key)
     if not isinstance(values, list) or not values:
-        raise PhysicsError("{}: {} must be a list of numbers.".format(where, key))
+        raise PhysicsError(f"{where}: {key} must be a list of numbers.")
     numbers = [_number(value, key, where) for value in values]
     for i, number in enumerate(numbers):
         if number <= 0.0:
-            raise PhysicsError(
-                "{}: {}[{}] = {!r} must be positive.".format(where, key, i, number)
-            )
+            raise PhysicsError(f"{where}: {key}[{i}] = {number!r} must be positive.")
     return numbers
 
 
 def _ratio(value: Any, key: str, where: str) -> float:
     number = _number(value, key, where)
     if not 0.0 <= number < 1.0:
-        raise PhysicsError("{}: {} = {!r} must lie in [0, 1).".format(where, key, number))
+        raise PhysicsError(f"{where}: {key} = {number!r} must lie in [0, 1).")
     return number
 
 
-def _freeze(rows: List[List[float]]) -> Matrix:
+def _freeze(rows: list[list[float]]) -> Matrix:
     return tuple(tuple(row) for row in rows)

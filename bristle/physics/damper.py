@@ -7,18 +7,18 @@ advances the state over a time step and gives the force at its end. Both take fl
 
 from __future__ import annotations
 
-from typing import Any, Dict, List
+from typing import Any
 
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .bingham import Bingham
 from .effect import effects_of
-from .linear import solve_in_place
+from .linear import Row, solve_in_place
 from .lugre import LuGre
 from .weave import LAW_PARAMETERS, LAW_STATES, Layout, switched, weave
 
 BINGHAM = 0
 LUGRE = 1
-LAWS: Dict[str, Any] = {"bingham": Bingham, "lugre": LuGre}
+LAWS: dict[str, Any] = {"bingham": Bingham, "lugre": LuGre}
 LAW_CODES = {"bingham": BINGHAM, "lugre": LUGRE}
 
 IMPLICIT_STEP = 5e-4
@@ -42,8 +42,8 @@ def _motion_source(layout: Layout) -> str:
 def _evaluate_source(layout: Layout) -> str:
     signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v", "halt")
     q = {name: name for name in signals}
-    lugre = ", ".join("p[{}]".format(i) for i in range(len(LuGre.parameters)))
-    bingham = ", ".join("p[{}]".format(i) for i in range(len(Bingham.parameters)))
+    lugre = ", ".join(f"p[{i}]" for i in range(len(LuGre.parameters)))
+    bingham = ", ".join(f"p[{i}]" for i in range(len(Bingham.parameters)))
     lines = [
         "def evaluate(law, x, v, a, V, dt, energy, halt, halts, z, p, on, dz, z_next):",
         "    rod_x = x",
@@ -64,13 +64,14 @@ def _evaluate_source(layout: Layout) -> str:
         *switched(layout, "factor", "factor *= {call}", **q),
         *switched(layout, "halt", "halt = {call}; halts = True", **q),
         "    if law == 1:",
-        "        lugre = LuGreP({})".format(lugre),
+        f"        lugre = LuGreP({lugre})",
         "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
         "        friction = 0.0",
-        "        rest = (LuGre_bristle(z[0], v, V, lugre) * yield_factor + viscous) * factor + added",
+        "        bristle = LuGre_bristle(z[0], v, V, lugre) * yield_factor",
+        "        rest = (bristle + viscous) * factor + added",
         "        dz[0] = LuGre_rate(z[0], v, lugre)",
         "    else:",
-        "        bingham = BinghamP({})".format(bingham),
+        f"        bingham = BinghamP({bingham})",
         "        rest = Bingham_viscous(v, V, bingham) * viscous_factor * factor + added",
         "        limit = Bingham_yielding(V, bingham) * yield_factor * factor",
         "        if directed:",
@@ -114,7 +115,7 @@ def reweave() -> None:
 def _values(law: Any) -> Any:
     from collections import namedtuple
 
-    return namedtuple(law.__name__ + "Values", tuple(law.parameters))  # type: ignore[misc]
+    return namedtuple(law.__name__ + "Values", tuple(law.parameters))
 
 
 LUGRE_VALUES = _values(LuGre)
@@ -126,8 +127,10 @@ reweave()
 
 
 def advance_implicit(
-    law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, halt, halts, z, p, on, moving, n_moving, work
-):  # type: ignore[no-untyped-def]
+    law: int, x0: float, v0: float, a0: float, V0: float, x1: float, v1: float, a1: float,
+    V1: float, dt: float, energy: float, halt: float, halts: bool, z: Row, p: Row, on: Row,
+    moving: Row, n_moving: int, work: Row,
+) -> None:  # fmt: skip
     """Advance the states that move by `rate` over dt [s], in place, with inputs linear in time.
 
     Rosenbrock's method of order two and L-stable (ROS2: Verwer, Spee, Blom & Hundsdorfer 1999,
@@ -152,8 +155,18 @@ def advance_implicit(
     h = dt / count
     for k in range(count):
         s, e = k / count, (k + 1.0) / count
-        xs, vs, As, Vs = x0 + s * (x1 - x0), v0 + s * (v1 - v0), a0 + s * (a1 - a0), V0 + s * (V1 - V0)
-        xe, ve, ae, Ve = x0 + e * (x1 - x0), v0 + e * (v1 - v0), a0 + e * (a1 - a0), V0 + e * (V1 - V0)
+        xs, vs, As, Vs = (
+            x0 + s * (x1 - x0),
+            v0 + s * (v1 - v0),
+            a0 + s * (a1 - a0),
+            V0 + s * (V1 - V0),
+        )
+        xe, ve, ae, Ve = (
+            x0 + e * (x1 - x0),
+            v0 + e * (v1 - v0),
+            a0 + e * (a1 - a0),
+            V0 + e * (V1 - V0),
+        )
         for i in range(size):
             y[i] = z[i]
         evaluate(law, xs, vs, As, Vs, h, energy, halt, halts, y, p, on, f, unused)
@@ -185,9 +198,10 @@ def advance_implicit(
 
 
 def step(
-    law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, halt, halts, z0, p, on, moving, n_moving,
-    advances, z1, work,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    law: int, x0: float, v0: float, a0: float, V0: float, x1: float, v1: float, a1: float,
+    V1: float, dt: float, energy: float, halt: float, halts: bool, z0: Row, p: Row, on: Row,
+    moving: Row, n_moving: int, advances: bool, z1: Row, work: Row,
+) -> tuple[float, float]:  # fmt: skip
     """Advance a damper over dt [s]; return its force [N] at the end and the friction in it [N].
 
     Parameters
@@ -222,7 +236,7 @@ def step(
         _, vs = inner_motion(x0, v0, a0, V0, dt, energy, z0, p, on)
         _, ve = inner_motion(x1, v1, a1, V1, dt, energy, z1, p, on)
         z1[0] = lugre_advance(z0[0], 0.5 * (vs + ve), dt, p[6])
-    return evaluate(
+    return evaluate(  # type: ignore[no-any-return]
         law, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, work[0:size], work[size : 2 * size]
     )
 
@@ -236,7 +250,7 @@ def work_size() -> int:
     return 7 * size + 2 * size * size
 
 
-def moving_states(law: str, switched_on: List[str]) -> List[int]:
+def moving_states(law: str, switched_on: list[str]) -> list[int]:
     """Return the slots that move by `rate` when these effects are on; empty if none does.
 
     The bristle moves with them, for it is coupled to the inner joint of a series element.
@@ -250,7 +264,7 @@ def moving_states(law: str, switched_on: List[str]) -> List[int]:
     return ([0] if law == "lugre" else []) + slots if slots else []
 
 
-def advances(switched_on: List[str]) -> bool:
+def advances(switched_on: list[str]) -> bool:
     """Return whether any of these effects moves its states by `advance`."""
     return any("advance" in e.hooks() for e in LAYOUT.effects if e.name in switched_on)
 
@@ -271,8 +285,8 @@ class DamperModel:
     def __init__(
         self,
         law: str,
-        values: "Dict[str, float] | None" = None,
-        effects: "List[str] | None" = None,
+        values: dict[str, float] | None = None,
+        effects: list[str] | None = None,
     ) -> None:
         values, effects = values or {}, effects or []
         self.law = LAW_CODES[law]
@@ -288,7 +302,17 @@ class DamperModel:
         self._work = [0.0] * work_size()
         self._end = [0.0] * LAYOUT.z_size
 
-    def force(self, x: float, v: float, a: float, V: float, dt: float, energy: float, halt: float, halts: bool) -> float:
+    def force(
+        self,
+        x: float,
+        v: float,
+        a: float,
+        V: float,
+        dt: float,
+        energy: float,
+        halt: float,
+        halts: bool,
+    ) -> float:
         """Return the force [N] at the present state, without advancing it."""
         size = len(self.z)
         return evaluate(  # type: ignore[no-any-return]
@@ -296,17 +320,27 @@ class DamperModel:
             self._work[0:size], self._spare,
         )[0]  # fmt: skip
 
-    def step(self, x: float, v: float, a: float, V: float, dt: float, energy: float, halt: float, halts: bool) -> float:
-        """Advance the state over dt [s] with the given inputs held; return the force [N] at the end."""
+    def step(
+        self,
+        x: float,
+        v: float,
+        a: float,
+        V: float,
+        dt: float,
+        energy: float,
+        halt: float,
+        halts: bool,
+    ) -> float:
+        """Advance over dt [s] with the given inputs held; return the force [N] at the end."""
         force = step(
             self.law, x, v, a, V, x, v, a, V, dt, energy, halt, halts, self.z, self.p, self.on,
             self.moving, len(self.moving), self.advances, self._end, self._work,
         )[0]  # fmt: skip
         self.z, self._end = self._end, self.z
-        return force  # type: ignore[no-any-return]
+        return force
 
 
-def pack(law: str, values: "Dict[str, float]") -> "List[float]":
+def pack(law: str, values: dict[str, float]) -> list[float]:
     """Return the flat parameters of a law and of all effects; missing ones take their defaults."""
     p = [0.0] * LAYOUT.p_size
     for slot, (name, parameter) in enumerate(LAWS[law].parameters.items()):

@@ -9,7 +9,7 @@ runs in plain Python and under numba.
 from __future__ import annotations
 
 from collections import namedtuple
-from typing import Any, Callable, ClassVar, Dict, NamedTuple, Tuple
+from typing import Any, Callable, ClassVar, NamedTuple
 
 from ..errors import PhysicsError
 
@@ -64,11 +64,11 @@ class Parameter(NamedTuple):
 
     value: float
     unit: str
-    bounds: Tuple[float, float]
+    bounds: tuple[float, float]
     text: str
 
 
-EFFECTS: Dict[str, "type[Effect]"] = {}
+EFFECTS: dict[str, type[Effect]] = {}
 
 
 class Effect:
@@ -88,13 +88,13 @@ class Effect:
 
     name: ClassVar[str] = ""
     site: ClassVar[str] = "damper"
-    laws: ClassVar[Tuple[str, ...]] = ("bingham", "lugre")
-    needs: ClassVar[Tuple[str, ...]] = ()
-    states: ClassVar[Dict[str, str]] = {}
-    parameters: ClassVar[Dict[str, Parameter]] = {}
+    laws: ClassVar[tuple[str, ...]] = ("bingham", "lugre")
+    needs: ClassVar[tuple[str, ...]] = ()
+    states: ClassVar[dict[str, str]] = {}
+    parameters: ClassVar[dict[str, Parameter]] = {}
     passive: ClassVar[bool] = False
     zero_at_rest: ClassVar[bool] = True
-    excludes: ClassVar[Tuple[str, ...]] = ()
+    excludes: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str] = ""
     expect: ClassVar[str] = ""
     State: ClassVar[Any]
@@ -109,7 +109,7 @@ class Effect:
             EFFECTS[cls.name] = cls
 
     @classmethod
-    def hooks(cls) -> Dict[str, Callable[..., Any]]:
+    def hooks(cls) -> dict[str, Callable[..., Any]]:
         """Return the hooks that this effect defines, in the order of `HOOKS`."""
         return {hook: getattr(cls, hook) for hook in HOOKS if hasattr(cls, hook)}
 
@@ -119,34 +119,32 @@ class Effect:
         return (cls.__doc__ or "").strip().splitlines()[0]
 
 
-def _check(effect: "type[Effect]") -> None:
+def _check(effect: type[Effect]) -> None:
     """Refuse an effect whose class data could not work, when it is defined."""
-    where = "effect {!r} ({}.{})".format(effect.name, effect.__module__, effect.__qualname__)
+    where = f"effect {effect.name!r} ({effect.__module__}.{effect.__qualname__})"
     if effect.site not in SITES:
-        raise PhysicsError("{}: site {!r} is none of {}.".format(where, effect.site, SITES))
+        raise PhysicsError(f"{where}: site {effect.site!r} is none of {SITES}.")
     if not effect.name.isidentifier():
-        raise PhysicsError("{}: a name is one word of letters, digits and _.".format(where))
+        raise PhysicsError(f"{where}: a name is one word of letters, digits and _.")
     unknown = [need for need in effect.needs if need not in Q._fields]
     if unknown:
-        raise PhysicsError("{}: needs {}; q offers {}.".format(where, unknown, list(Q._fields)))
+        raise PhysicsError(f"{where}: needs {unknown}; q offers {list(Q._fields)}.")
     if not effect.hooks():
-        raise PhysicsError("{}: defines no hook; there are {}.".format(where, list(HOOKS)))
+        raise PhysicsError(f"{where}: defines no hook; there are {list(HOOKS)}.")
     if "rate" in effect.hooks() and "advance" in effect.hooks():
-        raise PhysicsError("{}: its states move by `rate` or by `advance`, not both.".format(where))
+        raise PhysicsError(f"{where}: its states move by `rate` or by `advance`, not both.")
     if effect.states and not ("rate" in effect.hooks() or "advance" in effect.hooks()):
-        raise PhysicsError("{}: has states and neither `rate` nor `advance`.".format(where))
+        raise PhysicsError(f"{where}: has states and neither `rate` nor `advance`.")
     if not (effect.__doc__ or "").strip():
-        raise PhysicsError("{}: a first docstring line tells users what it is.".format(where))
+        raise PhysicsError(f"{where}: a first docstring line tells users what it is.")
     for name, parameter in effect.parameters.items():
         low, high = parameter.bounds
         if not low <= parameter.value <= high:
-            raise PhysicsError(
-                "{}: {} = {} lies outside {}.".format(where, name, parameter.value, (low, high))
-            )
+            raise PhysicsError(f"{where}: {name} = {parameter.value} lies outside {(low, high)}.")
 
 
-def effects_of(site: str, law: str = "") -> "tuple[type[Effect], ...]":
-    """Return the registered effects of a site by name, those that can join `law` if one is given."""
+def effects_of(site: str, law: str = "") -> tuple[type[Effect], ...]:
+    """Return the registered effects of a site by name, or those of them that can join `law`."""
     return tuple(
         effect
         for _, effect in sorted(EFFECTS.items())

@@ -6,11 +6,15 @@ twice the number of floors.
 
 from __future__ import annotations
 
-from typing import List, Sequence, Tuple
+from collections.abc import Sequence
+from typing import Any
 
 from ..errors import PhysicsError
 
-Flat = List[float]
+Flat = list[float]
+
+Row = Any
+"""A flat sequence of numbers: a list inside FMUs, an array under numba."""
 
 
 def identity(n: int) -> Flat:
@@ -32,7 +36,7 @@ def multiply(a: Sequence[float], b: Sequence[float], n: int, m: int, columns: in
     return product
 
 
-def solve_in_place(a, b, n):  # type: ignore[no-untyped-def]
+def solve_in_place(a: Row, b: Row, n: int) -> None:
     """Solve a x = b for a (n, n), b (n,): b becomes x, a is destroyed. Partial pivoting."""
     for k in range(n):
         pivot = k
@@ -69,13 +73,13 @@ def inverse(a: Sequence[float], n: int) -> Flat:
         try:
             solve_in_place(list(a), column, n)
         except ZeroDivisionError:
-            raise PhysicsError("a matrix of {0} x {0} is singular.".format(n)) from None
+            raise PhysicsError(f"a matrix of {n} x {n} is singular.") from None
         for i in range(n):
             result[i * n + j] = column[i]
     return result
 
 
-def cholesky(a: Sequence[float], n: int) -> "Flat | None":
+def cholesky(a: Sequence[float], n: int) -> Flat | None:
     """Return the lower factor L of a = L L^T, or None if a (n, n) is not positive definite."""
     low = [0.0] * (n * n)
     for i in range(n):
@@ -90,7 +94,7 @@ def cholesky(a: Sequence[float], n: int) -> "Flat | None":
     return low
 
 
-def phi_functions(a: Sequence[float], n: int) -> Tuple[Flat, Flat, Flat]:
+def phi_functions(a: Sequence[float], n: int) -> tuple[Flat, Flat, Flat]:
     """Return phi_0 = e^A, phi_1 = int_0^1 e^((1-s)A) ds and phi_2 = int_0^1 e^((1-s)A) s ds.
 
     With A = h a they give the exact step of x' = a x + b u for u linear in time:
@@ -117,8 +121,6 @@ def phi_functions(a: Sequence[float], n: int) -> Tuple[Flat, Flat, Flat]:
     for _ in range(halvings):
         square = multiply(phi_1, phi_1, n, n, n)
         phi_2 = [0.25 * value + 0.5 * two for value, two in zip(square, phi_2)]
-        phi_1 = [
-            0.5 * (one + value) for one, value in zip(phi_1, multiply(phi_0, phi_1, n, n, n))
-        ]
+        phi_1 = [0.5 * (one + value) for one, value in zip(phi_1, multiply(phi_0, phi_1, n, n, n))]
         phi_0 = multiply(phi_0, phi_0, n, n, n)
     return phi_0, phi_1, phi_2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import exp, expm1
-from typing import Any, ClassVar, Dict
+from typing import Any, ClassVar
 
 from .bingham import EXPONENT, falling
 from .effect import Parameter
@@ -20,14 +20,16 @@ class LuGre:
     """
 
     name: ClassVar[str] = "lugre"
-    parameters: ClassVar[Dict[str, Parameter]] = {
+    parameters: ClassVar[dict[str, Parameter]] = {
         "sigma_a": Parameter(650.0, "N/m", (0.0, 1e9), "stiffness of the bristles"),
         "sigma_0": Parameter(415.0, "N/(m.V)", (0.0, 1e9), "stiffness of the bristles per volt"),
         "sigma_1": Parameter(5.0, "N.s/m", (0.0, 1e7), "damping of the bristles"),
         "sigma_2": Parameter(100.0, "N.s/m", (0.0, 1e7), "viscous coefficient without voltage"),
         "sigma_b": Parameter(20.0, "N.s/(m.V)", (0.0, 1e7), "viscous coefficient per volt"),
         "v_n": Parameter(0.02, "m/s", (1e-5, 1e2), "speed at which the viscous part is largest"),
-        "a_0": Parameter(500.0, "1/m", (1.0, 1e7), "inverse of the bristles' deflection in sliding"),
+        "a_0": Parameter(
+            500.0, "1/m", (1.0, 1e7), "inverse of the bristles' deflection in sliding"
+        ),
         "exponent": EXPONENT,
     }
 

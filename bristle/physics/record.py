@@ -242,7 +242,7 @@ def check_times(times: Sequence[float], lines: Sequence[int], name: str) -> None
             f"{name}, line {lines[0]}: the time begins at {times[0]:g} s, before a run does. "
             "Shift it to begin at 0 or later."
         )
-    spacings = [after - before for before, after in zip(times, times[1:])]  # noqa: B905, RUF007
+    spacings = [after - before for before, after in zip(times, times[1:])]
     for k, spacing in enumerate(spacings, 1):
         if spacing <= 0.0:
             what = "appears twice" if spacing == 0.0 else f"follows {times[k - 1]!r} s"

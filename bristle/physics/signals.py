@@ -6,8 +6,8 @@ of `PARAMETERS`, the samples of the kinds "steps" and "csv" as two sequences.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, isfinite, pi, sin
-from typing import Dict, List, Sequence, Tuple
 
 from ..errors import PhysicsError
 from .effect import Parameter
@@ -29,7 +29,7 @@ KINDS = {
 }
 
 _ANY = (-1e12, 1e12)
-PARAMETERS: Dict[str, Parameter] = {
+PARAMETERS: dict[str, Parameter] = {
     "level": Parameter(0.0, "", _ANY, "value of the kind constant"),
     "amplitude": Parameter(1.0, "", _ANY, "amplitude of sine, chirp and half_sine"),
     "frequency": Parameter(1.0, "Hz", (0.0, 1e6), "frequency; of a chirp at its start"),
@@ -41,7 +41,9 @@ PARAMETERS: Dict[str, Parameter] = {
 }
 
 
-def value(kind: int, t: float, p: Sequence[float], times: Sequence[float], values: Sequence[float]) -> float:
+def value(
+    kind: int, t: float, p: Sequence[float], times: Sequence[float], values: Sequence[float]
+) -> float:
     """Return the signal at time t [s].
 
     `times`, `values` (n,): samples, held from each to the next for "steps", linear between for
@@ -70,9 +72,11 @@ def value(kind: int, t: float, p: Sequence[float], times: Sequence[float], value
     return p[4] + p[1] * sin(2.0 * pi * (p[2] + 0.5 * (p[7] - p[2]) * s / p[6]) * s + p[3])
 
 
-def rate(kind: int, t: float, p: Sequence[float], times: Sequence[float], values: Sequence[float]) -> float:
+def rate(
+    kind: int, t: float, p: Sequence[float], times: Sequence[float], values: Sequence[float]
+) -> float:
     """Return the rate of the signal at time t [1/s]; between the samples of "csv", their slope."""
-    if kind == CONSTANT or kind == STEPS:
+    if kind in (CONSTANT, STEPS):
         return 0.0
     if kind == CSV:
         last = len(times) - 1
@@ -100,7 +104,7 @@ def rate(kind: int, t: float, p: Sequence[float], times: Sequence[float], values
     return p[1] * 2.0 * pi * (p[2] + sweep * s) * cos(angle)
 
 
-def read_steps(text: str) -> Tuple[List[float], List[float]]:
+def read_steps(text: str) -> tuple[list[float], list[float]]:
     """Return times [s] and values of the text "0:0 1.5:4 3:0", time:value pairs in order.
 
     Raises
@@ -108,8 +112,8 @@ def read_steps(text: str) -> Tuple[List[float], List[float]]:
     PhysicsError
         If a pair is not two finite numbers or a time does not follow the one before.
     """
-    times: List[float] = []
-    values: List[float] = []
+    times: list[float] = []
+    values: list[float] = []
     for pair in text.split():
         time, _, level = pair.partition(":")
         try:
@@ -118,10 +122,10 @@ def read_steps(text: str) -> Tuple[List[float], List[float]]:
             numbers = float("nan"), float("nan")
         if not (isfinite(numbers[0]) and isfinite(numbers[1])):
             raise PhysicsError(
-                'steps: "{}" is not TIME:VALUE, two finite numbers; such as "0:0 1.5:4 3:0".'.format(pair)
+                f'steps: "{pair}" is not TIME:VALUE, two finite numbers; such as "0:0 1.5:4 3:0".'
             )
         if times and numbers[0] <= times[-1]:
-            raise PhysicsError("steps: the time {:g} s does not follow {:g} s.".format(numbers[0], times[-1]))
+            raise PhysicsError(f"steps: the time {numbers[0]:g} s does not follow {times[-1]:g} s.")
         times.append(numbers[0])
         values.append(numbers[1])
     if not times:

@@ -8,11 +8,11 @@ inside FMUs, arrays under numba.
 from __future__ import annotations
 
 from math import inf
-from typing import Any, Dict, List, NamedTuple, Tuple
+from typing import Any, NamedTuple
 
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .building import Building
-from .linear import inverse, multiply, phi_functions
+from .linear import Row, inverse, multiply, phi_functions
 from .weave import Layout, switched, weave
 
 EFFECT_STEP = 5e-4
@@ -23,7 +23,7 @@ SWEEPS = 3
 
 
 class StepMatrices(NamedTuple):
-    """Exact step of x = [q, q'] over h: x_1 = phi x_0 + held (f, a_g)_0 + ramp ((f, a_g)_1 - (f, a_g)_0).
+    """Exact step of x = [q, q'] over h: x_1 = phi x_0 + held u_0 + ramp (u_1 - u_0), u = (f, a_g).
 
     `phi` (2n, 2n); `held`, `ramp` (2n, n + 1): columns for a force on each level [N, positive
     against +x] and for the ground acceleration [m/s2]. All flat, row-major.
@@ -81,7 +81,9 @@ def step_matrices(m: Matrices, h: float) -> StepMatrices:
     )
 
 
-def free_step(n, phi, held, ramp, x0, a0, a1, x1):  # type: ignore[no-untyped-def]
+def free_step(
+    n: int, phi: Row, held: Row, ramp: Row, x0: Row, a0: float, a1: float, x1: Row
+) -> None:
     """Fill x1 with the state after a step under ground motion alone, a_g from a0 to a1 [m/s2]."""
     size = 2 * n
     for i in range(size):
@@ -91,14 +93,14 @@ def free_step(n, phi, held, ramp, x0, a0, a1, x1):  # type: ignore[no-untyped-de
         x1[i] = total
 
 
-def add_force(n, held, ramp, level, f0, f1, x1):  # type: ignore[no-untyped-def]
+def add_force(n: int, held: Row, ramp: Row, level: int, f0: float, f1: float, x1: Row) -> None:
     """Add to x1 what a force on a level does that goes linearly from f0 to f1 [N]."""
     for i in range(2 * n):
         x1[i] += held[i * (n + 1) + level] * f0 + ramp[i * (n + 1) + level] * (f1 - f0)
 
 
-def accelerations(n, M_inverse, C, K, x, forces, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (n,) with q'' + a_g [m/s2], the absolute accelerations, under `forces` (n,) [N]."""
+def accelerations(n: int, M_inverse: Row, C: Row, K: Row, x: Row, forces: Row, out: Row) -> None:
+    """Fill `out` (n,) with the absolute accelerations q'' + a_g [m/s2] under `forces` (n,) [N]."""
     for i in range(n):
         total = 0.0
         for j in range(n):
@@ -109,8 +111,8 @@ def accelerations(n, M_inverse, C, K, x, forces, out):  # type: ignore[no-untype
         out[i] = total
 
 
-def holding_force(n, C, K, mass, x, a_g, others):  # type: ignore[no-untyped-def]
-    """Return the force on the first level [N] at which its acceleration relative to the ground is 0.
+def holding_force(n: int, C: Row, K: Row, mass: float, x: Row, a_g: float, others: float) -> float:
+    """Return the force [N] at which the first level does not accelerate relative to the ground.
 
     `others` is the sum of all other forces on that level [N]. With a full mass matrix the coupling
     to the other levels' accelerations is left out (a chain has none).
@@ -185,9 +187,10 @@ reweave()
 
 
 def step(
-    n, isolated, stiffnesses, phi, held, ramp, h, x0, a0, a1, f0, f1, energy, z0, p, on, active,
-    x1, z1, work,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+    n: int, isolated: bool, stiffnesses: Row, phi: Row, held: Row, ramp: Row, h: float, x0: Row,
+    a0: float, a1: float, f0: float, f1: float, energy: float, z0: Row, p: Row, on: Row,
+    active: bool, x1: Row, z1: Row, work: Row,
+) -> None:  # fmt: skip
     """Advance a structure over one step h [s] with its effects.
 
     Parameters
@@ -246,7 +249,10 @@ class StructureModel:
     """A building and its state, ready to step in plain Python."""
 
     def __init__(
-        self, building: Building, values: "Dict[str, float] | None" = None, effects: "List[str] | None" = None
+        self,
+        building: Building,
+        values: dict[str, float] | None = None,
+        effects: list[str] | None = None,
     ) -> None:
         values, effects = values or {}, effects or []
         self.m = matrices(building)
@@ -259,7 +265,7 @@ class StructureModel:
                 key = effect.name + "." + name
                 self.p[LAYOUT.parameters[key]] = values.get(key, parameter.value)
         self.z = [values.get(name + "_0", 0.0) for name in LAYOUT.states]
-        self._step: Dict[float, Tuple[int, StepMatrices]] = {}
+        self._step: dict[float, tuple[int, StepMatrices]] = {}
         self._forces = [0.0] * self.m.n
 
     def step(self, dt: float, a0: float, a1: float, force: float) -> None:
@@ -276,7 +282,7 @@ class StructureModel:
             )  # fmt: skip
             self.x, self.z = x1, z1
 
-    def _matrices(self, dt: float) -> "Tuple[int, StepMatrices]":
+    def _matrices(self, dt: float) -> tuple[int, StepMatrices]:
         """Return how many substeps dt takes and the matrices of one; kept for the last few dt."""
         known = self._step.get(dt)
         if known is None:
@@ -286,7 +292,7 @@ class StructureModel:
             known = self._step[dt] = (count, step_matrices(self.m, dt / count))
         return known
 
-    def effect_forces(self, dt: float) -> "List[float]":
+    def effect_forces(self, dt: float) -> list[float]:
         """Return the forces of the effects on the levels (n,) [N] at the present state."""
         if self.active:
             m = self.m
@@ -296,7 +302,7 @@ class StructureModel:
             )  # fmt: skip
         return self._forces
 
-    def absolute_accelerations(self, force: float) -> "List[float]":
+    def absolute_accelerations(self, force: float) -> list[float]:
         """Return q'' + a_g (n,) [m/s2] under the devices' force [N] on the first level."""
         loads = list(self.effect_forces(inf))
         loads[0] += force
@@ -306,7 +312,7 @@ class StructureModel:
         return out
 
     def holding_force(self, a_g: float, others: float) -> float:
-        """Return the damper force [N] at which the first level does not accelerate on the ground."""
+        """Return the damper force [N] at which the first level stays at its velocity."""
         m = self.m
         others += self.effect_forces(inf)[0]
-        return holding_force(m.n, m.C, m.K, m.mass, self.x, a_g, others)  # type: ignore[no-any-return]
+        return holding_force(m.n, m.C, m.K, m.mass, self.x, a_g, others)

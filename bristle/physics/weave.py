@@ -8,9 +8,9 @@ parameters, `z` for states, `on` for switches; a `Layout` says which is where.
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, Tuple
+from typing import Any
 
-from .effect import EFFECTS, Effect, Q, effects_of
+from .effect import Effect, Q, effects_of
 
 LAW_PARAMETERS = 8
 """Slots in front of `p` that belong to the law itself."""
@@ -33,9 +33,9 @@ class Layout:
 
     def __init__(self, site: str, parameters_first: int, states_first: int) -> None:
         self.effects = effects_of(site)
-        self.parameters: Dict[str, int] = {}
-        self.states: Dict[str, int] = {}
-        self.switches: Dict[str, int] = {}
+        self.parameters: dict[str, int] = {}
+        self.states: dict[str, int] = {}
+        self.switches: dict[str, int] = {}
         self.p_size = parameters_first
         self.z_size = states_first
         for effect in self.effects:
@@ -47,24 +47,28 @@ class Layout:
                 self.states[effect.name + "." + name] = self.z_size
                 self.z_size += 1
 
-    def values(self, effect: "type[Effect]") -> str:
+    def values(self, effect: type[Effect]) -> str:
         """Return the source that makes the effect's parameter tuple from `p`."""
-        return _tuple(effect.name + "_P", "p", [self.parameters[effect.name + "." + n] for n in effect.parameters])
+        return _tuple(
+            effect.name + "_P",
+            "p",
+            [self.parameters[effect.name + "." + n] for n in effect.parameters],
+        )
 
-    def state(self, effect: "type[Effect]") -> str:
+    def state(self, effect: type[Effect]) -> str:
         """Return the source that makes the effect's state tuple from `z`."""
-        return _tuple(effect.name + "_Z", "z", [self.states[effect.name + "." + n] for n in effect.states])
+        return _tuple(
+            effect.name + "_Z", "z", [self.states[effect.name + "." + n] for n in effect.states]
+        )
 
 
-def _tuple(name: str, sequence: str, slots: List[int]) -> str:
-    return "{}({})".format(name, ", ".join("{}[{}]".format(sequence, slot) for slot in slots))
+def _tuple(name: str, sequence: str, slots: list[int]) -> str:
+    return "{}({})".format(name, ", ".join(f"{sequence}[{slot}]" for slot in slots))
 
 
-def call(effect: "type[Effect]", hook: str, layout: Layout, q: str) -> str:
+def call(effect: type[Effect], hook: str, layout: Layout, q: str) -> str:
     """Return the source of one call of a hook."""
-    return "{0}_{1}({2}, {3}, {4})".format(
-        effect.name, hook, q, layout.state(effect), layout.values(effect)
-    )
+    return f"{effect.name}_{hook}({q}, {layout.state(effect)}, {layout.values(effect)})"
 
 
 def q_source(**given: str) -> str:
@@ -72,7 +76,7 @@ def q_source(**given: str) -> str:
     return "Q({})".format(", ".join(given.get(name, "0.0") for name in Q._fields))
 
 
-def switched(layout: Layout, hook: str, line: str, **q: str) -> List[str]:
+def switched(layout: Layout, hook: str, line: str, **q: str) -> list[str]:
     """Return `if on[...]: LINE` for every effect of the layout with that hook.
 
     `line` holds `{call}` where the hook's value belongs, and `{dz}` or `{z_next}` for the
@@ -84,17 +88,17 @@ def switched(layout: Layout, hook: str, line: str, **q: str) -> List[str]:
         if hook not in effect.hooks():
             continue
         if hook == "voltage":
-            lines.append("    V_{} = V".format(effect.name))
+            lines.append(f"    V_{effect.name} = V")
         if "voltage" in effect.hooks():
             q["V"] = "V_" + effect.name
         elif "V" in q:
             q["V"] = "V"
         slots = [layout.states[effect.name + "." + name] for name in effect.states]
-        lines.append("    if on[{}]:  # {}".format(layout.switches[effect.name], effect.name))
+        lines.append(f"    if on[{layout.switches[effect.name]}]:  # {effect.name}")
         text = line.format(
             call=call(effect, hook, layout, q_source(**q)),
-            dz="".join("dz[{}], ".format(slot) for slot in slots),
-            z_next="".join("z_next[{}], ".format(slot) for slot in slots),
+            dz="".join(f"dz[{slot}], " for slot in slots),
+            z_next="".join(f"z_next[{slot}], " for slot in slots),
         )
         lines.append("        " + text)
     return lines
@@ -102,19 +106,14 @@ def switched(layout: Layout, hook: str, line: str, **q: str) -> List[str]:
 
 def weave(name: str, source: str, layout: Layout, **also: Any) -> Any:
     """Compile woven source; return the function `name` with the hooks in its globals."""
-    namespace: Dict[str, Any] = {"Q": Q, "__name__": __name__}
+    namespace: dict[str, Any] = {"Q": Q, "__name__": __name__}
     namespace.update(also)
     for effect in layout.effects:
         namespace[effect.name + "_P"] = effect.Values
         namespace[effect.name + "_Z"] = effect.State
         for hook, function in effect.hooks().items():
             namespace[effect.name + "_" + hook] = function
-    exec(compile(source, "<woven {}>".format(name), "exec"), namespace)
+    exec(compile(source, f"<woven {name}>", "exec"), namespace)
     function = namespace[name]
     function.source = source
     return function
-
-
-def registry_key() -> Tuple[str, ...]:
-    """Return the names of the registered effects; what is woven holds as long as they do."""
-    return tuple(sorted(EFFECTS))

@@ -18,7 +18,9 @@ class MountCompliance(Effect):
     passive = True
     zero_at_rest = True
     source = "Makris & Constantinou (1991), J. Struct. Eng. 117(9), 2708-2724 (Maxwell element)"
-    expect = "the force turns late and softly after each reversal of the motion, by force over stiffness"
+    expect = (
+        "the force turns late and softly after each reversal of the motion, by force over stiffness"
+    )
     states = {"compression": "m", "joint_velocity": "m/s"}
     parameters = {
         "k": Parameter(2e4, "N/m", (1e2, 1e9), "stiffness of the mount"),

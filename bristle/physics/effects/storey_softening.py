@@ -18,9 +18,13 @@ class StoreySoftening(Effect):
     passive = True
     zero_at_rest = True
     source = "Kinematically exact P-delta and connection softening as a rational secant stiffness"
-    expect = "storey drifts larger, and floor accelerations lower and slower, in strong shaking only"
+    expect = (
+        "storey drifts larger, and floor accelerations lower and slower, in strong shaking only"
+    )
     parameters = {
-        "d_half": Parameter(0.01, "m", (1e-4, 10.0), "drift at which the secant stiffness has halved"),
+        "d_half": Parameter(
+            0.01, "m", (1e-4, 10.0), "drift at which the secant stiffness has halved"
+        ),
         "shape": Parameter(2.0, "1", (1.0, 4.0), "exponent of the loss"),
         "which": Parameter(0.0, "1", (0.0, 20.0), "number of the storey; 0: every storey"),
     }

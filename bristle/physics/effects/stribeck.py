@@ -19,7 +19,9 @@ class Stribeck(Effect):
     needs = ("v",)
     passive = True
     zero_at_rest = True
-    source = "Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30(7), 1083-1138, eq. 4"
+    source = (
+        "Armstrong-Helouvry, Dupont & Canudas de Wit (1994), Automatica 30(7), 1083-1138, eq. 4"
+    )
     expect = "excess force in the direction of motion at the lowest speeds, gone at higher speed"
     parameters = {
         "rise": Parameter(0.3, "1", (0.0, 5.0), "excess of the yield force as v -> 0"),
