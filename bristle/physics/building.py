@@ -273,15 +273,18 @@ def read_building(path: str | Path) -> Building:
             data = tomllib.load(file)
     except OSError as error:
         raise PhysicsError(f"{path}: cannot be read ({error.strerror}).") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # also numbers and nests beyond all measure
         raise PhysicsError(f"{path}: not valid TOML: {error}.") from error
     return from_data(data, str(path))
 
 
 def _number(value: Any, key: str, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-        raise PhysicsError(f"{where}: {key} must be a finite number, found {value!r}.")
-    return float(value)
+    try:
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value):
+            return float(value)
+    except OverflowError:  # an integer beyond the largest float
+        value = "a number beyond 1e308"
+    raise PhysicsError(f"{where}: {key} must be a finite number, found {value!r}.")
 
 
 def _positives(data: dict[str, Any], key: str, where: str) -> list[float]:

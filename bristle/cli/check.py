@@ -1,0 +1,86 @@
+"""Check scenario files without running them: every mistake at once, with its line."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..cosim.scenario import Finding
+
+HELP = "check scenario files: every mistake at once, with its line"
+
+_COLOURS = {"error": "31", "warning": "33", "note": "36"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle check`."""
+    parser.add_argument(
+        "files", nargs="*", metavar="FILE", help="scenario files, or names of stock scenarios"
+    )
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="take a value in place of the file's, e.g. --set damper.f_c=2",
+    )
+    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+    parser.add_argument(
+        "--schema", action="store_true", help="print the JSON schema of scenario files"
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Print what is found; return 2 if there is an error, else 0."""
+    from ..errors import ScenarioError
+
+    if arguments.schema:
+        from ..cosim.schema import schema_text
+
+        print(schema_text(), end="")
+        return 0
+    if not arguments.files:
+        raise ScenarioError("bristle check wants a FILE: a scenario, e.g. bristle check my.toml.")
+    from ..cosim.scenario import check_scenario, parse_overrides
+
+    overrides = parse_overrides(arguments.overrides)
+    found = {file: check_scenario(file, overrides) for file in arguments.files}
+    if arguments.json:
+        _print_json(found)
+    else:
+        for file, findings in found.items():
+            _print_plain(file, findings)
+    wrong = any(finding.level == "error" for findings in found.values() for finding in findings)
+    return 2 if wrong else 0
+
+
+def _print_json(found: dict[str, list[Finding]]) -> None:
+    import json
+
+    answer = [
+        {
+            "file": file,
+            "ok": all(finding.level != "error" for finding in findings),
+            "findings": [finding._asdict() for finding in findings],
+        }
+        for file, findings in found.items()
+    ]
+    print(json.dumps({"files": answer}, indent=2))
+
+
+def _print_plain(file: str, findings: list[Finding]) -> None:
+    """Print one line per finding, `FILE:LINE: level: text`, which editors make clickable."""
+    colour = sys.stdout.isatty()
+    for line, level, text in findings:
+        place = f"{file}:{line}" if line else file
+        word = f"\033[{_COLOURS[level]}m{level}\033[0m" if colour else level
+        print(f"{place}: {word}: {text}")
+    counts = {level: sum(finding.level == level for finding in findings) for level in _COLOURS}
+    told = ", ".join(f"{n} {level}{'s' * (n > 1)}" for level, n in counts.items() if n)
+    if counts["error"]:
+        print(f"{file}: {told}")
+    else:
+        print(f"{file}: ok{', ' + told if told else ''}")

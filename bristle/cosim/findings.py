@@ -1,0 +1,125 @@
+"""What a check finds, and how it words it: the nearest right names, values as they were written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from difflib import get_close_matches
+from typing import Literal, NamedTuple
+
+from .lines import KeyPath
+
+Level = Literal["error", "warning", "note"]
+LIST_AT_MOST = 12
+"""Longer lists of names are cut down to the nearest few."""
+
+
+class Finding(NamedTuple):
+    """One finding of a check. `line` 0 stands for the whole file, or for an override."""
+
+    line: int
+    level: Level
+    text: str
+
+
+class Findings:
+    """Collects findings, each at the line of the key that it is about.
+
+    Parameters
+    ----------
+    place : callable
+        Gives (line, words that go before the text) of a key's path.
+    """
+
+    def __init__(self, place: Callable[[KeyPath], tuple[int, str]]) -> None:
+        self._place = place
+        self.found: list[Finding] = []
+
+    def add(self, level: Level, path: KeyPath, text: str) -> None:
+        line, before = self._place(path)
+        finding = Finding(line, level, before + text)
+        if finding not in self.found:
+            self.found.append(finding)
+
+    def error(self, path: KeyPath, text: str) -> None:
+        self.add("error", path, text)
+
+    def warning(self, path: KeyPath, text: str) -> None:
+        self.add("warning", path, text)
+
+    def note(self, path: KeyPath, text: str) -> None:
+        self.add("note", path, text)
+
+    def in_order(self) -> list[Finding]:
+        """Return the findings by line; those of one line in the order in which they were made."""
+        return sorted(self.found, key=lambda finding: finding.line)
+
+
+def nearest(name: str, names: Iterable[str], count: int = 1) -> list[str]:
+    """Return the names most like `name`, upper and lower case alike, best first."""
+    folded: dict[str, str] = {}
+    for candidate in names:
+        folded.setdefault(candidate.casefold(), candidate)
+    matches = get_close_matches(name.casefold(), folded, n=count, cutoff=0.6)
+    return [folded[match] for match in matches]
+
+
+def unknown(what: str, name: str, names: Iterable[str], more: str = "") -> str:
+    """Return the words for a name that is not there, with what would be right.
+
+    Parameters
+    ----------
+    what, name : str
+        Kind of thing and the name that was written.
+    names : iterable of str
+        All names that there are.
+    more : str
+        Where to read them all, for lists too long to print.
+    """
+    names = list(names)
+    close = nearest(name, names)
+    words = f'there is no {what} "{name}".'
+    if close:
+        words += f' Did you mean "{close[0]}"?'
+    if not names:
+        words += " There are none."
+    elif len(names) <= LIST_AT_MOST:
+        words += f" There are: {', '.join(names)}."
+    else:
+        some = nearest(name, names, 3) or names[:3]
+        words += f" There are {len(names)}, among them {', '.join(some)}."
+        if more:
+            words += f" All: {more}"
+    return words
+
+
+def written(value: object) -> str:
+    """Return the words for a value as somebody wrote it."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'the text "{value if len(value) <= 60 else value[:57] + "..."}"'
+    if isinstance(value, dict):
+        return "a table"
+    if isinstance(value, list):
+        return "a list"
+    if isinstance(value, int) and abs(value) > 10**20:
+        return "a whole number beyond all bounds"
+    return str(value)
+
+
+def number(value: object) -> float | str:
+    """Return a finite number as float, or the words for why the value is none."""
+    if isinstance(value, str):
+        try:
+            float(value)
+        except ValueError:
+            return f"is {written(value)}, not a number"
+        return f"is {written(value)}: a number stands without quotes"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return f"is {written(value)}, not a number"
+    try:
+        result = float(value)
+    except OverflowError:
+        return f"is {written(value)}"
+    return result if math.isfinite(result) else f"is {result}, not a finite number"

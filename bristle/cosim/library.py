@@ -1,0 +1,56 @@
+"""What a check asks of the rest of bristle: components, records, buildings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..fmu.description import Description
+
+
+@dataclass(frozen=True)
+class Library:
+    """Where a check looks things up; tests put their own in its place.
+
+    Attributes
+    ----------
+    names
+        () -> names of the built-in components.
+    describe
+        (name, building file or None) -> Description of a built-in component.
+    describe_file
+        (path) -> Description of an FMU file; raises FmuError.
+    read_record
+        (record, folder) -> the ground motion; raises RecordError.
+    driven_mass
+        (building file or None) -> mass [kg] that a damper's force acts on; raises PhysicsError.
+    """
+
+    names: Callable[[], Sequence[str]]
+    describe: Callable[[str, Path | None], Description]
+    describe_file: Callable[[Path], Description]
+    read_record: Callable[[str, Path], object]
+    driven_mass: Callable[[Path | None], float]
+
+
+def installed() -> Library:
+    """Return the library of what is installed."""
+    from ..fmu import catalogue
+    from ..fmu.description import read_description
+    from ..records import read_ground_motion
+
+    return Library(
+        names=catalogue.component_names,
+        describe=catalogue.describe,
+        describe_file=read_description,
+        read_record=read_ground_motion,
+        driven_mass=driven_mass,
+    )
+
+
+def driven_mass(building: Path | None) -> float:
+    """Return the mass [kg] that a damper's force acts on: the base, or floor 1 of a fixed base."""
+    from ..physics.building import paper_building, read_building
+
+    return (read_building(building) if building else paper_building()).M[0][0]

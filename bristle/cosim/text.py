@@ -1,0 +1,75 @@
+"""A scenario as TOML text: as it is run, with what was overridden."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..fmu.description import Value
+from .document import FILE_PARAMETERS
+
+if TYPE_CHECKING:
+    from .scenario import Component, Scenario
+
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+def scenario_text(scenario: Scenario) -> str:
+    """Return the TOML text of a scenario; read again it gives the same run.
+
+    Files are written as absolute paths, so that the text holds wherever it is put.
+    """
+    lines = [
+        "schema = 1",
+        f"title = {_value(scenario.title)}",
+        "",
+        "[run]",
+        f"stop = {_value(scenario.stop)}",
+        f"step = {_value(scenario.step)}",
+        f"algorithm = {_value(scenario.algorithm)}",
+    ]
+    for component in scenario.components:
+        lines += [
+            "",
+            f"[components.{_key(component.name)}]",
+            *_component(component, scenario.file.parent),
+        ]
+    lines += ["", "[connections]"]
+    for wire in scenario.connections:
+        target, source = f"{wire.target}.{wire.input}", f"{wire.source}.{wire.output}"
+        lines.append(f"{_value(target)} = {_value(source)}")
+    return "\n".join(lines) + "\n"
+
+
+def _component(component: Component, folder: Path) -> list[str]:
+    fmu = component.fmu if component.path is None else component.path.absolute().as_posix()
+    lines = [f"fmu = {_value(fmu)}"]
+    if component.building is not None:
+        lines.append(f"building = {_value(component.building.absolute().as_posix())}")
+    if component.step is not None:
+        lines.append(f"step = {_value(component.step)}")
+    if component.parameters:
+        values = dict(component.parameters)
+        for name in FILE_PARAMETERS:
+            if (folder / str(values.get(name, ""))).is_file():
+                values[name] = (folder / str(values[name])).absolute().as_posix()
+        pairs = [f"{_key(name)} = {_value(value)}" for name, value in values.items()]
+        lines.append(f"parameters = {{ {', '.join(pairs)} }}")
+    return lines
+
+
+def _key(name: str) -> str:
+    return name if _BARE.fullmatch(name) else _value(name)
+
+
+def _value(value: Value) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)  # "inf", "-inf", "nan", as TOML spells them
+    if isinstance(value, str):  # JSON's escapes are TOML's; only DEL is missing
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(value)

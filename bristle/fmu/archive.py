@@ -1,0 +1,224 @@
+"""FMU archives, opened with suspicion: bounded sizes, no path that leaves the folder.
+
+An FMU comes from anywhere and is unpacked before anything else is known of it. So names, sizes
+and kinds of all members are judged from the archive's directory first, and nothing is written
+unless all of them are sound.
+"""
+
+from __future__ import annotations
+
+import platform
+import stat
+import struct
+import sys
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+from ..errors import FmuError
+
+DESCRIPTION = "modelDescription.xml"
+
+# Far above any FMU we know of, far below what fills a disk.
+MAX_MEMBERS = 50_000
+MAX_TOTAL = 2 * 1024**3  # bytes, unpacked
+MAX_DESCRIPTION = 64 * 1024**2  # bytes
+_SUSPECT_RATIO = 500  # deflate reaches 1032 on zeros; real members stay below 50
+_SUSPECT_SIZE = 64 * 1024**2  # bytes; below it, no ratio does harm
+
+_CHUNK = 1024**2
+_ELF_MACHINES = {"x86_64": 62, "amd64": 62, "aarch64": 183, "arm64": 183, "i686": 3, "i386": 3}
+
+
+@contextmanager
+def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open `path` as a zip whose members are all sound.
+
+    Raises
+    ------
+    FmuError
+        If the file is missing, a folder, unreadable or no zip, or if a member is encrypted, a
+        link, too large, or named so that it would leave the folder it is unpacked into.
+    """
+    if path.is_dir():
+        raise FmuError(f"{path}: this is a folder. An FMU is one zip file named *.fmu.")
+    if not path.exists():
+        raise FmuError(f"{path}: there is no such file.")
+    if not path.is_file():  # a pipe would be waited for without end
+        raise FmuError(f"{path}: this is a device or pipe. An FMU is one zip file named *.fmu.")
+    try:
+        archive = zipfile.ZipFile(path)
+    except (zipfile.BadZipFile, EOFError, struct.error, NotImplementedError, ValueError) as error:
+        raise FmuError(f"{path}: not a zip file, so not an FMU ({error}).") from None
+    except OSError as error:
+        raise FmuError(f"{path}: cannot be read: {error.strerror or error}.") from None
+    with archive:
+        _check_members(path, archive)
+        try:
+            yield archive
+        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError) as error:
+            raise FmuError(f"{path}: the zip file is damaged: {error}.") from None
+        except RuntimeError as error:  # what zipfile raises for a password
+            raise FmuError(f"{path}: the zip file cannot be unpacked: {error}.") from None
+
+
+def member_names(archive: zipfile.ZipFile) -> list[str]:
+    """Return the names of all members with forward slashes, folders left out."""
+    return [_name(info) for info in archive.infolist() if not info.is_dir()]
+
+
+def read_member(path: Path, archive: zipfile.ZipFile, name: str, limit: int) -> bytes:
+    """Return one member's bytes, at most `limit` of them; FmuError if there are more."""
+    for info in archive.infolist():
+        if _name(info) == name:
+            with archive.open(info) as stream:
+                data = stream.read(limit + 1)
+            if len(data) > limit:
+                raise FmuError(f"{path}: {name} is larger than {limit // 1024**2} MiB: refused.")
+            return data
+    raise FmuError(f"{path}: there is no {name} at its root, so it is not an FMU.")
+
+
+def extract(path: Path | str, folder: Path | str) -> Path:
+    """Unpack an FMU into `folder` (made if missing) and return that folder.
+
+    Raises
+    ------
+    FmuError
+        For what `open_archive` refuses, for a member that holds more than it declares, and if
+        the folder cannot be written.
+    """
+    path, folder = Path(path), Path(folder)
+    with open_archive(path) as archive:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            for info in archive.infolist():
+                target = folder / _name(info)
+                if info.is_dir():
+                    target.mkdir(parents=True, exist_ok=True)
+                    continue
+                target.parent.mkdir(parents=True, exist_ok=True)
+                _unpack(path, archive, info, target)
+        except OSError as error:
+            raise FmuError(f"{path}: cannot be unpacked into {folder}: {error}.") from None
+    return folder
+
+
+def platform_folder() -> str:
+    """Return the name that FMI 2.0 gives this platform ("linux64", "win64", "darwin64" ...)."""
+    system = {"win32": "win", "darwin": "darwin"}.get(sys.platform, "linux")
+    return f"{system}{64 if sys.maxsize > 2**32 else 32}"
+
+
+def library_suffix() -> str:
+    """Return what a shared library's name ends with on this platform."""
+    return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+def library_member(identifier: str) -> str:
+    """Return where an FMU keeps its shared library for this platform."""
+    return f"binaries/{platform_folder()}/{identifier}{library_suffix()}"
+
+
+def check_library(path: Path, archive: zipfile.ZipFile, identifier: str) -> None:
+    """Raise FmuError unless the archive holds a binary that this platform can load."""
+    names = member_names(archive)
+    wanted = library_member(identifier)
+    if wanted not in names:
+        raise FmuError(
+            f"{path}: no binary for this platform: {wanted} is missing. "
+            f"There are: {', '.join(_binaries(names)) or 'none'}."
+        )
+    with archive.open(next(i for i in archive.infolist() if _name(i) == wanted)) as stream:
+        found = _kind_of_library(stream.read(20))
+    expected = _kind_of_this_platform()
+    if found != expected:
+        raise FmuError(f"{path}: {wanted} is {found}; this platform loads {expected}.")
+
+
+def _binaries(names: list[str]) -> list[str]:
+    """Return the platforms that an FMU has binaries or sources for."""
+    parts = [PurePosixPath(n).parts for n in names]
+    found = {p[1] for p in parts if len(p) == 3 and p[0] == "binaries"}
+    sources = any(p[0] == "sources" and p[-1].endswith((".c", ".cpp")) for p in parts if p)
+    return sorted(found) + (["C sources (not compiled here)"] if sources else [])
+
+
+def _kind_of_library(head: bytes) -> str:
+    if head[:4] == b"\x7fELF" and len(head) >= 20:
+        order = "<" if head[5] == 1 else ">"
+        (machine,) = struct.unpack(f"{order}H", head[18:20])
+        bits = 64 if head[4] == 2 else 32
+        names = {62: "x86-64", 183: "ARM", 3: "x86"}
+        return f"a {bits}-bit Linux library for {names.get(machine, f'machine {machine}')}"
+    if head[:2] == b"MZ":
+        return "a Windows library"
+    if head[:4] in (b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"\xca\xfe\xba\xbf"):
+        return "a macOS library"
+    return "no shared library"
+
+
+def _kind_of_this_platform() -> str:
+    if sys.platform == "win32":
+        return "a Windows library"
+    if sys.platform == "darwin":
+        return "a macOS library"
+    machine = _ELF_MACHINES.get(platform.machine().lower(), 0)
+    bits = 2 if sys.maxsize > 2**32 else 1
+    order = 1 if sys.byteorder == "little" else 2
+    head = b"\x7fELF" + bytes([bits, order]) + bytes(12)
+    return _kind_of_library(head + struct.pack("<H" if order == 1 else ">H", machine))
+
+
+def _name(info: zipfile.ZipInfo) -> str:
+    # Some Windows tools write backslashes; everybody reads them as separators.
+    return info.filename.replace("\\", "/")
+
+
+def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
+    members = archive.infolist()
+    if len(members) > MAX_MEMBERS:
+        raise FmuError(f"{path}: {len(members)} members (at most {MAX_MEMBERS}): refused.")
+    total = sum(info.file_size for info in members)
+    if total > MAX_TOTAL:
+        raise FmuError(
+            f"{path}: unpacks to {total / 1024**3:.1f} GiB "
+            f"(at most {MAX_TOTAL // 1024**3} GiB): refused."
+        )
+    for info in members:
+        _check_member(path, info)
+
+
+def _check_member(path: Path, info: zipfile.ZipInfo) -> None:
+    name = _name(info)
+    parts = PurePosixPath(name).parts
+    if not parts or ".." in parts or name.startswith("/") or ":" in name or "\0" in name:
+        raise FmuError(
+            f"{path}: the member {info.filename!r} leaves the archive's folder: refused. "
+            "Member paths are relative and stay inside."
+        )
+    mode = info.external_attr >> 16
+    if stat.S_IFMT(mode) not in (0, stat.S_IFREG, stat.S_IFDIR):
+        raise FmuError(f"{path}: the member {name!r} is a link or device: refused.")
+    if info.flag_bits & 0x1:
+        raise FmuError(f"{path}: the member {name!r} is encrypted: refused.")
+    if (
+        info.file_size > _SUSPECT_SIZE
+        and info.file_size > _SUSPECT_RATIO * max(info.compress_size, 1)
+    ):  # fmt: skip
+        raise FmuError(
+            f"{path}: the member {name!r} unpacks {info.compress_size} bytes "
+            f"to {info.file_size}: refused as a zip bomb."
+        )
+
+
+def _unpack(path: Path, archive: zipfile.ZipFile, info: zipfile.ZipInfo, target: Path) -> None:
+    written = 0
+    with archive.open(info) as source, target.open("wb") as sink:
+        while chunk := source.read(_CHUNK):
+            written += len(chunk)
+            if written > info.file_size:
+                raise FmuError(f"{path}: the member {info.filename!r} holds more than it declares.")
+            sink.write(chunk)
