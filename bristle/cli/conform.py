@@ -1,0 +1,86 @@
+"""Judge any FMI 2.0 co-simulation FMU: what was tried, what was seen, what the standard says."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..fmu.conform.report import Report
+
+HELP = "judge an FMU against FMI 2.0 co-simulation"
+
+_COLOURS = {"pass": "green", "fail": "bold red", "note": "yellow"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle conform`."""
+    parser.epilog = (
+        "Exit codes: 0 nothing falls short (notes allowed), 1 something does, "
+        "2 the file cannot or must not be opened. The FMU's code runs on this machine: "
+        "in processes of its own, with a time limit, with your rights."
+    )
+    parser.add_argument("fmu", metavar="FILE.fmu", help="the FMU, anybody's")
+    parser.add_argument("--json", action="store_true", help="print the table as JSON")
+    parser.add_argument(
+        "--timeout",
+        type=float,
+        default=20.0,
+        metavar="S",
+        help="time limit of one probe in s (default: %(default)g)",
+    )
+    parser.add_argument(
+        "--only", action="append", metavar="PROBE", help="try this probe only; may be repeated"
+    )
+    parser.add_argument(
+        "--beside", metavar="OTHER.fmu", help="another FMU to load into the same process"
+    )
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Judge one FMU; return 0 if it conforms, 1 if it falls short."""
+    report = _judge(arguments)
+    if arguments.json:
+        print(report.to_json())
+    elif sys.stdout.isatty():
+        _show(report)
+    else:
+        print(report.to_text())
+    return 0 if report.ok else 1
+
+
+def _judge(arguments: argparse.Namespace) -> Report:
+    from ..fmu.conform import conform
+
+    def judge(progress: Callable[[str], None] | None) -> Report:
+        return conform(
+            arguments.fmu,
+            arguments.timeout,
+            only=arguments.only,
+            beside=arguments.beside,
+            progress=progress,
+        )
+
+    if not sys.stderr.isatty():
+        return judge(None)
+    from rich.console import Console
+
+    with Console(stderr=True).status("reading the FMU") as status:
+        return judge(lambda name: status.update(f"trying: {name}"))
+
+
+def _show(report: Report) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table("probe", "tried", "seen", "what the standard says", "verdict", show_lines=True)
+    for row in report.rows:
+        verdict = Text(row.verdict, style=_COLOURS[row.verdict])
+        # Text, not str: what an FMU says may hold what rich would read as markup.
+        table.add_row(*map(Text, (row.probe, row.tried, row.seen, row.standard)), verdict)
+    console = Console()
+    console.print(table)
+    console.print(Text(report.summary()))

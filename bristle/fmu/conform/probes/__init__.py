@@ -1,0 +1,13 @@
+"""All probes, in the order of the table."""
+
+from ..registry import PROBES as _ENTERED
+from . import ending, faults, file, instances, order, run, state, values
+
+__all__ = ["PROBES"]
+
+PROBES = {
+    name: probe
+    for module in (file, run, instances, ending, order, values, state, faults)
+    for name, probe in _ENTERED.items()
+    if probe.run.__module__ == module.__name__
+}

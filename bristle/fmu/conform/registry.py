@@ -1,0 +1,102 @@
+"""What a probe is. Probes are plain functions in `probes/`, listed here in their order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from .bench import Bench
+    from .plan import Plan
+
+Verdict = Literal["pass", "fail", "note"]
+Level = Literal["file", "library", "run"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What one probe saw, in words, and how that is to be judged.
+
+    `data` is for the probes that follow (step count, whether inputs may be driven).
+    """
+
+    verdict: Verdict
+    seen: str
+    data: Mapping[str, float | bool] = field(default_factory=dict)
+
+
+class UnexpectedError(Exception):
+    """A legal call was not answered as the standard demands; the text says which."""
+
+
+@dataclass(frozen=True)
+class Probe:
+    """One row to be: what it tries, the rule it holds the FMU to, and the code that tries it.
+
+    `needs` is what must have worked before: "file" nothing, "library" that the library loads,
+    "run" that a legal run gave a reference. `unless` returns why a probe does not apply, or None.
+    `bare` runs it in an interpreter without site-packages. `house` marks a rule of bristle's own,
+    which does not concern strangers.
+    """
+
+    name: str
+    tried: str
+    standard: str
+    run: Callable[[Bench], Finding]
+    needs: Level
+    unless: Callable[[Plan], str | None]
+    bare: bool
+    house: bool
+
+
+PROBES: dict[str, Probe] = {}
+
+
+def probe(
+    name: str,
+    *,
+    tried: str,
+    standard: str,
+    needs: Level = "run",
+    unless: Callable[[Plan], str | None] = lambda plan: None,
+    bare: bool = False,
+    house: bool = False,
+) -> Callable[[Callable[[Bench], Finding]], Callable[[Bench], Finding]]:
+    """Enter a function into the list of probes."""
+
+    def enter(function: Callable[[Bench], Finding]) -> Callable[[Bench], Finding]:
+        PROBES[name] = Probe(name, tried, standard, function, needs, unless, bare, house)
+        return function
+
+    return enter
+
+
+def passed(seen: str, **data: float | bool) -> Finding:
+    """Return a finding that does what the standard says."""
+    return Finding("pass", seen, data)
+
+
+def failed(seen: str, **data: float | bool) -> Finding:
+    """Return a finding that breaks a rule of the standard, or takes its host down."""
+    return Finding("fail", seen, data)
+
+
+def noted(seen: str, **data: float | bool) -> Finding:
+    """Return a finding that a user should know and the standard leaves open."""
+    return Finding("note", seen, data)
+
+
+def unless_claimed(flag: str) -> Callable[[Plan], str | None]:
+    """Return a condition: the probe applies to FMUs that claim a capability only."""
+
+    def unless(plan: Plan) -> str | None:
+        return None if plan.claims(flag) else f"{flag} is not claimed"
+
+    return unless
+
+
+def unless_single(plan: Plan) -> str | None:
+    """Return why an FMU may be instantiated once only, None if it may be more often."""
+    flag = "canBeInstantiatedOnlyOncePerProcess"
+    return f"{flag} is claimed" if plan.claims(flag) else None
