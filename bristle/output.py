@@ -57,16 +57,19 @@ class Output:
             return
         for name in _OURS[:3]:
             if name != "results.csv" or self.format != "csv":  # that one is replaced at once
-                (self.folder / name).unlink(missing_ok=True)
+                try:
+                    (self.folder / name).unlink(missing_ok=True)
+                except OSError as error:
+                    raise cannot_write(self.folder / name, error, 0) from error
         if self.format == "csv":
             self._writer = CsvWriter(self.folder / "results.csv", table, made)
 
     def write(self, table: Table) -> None:
         """Append rows to a CSV file; a Parquet file is written whole at the end."""
-        if self.failed:
-            raise self.failed
         if self._writer:
             self._writer.write(table)
+        if self.failed:
+            raise self.failed
 
     def finish(self, frame: pd.DataFrame) -> None:
         """Mark the file as complete or incomplete; a Parquet file is written now."""
@@ -74,6 +77,8 @@ class Output:
             self._writer.finish(frame.attrs["complete"], frame.attrs["made"]["wall_time"])
         elif self.folder is not None:
             write_parquet(frame, self.folder / "results.parquet")
+        if self.failed:
+            raise self.failed
 
     def warn(self, line: str) -> None:
         """Write a line to the log and show it, once, on stderr."""

@@ -18,6 +18,7 @@ class Structure(EffectSlave):
         self.add_input("damper_force", "N", "force of the damper, positive against +x")
         text = "force of a second device, positive against +x"
         self.add_input("extra_force", "N", text, optional=True)
+        self.first_output = len(self._values)
         levels = self.building.levels()
         coupled = StructureModel(self.building).m.M_inverse
         for i, level in enumerate(levels):
@@ -46,20 +47,21 @@ class Structure(EffectSlave):
         force = self.damper_force + self.extra_force
         self.model.step(step, self.ground_before, self.ground_acceleration, force)
         self.ground_before = self.ground_acceleration
-
-    def refresh(self):
-        x, n = self.model.x, self.model.m.n
-        force = self.damper_force + self.extra_force
-        absolute = self.model.absolute_accelerations(force)
-        values, at = self._values, self._index["extra_force"] + 1
+        x, n, values, at = self.model.x, self.model.m.n, self._values, self.first_output
         for i in range(n):
-            values[at : at + 3] = x[i], x[n + i], absolute[i]
+            values[at], values[at + 1] = x[i], x[n + i]
             at += 3
         for i in range(1 if self.model.m.isolated else 0, n):
             values[at] = x[i] - x[i - 1] if i else x[0]
             at += 1
+
+    def refresh(self):
+        values, at = self._values, self.first_output + 2
+        for absolute in self.model.absolute_accelerations(self.damper_force + self.extra_force):
+            values[at] = absolute
+            at += 3
         self.holding_force = self.model.holding_force(self.ground_acceleration, self.extra_force)
-        if self._mode != 2:  # before the first step the ground has no earlier value
+        if not self.stepping:  # before the first step the ground has no earlier value
             self.ground_before = self.ground_acceleration
 
     def get_inner(self):
@@ -68,3 +70,4 @@ class Structure(EffectSlave):
     def set_inner(self, state):
         self.model.x, self.model.z = list(state[0]), list(state[1])
         self.ground_before = state[2]
+        self.model.settle()

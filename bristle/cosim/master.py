@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, NoReturn, Self
 
 import numpy as np
 
-from ..errors import RunError
+from ..errors import RunError, ScenarioError
 from ..fmu.description import Description, Value
-from ..results import Array, Column, Table
+from ..results import Array, Table
 from .loop import Memory, compile_loop
+from .rows import count_steps, make_columns, times
 from .schedule import Node, Operation, Port, Read, Step, find_loop, kind_of, make_schedule
 from .session import FATAL, STATUS, WARNING, Instance, Message, Unpacked
 
@@ -81,7 +82,7 @@ class Master:
         self._stop = scenario.stop
         self._parameters = parameters
         self._nodes = make_nodes(scenario, descriptions)
-        self.columns = make_columns(self._nodes)
+        self.columns = make_columns(scenario, descriptions)
         schedule = make_schedule(self._nodes, scenario.algorithm)
         self._memory = Memory(self._nodes, schedule)
         self._rows: list[bytes] = []
@@ -168,6 +169,10 @@ class Master:
         """Free the FMUs and remove what was unpacked."""
         while self._instances:
             self._instances.pop().close()
+        self.forget()
+
+    def forget(self) -> None:
+        """Remove what was unpacked without a call of the FMUs, one of which may hang."""
         self._unpacked.close()
 
     def _instantiate(
@@ -264,6 +269,11 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
     numbers = {component.name: c for c, component in enumerate(scenario.components)}
     sources: list[dict[str, Port]] = [{} for _ in scenario.components]
     for connection in scenario.connections:
+        if descriptions[connection.target].variables[connection.input].kind == "String":
+            raise ScenarioError(
+                f'{scenario.file}: "{connection.target}.{connection.input}" is a text; texts are '
+                "set in parameters, only numbers and Booleans are passed on."
+            )
         port = numbers[connection.source], connection.output
         sources[numbers[connection.target]][connection.input] = port
     nodes = []
@@ -274,33 +284,6 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
         inputs = {v.name: v for v in description.of("input")}
         nodes.append(Node(component.name, inputs, outputs, sources[c], substeps))
     return nodes
-
-
-def make_columns(nodes: Sequence[Node]) -> tuple[Column, ...]:
-    """Return the columns of the results: every output but texts, in the order of the file."""
-    return tuple(
-        Column(f"{node.name}.{name}", variable.kind, variable.unit)
-        for node in nodes
-        for name, variable in node.outputs.items()
-    )
-
-
-def count_steps(stop: float, step: float) -> int:
-    """Return the number of whole steps up to `stop`."""
-    ratio = stop / step
-    return round(ratio) if math.isclose(ratio, round(ratio), rel_tol=1e-9) else int(ratio)
-
-
-def times(first: int, last: int, step: float) -> Array:
-    """Return t_k for k = first ... last - 1, shape (last - first,).
-
-    Where 1/step is whole, t_k = k / (1/step): 0.3 s is then 0.3 and not 0.30000000000000004.
-    """
-    rate = round(1 / step)
-    numbers = np.arange(first, last)
-    if math.isclose(rate * step, 1.0, rel_tol=1e-12):
-        return np.divide(numbers, rate, dtype=np.float64)
-    return np.multiply(numbers, step, dtype=np.float64)
 
 
 def _equal(one: Value, other: Value, near: float) -> bool:

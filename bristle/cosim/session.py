@@ -276,7 +276,9 @@ def _callbacks(key: int) -> fmi2.fmi2CallbackFunctions:
 def _on_message(
     environment: int | None, name: bytes | None, status: int, category: bytes, text: bytes
 ) -> None:
-    instance = _LISTENERS.get(environment or 0)
+    said_by = (name or b"").decode("utf-8", "replace")
+    named = [one for one in _LISTENERS.values() if one.name == said_by]  # many pass no environment
+    instance = _LISTENERS.get(environment or 0, named[-1] if named else None)
     if instance is None:  # an FMU that another part of this process has loaded through fmpy
         fmi2.printLogMessage(environment, name or b"", status, category or b"", text or b"")
         return

@@ -219,6 +219,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """Return the value of a variable by its full name ("gas_spring.k")."""
         return self._values[self._index[name]]
 
+    @property
+    def stepping(self) -> bool:
+        """Whether initialisation is over."""
+        return self._mode == _STEPPING
+
     def was_set(self, name: str) -> bool:
         """Return whether the host has ever set this variable."""
         return self._index[name] in self._set

@@ -1,0 +1,1 @@
+"""Figures that the project is held to, measured: `python -m benchmarks`."""

@@ -1,0 +1,60 @@
+"""Measure every figure and print one table: `python -m benchmarks [NAME ...] [--json]`.
+
+A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import json
+import pkgutil
+import sys
+from dataclasses import asdict
+
+from . import __path__ as folder
+from ._rows import Row
+
+
+def main() -> int:
+    """Print the table; return 0 whatever is reached, for times depend on the machine."""
+    names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
+    parser.add_argument("--json", action="store_true", help="print the rows as JSON")
+    arguments = parser.parse_args()
+    unknown = sorted(set(arguments.names) - set(names))
+    if unknown:
+        parser.error(f"no benchmark is named {', '.join(unknown)}; there are: {', '.join(names)}")
+    rows: list[Row] = []
+    for name in arguments.names or names:
+        print(f"{name} ...", file=sys.stderr)
+        rows += importlib.import_module(f"benchmarks.{name}").run()
+    if arguments.json:
+        print(json.dumps([asdict(row) for row in rows], indent=2))
+    else:
+        show(rows)
+    return 0
+
+
+def show(rows: list[Row]) -> None:
+    """Print rows as a table; `ratio` is measured / goal, 1 or less is reached."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False)
+    for column in ("figure", "measured", "goal"):
+        table.add_column(column, overflow="fold")
+    table.add_column("ratio", justify="right")
+    table.add_column("")
+    for row in rows:
+        ratio = "" if row.ratio is None else f"{row.ratio:.3f}"
+        verdict = "" if row.ratio is None else "reached" if row.ratio <= 1 else "missed"
+        table.add_row(row.name, row.measured, row.goal, ratio, verdict)
+        if row.note:
+            table.add_row(f"  {row.note}")
+    Console(highlight=False, markup=False).print(table)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
