@@ -36,6 +36,10 @@ class ScenarioError(BristleError):
     """A scenario file that is wrong; the text lists every mistake found, with lines."""
 
 
+class DesignError(BristleError):
+    """A controller that cannot be designed, or a controller file that must not be used."""
+
+
 class RunError(BristleError):
     """A run that started and failed; the text says what is kept, and where."""
 

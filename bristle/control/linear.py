@@ -1,0 +1,43 @@
+"""Linear controllers in discrete time: one, or a table of them looked up by speed.
+
+        u_k = C x_k,   x_k+1 = A x_k + B y_k + W w_k
+
+`y` is the measured floor acceleration, `w` a second input: for anti-windup, w = rate (sat(u) - u)
+with the rate in 1/s; for LQG, the damper's force. Matrices of a table lie one after another in flat
+sequences, `row` says which one: `A` (rows n n), `B`, `W`, `C` (rows n).
+"""
+
+from __future__ import annotations
+
+from ..physics.linear import Row
+
+
+def table_row(v: float, v_top: float, rows: int) -> int:
+    """Return the row nearest to the speed |v| [m/s] of a table even over 0 .. v_top [m/s]."""
+    share = abs(v) / v_top
+    if share >= 1.0:
+        return rows - 1
+    return int(share * (rows - 1) + 0.5)
+
+
+def command(n: int, C: Row, row: int, x: Row) -> float:
+    """Return u = C x, with x (n,)."""
+    at = row * n
+    total = 0.0
+    for j in range(n):
+        total += C[at + j] * x[j]
+    return total
+
+
+def advance(
+    n: int, A: Row, B: Row, W: Row, row: int, x: Row, y: float, w: float, spare: Row
+) -> None:
+    """Move the state x (n,) on by one sample, in place; `spare` (n,) is room to work."""
+    at = row * n
+    for i in range(n):
+        total = B[at + i] * y + W[at + i] * w
+        for j in range(n):
+            total += A[(at + i) * n + j] * x[j]
+        spare[i] = total
+    for i in range(n):
+        x[i] = spare[i]

@@ -1,0 +1,277 @@
+"""The design file: TOML in, a checked task out.
+
+schema = 1
+kind = "lpv"                     # or "hinf", "lqg"; the rest may be left out
+building = "my_building.toml"    # else the paper's model
+sample_period = 0.002            # s
+tau = 2.0                        # 1 or more; larger: a slower controller
+order = 12                       # balanced states to keep; else all
+
+[weights]                        # hinf, lpv
+acceleration = { gain = 1.5, corner = 12.0 }           # gain w/(s + w), rad/s
+command = { gain = 2.0, zero = 15.0, pole = 50.0 }     # gain (s + zero)/(s + pole)
+noise = 0.04                     # m/s2; a weight may also be { numerator, denominator }
+
+[damper]
+model = "model.toml"             # or law, parameters = { f_c = 1.3 }, effects = ["stribeck"]
+v_max = 8.0                      # V
+known_to = 0.4                   # m/s, the largest speed of the data behind the model
+
+[scheduling]                     # lpv
+grid = [0.0, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3]        # m/s
+varies = "none"                  # or "X", "Y": which Lyapunov matrix follows the speed
+rate = 1.0                       # m/s2
+
+[lqg]                            # lqg: acceleration, drift, force, ground, noise
+force = 0.2
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from difflib import get_close_matches
+from functools import partial
+from math import isfinite
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..errors import BristleError, DesignError
+from ..physics.building import paper_building, read_building
+from ..physics.damper import LAWS
+from ..physics.effect import EFFECTS
+from ..units import convert
+from .sliding import Damper
+from .task import Scheduling, Task
+from .weights import LqgWeights, Weight, Weights
+
+T = TypeVar("T")
+
+SCHEMA = 1
+_TABLES = {"hinf": {"weights", "damper"}, "lpv": {"weights", "damper", "scheduling"}}
+_TABLES["lqg"] = {"lqg", "damper"}
+_NO_NUMBERS = ("grid", "rows", "varies")
+_TOP = {"schema", "kind", "title", "building", "sample_period", "tau", "order"}
+_WEIGHT_FORMS: dict[frozenset[str], Callable[..., Weight]] = {
+    frozenset({"gain", "corner"}): Weight.low_pass,
+    frozenset({"gain", "zero", "pole"}): Weight.lead,
+    frozenset({"numerator", "denominator"}): lambda numerator, denominator: Weight(
+        tuple(numerator), tuple(denominator)
+    ),
+}
+
+
+def read_task(path: str | Path) -> Task:
+    """Return the task of a design file.
+
+    Raises
+    ------
+    DesignError
+        Naming the file, the table and what would be right.
+    PhysicsError
+        If the building's file is wrong.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            data = tomllib.load(file)
+    except OSError as error:
+        raise DesignError(f"{path}: cannot be read ({error.strerror}).") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DesignError(f"{path}: not valid TOML: {error}.") from error
+    return task_from_data(data, path.parent, str(path))
+
+
+def task_from_data(data: Mapping[str, Any], folder: Path, where: str = "design") -> Task:
+    """Return the task that the content of a design file describes; paths are from `folder`.
+
+    Raises
+    ------
+    DesignError, PhysicsError
+        As `read_task`.
+    """
+    if data.get("schema") != SCHEMA:
+        raise DesignError(f"{where}: schema = {data.get('schema')!r}; this version reads {SCHEMA}.")
+    kind = data.get("kind")
+    if not isinstance(kind, str) or kind not in _TABLES:
+        raise DesignError(f"{where}: kind = {kind!r}; there are {', '.join(_TABLES)}.")
+    _known(data, _TOP | _TABLES[kind], where)
+    given: dict[str, Any] = {"kind": kind, "title": _text(data, "title", where)}
+    for key in ("sample_period", "tau"):
+        if key in data:
+            given[key] = _number(data[key], key, where)
+    if "order" in data:
+        given["order"] = _whole(data["order"], "order", where)
+    building = _text(data, "building", where)
+    given["building"] = read_building(folder / building) if building else paper_building()
+    readers: dict[str, Callable[[Mapping[str, Any], str], Any]] = {
+        "weights": _weights,
+        "damper": lambda table, at: _damper(table, folder, at),
+        "scheduling": _scheduling,
+        "lqg": lambda table, at: _plain(LqgWeights, table, at),
+    }
+    for name in sorted(_TABLES[kind] & set(data)):
+        if not isinstance(data[name], dict):
+            raise DesignError(f"{where}: {name} must be a table, [{name}].")
+        at = f"{where} [{name}]"
+        given[name] = _located(partial(readers[name], data[name], at), at)
+    return _located(lambda: Task(**given), where)
+
+
+def damper_from_model(
+    path: str | Path, v_max: float = 8.0, known_to: float | None = None
+) -> Damper:
+    """Return the damper of a model file (schema 1: law, parameters, effects).
+
+    Raises
+    ------
+    DesignError, UnitError
+        Naming the file and the key.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            data = tomllib.load(file)
+    except OSError as error:
+        raise DesignError(f"{path}: cannot be read ({error.strerror}).") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise DesignError(f"{path}: not valid TOML: {error}.") from error
+    law = str(data.get("law", ""))
+    base = law.removesuffix("_standard")
+    if data.get("schema") != 1 or base not in LAWS:
+        raise DesignError(f"{path}: schema 1 and a law of {', '.join(LAWS)} are right.")
+    units = {name: parameter.unit for name, parameter in LAWS[base].parameters.items()}
+    values = _model_values(data.get("parameters", {}), units, "", path)
+    effects = data.get("effects", {})
+    for name, table in effects.items():
+        if name not in EFFECTS:
+            raise DesignError(f"{path} [effects.{name}]: no effect is named {name!r}.")
+        known = {key: parameter.unit for key, parameter in EFFECTS[name].parameters.items()}
+        values |= _model_values(table.get("parameters", {}), known, name + ".", path)
+    on = tuple(name for name in effects if EFFECTS[name].site == "damper")
+    values = {key: value for key, value in values.items() if key.split(".")[0] in (*units, *on)}
+    return _located(lambda: Damper(law, values, on, v_max, known_to), str(path))
+
+
+def _model_values(
+    table: Mapping[str, Any], units: Mapping[str, str], prefix: str, path: Path
+) -> dict[str, float]:
+    values = {}
+    for name, entry in table.items():
+        where = f"{path}: {prefix}{name}"
+        if name not in units:
+            raise DesignError(f"{where} is not a parameter; there are {', '.join(units)}.")
+        if not isinstance(entry, dict) or "value" not in entry:
+            raise DesignError(f"{where} must be a table with a value.")
+        value = _number(entry["value"], name, str(path))
+        values[prefix + name] = convert(value, str(entry.get("unit", units[name])), units[name])
+    return values
+
+
+def _weights(table: Mapping[str, Any], where: str) -> Weights:
+    _known(table, {"acceleration", "command", "noise"}, where)
+    given: dict[str, Any] = {
+        name: _weight(table[name], f"{where} {name}")
+        for name in ("acceleration", "command")
+        if name in table
+    }
+    if "noise" in table:
+        given["noise"] = _number(table["noise"], "noise", where)
+    return Weights(**given)
+
+
+def _weight(table: Any, where: str) -> Weight:
+    form = _WEIGHT_FORMS.get(frozenset(table)) if isinstance(table, dict) else None
+    if form is None:
+        forms = "; ".join("{ " + ", ".join(sorted(keys)) + " }" for keys in _WEIGHT_FORMS)
+        raise DesignError(f"{where}: a weight is one of {forms}.")
+    values: dict[str, Any] = {}
+    for name, value in table.items():
+        if name in ("numerator", "denominator"):
+            if not isinstance(value, list):
+                raise DesignError(f"{where}: {name} must be a list, highest power of s first.")
+            values[name] = [_number(v, name, where) for v in value]
+        else:
+            values[name] = _number(value, name, where)
+    return form(**values)
+
+
+def _damper(table: Mapping[str, Any], folder: Path, where: str) -> Damper:
+    _known(table, {"law", "parameters", "effects", "model", "v_max", "known_to"}, where)
+    limits = {
+        name: _number(table[name], name, where) for name in ("v_max", "known_to") if name in table
+    }
+    if "model" in table:
+        if {"law", "parameters", "effects"} & set(table):
+            raise DesignError(f"{where}: give either model or law, parameters, effects.")
+        return damper_from_model(folder / _text(table, "model", where), **limits)
+    parameters, effects = table.get("parameters", {}), table.get("effects", [])
+    if not isinstance(parameters, dict) or not isinstance(effects, list):
+        raise DesignError(
+            f"{where}: parameters must be a table of numbers, effects a list of names."
+        )
+    values = {str(name): _number(value, str(name), where) for name, value in parameters.items()}
+    law = _text(table, "law", where) or "bingham"
+    return Damper(law, values, tuple(map(str, effects)), **limits)
+
+
+def _scheduling(table: Mapping[str, Any], where: str) -> Scheduling:
+    given = dict(table)
+    if "grid" in given:
+        if not isinstance(given["grid"], list):
+            raise DesignError(f"{where}: grid must be a list of speeds [m/s].")
+        given["grid"] = tuple(_number(value, "grid", where) for value in given["grid"])
+    if "rows" in given:
+        given["rows"] = _whole(given["rows"], "rows", where)
+    return _plain(Scheduling, given, where)
+
+
+def _plain(kind: type[T], table: Mapping[str, Any], where: str) -> T:
+    """Return a dataclass of numbers; what is not a number there is taken as it is."""
+    _known(table, {f.name for f in fields(kind)}, where)  # type: ignore[arg-type]
+    return kind(
+        **{
+            name: value if name in _NO_NUMBERS else _number(value, name, where)
+            for name, value in table.items()
+        }
+    )
+
+
+def _located(make: Callable[[], T], where: str) -> T:
+    """Return what `make` makes; put the place in front of a design error that lacks it."""
+    try:
+        return make()
+    except BristleError as error:
+        if not isinstance(error, DesignError) or str(error).startswith(where.split(" [")[0]):
+            raise
+        raise DesignError(f"{where}: {error}") from None
+
+
+def _known(table: Mapping[str, Any], known: set[str], where: str) -> None:
+    for key in table:
+        if key not in known:
+            close = get_close_matches(key, known, n=1)
+            hint = f' Did you mean "{close[0]}"?' if close else ""
+            raise DesignError(
+                f"{where}: unknown key {key!r}; there are {', '.join(sorted(known))}.{hint}"
+            )
+
+
+def _number(value: Any, key: str, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
+        raise DesignError(f"{where}: {key} must be a finite number, found {value!r}.")
+    return float(value)
+
+
+def _whole(value: Any, key: str, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int):
+        raise DesignError(f"{where}: {key} must be a whole number, found {value!r}.")
+    return value
+
+
+def _text(table: Mapping[str, Any], key: str, where: str) -> str:
+    value = table.get(key, "")
+    if not isinstance(value, str):
+        raise DesignError(f"{where}: {key} must be a text, found {value!r}.")
+    return value

@@ -1,0 +1,56 @@
+"""Writes the controllers of the reference design: `python -m bristle.design.reference --out DIR`.
+
+A solver's matrices are not unique, and a switching law feels their last digits. So tests that
+compare runs use these files, made once.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..control.controller import KINDS
+from ..errors import BristleError, DesignError
+from . import design
+from .task import Task
+
+TITLE = "reference design of the base-isolated two-storey model"
+
+
+def write(folder: Path) -> list[Path]:
+    """Design and write hinf.json, lpv.json and lqg.json; return their paths.
+
+    Raises
+    ------
+    DesignError
+        If a design fails or a file cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise DesignError(f"{folder}: cannot be made ({error.strerror}).") from error
+    paths = []
+    for kind in KINDS:
+        path = folder / f"{kind}.json"
+        design(Task(kind, title=TITLE)).controller.save(path)
+        paths.append(path)
+    return paths
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit code."""
+    parser = argparse.ArgumentParser(prog="python -m bristle.design.reference", description=TITLE)
+    parser.add_argument("--out", type=Path, required=True, help="folder of the controller files")
+    try:
+        for path in write(parser.parse_args(arguments).out):
+            print(path)
+    except BristleError as error:
+        print(f"{type(error).__name__}: {error}", file=sys.stderr)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,196 @@
+"""What a damper is to a design: at each speed a dashpot, and a gain from voltage to force.
+
+In steady sliding at speed r = |v| the force is sgn(v) (r d(r) + b(r) V). The sign function is
+smoothed, sgn(v) -> v/(|v| + eps), so that d stays finite at rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import DesignError
+from ..physics.bingham import falling
+from ..physics.damper import LAWS, DamperModel
+from ..physics.effect import EFFECTS, effects_of
+
+Array = NDArray[np.float64]
+
+_STANDARD = "_standard"
+_LASTS = 0.25
+"""How long the damper slides before its force is read [s]: coils and mounts have settled then."""
+_STEPS = 100
+_SPEEDS = 12
+_NUDGE = 1e-3
+"""Displacement to either side at which the damper's stiffness is read [m]."""
+
+
+@dataclass(frozen=True)
+class Damper:
+    """A damper model: law, parameters, effects.
+
+    Attributes
+    ----------
+    law : str
+        "bingham", "lugre", or either with "_standard": without the exponential.
+    values : mapping
+        Name ("f_c", "gas_spring.k") to value in SI; what is missing takes the law's value.
+    effects : tuple of str
+        The effects that are on.
+    v_max : float
+        Largest voltage [V].
+    known_to : float or None
+        Largest speed [m/s] of the data behind the model; a design must not go beyond.
+    """
+
+    law: str = "bingham"
+    values: Mapping[str, float] = field(default_factory=dict)
+    effects: tuple[str, ...] = ()
+    v_max: float = 8.0
+    known_to: float | None = None
+
+    def __post_init__(self) -> None:
+        laws = [*LAWS, *(law + _STANDARD for law in LAWS)]
+        if self.law not in laws:
+            raise DesignError(f"damper: law = {self.law!r}; there are {', '.join(laws)}.")
+        if not (isfinite(self.v_max) and self.v_max > 0.0):
+            raise DesignError(
+                f"damper: v_max = {self.v_max!r} V leaves nothing to control; it must be positive."
+            )
+        if self.known_to is not None and not self.known_to > 0.0:
+            raise DesignError(f"damper: known_to = {self.known_to!r} m/s must be positive.")
+        known = dict(LAWS[self.base].parameters)
+        available = {effect.name: effect for effect in effects_of("damper", self.base)}
+        for name in self.effects:
+            if name not in available:
+                raise DesignError(_unknown("effect", name, available))
+            for key, parameter in available[name].parameters.items():
+                known[f"{name}.{key}"] = parameter
+        for name, value in self.values.items():
+            if name not in known:
+                raise DesignError(_unknown("parameter", name, known))
+            low, high = known[name].bounds
+            if not low <= value <= high:
+                raise DesignError(f"damper: {name} = {value!r} lies outside {low:g} .. {high:g}.")
+
+    @property
+    def base(self) -> str:
+        """The law without "_standard"."""
+        return self.law.removesuffix(_STANDARD)
+
+    def parameters(self) -> dict[str, float]:
+        """Return the base law's parameters, complete, in the law's order."""
+        values = {
+            name: float(self.values.get(name, parameter.value))
+            for name, parameter in LAWS[self.base].parameters.items()
+        }
+        if self.law.endswith(_STANDARD):
+            values["exponent"] = 0.0
+        return values
+
+    def sliding(self) -> dict[str, float]:
+        """Return f_c, f_v, c_0, c_v, v_n, exponent of steady sliding, effects left out."""
+        p = self.parameters()
+        if self.base == "bingham":
+            return p
+        return {
+            "f_c": p["sigma_a"] / p["a_0"],
+            "f_v": p["sigma_0"] / p["a_0"],
+            "c_0": p["sigma_2"],
+            "c_v": p["sigma_b"],
+            "v_n": p["v_n"],
+            "exponent": p["exponent"],
+        }
+
+    def data(self) -> dict[str, Any]:
+        """Return the damper as a table of a design file."""
+        return {
+            "law": self.law,
+            "parameters": {**self.parameters(), **dict(self.values)},
+            "effects": list(self.effects),
+            "v_max": self.v_max,
+            "known_to": self.known_to,
+        }
+
+
+def coefficients(damper: Damper, r: Array, eps: float) -> tuple[Array, Array]:
+    """Return d(r) [N s/m] and b(r) [N/V] at speeds r (k,) [m/s].
+
+        d = f_c/(r + eps) + c_0 e(r),   b = r (f_v/(r + eps) + c_v e(r)),   e = exp(-(r/v_n)^m)
+
+    Effects enter as what they add to the force in steady sliding, read from the damper itself at
+    some speeds, the mean of both directions; a slow effect as it is near its start. Elements in
+    series with the fluid (mount, backlash) carry its force and are left out.
+    """
+    p = damper.sliding()
+    fall = np.array([falling(float(speed), p["v_n"], p["exponent"]) for speed in r])
+    d = p["f_c"] / (r + eps) + p["c_0"] * fall
+    b = r * (p["f_v"] / (r + eps) + p["c_v"] * fall)
+    if _parallel(damper):
+        speeds, still, driven = _added(damper, float(r.max()))
+        jump, slope = still[0], (driven - still) / damper.v_max
+        d = d + jump / (r + eps) + np.interp(r, speeds, (still - jump) / speeds)
+        b = b + r * (slope[0] / (r + eps)) + np.interp(r, speeds, slope - slope[0])
+    return d, b
+
+
+def stiffness(damper: Damper) -> float:
+    """Return the force per displacement [N/m] that the damper's effects add: a gas spring's."""
+    on = _parallel(damper)
+    if not on:
+        return 0.0
+    v = damper.parameters()["v_n"]
+    force = [
+        sum(_slid(damper, sign * v, 0.0, x, on) for sign in (1.0, -1.0)) for x in (-_NUDGE, _NUDGE)
+    ]
+    return (force[1] - force[0]) / (4.0 * _NUDGE)
+
+
+def _parallel(damper: Damper) -> tuple[str, ...]:
+    """Return the effects that are on and not in series with the fluid."""
+    return tuple(name for name in damper.effects if "motion" not in EFFECTS[name].hooks())
+
+
+def _added(damper: Damper, top: float) -> tuple[Array, Array, Array]:
+    """Return speeds (k,), and what the effects add there to the force at 0 V and at v_max [N]."""
+    v_n = damper.parameters()["v_n"]
+    speeds = np.geomspace(min(1e-2 * v_n, 1e-2 * top), top, _SPEEDS)
+    forces = []
+    for V in (0.0, damper.v_max):
+        both = [
+            [
+                0.5 * (_slid(damper, v, V, 0.0, on) - _slid(damper, -v, V, 0.0, on))
+                for on in (_parallel(damper), ())
+            ]
+            for v in speeds.tolist()
+        ]
+        forces.append(np.array([enriched - plain for enriched, plain in both]))
+    return speeds, forces[0], forces[1]
+
+
+def _slid(damper: Damper, v: float, V: float, x: float, effects: tuple[str, ...]) -> float:
+    """Return the mean force [N] of sliding past x [m] at v [m/s] and V [V], once settled."""
+    p = damper.parameters()
+    start = {"coil_lag.voltage_0": V}
+    if damper.base == "lugre":
+        start["bristle_deflection_0"] = float(np.sign(v)) / p["a_0"]
+    model = DamperModel(damper.base, {**damper.values, **p, **start}, list(effects))
+    dt = _LASTS / _STEPS
+    total = 0.0
+    for k in range(_STEPS):
+        here = x + v * dt * (k + 0.5 - 0.75 * _STEPS)  # x is the middle of the second half
+        force = model.step(here, v, 0.0, V, dt, 0.0, 0.0, False)
+        total += force if 2 * k >= _STEPS else 0.0
+    return 2.0 * total / _STEPS
+
+
+def _unknown(what: str, name: str, known: Mapping[str, Any]) -> str:
+    close = get_close_matches(name, known, n=1)
+    hint = f' Did you mean "{close[0]}"?' if close else ""
+    return f'damper: no {what} is named "{name}". There are: {", ".join(sorted(known))}.{hint}'
