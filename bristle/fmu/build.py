@@ -13,9 +13,11 @@ import shutil
 import sys
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 from uuid import UUID, uuid5
@@ -120,7 +122,7 @@ def plan(
     """
     path = catalogue.source(component)
     kind = catalogue.component_class(path)
-    chosen = name or component
+    chosen = component if name is None else name
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", chosen):
         raise BuildError(f'"{chosen}" is no model name: letters, digits and _ are right.')
     baked: dict[str, Any] = {"name": chosen}
@@ -132,16 +134,43 @@ def plan(
         _only("GroundMotion", component, "a record")
         from ..records import ground_motion_file
 
-        stem = re.sub(r"[^A-Za-z0-9_]", "_", record.stem)
-        files[f"{stem}.csv"] = Path(ground_motion_file(str(record), Path.cwd()))
-        baked["record"] = stem
+        found = ground_motion_file(str(record), Path.cwd())
+        if f"{found}.csv" not in files:  # else it is in every GroundMotion
+            stem = re.sub(r"[^A-Za-z0-9_]", "_", record.stem)
+            files[f"{stem}.csv"] = Path(found)
+            found = stem
+        baked["record"] = found
     if starts:
-        known = catalogue.describe(component, building).variables
-        for key in starts:
-            if key not in known:
-                raise BuildError(f'{component} has no parameter "{key}".')
-        baked["starts"] = dict(starts)
-    return Plan(chosen, path, baked, files, tuple(effects))
+        baked["starts"] = _checked_starts(component, building, starts)
+    effects = tuple(effects)
+    for file in effects:
+        if not file.is_file():
+            raise BuildError(f"{file}: there is no such file with an effect.")
+    return Plan(chosen, path, baked, files, effects)
+
+
+def _checked_starts(
+    component: str, building: Path | None, starts: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Return start values in the types of their variables; BuildError for what cannot be."""
+    known = catalogue.describe(component, building).variables
+    kinds = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,), "String": (str,)}
+    checked: dict[str, Any] = {}
+    for key, value in starts.items():
+        variable = known.get(key)
+        if variable is None or variable.causality not in ("parameter", "input"):
+            raise BuildError(f'{component} has no parameter "{key}".')
+        where = f"{component}.{key} = {value!r}"
+        if type(value) not in kinds[variable.kind]:
+            raise BuildError(f"{where}: a value of the type {variable.kind} is right.")
+        if variable.kind == "Real":
+            value = float(value)
+            low = -inf if variable.minimum is None else variable.minimum
+            high = inf if variable.maximum is None else variable.maximum
+            if not (isfinite(value) and low <= value <= high):
+                raise BuildError(f"{where}: a finite number in [{low!r}, {high!r}] is right.")
+        checked[key] = value
+    return checked
 
 
 def _only(right: str, component: str, what: str) -> None:
@@ -180,7 +209,7 @@ def built_guid(path: Path) -> str | None:
     try:
         with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
             found = re.search(rb'guid="([^"]*)"', file.read(4096))
-    except (OSError, KeyError, zipfile.BadZipFile):
+    except (OSError, KeyError, zipfile.BadZipFile, zlib.error):
         return None
     return found.group(1).decode() if found else None
 
@@ -217,8 +246,12 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
         return Path(
             FmuBuilder.build_FMU(script, dest=out, project_files={package, *extra}, **_OPTIONS)
         )
-    except (ImportError, SyntaxError, TypeError, ValueError, AssertionError) as error:
-        raise BuildError(f"{what.component}: pythonfmu cannot build it: {error}") from error
+    except OSError:
+        raise
+    except Exception as error:  # whatever a component or an effect of the user's raises at import
+        raise BuildError(
+            f"{what.component}: cannot be built: {type(error).__name__}: {error}"
+        ) from error
     finally:
         sys.path[:] = before
         for module in [name for name in sys.modules if digest in name]:
@@ -228,13 +261,17 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
 def _pack(loose: Path, target: Path) -> None:
     """Write the FMU again, in order and without times, and rename it into place."""
     part = target.with_suffix(".part")
-    with zipfile.ZipFile(loose) as old, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as new:
-        for name in sorted(old.namelist()):
-            entry = zipfile.ZipInfo(name, _EPOCH)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            entry.external_attr = 0o644 << 16
-            new.writestr(entry, old.read(name))
-    part.replace(target)
+    try:
+        with zipfile.ZipFile(loose) as old, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as new:
+            for name in sorted(old.namelist()):
+                entry = zipfile.ZipInfo(name, _EPOCH)
+                entry.compress_type = zipfile.ZIP_DEFLATED
+                entry.external_attr = 0o644 << 16
+                new.writestr(entry, old.read(name))
+        part.replace(target)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def ensure(component: str, building: Path | None = None) -> Path:

@@ -1,0 +1,101 @@
+"""Build a component into an FMU of its own: another building, a record baked in, another name."""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..fmu.build import Plan
+    from ..fmu.description import Description
+
+HELP = "build a component into an FMU"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle build`."""
+    parser.add_argument(
+        "component", metavar="COMPONENT", help="a name of `bristle list components`"
+    )
+    parser.add_argument(
+        "--from", dest="building", type=Path, metavar="FILE", help="building file, for a Structure"
+    )
+    parser.add_argument(
+        "--record",
+        type=Path,
+        metavar="FILE",
+        help="ground motion (PEER AT2, CSV or a name) to bake into a GroundMotion",
+    )
+    parser.add_argument("--name", help="the model's name and the file's; else the component's")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path(),
+        metavar="FOLDER",
+        help="where NAME.fmu goes, in place of an older one; else the current folder",
+    )
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Build one FMU, unless the same stands there already; say where it is and what it offers."""
+    from ..fmu.build import built_guid, plan
+    from ..fmu.description import read_description
+
+    what = plan(
+        arguments.component,
+        name=arguments.name,
+        building=arguments.building,
+        record=arguments.record,
+    )
+    target = arguments.out / f"{what.name}.fmu"
+    fresh = built_guid(target) == what.guid()
+    if not fresh:
+        _build(what, target)
+    description = read_description(target, any_platform=True)
+    if arguments.json:
+        import json
+
+        answer = {"file": str(target.absolute()), "built": not fresh, **_told(description)}
+        print(json.dumps(answer, indent=2))
+    else:
+        _print(target, description, fresh)
+    return 0
+
+
+def _build(what: Plan, target: Path) -> None:
+    """Build beside the target and rename into place, so that nothing else is left there."""
+    from ..errors import BuildError
+    from ..fmu.build import build
+
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.is_dir():
+            raise BuildError(f"{target}: is a folder; --name or --out elsewhere is right.")
+        with tempfile.TemporaryDirectory(prefix=".bristle_", dir=target.parent) as folder:
+            build(what, Path(folder)).replace(target)
+    except (FileExistsError, NotADirectoryError):
+        raise BuildError(f"{target.parent}: is a file; an FMU goes into a folder.") from None
+    except OSError as error:
+        raise BuildError(f"{target}: cannot be written: {error.strerror or error}.") from error
+
+
+def _told(description: Description) -> dict[str, Any]:
+    ports = {
+        kind: [{"name": v.name, "unit": v.unit} for v in description.of(causality)]
+        for kind, causality in (("inputs", "input"), ("outputs", "output"))
+    }
+    about = {"name": description.name, "guid": description.guid}
+    return {**about, **ports, "parameters": len(description.of("parameter"))}
+
+
+def _print(target: Path, description: Description, fresh: bool) -> None:
+    print(f"{target}: {'up to date' if fresh else 'built'}, guid {description.guid}")
+    for causality in ("input", "output"):
+        ports = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in description.of(causality)]
+        if ports:
+            print(f"  {causality}s: {', '.join(ports)}")
+    print(f"  {len(description.of('parameter'))} parameters: bristle list ports {target}")
+    print(f'In a scenario: fmu = "{target.name}", a path relative to the scenario\'s file.')

@@ -1,0 +1,232 @@
+"""The figure of a run: what the structure feels, and what the dampers do about it."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import GridSpec
+
+_TOP = re.compile(r"(?P<component>.*)\.floor(?P<floor>\d+)_acceleration_absolute")
+_SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (1.0, "")}
+_MOST_HISTORIES = 5
+_HISTORY, _LOOP = 1.75, 3.55
+"""Heights of the panels with their titles [in]."""
+_DPI = 160
+
+Array = np.ndarray[Any, Any]
+Draw = Callable[["Axes"], None]
+
+
+def run_figure(frame: pd.DataFrame, path: str | Path, *, title: str = "") -> None:
+    """Draw a run into an image file.
+
+    Panels: absolute acceleration of the top floor, base drift, voltages that vary, force over
+    displacement and over velocity of the dampers. What the scenario does not have is left out; if
+    nothing of it is there, its first outputs are drawn over time.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Results as `bristle.run` returns them.
+    path : path
+        The image; its ending decides the format, png, svg or pdf.
+    title : str
+        Above the panels; by default the scenario's title.
+
+    Raises
+    ------
+    RunError
+        If the file cannot be written or its ending is no format.
+    """
+    draw_run(frame, title).save(Path(path), dpi=_DPI)
+
+
+def draw_run(frame: pd.DataFrame, title: str = "") -> Page:
+    """Return the figure of a run, drawn and not yet written; see `run_figure`."""
+    run = _Run(frame)
+    histories, loops = run.histories(), run.loops()
+    if not histories and not loops:
+        histories = [run.history(name, name) for name in run.reals()[:4]]
+    room = _HISTORY * len(histories) + 0.3 * bool(histories) + _LOOP * bool(loops)
+    with look():
+        page = Page(9.6, room + 0.1, title or run.title(), run.subtitle())
+        if histories:
+            below = _LOOP * bool(loops)
+            grid = page.grid(len(histories), 1, top=0.35, bottom=below + 0.45, row_gap=0.45)
+            _draw_histories(page.figure, grid, histories)
+        if loops:
+            grid = page.grid(1, len(loops), top=room - _LOOP + 0.35, bottom=0.5)
+            for column, draw in enumerate(loops):
+                draw(page.figure.add_subplot(grid[0, column]))
+    return page
+
+
+def _draw_histories(figure: Figure, grid: GridSpec, histories: list[Draw]) -> None:
+    shared: Axes | None = None
+    for row, draw in enumerate(histories):
+        shared = figure.add_subplot(grid[row, 0], sharex=shared)
+        draw(shared)
+        last = row == len(histories) - 1
+        shared.tick_params(labelbottom=last)
+        if last:
+            shared.set_xlabel("time [s]", loc="right", labelpad=0)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What can be drawn of a frame of results."""
+
+    frame: pd.DataFrame
+
+    @property
+    def made(self) -> dict[str, Any]:
+        made: dict[str, Any] = self.frame.attrs.get("made", {})
+        return made
+
+    def title(self) -> str:
+        return str(self.made.get("title") or Path(str(self.made.get("file", "run"))).stem)
+
+    def subtitle(self) -> str:
+        made, parts = self.made, []
+        if not self.frame.attrs.get("complete", True):
+            parts.append(f"INCOMPLETE, stopped at t = {self.frame.index[-1]:.6g} s")
+        if made.get("step"):
+            parts.append(f"step {1e3 * made['step']:g} ms")
+        parts += [str(made[key]) for key in ("algorithm",) if made.get(key)]
+        overrides = made.get("overrides") or {}
+        parts += [f"{name} = {value}" for name, value in list(overrides.items())[:6]]
+        return "; ".join(parts)
+
+    def reals(self) -> list[str]:
+        return [str(name) for name in self.frame if self.frame[name].dtype.kind == "f"]
+
+    def histories(self) -> list[Draw]:
+        """Return accelerations and drifts of every structure, and voltages that vary."""
+        tops: dict[str, int] = {}
+        for name in self.reals():
+            if match := _TOP.fullmatch(name):
+                tops[match["component"]] = max(int(match["floor"]), tops.get(match["component"], 0))
+        many, draws = len(tops) > 1, []
+        for component, floor in tops.items():
+            of = f", {component}" if many else ""
+            name = f"{component}.floor{floor}_acceleration_absolute"
+            ground = self.wires().get(f"{component}.ground_acceleration", "")
+            what = f"Absolute acceleration of floor {floor}{of}"
+            draws.append(self.history(name, what, ground=ground))
+            base = f"{component}.base_displacement"
+            drift = base if base in self.frame else f"{component}.drift1"
+            what = "Base drift" if drift == base else "Drift of the first storey"
+            if drift in self.frame:
+                draws.append(self.history(drift, what + of, stroke=drift == base and not many))
+        if not tops:
+            moved = [name for name in self.reals() if name.endswith(".displacement")]
+            draws += [self.history(name, f"Displacement, {name[:-13]}") for name in moved]
+        draws += [self.history(name, f"Voltage, {name[:-8]}") for name in self._varying()]
+        return draws[:_MOST_HISTORIES]
+
+    def _varying(self) -> list[str]:
+        names = [name for name in self.reals() if name.endswith(".voltage")]
+        return [name for name in names if np.ptp(self.frame[name].to_numpy()) > 0.0]
+
+    def wires(self) -> dict[str, str]:
+        """Return the connections of the scenario, input to output."""
+        wires: dict[str, str] = tomllib.loads(self.made.get("scenario", "")).get("connections", {})
+        return wires
+
+    def history(self, name: str, title: str, *, stroke: bool = False, ground: str = "") -> Draw:
+        """Return what draws one output over time, its peak marked, over that of the ground."""
+
+        def draw(axes: Axes) -> None:
+            time = self.frame.index.to_numpy()
+            values, unit = self._shown(name)
+            axes.axhline(0.0, color=PALE, linewidth=0.8, zorder=1)
+            if ground in self.frame:
+                axes.plot(time, self.frame[ground].to_numpy(), color="#9a9a9a", linewidth=0.8)
+                axes.set_title("grey: ground", loc="right", fontsize=8.5, color=GREY)
+            axes.plot(time, values, color=BLUE, linewidth=0.9)
+            axes.set_title(title + _bracketed(unit))
+            axes.margins(x=0.0, y=0.2)
+            if len(time) > 1:
+                axes.set_xlim(time[0], time[-1])
+            words = f" {unit} at {{time:.4g}} s" + (self._of_stroke() if stroke else "")
+            _mark_peak(axes, time, values, words)
+
+        return draw
+
+    def _of_stroke(self) -> str:
+        ratios = [name for name in self.reals() if name.endswith(".stroke_ratio")]
+        if len(ratios) != 1:
+            return ""
+        return f", {np.nanmax(self.frame[ratios[0]].to_numpy()):.0%} of the damper's stroke"
+
+    def loops(self) -> list[Draw]:
+        """Return force over displacement and force over velocity of all dampers."""
+        wires = self.wires()
+        dampers = [name[:-6] for name in self.reals() if name.endswith(".force")]
+        draws = []
+        for motion in ("displacement", "velocity"):
+            pairs = [
+                (damper, source)
+                for damper in dampers
+                if (source := wires.get(f"{damper}.{motion}", "")) in self.frame
+            ]
+            if pairs:
+                draws.append(self._loop(motion, pairs))
+        return draws
+
+    def _loop(self, motion: str, pairs: list[tuple[str, str]]) -> Draw:
+        def draw(axes: Axes) -> None:
+            zero_lines(axes)
+            for number, (damper, source) in enumerate(pairs):
+                across, unit = self._shown(source)
+                force, force_unit = self._shown(f"{damper}.force")
+                colour = COLOURS[number % len(COLOURS)]
+                axes.plot(across, force, color=colour, linewidth=0.6, label=damper)
+                axes.set_xlabel(motion + _bracketed(unit))
+                axes.set_title(f"Damper force{_bracketed(force_unit)} over {motion}")
+                if len(pairs) == 1:
+                    _mark_peak(axes, across, force, f" {force_unit}")
+            axes.margins(y=0.12)
+            if len(pairs) > 1:
+                axes.legend(labelcolor="linecolor")
+
+        return draw
+
+    def _shown(self, name: str) -> tuple[Array, str]:
+        """Return an output as it is shown, and its unit ("" without one)."""
+        unit = self.frame.attrs.get("units", {}).get(name) or ""
+        factor, shown = _SHOWN.get(unit, (1.0, unit))
+        return self.frame[name].to_numpy() * factor, shown
+
+
+def _mark_peak(axes: Axes, across: Array, values: Array, words: str) -> None:
+    """Mark the largest absolute value and write it beside, on the side where there is room."""
+    size = np.abs(values)
+    if not np.isfinite(size).any() or not np.nanmax(size) > 0.0:
+        return
+    at = int(np.nanargmax(size))
+    low, high = axes.get_xlim()
+    on_the_left = across[at] > low + 0.55 * (high - low)
+    axes.plot(across[at], values[at], "o", color=VERMILION, markersize=4.5, zorder=4)
+    text = f"{size[at]:.4g}{words.format(time=across[at])}"
+    # Above a maximum and below a minimum there is no line.
+    aside, side = (-5, "right") if on_the_left else (5, "left")
+    away, edge = (3, "bottom") if values[at] > 0.0 else (-3, "top")
+    label(axes, text, across[at], values[at], VERMILION, xytext=(aside, away), ha=side, va=edge)
+
+
+def _bracketed(unit: str) -> str:
+    return f" [{unit}]" if unit else ""

@@ -1,0 +1,171 @@
+"""The documentation: it renders, its blocks run, what it shows is what the commands print."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+import bristle
+from bristle.cli import build_parser
+from bristle.fmu import catalogue
+from bristle.physics.effect import EFFECTS
+from bristle.report.paper import paper_figures
+
+ROOT = Path(__file__).resolve().parent.parent
+DOCS = ROOT / "docs"
+
+
+def load(name: str) -> ModuleType:
+    """Return a script of docs/ as a module."""
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module  # dataclasses look themselves up there
+    spec.loader.exec_module(module)
+    return module
+
+
+snippets = load("snippets")
+generate = load("generate")
+PAGES = {str(page.relative_to(ROOT)): page for page in snippets.all_pages()}
+
+
+@pytest.mark.parametrize("page", PAGES)
+@pytest.mark.skipif(sys.platform == "win32", reason="the pages' commands are for a POSIX shell")
+def test_what_a_page_shows_is_what_its_commands_print(page: str) -> None:
+    assert snippets.run_page(PAGES[page]) > 0
+
+
+def test_the_readme_and_the_main_pages_are_among_those_that_run() -> None:
+    assert {"README.md", "docs/quickstart.md", "docs/elsewhere.md", "docs/flow.md"} <= set(PAGES)
+
+
+@pytest.mark.parametrize(
+    ("said", "same"),
+    [
+        ("a\nb\nc\n", True),
+        ("a\n...\nc\n", True),
+        ("...\nb\n...\n", True),
+        ("a\n...\nb\n", False),
+        ("...\nd\n...\n", False),
+        ("a\nb\n", False),
+    ],
+)
+def test_an_output_is_compared_line_by_line_but_for_what_is_left_out(said: str, same: bool) -> None:
+    assert snippets.same(said, "a\nb\nc\n") is same
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("```python\nprint(1 + 1)\n```\n\n```text\n3\n```\n", "the page says"),
+        ("```python\nprint(1 + 1)\n```\n", "no block follows"),
+        ("```python\nraise ValueError\n```\n", "a python block fails"),
+        ("```console\n$ bristle check gone.toml\n```\n", "gone.toml"),
+        ("```console\n$ bristle --version\nbristle 9.9.9\n```\n", "the page says"),
+    ],
+)
+def test_a_page_that_is_wrong_is_found(body: str, words: str, tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(f"# Page\n\n{body}")
+    with pytest.raises(snippets.SnippetError, match=words):
+        snippets.run_page(page)
+
+
+def test_a_page_is_brought_up_to_date(tmp_path: Path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text("```console\n$ bristle --version\nold\n```\n\n```python\nprint(2)\n```\n\n"
+                    "```text\nold\n```\n")  # fmt: skip
+    assert snippets.run_page(page, update=True) == 2
+    assert f"$ bristle --version\nbristle {bristle.__version__}\n```" in page.read_text()
+    assert snippets.run_page(page) == 2
+
+
+def test_the_site_renders_without_a_warning(tmp_path: Path) -> None:
+    pytest.importorskip("mkdocs")
+    pytest.importorskip("material")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    for path in generate.pages():
+        page = tmp_path / "site" / path.removesuffix("index.md").removesuffix(".md")
+        assert (page / "index.html").is_file()
+
+
+def test_every_component_has_a_page_with_all_its_ports_and_parameters() -> None:
+    pages = generate.pages()
+    for name in catalogue.component_names():
+        text = pages[f"components/{name}.md"]
+        for variable in catalogue.describe(name).variables.values():
+            if "." not in variable.name:
+                assert f"| `{variable.name}` |" in text
+                assert variable.unit is None or f"`{variable.unit}`" in text
+
+
+def test_every_effect_has_a_page_with_text_parameters_and_source() -> None:
+    pages = generate.pages()
+    for name, effect in EFFECTS.items():
+        text = pages[f"effects/{name}.md"]
+        assert effect.first_line() in text
+        assert effect.source in text
+        assert effect.expect[1:] in text
+        body = generate.tell(effect)["text"]
+        assert len(body) > 60
+        assert body in text
+        for parameter, about in effect.parameters.items():
+            assert f"| `{name}.{parameter}` | {about.value:g} |" in text
+
+
+def test_tables_of_generated_pages_are_whole() -> None:
+    for path, text in generate.pages().items():
+        for block in re.findall(r"(?:^\|.*\|$\n?)+", text, re.MULTILINE):
+            widths = {len(re.findall(r"(?<!\\)\|", line)) for line in block.splitlines()}
+            assert len(widths) == 1, f"{path}: {block}"
+
+
+def links(text: str) -> list[str]:
+    prose = re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL)
+    return re.findall(r"\]\(([^)#\s]+)[^)]*\)", prose)
+
+
+@pytest.mark.parametrize("name", ["README.md", "CONTRIBUTING.md"])
+def test_links_lead_somewhere(name: str) -> None:
+    found = links((ROOT / name).read_text(encoding="utf-8"))
+    assert found
+    for link in found:
+        assert link.startswith("https://") or (ROOT / link).exists(), link
+
+
+def test_every_command_is_documented() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in [*DOCS.glob("*.md")])
+    commands = next(a for a in build_parser()._actions if a.dest == "command").choices
+    assert commands is not None
+    assert [name for name in commands if f"bristle {name}" not in text] == []
+
+
+def test_every_figure_is_in_the_gallery() -> None:
+    text = (DOCS / "figures.md").read_text(encoding="utf-8")
+    for name in paper_figures():
+        assert f"bristle figures {name}" in text
+        assert f"(figures/{name}.png)" in text
+        assert (DOCS / "figures" / f"{name}.png").is_file()
+
+
+def test_the_citation_names_this_version_and_the_paper() -> None:
+    text = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {bristle.__version__}\n" in text
+    for name in ("Shirazi", "Mohammadpour", "Grigoriadis", "Song", "Control Systems Technology"):
+        assert name in text

@@ -1,0 +1,63 @@
+"""`bristle effects`: everything about every effect, from the code."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from bristle.cli import main
+from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
+from bristle.physics.effect import EFFECTS
+
+
+def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert main(["effects", *arguments]) == 0
+    return capsys.readouterr().out
+
+
+def test_all_effects_are_listed_with_their_data(capsys: pytest.CaptureFixture[str]) -> None:
+    rows = json.loads(answer(capsys, "--json"))
+    assert [row["name"] for row in rows] == sorted(EFFECTS)
+    for row in rows:
+        effect = EFFECTS[row["name"]]
+        assert (row["site"], row["source"], row["expect"]) == (
+            effect.site,
+            effect.source,
+            effect.expect,
+        )
+        assert set(row["parameters"]) == set(effect.parameters)
+
+
+@pytest.mark.parametrize("name", sorted(EFFECTS))
+def test_one_effect_is_told_in_full(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    said = answer(capsys, name)
+    effect = EFFECTS[name]
+    assert effect.first_line() in said
+    assert effect.source in said
+    assert effect.expect in said
+    for parameter, about in effect.parameters.items():
+        assert f"{name}.{parameter} = {about.value:g}" in said
+        assert about.text in said
+
+
+def test_in_a_pipe_every_effect_has_its_block(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = answer(capsys).splitlines()
+    assert [line.partition(" ")[0] for line in lines if line[0] != " "][:-1] == sorted(EFFECTS)
+
+
+def test_on_a_terminal_there_is_a_table(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "160")
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    said = answer(capsys)
+    assert "when it is missing" in said
+    assert all(name in said for name in EFFECTS)
+
+
+def test_an_unknown_effect_is_an_error_that_names_the_nearest(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["effects", "gas_sprin"]) == 2
+    assert 'Did you mean "gas_spring"?' in capsys.readouterr().err
