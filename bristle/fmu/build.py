@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import re
 import shutil
+import subprocess
 import sys
 import tempfile
 import zipfile
@@ -196,12 +198,55 @@ def build(what: Plan, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         with FileLock(folder / ".lock"):
             if built_guid(target) != guid:
-                with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
-                    loose = _build_loose(what, guid, Path(temporary))
-                    _pack(loose, target)
+                if _pythonfmu_is_whole():
+                    with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
+                        _pack(_build_loose(what, guid, Path(temporary)), target)
+                else:
+                    _build_elsewhere(what, guid, target)
     except OSError as error:
         raise BuildError(f"{target}: cannot be written ({error.strerror or error}).") from error
     return target
+
+
+def _pythonfmu_is_whole() -> bool:
+    """Return whether pythonfmu is the installed one, with binaries.
+
+    An FMU that this process loaded before may have put its own copy, without them, in its place.
+    """
+    import pythonfmu
+
+    return (Path(pythonfmu.__file__).parent / "resources" / "binaries").is_dir()
+
+
+def _build_elsewhere(what: Plan, guid: str, target: Path) -> None:
+    """Build in a fresh interpreter, where no FMU was loaded."""
+    order = {
+        "name": what.name,
+        "component": str(what.component),
+        "baked": what.baked,
+        "files": {name: str(path) for name, path in what.files.items()},
+        "effects": [str(path) for path in what.effects],
+        "guid": guid,
+        "target": str(target),
+    }
+    path = os.pathsep.join([str(_PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
+    child = subprocess.run(
+        [sys.executable, "-c", "from bristle.fmu.build import _serve; _serve()"],
+        input=json.dumps(order), env={**os.environ, "PYTHONPATH": path}, capture_output=True,
+        text=True, check=False,
+    )  # fmt: skip
+    if child.returncode != 0:
+        raise BuildError(f"{what.component}: cannot be built: {child.stderr.strip()[-500:]}")
+
+
+def _serve() -> None:
+    """Build what stands on the standard input; the other end of `_build_elsewhere`."""
+    order = json.load(sys.stdin)
+    files = {name: Path(path) for name, path in order["files"].items()}
+    effects = tuple(Path(path) for path in order["effects"])
+    what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects)
+    with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
+        _pack(_build_loose(what, order["guid"], Path(temporary)), Path(order["target"]))
 
 
 def built_guid(path: Path) -> str | None:
@@ -227,13 +272,9 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
     for inner in (package, package / "fmu"):
         (inner / "__init__.py").write_text("", encoding="utf-8")
     for path in what.effects:
-        shutil.copyfile(path, package / "physics" / "effects" / path.name)
-    source = what.component.read_text(encoding="utf-8")
+        _copy_renamed(path, package / "physics" / "effects" / path.name, package.name)
     script = folder / f"{what.component.stem}_{digest}.py"
-    script.write_text(
-        re.sub(r"^from bristle\.", f"from {package.name}.", source, flags=re.MULTILINE),
-        encoding="utf-8",
-    )
+    _copy_renamed(what.component, script, package.name)
     (folder / BAKED).write_text(
         json.dumps({**what.baked, "guid": guid}, sort_keys=True), encoding="utf-8"
     )
@@ -258,18 +299,28 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
             del sys.modules[module]
 
 
+def _copy_renamed(source: Path, target: Path, package: str) -> None:
+    """Copy a Python file; what it imports from bristle it imports from the bundled package."""
+    text = source.read_text(encoding="utf-8")
+    text = re.sub(r"^(\s*)from bristle\.", rf"\1from {package}.", text, flags=re.MULTILINE)
+    target.write_text(text, encoding="utf-8")
+
+
 def _pack(loose: Path, target: Path) -> None:
     """Write the FMU again, in order and without times, and rename it into place."""
     part = target.with_suffix(".part")
     try:
         with zipfile.ZipFile(loose) as old, zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as new:
-            for name in sorted(old.namelist()):
+            names = sorted(old.namelist())
+            if not any(name.startswith("binaries/") for name in names):
+                raise BuildError(f"{target}: the installed pythonfmu holds no binaries.")
+            for name in names:
                 entry = zipfile.ZipInfo(name, _EPOCH)
                 entry.compress_type = zipfile.ZIP_DEFLATED
                 entry.external_attr = 0o644 << 16
                 new.writestr(entry, old.read(name))
         part.replace(target)
-    except OSError:
+    except (OSError, BuildError):
         part.unlink(missing_ok=True)
         raise
 
