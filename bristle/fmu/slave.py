@@ -303,6 +303,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             )
         return False
 
+    def log(self, msg: str, status: Any = Fmi2Status.ok, *more: Any) -> None:
+        # Hosts take a message for the format of a printf: a "%s" in a path would read wild memory.
+        super().log(msg.replace("%", "%%"), status, *more)
+
     def warn_once(self, text: str) -> None:
         """Log a warning, the first time only."""
         if text not in self._warned:
@@ -328,7 +332,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             wrong = f"{error}" or type(error).__name__
         if wrong:
             for index, value in zip(self._outputs, held):
-                values[index] = value
+                values[index] = 0.0 if final else value
             if final:
                 self._stop(BAD_PARAMETER, wrong)
 
@@ -438,6 +442,16 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         }
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        try:
+            self._take(state)
+        except Exception as error:  # an exception would poison the binary: it becomes a fault
+            self.fault = 0
+            self._stop(BAD_STATE, f"the state cannot be set: {error!r}")
+
+    def _take(self, state: dict[str, Any]) -> None:
+        parameters = [] if self._unbuilt else self._fixed()
+        if [type(value) for value in state["values"]] != [type(value) for value in self._values]:
+            raise ValueError("it is not one of this FMU.")
         self._values[:] = state["values"]
         self._set = set(state["set"])
         self._mode = state["mode"]
@@ -445,12 +459,25 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._warned = set(state["warned"])
         self._unbuilt = state["unbuilt"]
         self._stale = self._unbuilt
-        if not self._unbuilt:
-            # The state may come from another instance, with other parameters.
+        if self._unbuilt:
+            return
+        if parameters != self._fixed():  # a state of another instance, or from before a reset
             outputs = list(self._values)
             self.configure()
             self._values[:] = outputs
-            self.set_inner(state["inner"])
+        self.set_inner(state["inner"])
+
+    def _fixed(self) -> list[Any]:
+        """Return the values of the parameters."""
+        return [self._values[index] for index in sorted(self._parameters)]
+
+    @staticmethod
+    def _fmu_state_from_bytes(state: bytes) -> dict[str, Any]:
+        try:
+            found = json.loads(state.decode("utf-8"))
+        except ValueError:
+            found = None
+        return found if isinstance(found, dict) else {"values": []}
 
     # -- the model description
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..errors import PhysicsError
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .bingham import Bingham
 from .effect import effects_of
@@ -24,6 +25,12 @@ LAW_CODES = {"bingham": BINGHAM, "lugre": LUGRE}
 IMPLICIT_STEP = 5e-4
 """Longest substep [s] of states that move by `rate`."""
 
+MOST_TRIALS = 60
+"""How many speeds of a joint are tried in a substep; about six are the rule."""
+
+DIRECTED = 2
+"""Stands for `halts` where `halt` is not a force but the direction of the friction, -1 to 1."""
+
 _GAMMA = 1.0 - 0.5 * 2.0**0.5
 
 
@@ -37,6 +44,16 @@ def _motion_source(layout: Layout) -> str:
         "    return x, v",
     ]
     return "\n".join(lines)
+
+
+def _series_source(layout: Layout) -> str:
+    lines = ["def series_element(on):"]
+    for effect in layout.effects:
+        if effect.joint:
+            slots = [str(layout.states[effect.name + "." + name]) for name in effect.joint]
+            lines.append(f"    if on[{layout.switches[effect.name]}]:  # {effect.name}")
+            lines.append(f"        return {', '.join(slots)}")
+    return "\n".join([*lines, "    return -1, -1"])
 
 
 def _evaluate_source(layout: Layout) -> str:
@@ -62,7 +79,6 @@ def _evaluate_source(layout: Layout) -> str:
         *switched(layout, "force", "added += {call}", **q),
         "    factor = 1.0",
         *switched(layout, "factor", "factor *= {call}", **q),
-        *switched(layout, "halt", "halt = {call}; halts = True", **q),
         "    if law == 1:",
         f"        lugre = LuGreP({lugre})",
         "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
@@ -76,6 +92,8 @@ def _evaluate_source(layout: Layout) -> str:
         "        limit = Bingham_yielding(V, bingham) * yield_factor * factor",
         "        if directed:",
         "            friction = limit * direction",
+        f"        elif halts == {DIRECTED}:",
+        "            friction = limit * halt",
         "        elif halts:",
         "            friction = min(max(halt - rest, -limit), limit)",
         "        elif v > 0.0:",
@@ -95,9 +113,10 @@ def _evaluate_source(layout: Layout) -> str:
 
 def reweave() -> None:
     """Weave the damper's functions anew; call it after effects were registered late."""
-    global LAYOUT, evaluate, inner_motion
+    global LAYOUT, evaluate, inner_motion, series_element
     LAYOUT = Layout("damper", LAW_PARAMETERS, LAW_STATES)
     inner_motion = weave("inner_motion", _motion_source(LAYOUT), LAYOUT)
+    series_element = weave("series_element", _series_source(LAYOUT), LAYOUT)
     evaluate = weave(
         "evaluate",
         _evaluate_source(LAYOUT),
@@ -123,6 +142,7 @@ BINGHAM_VALUES = _values(Bingham)
 LAYOUT: Layout
 evaluate: Any
 inner_motion: Any
+series_element: Any
 reweave()
 
 
@@ -134,8 +154,8 @@ def advance_implicit(
     """Advance the states that move by `rate` over dt [s], in place, with inputs linear in time.
 
     Rosenbrock's method of order two and L-stable (ROS2: Verwer, Spee, Blom & Hundsdorfer 1999,
-    SIAM J. Sci. Comput. 20(4)), Jacobian by differences: the inner joint of a mount is stiff. As
-    many equal substeps as keep each below `IMPLICIT_STEP`.
+    SIAM J. Sci. Comput. 20(4)), Jacobian by differences. As many equal substeps as keep each below
+    `IMPLICIT_STEP`.
 
     `moving` lists the slots of those states in `z`, `n_moving` says how many; `work` holds
     `work_size(len(z))` floats or more.
@@ -181,7 +201,9 @@ def advance_implicit(
             y[slot] = z[slot]
             for i in range(n):
                 matrix[i * n + j] = -_GAMMA * h * (unused[moving[i]] - g[moving[i]]) / nudge
-            matrix[j * n + j] += 1.0
+            # What grows is left to the explicit part: 1 - gamma h J would pass through zero there,
+            # and the method keeps its order with any matrix.
+            matrix[j * n + j] = 1.0 + max(matrix[j * n + j], 0.0)
         for i in range(n):
             k1[i] = f[moving[i]] + drift[i]
         for i in range(n * n):
@@ -195,6 +217,81 @@ def advance_implicit(
         solve_in_place(matrix, k2, n)
         for i in range(n):
             z[moving[i]] += h * (1.5 * k1[i] + 0.5 * k2[i])
+
+
+def advance_joint(
+    law: int, x0: float, v0: float, a0: float, V0: float, x1: float, v1: float, a1: float,
+    V1: float, dt: float, energy: float, z: Row, p: Row, on: Row, travel: int, joint: int,
+    work: Row,
+) -> None:  # fmt: skip
+    """Advance a series element and the bristle over dt [s], in place, rod and voltage linear.
+
+    The joint is so light that its force balance decides. On the falling branch of the viscous part,
+    and where the motion turns, a linearised step would throw it about. So in each substep its
+    velocity at the end is found by bracketing (regula falsi with the Illinois rule): implicit Euler
+    for the joint, the trapezoidal rule for the travel between rod and fluid, the bristle exactly.
+    Friction that can stop the joint does.
+
+    `travel`, `joint` are the slots of the series element in `z`.
+    """
+    size = len(z)
+    y, dz, unused = work[0:size], work[size : 2 * size], work[2 * size : 3 * size]
+    count = max(1, int(dt / IMPLICIT_STEP + 0.999999))
+    h = dt / count
+    for k in range(count):
+        begin, e = v0 + k / count * (v1 - v0), (k + 1.0) / count
+        x, v = x0 + e * (x1 - x0), v0 + e * (v1 - v0)
+        a, V = a0 + e * (a1 - a0), V0 + e * (V1 - V0)
+        direction = 1.0
+        at_low = joint_excess(
+            law, x, v, a, V, begin, h, energy, 0.0, 1.0, z, p, on, travel, joint, y, dz, unused
+        )
+        if at_low >= 0.0:
+            direction = -1.0
+            at_low = -joint_excess(
+                law, x, v, a, V, begin, h, energy, 0.0, -1.0, z, p, on, travel, joint, y, dz, unused
+            )
+        low, high, at_high, last = 0.0, 0.0, 0.0, 0
+        speed = max(direction * z[joint], direction * v, 1e-6)
+        for _ in range(MOST_TRIALS if at_low < 0.0 else 0):  # else the joint stands still
+            excess = direction * joint_excess(
+                law, x, v, a, V, begin, h, energy, direction * speed, direction, z, p, on, travel,
+                joint, y, dz, unused,
+            )  # fmt: skip
+            if abs(excess) <= 1e-10 + 1e-9 * speed:
+                break
+            if excess < 0.0:
+                at_high *= 0.5 if last < 0 else 1.0
+                low, at_low, last = speed, excess, -1
+            else:
+                at_low *= 0.5 if last > 0 else 1.0
+                high, at_high, last = speed, excess, 1
+            if at_high > 0.0:
+                speed = (low * at_high - high * at_low) / (at_high - at_low)
+            else:
+                speed *= 2.0
+        for i in range(size):
+            z[i] = y[i]
+
+
+def joint_excess(
+    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, energy: float,
+    inner: float, direction: float, z: Row, p: Row, on: Row, travel: int, joint: int, y: Row,
+    dz: Row, unused: Row,
+) -> float:  # fmt: skip
+    """Return by how much `inner` [m/s] exceeds what the forces over h [s] give the joint.
+
+    x, v, a, V belong to the rod at the end, `begin` is its velocity at the begin, `direction` that
+    of the friction; y is filled with the state at the end that goes with `inner`.
+    """
+    for i in range(len(z)):
+        y[i] = z[i]
+    y[joint] = inner
+    y[travel] = z[travel] + 0.5 * h * (begin - z[joint] + v - inner)
+    if law == 1:
+        y[0] = lugre_advance(z[0], 0.5 * (z[joint] + inner), h, p[6])
+    evaluate(law, x, v, a, V, h, energy, direction, DIRECTED, y, p, on, dz, unused)
+    return inner - z[joint] - h * dz[joint]  # type: ignore[no-any-return]
 
 
 def step(
@@ -227,15 +324,20 @@ def step(
         z1[i] = z0[i]
     if advances:
         evaluate(law, x1, v1, a1, V1, dt, energy, halt, halts, z0, p, on, work[0:size], z1)
+    travel, joint = series_element(on)
+    if joint >= 0:
+        advance_joint(
+            law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, z1, p, on, travel, joint, work
+        )
+    elif law == 1 and n_moving == 0:
+        _, vs = inner_motion(x0, v0, a0, V0, dt, energy, z0, p, on)
+        _, ve = inner_motion(x1, v1, a1, V1, dt, energy, z1, p, on)
+        z1[0] = lugre_advance(z0[0], 0.5 * (vs + ve), dt, p[6])
     if n_moving > 0:
         advance_implicit(
             law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, moving,
             n_moving, work,
         )  # fmt: skip
-    elif law == 1:
-        _, vs = inner_motion(x0, v0, a0, V0, dt, energy, z0, p, on)
-        _, ve = inner_motion(x1, v1, a1, V1, dt, energy, z1, p, on)
-        z1[0] = lugre_advance(z0[0], 0.5 * (vs + ve), dt, p[6])
     return evaluate(  # type: ignore[no-any-return]
         law, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, work[0:size], work[size : 2 * size]
     )
@@ -253,15 +355,18 @@ def work_size() -> int:
 def moving_states(law: str, switched_on: list[str]) -> list[int]:
     """Return the slots that move by `rate` when these effects are on; empty if none does.
 
-    The bristle moves with them, for it is coupled to the inner joint of a series element.
+    The bristle moves with them, unless a series element carries it along.
     """
+    effects = [effect for effect in LAYOUT.effects if effect.name in switched_on]
     slots = [
         LAYOUT.states[effect.name + "." + state]
-        for effect in LAYOUT.effects
-        if effect.name in switched_on and "rate" in effect.hooks()
+        for effect in effects
+        if "rate" in effect.hooks()
         for state in effect.states
+        if state not in effect.joint
     ]
-    return ([0] if law == "lugre" else []) + slots if slots else []
+    carried = any(effect.joint for effect in effects)
+    return ([0] if law == "lugre" and not carried else []) + slots if slots else []
 
 
 def advances(switched_on: list[str]) -> bool:
@@ -289,6 +394,11 @@ class DamperModel:
         effects: list[str] | None = None,
     ) -> None:
         values, effects = values or {}, effects or []
+        series = [
+            effect.name for effect in LAYOUT.effects if effect.joint and effect.name in effects
+        ]
+        if len(series) > 1:
+            raise PhysicsError("{} are series elements: one is right.".format(" and ".join(series)))
         self.law = LAW_CODES[law]
         self.p = pack(law, values)
         self.on = [effect.name in effects for effect in LAYOUT.effects]

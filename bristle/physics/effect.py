@@ -25,7 +25,6 @@ HOOKS = (
     "force",
     "spring",
     "factor",
-    "halt",
     "reaction",
     "rate",
     "advance",
@@ -82,6 +81,9 @@ class Effect:
         Names of the signals in `q` that the hooks use.
     states, parameters
         `{name: unit}` and `{name: Parameter}`; start values of states are zero.
+    joint
+        Of a series element: the names of two states, the travel between rod and fluid [m] and the
+        velocity across the fluid [m/s]; the integrator finds both, from the second one's `rate`.
     passive, zero_at_rest, excludes, source, expect
         See each effect; conformance tests hold the first two.
     """
@@ -92,6 +94,7 @@ class Effect:
     needs: ClassVar[tuple[str, ...]] = ()
     states: ClassVar[dict[str, str]] = {}
     parameters: ClassVar[dict[str, Parameter]] = {}
+    joint: ClassVar[tuple[str, ...]] = ()
     passive: ClassVar[bool] = False
     zero_at_rest: ClassVar[bool] = True
     excludes: ClassVar[tuple[str, ...]] = ()
@@ -135,6 +138,8 @@ def _check(effect: type[Effect]) -> None:
         raise PhysicsError(f"{where}: its states move by `rate` or by `advance`, not both.")
     if effect.states and not ("rate" in effect.hooks() or "advance" in effect.hooks()):
         raise PhysicsError(f"{where}: has states and neither `rate` nor `advance`.")
+    if effect.joint and (len(effect.joint) != 2 or not set(effect.joint) <= set(effect.states)):
+        raise PhysicsError(f"{where}: joint = {effect.joint}; the names of two states are right.")
     if not (effect.__doc__ or "").strip():
         raise PhysicsError(f"{where}: a first docstring line tells users what it is.")
     for name, parameter in effect.parameters.items():

@@ -53,5 +53,5 @@ class LuGre:
         """Return the bristle deflection [m] after dt [s] at constant velocity v [m/s], exactly."""
         slip = a_0 * abs(v) * dt
         if slip < 1e-9:
-            return z + v * dt
+            return z + (v - a_0 * abs(v) * z) * dt
         return z * exp(-slip) - v / (a_0 * abs(v)) * expm1(-slip)

@@ -266,7 +266,8 @@ class StructureModel:
                 self.p[LAYOUT.parameters[key]] = values.get(key, parameter.value)
         self.z = [values.get(name + "_0", 0.0) for name in LAYOUT.states]
         self._step: dict[float, tuple[int, StepMatrices]] = {}
-        self._forces = [0.0] * self.m.n
+        self._unloaded = [0.0] * self.m.n
+        self.settle()
 
     def step(self, dt: float, a0: float, a1: float, force: float) -> None:
         """Advance over dt [s]: a_g linear from a0 to a1 [m/s2], the devices' force [N] held."""
@@ -281,6 +282,7 @@ class StructureModel:
                 force, force, 0.0, self.z, self.p, self.on, self.active, x1, z1, room,
             )  # fmt: skip
             self.x, self.z = x1, z1
+        self.settle()
 
     def _matrices(self, dt: float) -> tuple[int, StepMatrices]:
         """Return how many substeps dt takes and the matrices of one; kept for the last few dt."""
@@ -292,27 +294,26 @@ class StructureModel:
             known = self._step[dt] = (count, step_matrices(self.m, dt / count))
         return known
 
-    def effect_forces(self, dt: float) -> list[float]:
-        """Return the forces of the effects on the levels (n,) [N] at the present state."""
+    def settle(self) -> None:
+        """Compute what follows from the state alone, so that a new device force costs little.
+
+        Call it after the state was set from outside; `step` does so itself.
+        """
+        m = self.m
+        loads = [0.0] * m.n
         if self.active:
-            m = self.m
             effect_forces(
-                m.n, m.isolated, m.stiffnesses, self.x, dt, 0.0, 0.0, self.z, self.p, self.on,
-                self._forces,
+                m.n, m.isolated, m.stiffnesses, self.x, inf, 0.0, 0.0, self.z, self.p, self.on,
+                loads,
             )  # fmt: skip
-        return self._forces
+        accelerations(m.n, m.M_inverse, m.C, m.K, self.x, loads, self._unloaded)
+        self._hold = holding_force(m.n, m.C, m.K, m.mass, self.x, 0.0, loads[0])
 
     def absolute_accelerations(self, force: float) -> list[float]:
         """Return q'' + a_g (n,) [m/s2] under the devices' force [N] on the first level."""
-        loads = list(self.effect_forces(inf))
-        loads[0] += force
-        m = self.m
-        out = [0.0] * m.n
-        accelerations(m.n, m.M_inverse, m.C, m.K, self.x, loads, out)
-        return out
+        n, inertia = self.m.n, self.m.M_inverse
+        return [self._unloaded[i] - inertia[i * n] * force for i in range(n)]
 
     def holding_force(self, a_g: float, others: float) -> float:
         """Return the damper force [N] at which the first level stays at its velocity."""
-        m = self.m
-        others += self.effect_forces(inf)[0]
-        return holding_force(m.n, m.C, m.K, m.mass, self.x, a_g, others)
+        return self._hold - self.m.mass * a_g - others

@@ -14,7 +14,7 @@ class MountCompliance(Effect):
 
     name = "mount_compliance"
     site = "damper"
-    needs = ("rod_x", "rod_v", "dt", "force")
+    needs = ("rod_x", "rod_v", "force")
     passive = True
     zero_at_rest = True
     source = "Makris & Constantinou (1991), J. Struct. Eng. 117(9), 2708-2724 (Maxwell element)"
@@ -22,6 +22,7 @@ class MountCompliance(Effect):
         "the force turns late and softly after each reversal of the motion, by force over stiffness"
     )
     states = {"compression": "m", "joint_velocity": "m/s"}
+    joint = ("compression", "joint_velocity")
     parameters = {
         "k": Parameter(2e4, "N/m", (1e2, 1e9), "stiffness of the mount"),
         "c": Parameter(60.0, "N.s/m", (0.0, 1e6), "damping of the mount"),
@@ -31,10 +32,6 @@ class MountCompliance(Effect):
     @staticmethod
     def motion(q, z, p):
         return q.rod_x - z.compression, z.joint_velocity
-
-    @staticmethod
-    def halt(q, z, p):
-        return p.mass * z.joint_velocity / q.dt + p.k * z.compression + p.c * q.rod_v
 
     @staticmethod
     def reaction(q, z, p):

@@ -17,7 +17,10 @@ class StoreySoftening(Effect):
     needs = ("drift", "stiffness", "storey")
     passive = True
     zero_at_rest = True
-    source = "Kinematically exact P-delta and connection softening as a rational secant stiffness"
+    source = (
+        "Darendeli (2001), PhD thesis, University of Texas at Austin: G/G_max = 1/(1 + (g/g_r)^a), "
+        "here for a storey's secant stiffness"
+    )
     expect = (
         "storey drifts larger, and floor accelerations lower and slower, in strong shaking only"
     )

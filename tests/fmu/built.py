@@ -1,0 +1,44 @@
+"""The built-in FMUs, built once per test process into a temporary folder."""
+
+from __future__ import annotations
+
+import atexit
+import shutil
+import tempfile
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from bristle.fmu import build, catalogue
+from bristle.physics.effect import effects_of
+
+COMPONENTS = catalogue.component_names()
+SITES = {"Structure": ("structure", ""), "LuGreDamper": ("damper", "lugre")} | {
+    "BinghamDamper": ("damper", "bingham")
+}
+LIVELY: dict[str, dict[str, Any]] = {
+    "GroundMotion": {"peak": 3.0, "factor": 1.5},
+    "ConstantVoltage": {"level": 3.0},
+    "SignalSource": {"kind": "chirp", "amplitude": 2.0, "phase": 0.5},
+    "PrescribedMotion": {"kind": "sine", "amplitude": 0.01, "phase": 0.5},
+}
+"""Parameters with which a component's outputs move."""
+
+
+@cache
+def folder() -> Path:
+    path = Path(tempfile.mkdtemp(prefix="bristle-test-fmus-"))
+    atexit.register(shutil.rmtree, path, ignore_errors=True)
+    return path
+
+
+@cache
+def built(component: str) -> Path:
+    """Return a built-in component's FMU."""
+    return build.build(build.plan(component), folder())
+
+
+def lively(component: str) -> dict[str, Any]:
+    """Return parameters with every effect of the component on."""
+    effects = effects_of(*SITES[component]) if component in SITES else ()
+    return {**LIVELY.get(component, {}), **{f"{effect.name}.on": True for effect in effects}}

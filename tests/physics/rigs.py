@@ -1,0 +1,95 @@
+"""A damper on a test bench, in plain Python: for tests of laws and effects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from itertools import pairwise
+from math import cos, inf, pi, sin
+from typing import Any
+
+import numpy as np
+
+from bristle.physics import damper
+from bristle.physics.damper import LAW_CODES, DamperModel
+
+LAWS = ("bingham", "lugre")
+NO_LAW = {
+    "bingham": {"f_c": 0.0, "f_v": 0.0, "c_0": 0.0, "c_v": 0.0},
+    "lugre": {"sigma_a": 0.0, "sigma_0": 0.0, "sigma_1": 0.0, "sigma_2": 0.0, "sigma_b": 0.0},
+}
+"""Parameters that leave nothing of a law: what remains is the effects."""
+
+
+def force_at(
+    law: str,
+    *,
+    x: float = 0.0,
+    v: float = 0.0,
+    V: float = 0.0,
+    z: float = 0.0,
+    values: Mapping[str, float] | None = None,
+    effects: Iterable[str] = (),
+) -> float:
+    """Return a damper's force [N] at a motion, voltage and bristle deflection."""
+    start = {**(values or {}), "bristle_deflection_0": z}
+    return DamperModel(law, start, list(effects)).force(x, v, 0.0, V, inf, 0.0, 0.0, False)
+
+
+class Bench:
+    """A damper whose rod is moved: x, v and V linear over each step."""
+
+    def __init__(
+        self, law: str, values: Mapping[str, float] | None = None, effects: Iterable[str] = ()
+    ) -> None:
+        effects = list(effects)
+        self.law = LAW_CODES[law]
+        self.model = DamperModel(law, dict(values or {}), effects)
+        self.moving = damper.moving_states(law, effects)
+        self.last: tuple[float, float, float] | None = None
+        self._work = [0.0] * damper.work_size()
+
+    def state(self, name: str) -> float:
+        return self.model.z[damper.LAYOUT.states[name] if name != "bristle" else 0]
+
+    def move(self, x: float, v: float, V: float, dt: float) -> float:
+        """Move on over dt [s] to x, v, V; return the force there."""
+        x0, v0, V0 = self.last or (x, v, V)
+        z1 = [0.0] * len(self.model.z)
+        a = (v - v0) / dt
+        m = self.model
+        force, _ = damper.step(
+            self.law, x0, v0, a, V0, x, v, a, V, dt, 0.0, 0.0, False, m.z, m.p, m.on,
+            self.moving, len(self.moving), m.advances, z1, self._work,
+        )  # fmt: skip
+        m.z = z1
+        self.last = (x, v, V)
+        return float(force)
+
+    def play(
+        self, motion: Callable[[float], tuple[float, float]], V: Any, times: np.ndarray
+    ) -> np.ndarray:
+        """Return the forces at `times` (n,), the motion a function of time, V one too or fixed."""
+        voltage = V if callable(V) else lambda _t: V
+        clock = times.tolist()  # plain floats: laws run several times faster on them
+        self.last = x, v, first = (*motion(clock[0]), voltage(clock[0]))
+        forces = [self.model.force(x, v, 0.0, first, inf, 0.0, 0.0, False)]
+        for before, t in pairwise(clock):
+            forces.append(self.move(*motion(t), voltage(t), t - before))
+        return np.array(forces)
+
+
+def sine(
+    amplitude: float, frequency: float, middle: float = 0.0
+) -> Callable[[float], tuple[float, float]]:
+    """Return x(t), v(t) of a sine of this amplitude [m] about `middle`."""
+    omega = 2.0 * pi * frequency
+
+    def motion(t: float) -> tuple[float, float]:
+        return middle + amplitude * sin(omega * t), amplitude * omega * cos(omega * t)
+
+    return motion
+
+
+def loop_energy(forces: np.ndarray, velocities: np.ndarray, dt: float) -> float:
+    """Return the work over one closed cycle [J]; the first sample is also the last."""
+    return float(dt * np.sum(forces[1:] * velocities[1:]))

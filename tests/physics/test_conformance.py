@@ -1,0 +1,352 @@
+"""What holds for every registered effect, none excluded."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import textwrap
+from itertools import product
+from math import isfinite
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+import pytest
+from rigs import LAWS, NO_LAW, Bench, force_at, loop_energy, sine
+
+from bristle import units
+from bristle.cosim.scenario import load_scenario
+from bristle.errors import ScenarioError
+from bristle.physics.building import paper_building
+from bristle.physics.effect import EFFECTS, HOOKS, SITES, Effect, Q, effects_of
+from bristle.physics.structure import StructureModel
+from bristle.run import run
+
+ALL = [EFFECTS[name] for name in sorted(EFFECTS)]
+
+each_effect = pytest.mark.parametrize("effect", ALL, ids=lambda e: e.name)
+each_damper_effect = pytest.mark.parametrize(
+    ("effect", "law"),
+    [(e, law) for e in ALL if e.site == "damper" for law in e.laws],
+    ids=lambda value: getattr(value, "name", value),
+)
+each_structure_effect = pytest.mark.parametrize(
+    "effect", [e for e in ALL if e.site == "structure"], ids=lambda e: e.name
+)
+
+
+def parameter_sets(effect: type[Effect], count: int) -> list[dict[str, float]]:
+    """Return the defaults and sets drawn from the bounds, by decades where they span many."""
+    random = np.random.default_rng(crc32(effect.name.encode()))
+    sets: list[dict[str, float]] = [{}]
+    for _ in range(count):
+        drawn = {}
+        for name, parameter in effect.parameters.items():
+            low, high = parameter.bounds
+            share = random.random()
+            if low > 0.0 and high > 100.0 * low:
+                value = low * (high / low) ** share
+            else:
+                value = low + (high - low) * share
+            drawn[f"{effect.name}.{name}"] = float(value)
+        sets.append(drawn)
+    return sets
+
+
+def names_read(effect: type[Effect]) -> tuple[set[str], set[str], set[str]]:
+    """Return which fields of q, z and p the hooks read, from their source."""
+    read: tuple[set[str], set[str], set[str]] = (set(), set(), set())
+    for function in effect.hooks().values():
+        tree = ast.parse(textwrap.dedent(inspect.getsource(function)))
+        arguments = [argument.arg for argument in tree.body[0].args.args]
+        assert len(arguments) == 3, f"{effect.name}: a hook takes q, z, p"
+        for node in ast.walk(tree):
+            named = isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
+            if named and node.value.id in arguments:
+                read[arguments.index(node.value.id)].add(node.attr)
+    return read
+
+
+# -- class data
+
+
+def test_the_library_has_its_effects() -> None:
+    ready = {"gas_spring", "stribeck", "coil_lag", "mount_compliance", "remanence"}
+    assert ready | {"storey_softening"} <= set(EFFECTS)
+
+
+@each_effect
+def test_it_stands_in_a_file_of_its_name(effect: type[Effect]) -> None:
+    assert effect.__module__.rsplit(".", 1)[-1] == effect.name
+    assert EFFECTS[effect.name] is effect
+
+
+@each_effect
+def test_site_and_laws_are_known(effect: type[Effect]) -> None:
+    assert effect.site in SITES
+    assert effect.laws
+    assert set(effect.laws) <= set(LAWS)
+    assert effect.name not in effect.excludes
+
+
+@each_effect
+def test_units_are_known_and_spelled_as_everywhere(effect: type[Effect]) -> None:
+    spelled = [parameter.unit for parameter in effect.parameters.values()]
+    spelled += effect.states.values()
+    assert [units.canonical(unit) for unit in spelled] == spelled
+
+
+@each_effect
+def test_bounds_hold_the_default_and_are_finite(effect: type[Effect]) -> None:
+    assert effect.parameters
+    for name, parameter in effect.parameters.items():
+        low, high = parameter.bounds
+        assert isfinite(low), name
+        assert isfinite(high), name
+        assert low < high, name
+        assert low <= parameter.value <= high, name
+        assert parameter.text == parameter.text.strip(), name
+        assert parameter.text, name
+
+
+@each_effect
+def test_it_tells_users_what_it_is(effect: type[Effect]) -> None:
+    line = effect.first_line()
+    assert line.endswith(".")
+    assert len(line) <= 100
+    assert ":" in line, "NAME: what happens"
+    assert "Leaves out" in (effect.__doc__ or ""), "every law says where to doubt it"
+
+
+@each_effect
+def test_it_says_what_a_residual_looks_like_without_it(effect: type[Effect]) -> None:
+    assert len(effect.expect.split()) >= 5
+    assert not effect.expect.endswith(".")
+
+
+@each_effect
+def test_its_source_has_a_year(effect: type[Effect]) -> None:
+    assert re.search(r"\b(1[89]|20)\d\d\b", effect.source), effect.source
+
+
+@each_effect
+def test_needs_states_and_parameters_are_what_the_hooks_read(effect: type[Effect]) -> None:
+    q, z, p = names_read(effect)
+    assert q == set(effect.needs)
+    assert z == set(effect.states)
+    assert p == set(effect.parameters)
+
+
+@each_effect
+def test_its_hooks_are_pure_functions_in_order(effect: type[Effect]) -> None:
+    hooks = effect.hooks()
+    assert list(hooks) == [hook for hook in HOOKS if hook in hooks]
+    for hook, function in hooks.items():
+        assert isinstance(inspect.getattr_static(effect, hook), staticmethod), hook
+        assert function.__closure__ is None, hook
+
+
+@each_effect
+def test_hooks_return_as_many_values_as_they_must(effect: type[Effect]) -> None:
+    q = Q(*(0.01 * (i + 1) for i in range(len(Q._fields))))
+    z = effect.State(*(0.001 for _ in effect.states))
+    p = effect.Values(*(parameter.value for parameter in effect.parameters.values()))
+    counts = {"rate": len(effect.states), "advance": len(effect.states), "motion": 2}
+    for hook, function in effect.hooks().items():
+        returned = function(q, z, p)
+        assert function(q, z, p) == returned, hook
+        if hook in counts:
+            assert isinstance(returned, tuple), hook
+            assert len(returned) == counts[hook], hook
+        else:
+            returned = (returned,)
+        assert all(isinstance(value, float) and isfinite(value) for value in returned), hook
+
+
+# -- at rest
+
+
+@each_damper_effect
+def test_no_force_at_rest_where_it_says_so(effect: type[Effect], law: str) -> None:
+    found = [
+        force_at(law, V=V, values=values, effects=[effect.name])
+        for values in parameter_sets(effect, 20)
+        for V in (0.0, 4.0, 8.0)
+    ]
+    if effect.zero_at_rest:
+        assert found == [0.0] * len(found)
+    else:
+        assert max(map(abs, found)) > 0.0, "some parameters give a force at rest"
+
+
+@each_damper_effect
+def test_at_rest_it_stays_at_rest(effect: type[Effect], law: str) -> None:
+    bench = Bench(law, effects=[effect.name])
+    still = np.arange(50) * 0.002
+    force = bench.play(lambda _t: (0.0, 0.0), 0.0, still)
+    assert np.abs(force).max() <= 1e-12
+
+
+@each_structure_effect
+def test_a_building_at_rest_stays_at_rest(effect: type[Effect]) -> None:
+    for values in parameter_sets(effect, 5):
+        model = StructureModel(paper_building(), values, [effect.name])
+        for _ in range(20):
+            model.step(0.002, 0.0, 0.0, 0.0)
+        if effect.zero_at_rest:
+            assert model.x == [0.0] * 6
+
+
+# -- energy
+
+
+@each_damper_effect
+@pytest.mark.parametrize("alone", [False, True], ids=["with the law", "alone"])
+def test_closed_cycles_never_yield_energy(effect: type[Effect], law: str, alone: bool) -> None:
+    if not effect.passive:
+        pytest.skip("it may feed energy")
+    base = NO_LAW[law] if alone else {}
+    steps = 200
+    for amplitude, frequency, V in ((0.001, 8.0, 6.0), (0.015, 8.0, 0.0), (0.015, 0.5, 6.0)):
+        dt = 1.0 / (frequency * steps)
+        times = dt * np.arange(3 * steps + 1)
+        motion = sine(amplitude, frequency, middle=0.003)
+        v = np.array([motion(t)[1] for t in times])
+        for values in parameter_sets(effect, 1):
+            bench = Bench(law, {**base, **values}, [effect.name])
+            force = bench.play(motion, V, times)
+            last = slice(2 * steps, None)
+            work = loop_energy(force[last], v[last], dt)
+            scale = amplitude * max(1e-9, float(np.abs(force).max()))
+            assert work >= -1e-6 * scale, (amplitude, frequency, V, values)
+
+
+@each_structure_effect
+def test_closed_drifts_never_yield_energy(effect: type[Effect]) -> None:
+    if not effect.passive:
+        pytest.skip("it may feed energy")
+    building, steps = paper_building(), 400
+    M, C, K = (np.array(matrix) for matrix in (building.M, building.C, building.K))
+    for values in parameter_sets(effect, 5):
+        model = StructureModel(building, values, [effect.name])
+        work = scale = 0.0
+        for k in range(steps):
+            angles = 2.0 * np.pi * k / steps + np.arange(3)
+            q, v = 0.004 * np.sin(angles), 0.004 * np.cos(angles)
+            model.x = [*q.tolist(), *v.tolist()]
+            model.settle()
+            added = -M @ model.absolute_accelerations(0.0) - K @ q - C @ v
+            work += added @ v
+            scale += np.abs(added) @ np.abs(v)
+        assert work >= -1e-9 * max(scale, 1e-4)
+
+
+# -- robustness
+
+
+@each_damper_effect
+def test_every_bound_can_be_simulated(effect: type[Effect], law: str) -> None:
+    motion = sine(0.01, 3.0)
+    corners = [{}]
+    for name, parameter in effect.parameters.items():
+        corners += [{f"{effect.name}.{name}": bound} for bound in parameter.bounds]
+    for values, dt in product(corners, (0.0005, 0.01)):
+        bench = Bench(law, values, [effect.name])
+        force = bench.play(motion, 8.0, dt * np.arange(round(0.7 / dt)))
+        assert np.isfinite(force).all(), (values, dt)
+        assert np.isfinite(bench.model.z).all(), (values, dt)
+
+
+@each_structure_effect
+def test_every_bound_of_a_structure_can_be_simulated(effect: type[Effect]) -> None:
+    corners = [{}]
+    for name, parameter in effect.parameters.items():
+        corners += [{f"{effect.name}.{name}": bound} for bound in parameter.bounds]
+    for values in corners:
+        model = StructureModel(paper_building(), values, [effect.name])
+        for k in range(200):
+            model.step(0.002, 4.0 * np.sin(0.02 * k), 4.0 * np.sin(0.02 * k + 0.02), 0.0)
+        assert np.isfinite(model.x).all(), values
+        assert np.abs(model.x).max() < 10.0, values
+
+
+@each_damper_effect
+def test_switched_off_it_leaves_no_trace(effect: type[Effect], law: str) -> None:
+    motion, times = sine(0.01, 2.0), 0.002 * np.arange(300)
+    plain = Bench(law).play(motion, 4.0, times)
+    for values in parameter_sets(effect, 3):
+        np.testing.assert_array_equal(Bench(law, values).play(motion, 4.0, times), plain)
+
+
+@each_damper_effect
+def test_switched_on_it_matters(effect: type[Effect], law: str) -> None:
+    motion, times = sine(0.01, 2.0), 0.002 * np.arange(300)
+
+    def voltage(t: float) -> float:
+        return 4.0 + 3.0 * np.sin(9.0 * t)
+
+    plain = Bench(law).play(motion, voltage, times)
+    seen = Bench(law, {}, [effect.name]).play(motion, voltage, times)
+    rms = float(np.sqrt(np.mean((seen - plain) ** 2)) / np.sqrt(np.mean(plain**2)))
+    assert rms > 0.01
+
+
+# -- in a scenario
+
+SCENARIO = """
+schema = 1
+title = "Every effect at once"
+
+[run]
+stop = 0.1
+step = 0.002
+
+[components.ground]
+fmu = "SignalSource"
+parameters = {{ kind = "half_sine", amplitude = 2.0, duration = 0.2 }}
+
+[components.structure]
+fmu = "Structure"
+parameters = {{ {structure} }}
+
+[components.damper]
+fmu = "{damper}"
+parameters = {{ voltage = 4.0, {effects} }}
+
+[connections]
+"structure.ground_acceleration" = "ground.value"
+"structure.damper_force" = "damper.force"
+"damper.displacement" = "structure.base_displacement"
+"damper.velocity" = "structure.base_velocity"
+"""
+
+
+def spelled(effects: list[type[Effect]]) -> str:
+    given = {f"{effect.name}.on": "true" for effect in effects}
+    for effect in effects:
+        for name, parameter in effect.parameters.items():
+            given[f"{effect.name}.{name}"] = repr(parameter.value)
+    return ", ".join(f'"{name}" = {value}' for name, value in given.items())
+
+
+@pytest.mark.parametrize(
+    ("damper", "law"), [("LuGreDamper", "lugre"), ("BinghamDamper", "bingham")]
+)
+def test_a_scenario_can_switch_every_effect_on(
+    damper: str, law: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path / "cache"))
+    joined = list(effects_of("damper", law))
+    file = tmp_path / "all.toml"
+    text = {"structure": spelled(list(effects_of("structure"))), "effects": spelled(joined)}
+    file.write_text(SCENARIO.format(damper=damper, **text), encoding="utf-8")
+    loaded = {component.name: component for component in load_scenario(file).components}
+    for effect in joined:
+        assert loaded["damper"].parameters[f"{effect.name}.on"] is True
+        for name in effect.parameters:
+            assert f"{effect.name}.{name}" in loaded["damper"].parameters
+    frames = [run(file), run(file, {f"damper.{effect.name}.on": False for effect in joined})]
+    assert (frames[0]["damper.force"] != frames[1]["damper.force"]).any()
+    with pytest.raises(ScenarioError, match=f"{joined[0].name}"):
+        load_scenario(file, {f"damper.{joined[0].name}.colour": 1.0})
