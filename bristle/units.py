@@ -264,7 +264,7 @@ def _compose(text: str, powers: dict[str, int]) -> Unit:
             over *= factor**power
         else:
             under *= factor**-power
-        dimension = [d + power * e for d, e in zip(dimension, exponents)]  # noqa: B905 (3.9)
+        dimension = [d + power * e for d, e in zip(dimension, exponents)]
     if abs(ten) > 99 or any(abs(power) > 9 for power in powers.values()):
         raise _unreadable(text, "its powers")
     # Powers of ten are collected, so that mm/ms and kN/m come out without rounding.
@@ -309,7 +309,7 @@ def _name(powers: dict[str, int]) -> str:
 
 
 def _base_units(unit: Unit) -> str:
-    return _name(dict(zip(DIMENSIONS, unit.dimension)))  # noqa: B905 (3.9)
+    return _name(dict(zip(DIMENSIONS, unit.dimension)))
 
 
 def _nearest(symbol: str) -> str:

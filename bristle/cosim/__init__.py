@@ -1,1 +1,1 @@
-"""Co-simulation: scenarios as data, checked before the first step, and the master that runs them."""
+"""Co-simulation: scenarios as data, checked before a step, and the master that runs them."""
