@@ -13,6 +13,7 @@ import os
 import pkgutil
 import sys
 from collections.abc import Sequence
+from typing import NoReturn
 
 from ..errors import BristleError
 
@@ -58,6 +59,21 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print("interrupted", file=sys.stderr)
         return 130
+
+
+def run_and_exit() -> NoReturn:
+    """Run one command and end the process with its exit code; what the shell calls.
+
+    The binary of a Python FMU reads memory that it has freed when a process ends with it loaded,
+    which now and then aborts a process whose work is done and written. So a process that ran
+    FMUs ends without calling such libraries again.
+    """
+    code = main()
+    if "bristle.cosim.session" in sys.modules:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(code)
+    sys.exit(code)
 
 
 def _version() -> str:

@@ -1,7 +1,5 @@
 """`python -m bristle.cli`."""
 
-import sys
+from . import run_and_exit
 
-from . import main
-
-sys.exit(main())
+run_and_exit()
