@@ -1,0 +1,177 @@
+"""Studies of measurements: make one from files, look at the data before any model."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from glob import glob
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..study.new import Created
+
+HELP = "studies of measurements: new, first-look"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle study`."""
+    commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    _add_new(commands.add_parser("new", help="make a study's folder from measurement files"))
+    look = commands.add_parser("first-look", help="what the data show before any model")
+    look.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    look.add_argument("--json", action="store_true", help="print the findings as JSON")
+    look.set_defaults(act=_first_look)
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Run one action on studies."""
+    return int(arguments.act(arguments))
+
+
+def _add_new(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", type=Path, metavar="NAME", help="the folder to make")
+    parser.add_argument(
+        "--data",
+        nargs="+",
+        action="extend",
+        required=True,
+        metavar="GLOB",
+        help="measurement files, one run each: CSV, Parquet, MAT; quote the pattern: 'lab/*.csv'",
+    )
+    parser.add_argument(
+        "--rig",
+        choices=("bench", "structure"),
+        default="bench",
+        help="motion prescribed and force measured, or ground motion in and response out",
+    )
+    parser.add_argument(
+        "--building",
+        type=Path,
+        metavar="FILE",
+        help="the structure's data file, with --rig structure",
+    )
+    parser.add_argument(
+        "--channel",
+        action="append",
+        default=[],
+        metavar="CHANNEL=COLUMN@UNIT",
+        help="where a channel is, in place of the guess; a minus before COLUMN turns its sign: "
+        "--channel 'force=-Ch3@kN'",
+    )
+    parser.add_argument(
+        "--step", type=float, metavar="S", help="sampling step in s of files without a time"
+    )
+    parser.add_argument("--law", default="lugre", help="the law that the model begins with")
+    parser.add_argument("--title", default="", help="the study's title; else its name")
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+    parser.set_defaults(act=_new)
+
+
+def _new(arguments: argparse.Namespace) -> int:
+    from ..records.measurement import ChannelSpec
+    from ..study.errors import StudyError
+    from ..study.model import LAW_NAMES
+    from ..study.new import create_study, parse_channel
+
+    if arguments.law not in LAW_NAMES:
+        raise StudyError(f'--law "{arguments.law}"; there are: {", ".join(LAW_NAMES)}.')
+    channels = {}
+    for text in arguments.channel:
+        name, spec = parse_channel(text)
+        if name in channels:
+            raise StudyError(f"--channel {name} is given twice; once is right.")
+        channels[name] = spec
+    if arguments.step is not None:
+        if "time" in channels:
+            raise StudyError("--step and --channel time=... exclude each other.")
+        channels["time"] = ChannelSpec(step=arguments.step)
+    created = create_study(
+        arguments.name,
+        _files(arguments.data),
+        rig=arguments.rig,
+        building=arguments.building,
+        channels=channels,
+        title=arguments.title,
+        law=arguments.law,
+    )
+    if arguments.json:
+        _print_json(created)
+    else:
+        _print_new(created)
+    return 0
+
+
+def _files(patterns: list[str]) -> list[str]:
+    """Return the files that patterns name, each once, in order."""
+    from ..study.errors import StudyError
+
+    found: list[str] = []
+    for pattern in patterns:
+        # pathlib takes no pattern that begins at the root.
+        matches = sorted(glob(pattern, recursive=True))  # noqa: PTH207
+        matches = [pattern] if Path(pattern).is_file() else matches
+        files = [match for match in matches if Path(match).is_file()]
+        if not files:
+            raise StudyError(f'--data "{pattern}": no file matches, seen from {Path.cwd()}.')
+        found += files
+    return list(dict.fromkeys(found))
+
+
+def _print_json(created: Created) -> None:
+    import json
+    from dataclasses import asdict
+
+    settings = created.study.settings
+    answer = {
+        "folder": str(created.study.folder.absolute()),
+        "rig": settings.rig,
+        "runs": [asdict(run) for run in settings.runs],
+        "channels": [asdict(guess) for guess in created.guesses],
+        "unused": list(created.unused),
+        "notes": list(created.notes),
+    }
+    print(json.dumps(answer, indent=2, ensure_ascii=False))
+
+
+def _print_new(created: Created) -> None:
+    folder = created.study.folder
+    print(
+        f"{folder}: a study of {len(created.study.settings.runs)} run(s). The columns are taken as:"
+    )
+    for guess in created.guesses:
+        turned = "turned" if guess.sign < 0 else ""
+        print(f"  {guess.channel:28} {guess.column} [{guess.unit}] {turned}".rstrip())
+        print(f"  {'':28}   {guess.reason}")
+        if guess.doubt:
+            print(f"  {'':28}   doubtful: {guess.doubt}")
+    if created.unused:
+        print(f"Not used: {', '.join(created.unused)}.")
+    for note in created.notes:
+        print(f"{note[:1].upper()}{note[1:]}.")
+    print(f"Wrong? Change it in {folder / 'study.toml'}. Then:  bristle study first-look {folder}")
+
+
+def _first_look(arguments: argparse.Namespace) -> int:
+    from ..progress import Progress
+    from ..study.first_look import damper_level, first_look
+    from ..study.pictures import first_look_png
+    from ..study.study import Study
+
+    study = Study(arguments.folder)
+    total = len(study.settings.runs)
+    with Progress("looking at the runs", total, not arguments.json) as progress:
+        look = first_look(study, progress.show)
+    level = damper_level(list(look.runs)) if study.settings.rig == "structure" else ""
+    picture = study.write_report("first_look.png", first_look_png(list(look.runs), level))
+    if arguments.json:
+        import json
+
+        answer = {**look.as_dict(), "picture": str(picture.absolute())}
+        print(json.dumps(answer, indent=2, ensure_ascii=False))
+    else:
+        print(look.text())
+        print(f"\nPicture: {picture}")
+        if not look.ok:
+            print("Mend the above before a model is fitted.", file=sys.stderr)
+    return 0

@@ -1,0 +1,91 @@
+"""A damper on a test bench, compiled: the force that a model predicts from a measured motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics import damper
+
+Array = NDArray[np.float64]
+
+damper_step = damper.step
+damper_evaluate = damper.evaluate
+
+
+def force_history(
+    law: int, x: Any, v: Any, a: Any, V: Any, dt: float, z: Any, p: Any, on: Any, moving: Any,
+    n_moving: int, advances: bool, z1: Any, work: Any, out: Any,
+) -> None:  # fmt: skip
+    """Fill `out` (n,) with the force at each sample of a motion that is linear between them."""
+    size = len(z)
+    energy = 0.0
+    out[0] = damper_evaluate(
+        law, x[0], v[0], a[0], V[0], dt, 0.0, 0.0, False, z, p, on, work[0:size],
+        work[size : 2 * size],
+    )[0]  # fmt: skip
+    for k in range(1, len(x)):
+        out[k] = damper_step(
+            law, x[k - 1], v[k - 1], a[k - 1], V[k - 1], x[k], v[k], a[k], V[k], dt, energy, 0.0,
+            False, z, p, on, moving, n_moving, advances, z1, work,
+        )[0]  # fmt: skip
+        energy += 0.5 * dt * (out[k - 1] * v[k - 1] + out[k] * v[k])
+        for i in range(size):
+            z[i] = z1[i]
+
+
+@cache
+def compiled_history() -> Callable[..., None]:
+    """Return the compiled `force_history`; the first call on a machine takes seconds."""
+    from .jit import compiled
+
+    function: Callable[..., None] = compiled(force_history)
+    return function
+
+
+class Bench:
+    """Predicts the damper's force for one law and one set of effects.
+
+    Parameters
+    ----------
+    law : {"bingham", "lugre"}
+    effects : list of str
+        The effects that are on.
+    """
+
+    def __init__(self, law: str, effects: list[str]) -> None:
+        self.law = law
+        self.effects = list(effects)
+        layout = damper.LAYOUT
+        self._code = damper.LAW_CODES[law]
+        self._on = np.array([e.name in effects for e in layout.effects], dtype=np.bool_)
+        moving = damper.moving_states(law, self.effects)
+        self._n_moving = len(moving)
+        self._moving = np.array([*moving, *[0] * (layout.z_size - len(moving))], dtype=np.int64)
+        self._advances = damper.advances(self.effects)
+        self._history = compiled_history()
+
+    def force(
+        self, x: Array, v: Array, a: Array, V: Array, dt: float, values: dict[str, float]
+    ) -> Array:
+        """Return the force (n,) [N] for a motion x, v, a (n,) [m, m/s, m/s2] and V (n,) [V].
+
+        `values` are the parameters by name in SI; missing ones take their defaults. The start
+        values of states end in `_0`.
+        """
+        layout = damper.LAYOUT
+        p = np.array(damper.pack(self.law, values))
+        z = np.zeros(layout.z_size)
+        z[0] = values.get("bristle_deflection_0", 0.0)
+        for name, slot in layout.states.items():
+            z[slot] = values.get(name + "_0", 0.0)
+        out = np.empty(len(x))
+        self._history(
+            self._code, x, v, a, V, dt, z, p, self._on, self._moving, self._n_moving,
+            self._advances, np.zeros_like(z), np.zeros(damper.work_size()), out,
+        )  # fmt: skip
+        return out

@@ -1,0 +1,162 @@
+"""The channels of a measurement: their names and units, and what a column's name says of them."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from difflib import get_close_matches
+from typing import NamedTuple
+
+from ..errors import RecordError
+from ..units import parse as parse_unit
+
+PLAIN = {
+    "time": "s",
+    "displacement": "m",
+    "velocity": "m/s",
+    "acceleration": "m/s2",
+    "force": "N",
+    "voltage": "V",
+    "current": "A",
+    "ground_acceleration": "m/s2",
+    "holding_force": "N",
+}
+"""Channels with their SI units; those of the levels of a structure come on top."""
+
+_LEVEL = re.compile(r"(base|floor[1-9]\d?)_(displacement|velocity|acceleration_absolute)")
+_DRIFT = re.compile(r"drift[1-9]\d?")
+
+MOTION = ("displacement", "velocity", "acceleration")
+DRIVE = ("voltage", "current")
+
+
+def is_channel(name: str) -> bool:
+    """Return whether there is a channel of this name."""
+    return name in PLAIN or bool(_LEVEL.fullmatch(name) or _DRIFT.fullmatch(name))
+
+
+def channel_unit(channel: str) -> str:
+    """Return the SI unit of a channel.
+
+    Raises
+    ------
+    RecordError
+        If there is no such channel, with the nearest that is.
+    """
+    if channel in PLAIN:
+        return PLAIN[channel]
+    level = _LEVEL.fullmatch(channel)
+    if level:
+        return PLAIN[level[2].removesuffix("_absolute")]
+    if _DRIFT.fullmatch(channel):
+        return "m"
+    names = [*PLAIN, *(f"base_{one}" for one in (*MOTION[:2], "acceleration_absolute"))]
+    names += ["floor1_displacement", "floor1_velocity", "floor1_acceleration_absolute", "drift1"]
+    close = get_close_matches(channel, names, n=1, cutoff=0.5)
+    hint = f' Did you mean "{close[0]}"?' if close else ""
+    raise RecordError(f'there is no channel "{channel}".{hint} There are: {", ".join(names)}, ...')
+
+
+class Meaning(NamedTuple):
+    """What a column's name says: a quantity such as "force" and the words it is told by.
+
+    `place` is "" for the damper, "ground", "base", or "floor2"; `number` a bare number in the name;
+    `rank` tells how well the name fits, 0 for a quantity that a damper's model does not use.
+    """
+
+    quantity: str
+    place: str
+    number: int | None
+    rank: int
+
+
+_QUANTITIES = {
+    "time": "time t zeit tempo temps tiempo timestamp elapsed zeitstempel clock",
+    "displacement": "displacement disp displ displac x position pos stroke weg hub lvdt travel "
+    "deslocamento posicao curso auslenkung deflection d y s piston desloc deplacement course",
+    "velocity": "velocity vel v speed geschwindigkeit velocidade vitesse velo rate vp xdot xd dx",
+    "acceleration": "acceleration acc accel a beschleunigung aceleracao acel xddot xdd ddx accn",
+    "force": "force f load kraft forca fd last fuerza loadcell effort kraftaufnehmer fdamper",
+    "voltage": "voltage volt volts u spannung tensao coilvoltage vcoil uc tension voltaje",
+    "current": "current i strom corrente courant amps amperage icoil corriente",
+    "drift": "drift interstory interstorey",
+}
+_BY_WORD = {word: kind for kind, words in _QUANTITIES.items() for word in words.split()}
+_SINGLE = {"v": ("velocity", "voltage"), "u": ("voltage", "displacement")}
+_PLACES = {
+    "ground": "ground table shaketable gr g boden input soil tisch excitation",
+    "base": "base isolator isolation isol slab layer bearing basis",
+    "floor": "floor storey story level fl roof stockwerk etage andar",
+    "damper": "damper mr fluid friction rod dampfer amortecedor coil measured meas",
+    "other": "normal axial spring preload holding extra command cmd setpoint soll ref reference "
+    "desired target vertical lateral temperature torque",
+}
+_GROUND, _BASE, _FLOOR, _DAMPER, _OTHER = (frozenset(ws.split()) for ws in _PLACES.values())
+_KNOWN = frozenset().union(_BY_WORD, _GROUND, _BASE, _FLOOR, _DAMPER, _OTHER)
+
+
+def meaning(name: str, unit: str | None) -> Meaning | None:
+    """Return what a column's name says, or None if it says nothing that is known.
+
+    Parameters
+    ----------
+    name : str
+        The name without its unit: "ground_acc", "DamperForce", "acc1_abs", "damper.force".
+    unit : str or None
+        Its unit where there is one; it settles "v" and "u" and overrules no clear word.
+    """
+    words = _words(name)
+    quantity = _quantity(words, unit)
+    if quantity is None:
+        return None
+    number = next((int(word) for word in words if word.isdigit()), None)
+    place = ""
+    if _GROUND & set(words[:-1] if len(words) > 1 else ()):
+        place = "ground"
+    elif _BASE & set(words):
+        place = "base"
+    elif _FLOOR & set(words) and number is not None:
+        place = f"floor{number}"
+    rank = 2 + bool(_DAMPER & set(words)) + (name.lower() in PLAIN)
+    return Meaning(quantity, place, number, 0 if _OTHER & set(words) else rank)
+
+
+def quantity_of_unit(unit: str | None) -> str | None:
+    """Return the quantity that a unit alone tells, None if it tells none."""
+    if unit is None:
+        return None
+    dimension = parse_unit(unit).dimension
+    for quantity in ("time", *MOTION, "force", *DRIVE):
+        if parse_unit(PLAIN[quantity]).dimension == dimension:
+            return quantity
+    return None
+
+
+def _quantity(words: list[str], unit: str | None) -> str | None:
+    by_unit = quantity_of_unit(unit)
+    found = [_BY_WORD[word] for word in words if word in _BY_WORD]
+    for word in words:
+        if word in _SINGLE and (by_unit in _SINGLE[word] or unit is None):
+            found.insert(0, by_unit or _SINGLE[word][0])
+    if "drift" in found or by_unit in found:
+        return "drift" if "drift" in found else by_unit
+    longest = sorted((word for word in words if word in _BY_WORD), key=len)
+    return _BY_WORD[longest[-1]] if longest else None
+
+
+def _words(name: str) -> list[str]:
+    """Return the words of a name in lower case: "acc1_abs" gives acc, 1, abs."""
+    plain = unicodedata.normalize("NFKD", name)
+    plain = "".join(letter for letter in plain if not unicodedata.combining(letter))
+    parted = re.sub(r"(?<=[a-z])(?=[A-Z])|(?<=[A-Za-z])(?=\d)|(?<=\d)(?=[A-Za-z])", " ", plain)
+    words = [word.lower() for word in re.split(r"[^A-Za-z0-9]+", parted) if word]
+    out: list[str] = []
+    for word in words:
+        parts = [word]
+        if word not in _KNOWN:  # "dampingforce", "coilvoltage", "damperforce"
+            for known in sorted(_KNOWN, key=len, reverse=True):
+                if len(known) > 3 and word.endswith(known):
+                    parts = [word.removesuffix(known), known]
+                    break
+        out += [part for part in parts if part]
+    return out

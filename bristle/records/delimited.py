@@ -1,0 +1,228 @@
+"""Delimited text as recorders write it: preambles, titles, rows of units, decimal commas.
+
+Where the numbers begin is found from the numbers themselves: the rows in the middle of the file
+show how columns are parted and which hold numbers, and the first row like them begins the data.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import replace
+from datetime import datetime
+from itertools import islice
+
+import numpy as np
+
+from ..errors import RecordError
+from ..physics.record import shortened
+from ..units import parse as parse_unit
+from .columns import Column
+from .rows import Body, Layout, is_comment, read_fast, read_slow, state_of
+from .table import Table
+from .titles import is_unit_row, titles
+
+_TOKEN = re.compile(r'"[^"]*"|\S+(?: ?[\[(][^\])]*[\])])?')  # a title and its unit in brackets
+_RIGHT = 'Titles with units are, for example, "time [s];force [kN]".'
+
+
+def read_delimited(content: bytes, name: str) -> Table:
+    """Return the table in a delimited text.
+
+    Columns are parted by commas, semicolons, tabs or blanks; decimals have points, or commas
+    where columns are not parted by commas. Lines that begin with `#` or `%` are comments.
+
+    Raises
+    ------
+    RecordError
+        If no rows of numbers are found, a row has another count of columns, or decimal commas
+        cannot be told from those between columns: with the line.
+    """
+    text, notes = _decode(content, name)
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    layout = _find_layout(lines, name)
+    first = next(k for k, line in enumerate(lines) if _is_data(line, layout))
+    columns = _header(lines[:first], layout, name, first, notes)
+    body = read_fast(lines, first, layout) or read_slow(lines, first, layout, name)
+    columns, body = _without_empty(columns, body)
+    if any("bristle results" in line for line in lines[:1]) and any(
+        re.match(r"# status: incomplete", line) for line in lines[:first]
+    ):
+        notes.append("the run that wrote this file did not come to its end")
+    columns = _instants(columns, body, lines, layout)
+    words = {columns[index].text: text for index, text in body.words.items()}
+    values = {column.text: body.values[k] for k, column in enumerate(columns)}
+    return Table(name, columns, values, body.lines, "line", words, (*notes, *body.notes))
+
+
+def _decode(content: bytes, name: str) -> tuple[str, list[str]]:
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        try:
+            return content.decode("utf-16"), []
+        except UnicodeDecodeError as error:
+            raise RecordError(f"{name}: this is no whole UTF-16 text ({error.reason}).") from None
+    if b"\0" in content[:65536]:
+        raise RecordError(
+            f"{name}: this is binary data of a kind that is not read. "
+            "Save the measurement as CSV, Parquet or MAT (version 7)."
+        )
+    try:
+        return content.decode("utf-8-sig"), []
+    except UnicodeDecodeError:
+        return content.decode("cp1252", "replace"), ["not UTF-8: read as Windows-1252 text"]
+
+
+def _is_data(line: str, layout: Layout) -> bool:
+    stripped = line.strip()
+    return bool(stripped) and not is_comment(line) and layout.fits(layout.split(stripped))
+
+
+def _find_layout(lines: list[str], name: str) -> Layout:
+    """Return how the rows in the middle of a text are laid out."""
+    full = [k for k, line in enumerate(lines) if line.strip() and not is_comment(line)]
+    middle = [lines[k].strip() for k in islice(full, len(full) // 2, len(full) // 2 + 60)]
+    if len(middle) > 3:
+        middle.pop()  # the last line of a file may be cut
+    best: tuple[float, Layout] | None = None
+    for delimiter in (";", "\t", ",", ""):
+        for comma in (False, True) if delimiter != "," else (False,):
+            found = _try_layout(middle, delimiter, comma)
+            if found and (best is None or found[0] > best[0]):
+                best = found
+    if best is None:
+        shown = shortened(middle[0]) if middle else ""
+        raise RecordError(
+            f'{name}, line {full[len(full) // 2] + 1 if full else 1}: "{shown}" is no row of '
+            f"numbers, and no rows around it are. {_RIGHT}"
+        )
+    _refuse_comma_for_both(lines, best[1], name)
+    return best[1]
+
+
+def _try_layout(rows: list[str], delimiter: str, comma: bool) -> tuple[float, Layout] | None:
+    """Return a layout with a score: how much of the rows it reads as numbers."""
+    layout = Layout(delimiter, comma, [])
+    split = [layout.split(row) for row in rows]
+    count, often = Counter(map(len, split)).most_common(1)[0]
+    # One column is a layout of its own only where nothing parts the text.
+    if count < 2 and (delimiter != "" or any(";" in row or "\t" in row for row in rows)):
+        return None
+    same = [fields for fields in split if len(fields) == count]
+    states = [[state_of(fields[k], comma) for fields in same] for k in range(count)]
+    layout.numeric = [2 * column.count("word") < len(column) for column in states]
+    layout.numeric = [
+        n and "number" in column for n, column in zip(layout.numeric, states, strict=True)
+    ]
+    if not any(layout.numeric):
+        return None
+    share = sum(column.count("number") for column in states) / sum(map(len, states))
+    # Points win where both would do: whole numbers have neither.
+    return (often / len(rows)) * share + 0.01 * min(count, 5) - 0.001 * comma, layout
+
+
+def _refuse_comma_for_both(lines: list[str], layout: Layout, name: str) -> None:
+    """Refuse `0,001,2,5`, where a comma parts columns and decimals alike."""
+    if layout.delimiter != ",":
+        return
+    for k, line in enumerate(lines[:400]):
+        if _is_data(line, layout) and k:
+            above = [t for t in layout.split(lines[k - 1].strip()) if t.strip()]
+            wide = len(layout.numeric)
+            if wide == 2 * len(above) and not any(state_of(t, False) == "number" for t in above):
+                raise RecordError(
+                    f"{name}, line {k + 1}: {wide} numbers under {len(above)} titles. Commas part "
+                    "columns and decimals alike here: save the file with semicolons between "
+                    "columns, or with decimal points."
+                )
+            return
+
+
+def _header(
+    above: list[str], layout: Layout, name: str, first: int, notes: list[str]
+) -> tuple[Column, ...]:
+    """Return the columns from the lines above the first row of data."""
+    wide = len(layout.numeric)
+    rows = [
+        (k, fields)
+        for k, line in enumerate(above)
+        if line.strip() and not is_comment(line)
+        for fields in [_title_fields(line, layout, wide)]
+    ]
+    fitting = [(k, fields) for k, fields in rows if len(fields) == wide]
+    last = rows[-1] if rows else None
+    if last and last not in fitting and len(layout.split(last[1][0])) == 1 and not fitting:
+        last = None
+    units = None
+    if fitting and fitting[-1] == last and len(fitting) > 1 and is_unit_row(fitting[-1][1]):
+        units = fitting.pop()[1]
+    if fitting:
+        k, names = fitting[-1]
+        if sum(state_of(one, layout.comma) == "number" for one in names) > wide / 2:
+            raise RecordError(
+                f'{name}, line {k + 1}: "{shortened(above[k].strip())}" is neither titles nor a '
+                "row of numbers like those below it. Mend or remove it."
+            )
+        if k:
+            notes.append(f"titles in line {k + 1}, numbers from line {first + 1} on")
+        return titles(names, units)
+    in_comment = [
+        fields
+        for line in above[-1:]
+        if is_comment(line)
+        for fields in [_title_fields(line.strip().lstrip("#% "), layout, wide)]
+        if len(fields) == wide
+    ]
+    if in_comment:
+        return titles(in_comment[0])
+    notes.append("no titles: columns are called column 1, column 2, ... and have no units")
+    return titles([""] * wide)
+
+
+def _title_fields(line: str, layout: Layout, wide: int) -> list[str]:
+    """Return the titles in a line; there may be one less or more than numbers, left empty."""
+    stripped = line.strip("\n\r ")
+    if layout.delimiter:
+        fields = layout.split(stripped)
+    else:
+        fields = re.split(r"\s{2,}|\t", stripped)  # titles of several words stand further apart
+        fields = fields if len(fields) == wide else _TOKEN.findall(stripped)
+    if len(fields) == wide - 1 and layout.delimiter:
+        fields.append("")
+    while len(fields) > wide and not fields[-1].strip():
+        fields.pop()
+    return fields
+
+
+def _without_empty(columns: tuple[Column, ...], body: Body) -> tuple[tuple[Column, ...], Body]:
+    """Leave out columns without title and without values, as a delimiter at the end makes them."""
+    kept = [
+        k
+        for k, column in enumerate(columns)
+        if not (column.text == f"column {k + 1}" and np.isnan(body.values[k]).all())
+        or k in body.words
+    ]
+    body.values = [body.values[k] for k in kept]
+    body.words = {kept.index(k): text for k, text in body.words.items() if k in kept}
+    return tuple(columns[k] for k in kept), body
+
+
+def _instants(
+    columns: tuple[Column, ...], body: Body, lines: list[str], layout: Layout
+) -> tuple[Column, ...]:
+    """Turn columns of dates and times of day into seconds since the first."""
+    out = list(columns)
+    for index in list(body.words):
+        try:
+            instants = [
+                datetime.fromisoformat(layout.split(lines[line - 1].strip())[index].strip('" '))
+                for line in body.lines
+            ]
+        except (ValueError, IndexError):
+            continue
+        body.values[index] = np.array(
+            [(instant - instants[0]).total_seconds() for instant in instants]
+        )
+        del body.words[index]
+        out[index] = replace(columns[index], unit=parse_unit("s"))
+        body.notes.append(f'"{columns[index].text}" holds instants: taken as s since the first')
+    return tuple(out)

@@ -1,0 +1,109 @@
+"""Which column is which channel, in which unit and with which sign: a guess, each with its reason.
+
+Names and units say most; the data say the rest: which column is the derivative of which, which
+force takes power out of the motion. Where the data contradict a stated unit the unit is kept and
+the doubt is said, for either of the two columns could be wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...units import parse as parse_unit
+from ..channels import meaning, quantity_of_unit
+from ..measurement import ChannelSpec
+from ..table import Table
+from .bench import bench_guesses
+from .candidates import Search, candidate_of
+from .fitting import fit_signs, fit_units
+from .levels import structure_guesses
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A channel, the column it is in, its unit and sign, why, and what speaks against it.
+
+    `unit` is "" where nothing tells it.
+    """
+
+    channel: str
+    column: str
+    unit: str
+    sign: int
+    reason: str
+    doubt: str = ""
+
+    def __str__(self) -> str:
+        flipped = " turned in sign" if self.sign < 0 else ""
+        text = f'{self.channel} is "{self.column}" [{self.unit or "?"}]{flipped}: {self.reason}'
+        return text + (f"; doubtful: {self.doubt}" if self.doubt else "")
+
+
+def guess_channels(
+    table: Table, rig: str = "bench", levels: list[str] | None = None
+) -> list[Guess]:
+    """Return the channels that a table seems to hold, each column at most once.
+
+    Parameters
+    ----------
+    table : Table
+    rig : {"bench", "structure"}
+        On a structure, motions belong to levels of the building.
+    levels : list of str
+        Names of the building's levels, lowest first: ["base", "floor1", "floor2"]; numbers in
+        names are counted along them.
+    """
+    time, step = _find_time(table)
+    search = Search(table, step)
+    taken = time.column if time else ""
+    candidates = [one for column in table.columns if (one := candidate_of(search, column, taken))]
+    if rig == "structure":
+        chosen = structure_guesses(candidates, levels or ["base", "floor1", "floor2"])
+    else:
+        chosen = bench_guesses(search, candidates)
+    found = fit_signs(search, fit_units(search, chosen), rig)
+    guesses = [
+        Guess(channel, one.column.text, one.unit, one.sign, one.reason, one.doubt)
+        for channel, one in found.items()
+    ]
+    return ([time] if time else []) + guesses
+
+
+def left_out(table: Table, guesses: list[Guess]) -> list[str]:
+    """Return the titles of columns that no guess takes."""
+    taken = {guess.column for guess in guesses}
+    return [column.text for column in table.columns if column.text not in taken]
+
+
+def specs(table: Table, guesses: list[Guess]) -> dict[str, ChannelSpec]:
+    """Return guesses as `read_measurements` takes them."""
+    return {guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses}
+
+
+def _find_time(table: Table) -> tuple[Guess | None, float]:
+    """Return the guess of the time and the usual spacing [s], 0 where there is no time."""
+    best: tuple[int, Guess, float] | None = None
+    for column in table.columns:
+        values = table.values[column.text]
+        good = values[np.isfinite(values)]
+        if len(good) < max(10.0, 0.5 * table.rows):
+            continue
+        spacing = np.diff(good)
+        rising = float(np.mean(spacing > 0.0)) > 0.98
+        unit = column.unit.name if column.unit else ""
+        timed = quantity_of_unit(unit) == "time" if unit else False
+        told = meaning(column.name, unit or None)
+        named = told is not None and told.quantity == "time"
+        if not (named or (timed and rising) or (rising and column.index == 0 and not unit)):
+            continue
+        if unit and not timed:
+            continue
+        reason = "its name" if named else "its unit" if timed else "the first column, and it rises"
+        doubt = "" if unit else f"no unit is given, s is assumed: {1.0 / np.median(spacing):.4g} Hz"
+        score = 4 * named + 2 * timed + rising
+        guess = Guess("time", column.text, unit or "s", 1, reason, doubt)
+        if best is None or score > best[0]:
+            best = score, guess, float(np.median(spacing)) * parse_unit(unit or "s").factor
+    return (best[1], best[2]) if best else (None, 0.0)

@@ -1,0 +1,103 @@
+"""What a column can be by its name and unit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..channels import Meaning, channel_unit, is_channel, meaning, quantity_of_unit
+from ..columns import Column
+from ..relation import differentiated
+from ..table import Array, Table
+
+
+@dataclass
+class Candidate:
+    """A column and what it can be: quantity, place and unit, and how well its name fits."""
+
+    column: Column
+    quantity: str
+    unit: str
+    rank: int
+    reason: str
+    place: str = ""
+    number: int | None = None
+    sign: int = 1
+    doubt: str = ""
+
+
+@dataclass
+class Search:
+    """A table with the time found, its step [s], and columns with short gaps bridged."""
+
+    table: Table
+    step: float
+    data: dict[str, Array] = field(default_factory=dict)
+
+    def column(self, text: str) -> Array:
+        """Return a column with missing values bridged, for correlations alone."""
+        if text not in self.data:
+            values = self.table.values[text]
+            good = usable(values)
+            rows = np.arange(len(values))
+            self.data[text] = np.interp(rows, rows[good], values[good])
+        return self.data[text]
+
+
+def candidate_of(search: Search, column: Column, time: str) -> Candidate | None:
+    """Return what a column can be by name and unit, None where it can be nothing."""
+    # A column of words is none; one word among numbers is told when the column is read.
+    finite = usable(search.table.values[column.text])
+    if column.text == time or np.mean(finite) < 0.5 * (column.text in search.table.words):
+        return None
+    if not finite.any():
+        return None
+    unit = column.unit.name if column.unit else ""
+    exact = column.name.rpartition(".")[2].lower()
+    if is_channel(exact) and exact != "time":
+        fits = unit and quantity_of_unit(unit) == quantity_of_unit(channel_unit(exact))
+        if fits or not unit:
+            return Candidate(column, exact, unit, 5, "its name")
+    told = meaning(column.name, unit or None)
+    by_unit = quantity_of_unit(unit) if unit else None
+    if told is None:
+        if by_unit in (None, "time"):
+            return None
+        return Candidate(column, str(by_unit), unit, 1, f"its unit, {unit}")
+    return _by_name(column, told, unit, by_unit)
+
+
+def _by_name(column: Column, told: Meaning, unit: str, by_unit: str | None) -> Candidate | None:
+    quantity, doubt = told.quantity, ""
+    wanted = "displacement" if quantity == "drift" else quantity
+    if unit and by_unit not in (wanted, None, "time") and len(column.name) == 1:
+        return Candidate(column, str(by_unit), unit, 1, f"its unit, {unit}")  # a letter says little
+    if unit and by_unit != wanted:
+        if "[" in column.text or "(" in column.text or by_unit is None:
+            return None  # a force in V is a force not yet calibrated
+        # The ending of a name need not be a unit: "voltage_in" is in no inches.
+        doubt, unit = f'"{unit}" at the end of the name is not taken as a unit', ""
+    reason = f"its name and its unit, {unit}" if unit else "its name"
+    return Candidate(column, quantity, unit, told.rank, reason, told.place, told.number, 1, doubt)
+
+
+def usable(values: Array) -> NDArray[np.bool_]:
+    """Return which values can be of a measurement; reading the column refuses the others."""
+    return np.isfinite(values) & (np.abs(values) < 1e100)
+
+
+def velocity_of(search: Search, chosen: dict[str, Candidate]) -> Array | None:
+    """Return the velocity as recorded, else the derivative of the displacement, else None."""
+    if "velocity" in chosen:
+        return search.column(chosen["velocity"].column.text)
+    if "displacement" in chosen and search.step > 0.0:
+        x = search.column(chosen["displacement"].column.text)
+        return differentiated(x, search.step, min(18.0, 0.2 / search.step))
+    return None
+
+
+def joined(*words: str) -> str:
+    """Return words that are not empty, parted by semicolons."""
+    return "; ".join(word for word in words if word)

@@ -1,0 +1,222 @@
+"""How noisy a channel is, from the channel alone.
+
+Filters (1 - B)^a (1 + B)^b, B the shift by one sample, remove what is smooth and keep white noise
+of a band around tan^2(pi f dt) = a/b. Where a signal jumps, bends or is switched the filters answer
+too: blocks that hold more than white noise could are left out. Of the differences (b = 0) the
+smallest answer is taken, for what is left of the signal only ever adds to it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from math import sqrt
+from statistics import NormalDist
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordError
+
+Array = NDArray[np.float64]
+Kernel = tuple[int, int]
+
+SHORTEST = 60
+"""Fewest samples that a noise is estimated from."""
+_DIFFERENCES: tuple[Kernel, ...] = tuple((a, 0) for a in range(2, 10))
+# From half the sampling rate downwards.
+_BANDS: tuple[Kernel, ...] = ((9, 0), (8, 1), (8, 2), (6, 3), (5, 5), (4, 8), (4, 16))
+_BLOCK = 24  # samples; short, so that enough blocks lie between the jumps of a force
+_CLEANEST = 0.3  # the share of blocks that is taken to be free of jumps, to begin with
+_CHANGES = 6  # of a channel that is switched rather than moved, at most per hundred samples
+_KEPT = 0.97  # the share of blocks of white noise that the final threshold lets pass
+_FLAT = 1.12  # neighbouring bands whose levels differ by less are flat
+_RESTING = 0.03  # share of a channel's standard deviation below which it is at rest
+_PERFECT = 1e-4  # no instrument's noise is a smaller share
+_ROUGH = 0.15  # a noise above this share of a channel's standard deviation may be its signal
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The noise of a channel.
+
+    `std` is its standard deviation in the channel's unit, rounding included. `quantum` is the step
+    on which the values lie, 0 where there is none. `colour` says how far `std` can be trusted:
+
+    - "white": up to half the sampling rate.
+    - "low-passed": it fades towards there; `std` is that of white noise of the level below.
+    - "blue": it grows towards there, as after a numerical derivative; `std` is an upper limit for
+      what lies below.
+    - "resting": nowhere flat, as after a filter; `std` is that of the quietest stretch, at rest.
+    - "hidden": nowhere flat and never at rest: it cannot be told from the signal; `std` is a lower
+      limit.
+    - "rough": the signal itself changes that much from sample to sample; `std` is an upper limit.
+    - "none": there is no noise.
+    """
+
+    std: float
+    quantum: float = 0.0
+    colour: str = "white"
+
+
+def white_noise(y: Array) -> float:
+    """Return the standard deviation of the white noise on a channel, in the channel's unit.
+
+    Parameters
+    ----------
+    y : (n,) evenly spaced samples, finite, n >= `SHORTEST`
+
+    Raises
+    ------
+    RecordError
+        If there are too few samples, or one is not finite.
+    """
+    return estimate_noise(y).std
+
+
+def estimate_noise(y: Array) -> Noise:
+    """Return the noise of a channel with its colour; see `white_noise`."""
+    y = np.asarray(y, dtype=float)
+    if y.ndim != 1 or len(y) < SHORTEST:
+        raise RecordError(
+            f"noise: {len(y)} samples; the noise of a channel is told from {SHORTEST} or more."
+        )
+    if not np.isfinite(y).all():
+        raise RecordError("noise: a sample is not finite; fill it or cut the channel there.")
+    y = y - np.median(y)
+    largest = float(np.abs(y).max())
+    if largest == 0.0:
+        return Noise(0.0, 0.0, "none")
+    step = quantum(y)
+    # Rounding to a step q leaves an error of q/sqrt(12), also where nothing moves.
+    rounding = step / sqrt(12.0)
+    std = min(_level(y, kernel) for kernel in _DIFFERENCES)
+    # Numbers in double precision are rounded, too: below this nothing was measured.
+    if max(std, rounding) < 256.0 * float(np.finfo(float).eps) * largest:
+        return Noise(0.0, step, "none")
+    if std <= rounding:
+        return Noise(rounding, step)
+    rough = std > _ROUGH * float(np.std(y))
+    std, colour = (std, "rough") if rough else _in_bands(y, std)
+    if colour == "hidden" or std < _PERFECT * float(np.std(y)):
+        colour = "hidden"  # what is flat so far down is the rounding of numbers after a filter
+        quiet = _quietest(y)
+        if quiet < _RESTING * float(np.std(y)):
+            std, colour = max(std, quiet), "resting"
+    return Noise(max(std, rounding), step, colour)
+
+
+def _quietest(y: Array) -> float:
+    """Return the RMS about a straight line in the quietest stretches of 2 % of a channel."""
+    size = max(100, len(y) // 50)
+    if len(y) < 2 * size:
+        return float("inf")
+    line = np.linspace(-1.0, 1.0, size)
+    rows = np.lib.stride_tricks.sliding_window_view(y, size)[:: size // 2]
+    rows = rows - rows.mean(axis=1, keepdims=True)
+    rows = rows - (rows @ line / (line @ line))[:, None] * line
+    squares = np.mean(rows**2, axis=1)
+    # The quietest of many is quiet by chance, too: those that are not much louder belong to it.
+    return float(np.sqrt(np.mean(squares[squares <= 6.0 * squares.min()])))
+
+
+def quantum(y: Array) -> float:
+    """Return the step on which the values of a channel lie, 0 where there is none.
+
+    There is one when all values are whole multiples of it apart and many are met more than once.
+    """
+    levels = np.unique(y)
+    if len(levels) < 3 or len(levels) > 0.7 * len(y) or is_switched(y):
+        return 0.0
+    span = float(levels[-1] - levels[0])
+    gaps = np.diff(levels)
+    step = float(gaps[gaps > 1e-9 * span].min())  # smaller ones are the rounding of a conversion
+    # The smallest gap carries a rounding of its own; the mean over all whole multiples does not.
+    for _ in range(3):
+        multiples = np.round((levels - levels[0]) / step)
+        step = span / max(float(multiples[-1]), 1.0)
+    off = np.abs((levels - levels[0]) / step - multiples)
+    return step if float(np.quantile(off, 0.95)) < 0.15 else 0.0
+
+
+def is_switched(values: Array) -> bool:
+    """Return whether a channel keeps to a few levels and jumps between them, as a voltage does."""
+    finite = values[np.isfinite(values)]
+    if len(finite) < 20:
+        return False
+    changes = np.count_nonzero(np.diff(finite))
+    return bool(changes <= max(1, _CHANGES * len(finite) // 100))
+
+
+def _in_bands(y: Array, std: float) -> tuple[float, str]:
+    """Return the standard deviation and the colour that the bands tell.
+
+    The highest three neighbouring bands of one level are the noise; what rises below is signal.
+    """
+    levels = [_level(y, kernel) for kernel in _BANDS]
+    wide = _FLAT * (1.0 + 3.0 / sqrt(len(y)))  # levels scatter on short channels
+    for first in range(len(levels) - 2):
+        three = levels[first : first + 3]
+        if max(three) <= wide * min(three):
+            below = levels[first + 1 : 5]  # a signal only adds to these
+            blue = bool(below) and min(below) < levels[0] / wide**2
+            if blue or first == 0:
+                return std, "blue" if blue else "white"
+            return sum(three) / 3.0, "low-passed"
+    return std, "blue" if levels[0] > wide * levels[2] else "hidden"
+
+
+def _level(y: Array, kernel: Kernel) -> float:
+    """Return the standard deviation of white noise that gives a filter's answer."""
+    weights, freedom = _filter(kernel)
+    d = np.convolve(y, weights, "valid")
+    total = np.concatenate([[0.0], np.cumsum(d * d)])
+    begin = np.arange(0, len(d) - _BLOCK + 1, _BLOCK // 2)
+    squares = (total[begin + _BLOCK] - total[begin]) / _BLOCK
+    # Rounding error of the sums aside, a block of zeros holds one level of a coarse instrument.
+    moving = squares > 1e-14 * float(squares.max())
+    if np.mean(moving) > 0.1 and not is_switched(y):
+        squares = squares[moving]
+    found = float(np.quantile(squares, _CLEANEST)) / _chi2(_CLEANEST, freedom)
+    if found <= 1e-14 * float(squares.max()):
+        return 0.0
+    bound = _chi2(_KEPT, freedom)
+    for _ in range(20):
+        kept = squares[squares <= bound * found]
+        if not len(kept):
+            break
+        before, found = found, float(np.mean(kept)) / _truncated(freedom)
+        if abs(found - before) < 1e-4 * before:
+            break
+    return sqrt(max(found, 0.0))
+
+
+@cache
+def _filter(kernel: Kernel) -> tuple[Array, float]:
+    """Return the weights (a + b + 1,), of unit gain for white noise, and the freedom of a block.
+
+    The freedom is that of chi2 for the mean square over a block of the filter's answers, which
+    are correlated by the weights' own autocorrelation.
+    """
+    weights = np.ones(1)
+    for _ in range(kernel[0]):
+        weights = np.convolve(weights, [1.0, -1.0])
+    for _ in range(kernel[1]):
+        weights = np.convolve(weights, [1.0, 1.0])
+    weights = weights / sqrt(float(weights @ weights))
+    correlation = np.correlate(weights, weights, "full")[len(weights) :][: _BLOCK - 1]
+    share = 1.0 - np.arange(1, len(correlation) + 1) / _BLOCK
+    return weights, _BLOCK / (1.0 + 2.0 * float(share @ correlation**2))
+
+
+def _chi2(share: float, freedom: float) -> float:
+    """Return a quantile of chi2 over its freedom (Wilson & Hilferty 1931, PNAS 17, 684-688)."""
+    spread = 2.0 / (9.0 * freedom)
+    return float((1.0 - spread + NormalDist().inv_cdf(share) * sqrt(spread)) ** 3)
+
+
+@cache
+def _truncated(freedom: float) -> float:
+    """Return the mean of chi2 over its freedom when its highest values are cut off."""
+    shares = (np.arange(400) + 0.5) / 400.0 * _KEPT
+    return float(np.mean([_chi2(float(share), freedom) for share in shares]))

@@ -1,0 +1,147 @@
+"""Rows of a delimited text: which fields are numbers, and how rows become columns."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordError
+from ..physics.record import shortened
+from .table import Array
+
+_MISSING = frozenset(
+    ("", "-", "--", "nan", "-nan", "nan(ind)", "na", "n/a", "#n/a", "null", "none", "1.#qnan")
+)
+_INFINITE = frozenset(("inf", "-inf", "+inf", "infinity", "-infinity", "1.#inf", "-1.#inf"))
+_POINT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?")
+_COMMA = re.compile(r"[+-]?(?:\d+,?\d*|,\d+)(?:[eEdD][+-]?\d+)?")
+
+
+@dataclass
+class Layout:
+    """How a text is laid out: `delimiter` "" stands for blanks, `numeric` by column."""
+
+    delimiter: str
+    comma: bool
+    numeric: list[bool]
+
+    def split(self, line: str) -> list[str]:
+        if not self.delimiter:
+            return line.split()
+        if '"' in line:
+            return next(csv.reader([line], delimiter=self.delimiter), [])
+        return line.split(self.delimiter)
+
+    def fits(self, fields: Sequence[str]) -> bool:
+        """Return whether fields are a row of data: numbers where there are numbers."""
+        if len(fields) != len(self.numeric):
+            return False
+        states = [
+            state_of(one, self.comma) for one, n in zip(fields, self.numeric, strict=True) if n
+        ]
+        return "word" not in states and "number" in states
+
+
+@dataclass
+class Body:
+    """What is read: values (n,) per column, words that stand among them, the line of each row."""
+
+    values: list[Array]
+    lines: NDArray[np.int64]
+    words: dict[int, str] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def state_of(text: str, comma: bool) -> str:
+    """Return whether a field is a "number", "missing", or a "word"."""
+    plain = text.strip().strip('"').strip()
+    if (_COMMA if comma else _POINT).fullmatch(plain):
+        return "number"
+    lower = plain.lower().replace("+", "")
+    return "missing" if lower in _MISSING or lower in _INFINITE else "word"
+
+
+def is_comment(line: str) -> bool:
+    """Return whether a line is a comment."""
+    return line.lstrip()[:1] in ("#", "%")
+
+
+def read_fast(lines: list[str], first: int, layout: Layout) -> Body | None:
+    """Read rows of plain numbers at the speed of pyarrow; None if there is anything else."""
+    if not layout.delimiter or not all(layout.numeric):
+        return None
+    import pyarrow as pa
+    from pyarrow.csv import ConvertOptions, ParseOptions, ReadOptions, read_csv
+
+    last = len(lines)
+    while last > first and not lines[last - 1].strip():
+        last -= 1
+    names = [str(k) for k in range(len(layout.numeric))]
+    convert = ConvertOptions(
+        column_types=dict.fromkeys(names, pa.float64()),
+        null_values=["", "NaN", "nan", "NAN"],
+        decimal_point="," if layout.comma else ".",
+    )
+    parse = ParseOptions(delimiter=layout.delimiter, ignore_empty_lines=False)
+    body = io.BytesIO("\n".join(lines[first:last]).encode())
+    try:
+        read = read_csv(body, ReadOptions(column_names=names), parse, convert)
+    except pa.ArrowInvalid:
+        return None
+    values = [read[name].to_numpy().astype(float) for name in names]
+    if any(np.isinf(array).any() for array in values) or len(read) != last - first:
+        return None
+    return Body(values, np.arange(first + 1, last + 1))
+
+
+def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
+    """Read rows one by one, so that what is wrong has a line."""
+    wide = len(layout.numeric)
+    rows: list[list[float]] = []
+    places: list[int] = []
+    words: dict[int, str] = {}
+    notes: list[str] = []
+    full = [k for k in range(first, len(lines)) if lines[k].strip() and not is_comment(lines[k])]
+    infinite = 0
+    for k in full:
+        fields = layout.split(lines[k].strip(" \n\r"))
+        while len(fields) > wide and not fields[-1].strip():
+            fields.pop()
+        if len(fields) != wide:
+            if k == full[-1] and len(fields) < wide:
+                notes.append(f"line {k + 1}, the last one, is cut off and left out")
+                break
+            raise RecordError(
+                f'{name}, line {k + 1}: "{shortened(lines[k].strip())}" has {len(fields)} columns, '
+                f"and the rows above it {wide}. Is the line cut, or has it decimal commas?"
+            )
+        row = []
+        for index, text in enumerate(fields):
+            value = _value(text, layout.comma)
+            if value is None:
+                words.setdefault(index, f'line {k + 1}: "{shortened(text.strip())}" is no number')
+            infinite += value == float("inf")
+            row.append(float("nan") if value is None or value == float("inf") else value)
+        rows.append(row)
+        places.append(k + 1)
+    if infinite:
+        notes.append(f"{infinite} infinite values are taken as missing")
+    array = np.array(rows, dtype=float).reshape(len(rows), wide)
+    return Body([array[:, k].copy() for k in range(wide)], np.array(places), words, notes)
+
+
+def _value(text: str, comma: bool) -> float | None:
+    """Return a field's number, NaN where it is missing, infinity, or None for a word."""
+    plain = text.strip().strip('"').strip()
+    if (_COMMA if comma else _POINT).fullmatch(plain):
+        return float(plain.replace(",", ".").replace("D", "E").replace("d", "e"))
+    lower = plain.lower().replace("+", "")
+    if lower in _INFINITE:
+        return float("inf")
+    return float("nan") if lower in _MISSING else None

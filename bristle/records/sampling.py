@@ -1,0 +1,325 @@
+"""Even spacing in time: small jitter tolerated, short gaps filled, long ones cut, all of it said.
+
+A gap is a spacing above 1.5 times the median, as in ground motions. What is filled is marked, so
+that it never counts as measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordError
+from ..physics.record import GAP
+from .noise import SHORTEST, is_switched
+from .table import Array
+
+MAX_FILLED = 3
+"""Samples in a row that are filled by interpolation; a longer gap cuts the measurement."""
+_TOLERATED = 0.02  # share of the step by which a time may be off before all is resampled
+_MOVED = 0.02  # share of samples that may be off by more before all are interpolated
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How a measurement was sampled, and what was done about it.
+
+    `step` [s]; `recorded` samples in the file, `filled` of them made by interpolation; `jitter` the
+    largest distance of a time from even spacing, as a share of the step; `digits` [s] the step on
+    which the times are written, 0 where none is seen; `resampled` tells whether all samples are
+    interpolated.
+    """
+
+    step: float
+    recorded: int
+    filled: int = 0
+    jitter: float = 0.0
+    digits: float = 0.0
+    resampled: bool = False
+
+    @property
+    def rate(self) -> float:
+        """Samples per second [Hz]."""
+        return 1.0 / self.step
+
+
+@dataclass(frozen=True, eq=False)
+class Even:
+    """Evenly spaced pieces: per piece, times (n,), channels (n,) and which samples are measured."""
+
+    pieces: list[tuple[Array, dict[str, Array], NDArray[np.bool_]]]
+    sampling: Sampling
+    notes: list[str]
+
+
+def evenly(
+    time: Array, channels: dict[str, Array], lines: NDArray[np.int64], name: str, place: str
+) -> Even:
+    """Return channels at evenly spaced times.
+
+    Parameters
+    ----------
+    time : (n,) s, as recorded
+    channels : name to (n,), NaN where a value is missing
+    lines : (n,) where each sample stands in the file, called `place`
+    name : the file, for messages
+
+    Raises
+    ------
+    RecordError
+        If times go back, or appear twice with different values; if a channel holds no number; if
+        no piece of `SHORTEST` samples is left.
+    """
+    notes: list[str] = []
+    time, channels, lines = _in_order(time, channels, lines, name, place, notes)
+    for channel, values in channels.items():
+        if np.isnan(values).all():
+            raise RecordError(
+                f"{name}: {channel} holds no number. Take it out of [channels], or mend the file."
+            )
+    step = float(np.median(np.diff(time)))
+    breaks = np.flatnonzero(np.diff(time) > (MAX_FILLED + 1.5) * step) + 1
+    made = [
+        _even_stretch(time[part], {key: values[part] for key, values in channels.items()}, step)
+        for part in np.split(np.arange(len(time)), breaks)
+        if len(part) >= SHORTEST
+    ]
+    if not made:
+        raise RecordError(
+            f"{name}: no {SHORTEST} samples follow each other without a gap of more than "
+            f"{MAX_FILLED} samples of {_ms(step)}."
+        )
+    if len(breaks):
+        longest = int(np.argmax(np.diff(time)))
+        notes.append(
+            f"{len(breaks)} gap{'s' * (len(breaks) > 1)} in time, the longest from "
+            f"{time[longest]:.6g} s to {time[longest + 1]:.6g} s: cut there"
+        )
+    sampling = _summary(made, len(time))
+    notes += _grid_notes(made, time, sampling)
+    pieces = [piece for one in made for piece in _pieces(one, name, notes)]
+    if not pieces:
+        raise RecordError(
+            f"{name}: values are missing so often that no {SHORTEST} samples in a row are left."
+        )
+    kept = sum(len(piece[0]) for piece in pieces)
+    filled = sum(int((~good).sum()) for _, _, good in pieces)
+    lost = len(time) - (kept - filled)
+    if lost > 0 and len(pieces) + len(breaks) > 1:
+        notes.append(
+            f"{lost} of {len(time)} samples lie in no piece of {SHORTEST} and are left out"
+        )
+    if filled:
+        notes.append(
+            f"{filled} samples ({100.0 * filled / kept:.2g} %) were missing, at most {MAX_FILLED} "
+            "in a row: filled by interpolation (PCHIP) and marked as not measured"
+        )
+    return Even(pieces, replace(sampling, filled=filled), notes)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretch:
+    """Samples without a long gap in time, on an even grid; `known` where they are measured."""
+
+    even: Array
+    channels: dict[str, Array]
+    known: NDArray[np.bool_]
+    jitter: float
+    digits: float
+    resampled: bool
+    moved: int
+    sparse: tuple[str, ...]
+
+
+def _even_stretch(time: Array, channels: dict[str, Array], step: float) -> _Stretch:
+    grid, places, jitter, digits = _grid(time, step)
+    off = np.abs(time - grid[places]) / step > max(_TOLERATED, 0.51 * digits / step)
+    at = np.where(off, time, grid[places])
+    resampled = float(np.mean(off)) > _MOVED or not (np.diff(at) > 0.0).all()
+    if resampled:
+        count = int(np.floor((time[-1] - time[0]) / step * (1.0 + 1e-12))) + 1
+        grid, at = time[0] + step * np.arange(count), time
+    out, known, sparse = _on_grid(grid, at, channels, step)
+    moved = 0 if resampled else int(off.sum())
+    return _Stretch(grid, out, known, jitter, digits, resampled, moved, sparse)
+
+
+def _summary(made: list[_Stretch], recorded: int) -> Sampling:
+    longest = max(made, key=lambda one: len(one.even))
+    step = float((longest.even[-1] - longest.even[0]) / (len(longest.even) - 1))
+    return Sampling(
+        step, recorded, 0, max(one.jitter for one in made), longest.digits,
+        any(one.resampled for one in made),
+    )  # fmt: skip
+
+
+def _grid_notes(made: list[_Stretch], time: Array, sampling: Sampling) -> list[str]:
+    notes = []
+    if sampling.resampled:
+        notes.append(_resampled_note(time, sampling.step))
+    elif sampling.jitter > 1e-3:
+        moved = sum(one.moved for one in made)
+        taken = f", and {moved} samples are moved there by interpolation" if moved else ""
+        notes.append(
+            f"times are off even spacing by up to {100 * sampling.jitter:.2g} % of "
+            f"{_ms(sampling.step)}: taken as even{taken}"
+        )
+    for channel in dict.fromkeys(channel for one in made for channel in one.sparse):
+        notes.append(f"{channel} is written less often than the rest, and interpolated between")
+    return notes
+
+
+def _ms(step: float) -> str:
+    return f"{1e3 * step:.6g} ms"
+
+
+def _in_order(
+    time: Array,
+    channels: dict[str, Array],
+    lines: NDArray[np.int64],
+    name: str,
+    place: str,
+    notes: list[str],
+) -> tuple[Array, dict[str, Array], NDArray[np.int64]]:
+    """Return the samples with times that increase; refuse times that go back."""
+    there = np.isfinite(time)
+    if not there.all():
+        first = int(lines[np.argmin(there)])
+        notes.append(f"{int((~there).sum())} samples without a time are left out ({place} {first})")
+    time, lines = time[there], lines[there]
+    channels = {key: values[there] for key, values in channels.items()}
+    if len(time) < SHORTEST:
+        raise RecordError(
+            f"{name}: {len(time)} samples. A measurement has {SHORTEST} at least, and says "
+            "something of a damper only when it holds several cycles."
+        )
+    spacing = np.diff(time)
+    back = np.flatnonzero(spacing < 0.0)
+    if len(back):
+        k = int(back[0])
+        raise RecordError(
+            f"{name}, {place} {lines[k + 1]}: time goes back, from {time[k]:.9g} s to "
+            f"{time[k + 1]:.9g} s. If the file holds several runs, save each in a file of its own."
+        )
+    double = np.flatnonzero(spacing == 0.0)
+    if not len(double):
+        return time, channels, lines
+    for k in double.tolist():
+        same = all(
+            values[k] == values[k + 1] or (np.isnan(values[k]) and np.isnan(values[k + 1]))
+            for values in channels.values()
+        )
+        if not same:
+            raise RecordError(
+                f"{name}, {place} {lines[k + 1]}: the time {time[k]:.9g} s appears twice with "
+                f"different values ({len(double)} such times in all). Were times written with too "
+                "few digits?"
+            )
+    keep = np.ones(len(time), dtype=bool)
+    keep[double + 1] = False
+    notes.append(f"{len(double)} samples that repeat the one before are left out")
+    return time[keep], {key: values[keep] for key, values in channels.items()}, lines[keep]
+
+
+def _grid(time: Array, step: float) -> tuple[Array, NDArray[np.int64], float, float]:
+    """Return an even grid, each sample's place on it, the largest distance from it in steps, and
+    the step on which the times are written [s]."""
+    places = np.concatenate([[0], np.cumsum(np.maximum(np.round(np.diff(time) / step), 1.0))])
+    # The median spacing of rounded times is rounded, too: the whole span knows the step better.
+    slope = (time[-1] - time[0]) / places[-1]
+    start = float(time[0])
+    off = np.abs(time - start - slope * places) / slope
+    if off.max() > 1e-6:
+        for _ in range(2):  # the second time without what is far off
+            near = off <= max(_TOLERATED, float(np.quantile(off, 0.9)))
+            slope, start = (float(one) for one in np.polyfit(places[near], time[near], 1))
+            off = np.abs(time - start - slope * places) / slope
+    digits = 0.0
+    for power in range(0, 7):
+        unit = 10.0**-power
+        if np.abs(time / unit - np.round(time / unit)).max() < 1e-4:
+            digits = unit
+            break
+    grid = start + slope * np.arange(int(places[-1]) + 1)
+    return grid, places.astype(np.int64), float(off.max()), digits
+
+
+def _resampled_note(time: Array, step: float) -> str:
+    spacing = np.diff(time)
+    return (
+        f"spacing varies from {_ms(float(spacing.min()))} to {_ms(float(spacing.max()))}: "
+        f"resampled to even {_ms(step)}, the median, by monotone cubic interpolation (PCHIP; "
+        "switched channels keep their last value)"
+    )
+
+
+def _on_grid(
+    even: Array, at: Array, channels: dict[str, Array], step: float
+) -> tuple[dict[str, Array], NDArray[np.bool_], tuple[str, ...]]:
+    """Return channels on the grid, which of its samples lie next to measured ones, and which
+    channels are written less often than the rest."""
+    out: dict[str, Array] = {}
+    sparse = []
+    known = np.ones(len(even), dtype=bool)
+    for channel, values in channels.items():
+        finite = np.isfinite(values)
+        x, y = at[finite], values[finite]
+        if len(x) < 2:
+            known[:] = False
+            out[channel] = np.zeros(len(even))
+            continue
+        own = float(np.median(np.diff(x)))
+        if own > GAP * step:
+            sparse.append(channel)
+        known &= _covered(even, x, max(own, step))
+        out[channel] = (
+            y if len(x) == len(even) and np.array_equal(x, even) else _between(even, x, y)
+        )
+    return out, known, tuple(sparse)
+
+
+def _between(even: Array, x: Array, y: Array) -> Array:
+    """Return samples between others: switched channels keep their last value, others are curved."""
+    if is_switched(y):
+        nearly = even + 1e-6 * (even[1] - even[0])
+        last = np.searchsorted(x, nearly, side="right") - 1
+        return np.asarray(y[np.clip(last, 0, len(y) - 1)], dtype=float)
+    from scipy.interpolate import PchipInterpolator
+
+    return np.asarray(PchipInterpolator(x, y)(np.clip(even, x[0], x[-1])), dtype=float)
+
+
+def _covered(even: Array, x: Array, step: float) -> NDArray[np.bool_]:
+    """Return which times of a grid are samples, or lie between samples that are no gap apart."""
+    after = np.searchsorted(x, even - 1e-6 * step)
+    before = np.searchsorted(x, even + 1e-6 * step, side="right") - 1
+    inside = (before >= 0) & (after < len(x))
+    low, high = x[np.clip(before, 0, len(x) - 1)], x[np.clip(after, 0, len(x) - 1)]
+    return inside & (high - low <= GAP * step)
+
+
+def _pieces(
+    one: _Stretch, name: str, notes: list[str]
+) -> list[tuple[Array, dict[str, Array], NDArray[np.bool_]]]:
+    """Cut a stretch where more than `MAX_FILLED` values in a row are missing, and at its ends."""
+    size = len(one.even)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], (~one.known).astype(np.int8), [0]])))
+    bounds, gaps = [0], []
+    for start, stop in edges.reshape(-1, 2).tolist():
+        if stop - start > MAX_FILLED or start == 0 or stop == size:
+            bounds += [start, stop]
+            gaps.append((start, stop))
+    bounds.append(size)
+    if gaps:
+        start, stop = max(gaps, key=lambda gap: gap[1] - gap[0])
+        notes.append(
+            f"values are missing in {len(gaps)} place{'s' * (len(gaps) > 1)}, the longest from "
+            f"{one.even[start]:.6g} s to {one.even[stop - 1]:.6g} s: cut there"
+        )
+    return [
+        (one.even[a:b], {key: values[a:b] for key, values in one.channels.items()}, one.known[a:b])
+        for a, b in zip(bounds[::2], bounds[1::2], strict=True)
+        if b - a >= SHORTEST
+    ]

@@ -1,0 +1,104 @@
+"""What the title of a column says: name and unit, in the spellings that laboratories use."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..errors import UnitError
+from ..units import Unit
+from ..units import parse as parse_unit
+from .columns import Column, column
+
+_PARTED = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s|,\s*|:\s*|;\s*|\sin\s)\s*(?P<unit>[^\s,:;]+)\s*")
+_BARE = re.compile(r"[\[(]?\s*(?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]?")
+_NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none")
+
+
+def title(index: int, text: str) -> Column:
+    """Return a column from its title: `force [kN]`, `F (kN)`, `F_kN`, `F / kN`, `F, kN`, `F in kN`.
+
+    Parameters
+    ----------
+    index : int
+        Where the column stands, from 0.
+    text : str
+        Its title in the file.
+    """
+    found = column(index, text)
+    if found.unit is None and not found.problem:
+        parted = _PARTED.fullmatch(found.text)
+        unit = unit_or_none(parted["unit"]) if parted else None
+        if parted and unit is not None:
+            return replace(found, name=parted["name"], unit=unit)
+    return found
+
+
+def titles(names: Sequence[str], units: Sequence[str] | None = None) -> tuple[Column, ...]:
+    """Return the columns of a header and of the row of units below it, each title once.
+
+    Columns without a title are called `column 3`, counted from 1; a title that is met again gets a
+    number: `F`, `F (2)`.
+    """
+    out: list[Column] = []
+    met: dict[str, int] = {}
+    for index, name in enumerate(names):
+        text = name.strip().strip('"').strip() or f"column {index + 1}"
+        met[text] = met.get(text, 0) + 1
+        found = title(index, text)
+        if met[text] > 1:
+            found = replace(found, text=f"{text} ({met[text]})")
+        if units is not None and units[index].strip().lower() not in _NOTHING:
+            found = replace(found, unit=row_unit(units[index]), problem="")
+        out.append(found)
+    return tuple(out)
+
+
+def row_unit(text: str) -> Unit | None:
+    """Return the unit in a row of units, `[kN]` or `kN`; None if it is none."""
+    match = _BARE.fullmatch(text.strip().strip('"'))
+    return unit_or_none(match["unit"]) if match else None
+
+
+def is_unit_row(fields: Sequence[str]) -> bool:
+    """Return whether a row below the titles holds units: all that is there is a unit."""
+    some = [field for field in fields if field.strip().lower() not in _NOTHING]
+    return bool(some) and all(row_unit(field) is not None for field in some)
+
+
+def unit_or_none(text: str) -> Unit | None:
+    """Return a unit, or None where the text spells none."""
+    if not text.strip():
+        return None
+    for spelled in (text, _RENAMED.get(text.strip().lower(), text)):
+        try:
+            return parse_unit(spelled)
+        except UnitError:
+            continue
+    return None
+
+
+# What instruments print and no standard knows.
+_RENAMED = {
+    "volt": "V",
+    "volts": "V",
+    "amp": "A",
+    "amps": "A",
+    "ampere": "A",
+    "newton": "N",
+    "newtons": "N",
+    "sec.": "s",
+    "secs": "s",
+    "second": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "meter": "m",
+    "metre": "m",
+    "kip": "kip",
+    "lbs": "lbf",
+    "lb": "lbf",
+    "inch": "in",
+    "g's": "g",
+    "sekunden": "s",
+}

@@ -1,0 +1,26 @@
+"""Studies: a folder with measurements, the model held against them, and its history."""
+
+from __future__ import annotations
+
+from .errors import StudyError
+from .history import Step
+from .model import StudyModel, Value, new_model, read_model, write_model
+from .new import Created, create_study
+from .settings import RunFile, Settings
+from .study import Runs, Study
+
+__all__ = [
+    "Created",
+    "RunFile",
+    "Runs",
+    "Settings",
+    "Step",
+    "Study",
+    "StudyError",
+    "StudyModel",
+    "Value",
+    "create_study",
+    "new_model",
+    "read_model",
+    "write_model",
+]

@@ -1,0 +1,53 @@
+"""What a first look finds: in a sentence with numbers, and what to do about it."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+Level = Literal["error", "warning", "note"]
+_ORDER = {"error": 0, "warning": 1, "note": 2}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One finding.
+
+    `kind` names it for programs ("clipping"), `run` and `channel` are "" where it is about all;
+    `text` says it with numbers, `do` what to do, "" where there is nothing; `value` is the number
+    by which findings of one kind are ordered, worst last.
+    """
+
+    kind: str
+    level: Level
+    text: str
+    do: str = ""
+    run: str = ""
+    channel: str = ""
+    value: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the finding as JSON has it."""
+        return asdict(self)
+
+
+def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, list[str]]]:
+    """Return the worst finding of each kind and channel, with the runs that share it."""
+    groups: dict[tuple[str, str, str], list[Finding]] = defaultdict(list)
+    for finding in findings:
+        groups[finding.level, finding.kind, finding.channel].append(finding)
+    out = [
+        (max(group, key=lambda one: one.value), [one.run for one in group if one.run])
+        for group in groups.values()
+    ]
+    return sorted(out, key=lambda pair: _ORDER[pair[0].level])
+
+
+def sentence(finding: Finding, runs: list[str]) -> str:
+    """Return one finding as text: where, what, and in how many other runs."""
+    where = f"{finding.run}: " if finding.run else ""
+    others = len(set(runs)) - 1
+    also = f" (likewise in {others} other run{'s' * (others > 1)})" if others > 0 else ""
+    return f"{where}{finding.text}{also}"

@@ -1,0 +1,169 @@
+"""The steps of a study's model: each a folder with the model and why it came to be.
+
+A change touches several files. What is about to happen is written down first (`history/.pending`),
+so that a process that is killed on its way leaves a change that the next one completes.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from .errors import StudyError
+from .files import read_json, write_json, write_whole
+
+_NUMBER = re.compile(r"\d{3,}")
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step: what was changed and why, with the errors on the runs before and after.
+
+    `before`, `after` map names to numbers, `{"train": ..., "holdout": ...}`; step 0 is the model
+    that the study began with.
+    """
+
+    number: int
+    what: str
+    why: str
+    before: dict[str, Any] = field(default_factory=dict)
+    after: dict[str, Any] = field(default_factory=dict)
+
+
+class History:
+    """The folder history/ of a study, and the model.toml and verdict.json that follow from it.
+
+    Nothing here locks: `Study` does.
+    """
+
+    def __init__(self, study: Path) -> None:
+        self.study = study
+        self.folder = study / "history"
+        self.pending = self.folder / ".pending"
+
+    def numbers(self) -> list[int]:
+        """Return the numbers of the steps, in order."""
+        if not self.folder.is_dir():
+            return []
+        names = (path.name for path in self.folder.iterdir() if path.is_dir())
+        return sorted(int(name) for name in names if _NUMBER.fullmatch(name))
+
+    def steps(self) -> list[Step]:
+        """Return the steps, the first model included."""
+        return [self.step(number) for number in self.numbers()]
+
+    def step(self, number: int) -> Step:
+        """Return one step; StudyError if its file is damaged."""
+        path = self.path(number) / "step.json"
+        data = read_json(path)
+        try:
+            return Step(
+                int(data["number"]),
+                str(data["what"]),
+                str(data["why"]),
+                dict(data["before"]),
+                dict(data["after"]),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise StudyError(
+                f"{path}: no step of a study: {error!r} is missing or wrong."
+            ) from None
+
+    def path(self, number: int) -> Path:
+        """Return the folder of a step."""
+        return self.folder / f"{number:03d}"
+
+    def model_file(self, number: int) -> Path:
+        """Return the model.toml of a step."""
+        return self.path(number) / "model.toml"
+
+    def add(self, step: Step, model: str) -> None:
+        """Add a step with its model, make that the present one, and drop the present verdict."""
+        self._keep_verdict(step.number - 1)
+        self._begin({"add": step.number})
+        draft = Path(tempfile.mkdtemp(dir=self.folder, prefix=".draft-"))
+        try:
+            write_whole(draft / "model.toml", model)
+            write_json(draft / "step.json", {"schema": 1, **asdict(step)})
+            draft.chmod(0o755)
+            draft.replace(self.path(step.number))
+        except OSError as error:
+            raise StudyError(
+                f"{self.path(step.number)}: cannot be written ({error.strerror or error})."
+            ) from None
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+        self.recover()
+
+    def keep_edit(self) -> None:
+        """Make a step of a model.toml that was edited by hand, so that no step loses it."""
+        numbers = self.numbers()
+        present = self.study / "model.toml"
+        if not numbers or not present.is_file():
+            return
+        content = present.read_bytes()
+        if content != self.model_file(numbers[-1]).read_bytes():
+            step = Step(numbers[-1] + 1, "edited by hand", "model.toml was changed in an editor")
+            self.add(step, content.decode("utf-8-sig"))
+
+    def undo(self) -> Step:
+        """Take the last step back and return it; it is kept in history/undone/.
+
+        Raises
+        ------
+        StudyError
+            If there is no step but the first model.
+        """
+        numbers = self.numbers()
+        if len(numbers) < 2:
+            raise StudyError(
+                f"{self.study}: there is nothing to undo: the model is the one that the study "
+                "began with."
+            )
+        last = self.step(numbers[-1])
+        self._keep_verdict(last.number)
+        self._begin({"undo": last.number})
+        self.recover()
+        return last
+
+    def recover(self) -> None:
+        """Complete what a process began and did not end; nothing where nothing is pending."""
+        if not self.pending.is_file():
+            return
+        begun = read_json(self.pending)
+        if "add" in begun and self.path(int(begun["add"])).is_dir():
+            self._make_present(int(begun["add"]))
+        if "undo" in begun:
+            number = int(begun["undo"])
+            self._make_present(max((n for n in self.numbers() if n < number), default=0))
+            if self.path(number).is_dir():
+                kept = self.folder / "undone" / self.path(number).name
+                kept.parent.mkdir(exist_ok=True)
+                shutil.rmtree(kept, ignore_errors=True)
+                self.path(number).replace(kept)
+        for draft in self.folder.glob(".draft-*"):
+            shutil.rmtree(draft, ignore_errors=True)
+        self.pending.unlink(missing_ok=True)
+
+    def _begin(self, what: Mapping[str, int]) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True)
+        write_json(self.pending, what)
+
+    def _make_present(self, number: int) -> None:
+        write_whole(self.study / "model.toml", self.model_file(number).read_bytes())
+        verdict = self.path(number) / "verdict.json"
+        if verdict.is_file():
+            write_whole(self.study / "verdict.json", verdict.read_bytes())
+        else:
+            (self.study / "verdict.json").unlink(missing_ok=True)
+
+    def _keep_verdict(self, number: int) -> None:
+        """Keep the present verdict with the step whose model it judges."""
+        verdict = self.study / "verdict.json"
+        if verdict.is_file() and self.path(number).is_dir():
+            write_whole(self.path(number) / "verdict.json", verdict.read_bytes())

@@ -1,0 +1,111 @@
+"""The picture of a first look: channels over time, force over velocity and displacement."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+from ..records.channels import DRIVE
+from ..records.measurement import Measurement
+from ..records.table import Array
+from .look_motion import velocity_of_run
+
+_SCALES = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+_SHOWN = 4000  # samples per line: more are not seen
+_ROWS = 8
+
+
+def first_look_png(runs: list[Measurement], level: str = "") -> bytes:
+    """Return a PNG: the channels of the longest run, and force over motion in all runs."""
+    from matplotlib.figure import Figure
+
+    longest = max(runs, key=lambda run: run.duration)
+    channels = _rows(longest)
+    forced = [run for run in runs if "force" in run.channels]
+    figure = Figure(figsize=(12.0, 1.6 * max(len(channels), 3) + 0.6), layout="constrained")
+    grid = figure.add_gridspec(len(channels), 3 if forced else 2)
+    first = None
+    for row, channel in enumerate(channels):
+        axes = figure.add_subplot(grid[row, :2], sharex=first)
+        first = first or axes
+        _line(axes, longest, channel)
+        last = row == len(channels) - 1
+        axes.tick_params(labelbottom=last)
+        axes.set_xlabel("time [s]" if last else "")
+    assert first is not None
+    first.set_title(f"{longest.name}: {longest.sampling.rate:.4g} Hz, {longest.duration:.4g} s")
+    if forced:
+        half = max(1, len(channels) // 2)
+        _loops(figure.add_subplot(grid[:half, 2]), forced, level, "velocity")
+        if half < len(channels):
+            _loops(figure.add_subplot(grid[half:, 2]), forced, level, "displacement")
+    file = io.BytesIO()
+    figure.savefig(file, format="png", dpi=110)
+    return file.getvalue()
+
+
+def save_first_look(runs: list[Measurement], path: Path, level: str = "") -> None:
+    """Write the picture of a first look, whole."""
+    from .files import write_whole
+
+    write_whole(path, first_look_png(runs, level))
+
+
+def _rows(run: Measurement) -> list[str]:
+    """Return the channels to show, the damper's first."""
+    first = ["ground_acceleration", "displacement", "velocity", "acceleration", "force", *DRIVE]
+    first += [f"base_{one}" for one in ("displacement", "velocity", "acceleration_absolute")]
+    named = [channel for channel in first if channel in run.channels]
+    return [*named, *(channel for channel in run.channels if channel not in named)][:_ROWS]
+
+
+def _line(axes, run: Measurement, channel: str) -> None:  # type: ignore[no-untyped-def]
+    factor, unit = _SCALES.get(run.units[channel], (1.0, run.units[channel]))
+    every = max(1, len(run.time) // _SHOWN)
+    axes.plot(run.time[::every], factor * run[channel][::every], lw=0.7)
+    missing = ~run.measured
+    if missing.any():
+        axes.plot(run.time[missing], factor * run[channel][missing], ".", ms=3, color="tab:red")
+    axes.set_ylabel(f"{channel.replace('_', ' ')}\n[{unit}]", fontsize=8)
+    axes.grid(alpha=0.3)
+
+
+def _loops(axes, runs: list[Measurement], level: str, over: str) -> None:  # type: ignore[no-untyped-def]
+    """Draw force over velocity or displacement, coloured by the voltage where there is one."""
+    x, force, drive = _gathered(runs, level, over)
+    if not len(x):
+        axes.set_axis_off()
+        return
+    unit = "mm/s" if over == "velocity" else "mm"
+    dots = {"s": 1.5, "alpha": 0.6, "lw": 0}
+    if len(drive) == len(x) and np.ptp(drive) > 0.0:
+        points = axes.scatter(1e3 * x, force, c=drive, cmap="viridis", **dots)
+        axes.figure.colorbar(points, ax=axes, label="voltage [V] or current [A]")
+    else:
+        axes.scatter(1e3 * x, force, **dots)
+    axes.set_xlabel(f"{over} [{unit}]")
+    axes.set_ylabel("force [N]")
+    axes.set_title(f"force over {over}, {len(runs)} run{'s' * (len(runs) > 1)}", fontsize=9)
+    axes.grid(alpha=0.3)
+
+
+def _gathered(runs: list[Measurement], level: str, over: str) -> tuple[Array, Array, Array]:
+    xs, forces, drives = [], [], []
+    for run in runs:
+        if over == "velocity":
+            x = velocity_of_run(run, level)
+        else:
+            x = run.channels.get(f"{level}_displacement" if level else "displacement")
+        if x is None:
+            continue
+        every = max(1, len(x) * len(runs) // (3 * _SHOWN))
+        xs.append(x[::every])
+        forces.append(run["force"][::every])
+        drive = next((run[one] for one in DRIVE if one in run.channels), None)
+        if drive is not None:
+            drives.append(drive[::every])
+    empty = np.zeros(0)
+    join = [np.concatenate(parts) if parts else empty for parts in (xs, forces, drives)]
+    return join[0], join[1], join[2]

@@ -1,0 +1,298 @@
+"""A study: a folder with measurements, the model held against them, and how it came to be."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from ..records.measurement import Measurement, read_measurements
+from .errors import StudyError
+from .files import read_json, write_json, write_whole
+from .history import History, Step
+from .model import StudyModel, model_text, read_model
+from .settings import ROLES, Settings, read_settings
+
+PATIENCE = 10.0
+"""Seconds to wait for another process that writes in the same study."""
+SPLIT = 0.7
+"""Share of a single run that is for training; the rest is held out."""
+
+
+@dataclass(frozen=True)
+class Runs:
+    """The measurements of a study: those that a model is fitted to, and those held out.
+
+    `notes` says what weakens the split, in sentences.
+    """
+
+    train: list[Measurement]
+    holdout: list[Measurement]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def all(self) -> list[Measurement]:
+        """Both, in order."""
+        return [*self.train, *self.holdout]
+
+
+class Study:
+    """A study's folder.
+
+    Reading needs no lock. What is written is written whole, under a lock, and refused when another
+    process has changed the model since this one has read it.
+
+    Parameters
+    ----------
+    folder : path
+        The folder that holds study.toml.
+
+    Raises
+    ------
+    StudyError
+        If there is no study, or its study.toml is wrong: with every mistake and its line.
+    """
+
+    def __init__(self, folder: Path | str) -> None:
+        self.folder = Path(folder)
+        if not (self.folder / "study.toml").is_file():
+            raise StudyError(
+                f"{self.folder}: no study: there is no study.toml. Make one with  bristle study "
+                f"new {self.folder.name or 'NAME'} --data 'lab/*.csv'"
+            )
+        self.history = History(self.folder)
+        self._lock = FileLock(self.folder / ".lock")
+        self._complete_what_was_begun()
+        self.settings: Settings = read_settings(self.folder / "study.toml")
+        self._seen = self._state()
+
+    @classmethod
+    def open(cls, folder: Path | str) -> Study:
+        """Return the study in a folder; the same as `Study(folder)`."""
+        return cls(folder)
+
+    @classmethod
+    def create(cls, folder: Path | str, files: Sequence[Path | str], **choices: Any) -> Study:
+        """Make a study's folder from files; see `bristle.study.create_study` for the choices."""
+        from .new import create_study
+
+        return create_study(folder, files, **choices).study
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.folder.resolve().name
+
+    @property
+    def effects_folder(self) -> Path:
+        """Where the user's own effects are."""
+        return self.folder / "effects"
+
+    @property
+    def reports_folder(self) -> Path:
+        """Where reports and pictures go."""
+        return self.folder / "reports"
+
+    def files(self, role: str | None = None) -> list[Path]:
+        """Return the files of the runs, all or those of one role."""
+        return [self.folder / run.file for run in self.settings.runs if role in (None, run.role)]
+
+    def read(self, role: str | None = None) -> list[Measurement]:
+        """Return the measurements as they are in the files, without a look at what they are for.
+
+        Raises
+        ------
+        RecordError
+            If a file cannot be read.
+        """
+        return read_measurements(self.files(role), self.settings.channels)
+
+    def runs(self) -> Runs:
+        """Return the measurements for training and those held out.
+
+        A single run is split in time, 70 to 30 %.
+
+        Raises
+        ------
+        StudyError
+            If no run is held out, or a run held out is also one for training.
+        RecordError
+            If a file cannot be read.
+        """
+        train, holdout = (self.read(role) for role in ROLES)
+        if len(self.settings.runs) == 1:
+            return split_in_time([*train, *holdout])
+        if not train or not holdout:
+            lacking = ROLES[0] if not train else ROLES[1]
+            raise StudyError(
+                f'{self.folder / "study.toml"}: no run has role = "{lacking}". Give it to some: a '
+                "model is judged on runs that it was not fitted to."
+            )
+        _refuse_twins(train, holdout)
+        return Runs(train, holdout, tuple(_twins_within(train) + _twins_within(holdout)))
+
+    def model(self) -> StudyModel:
+        """Return the present model; StudyError with every mistake of model.toml."""
+        model = read_model(self.folder / "model.toml")
+        self._seen = self._state()
+        return model
+
+    def steps(self) -> list[Step]:
+        """Return the history, the first model included."""
+        return self.history.steps()
+
+    def add_step(
+        self,
+        what: str,
+        why: str,
+        model: StudyModel,
+        before: Mapping[str, Any] | None = None,
+        after: Mapping[str, Any] | None = None,
+    ) -> Step:
+        """Make a model the present one, with a new step in the history; its verdict is gone.
+
+        Parameters
+        ----------
+        what, why : str
+            As in "add gas_spring", "verdict of the diagnosis: ...".
+        before, after : mapping
+            Errors of the two models by name, on training and held-out runs.
+
+        Raises
+        ------
+        StudyError
+            If another process has changed the model since it was read here, writes for longer than
+            `PATIENCE`, or the folder cannot be written.
+        """
+        with self.writing():
+            self._refuse_if_changed()
+            self.history.keep_edit()
+            numbers = self.history.numbers()
+            step = Step(
+                numbers[-1] + 1 if numbers else 0, what, why, {**(before or {})}, {**(after or {})}
+            )
+            self.history.add(step, model_text(model, self.folder / "model.toml"))
+            self._seen = self._state()
+        return step
+
+    def undo(self) -> Step:
+        """Go back to the model before the last step; return that step.
+
+        Raises
+        ------
+        StudyError
+            If there is no step to undo, or as for `add_step`.
+        """
+        with self.writing():
+            self.history.keep_edit()
+            step = self.history.undo()
+            self._seen = self._state()
+        return step
+
+    def verdict(self) -> dict[str, Any] | None:
+        """Return the verdict on the present model, None if there is none."""
+        path = self.folder / "verdict.json"
+        return read_json(path) if path.is_file() else None
+
+    def write_verdict(self, verdict: Mapping[str, Any]) -> None:
+        """Write the verdict on the model that was read here; see `add_step` for what is raised."""
+        with self.writing():
+            self._refuse_if_changed()
+            write_json(self.folder / "verdict.json", verdict)
+
+    def write_report(self, name: str, content: str | bytes) -> Path:
+        """Write a file into reports/, whole; return its path."""
+        path = self.reports_folder / name
+        with self.writing():
+            write_whole(path, content)
+        return path
+
+    @contextmanager
+    def writing(self, patience: float = PATIENCE) -> Iterator[None]:
+        """Hold the study's lock; other processes that write wait `patience` s, then give up."""
+        try:
+            with self._lock.acquire(timeout=patience):
+                self.history.recover()
+                yield
+        except Timeout:
+            raise StudyError(
+                f"{self.folder}: another process has been writing here for more than "
+                f"{patience:g} s. Wait for it, or end it; then run this again."
+            ) from None
+        except OSError as error:
+            raise StudyError(
+                f"{error.filename or self.folder}: cannot be written ({error.strerror or error})."
+            ) from None
+
+    def _complete_what_was_begun(self) -> None:
+        if not self.history.pending.is_file():
+            return
+        try:
+            with self._lock.acquire(timeout=0.0):
+                self.history.recover()
+        except Timeout:
+            return  # it is being completed by the process that began it
+
+    def _state(self) -> tuple[tuple[int, ...], str]:
+        """Return what tells whether the model has been changed."""
+        path = self.folder / "model.toml"
+        content = path.read_bytes() if path.is_file() else b""
+        return tuple(self.history.numbers()), hashlib.sha256(content).hexdigest()
+
+    def _refuse_if_changed(self) -> None:
+        now = self._state()
+        if now != self._seen:
+            steps = len(now[0]) - len(self._seen[0])
+            what = f"{abs(steps)} step{'s' * (abs(steps) != 1)} " if steps else ""
+            how = "added" if steps > 0 else "undone" if steps < 0 else "model.toml was edited"
+            raise StudyError(
+                f"{self.folder}: the model has been changed meanwhile ({what}{how}), so that this "
+                "result is not of the present one. Nothing is written; run this again."
+            )
+
+
+def split_in_time(pieces: list[Measurement]) -> Runs:
+    """Return the first 70 % of a single run's samples for training, and the rest held out."""
+    total = sum(len(piece.time) for piece in pieces)
+    wanted, train, holdout = round(SPLIT * total), [], []
+    for piece in pieces:
+        size = len(piece.time)
+        if wanted >= size:
+            train.append(piece)
+        elif wanted <= 0:
+            holdout.append(piece)
+        else:
+            train.append(piece.part(0, wanted, f"{piece.name}, first {SPLIT:.0%}"))
+            holdout.append(piece.part(wanted, size, f"{piece.name}, last {1.0 - SPLIT:.0%}"))
+        wanted -= size
+    note = (
+        "There is one run. It is split in time, the last 30 % held out: weaker than a run of its "
+        "own, for motion, voltage and temperature there are much like those of the training part."
+    )
+    return Runs(train, [replace(one) for one in holdout], (note,))
+
+
+def _refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
+    first = {one.digest(): one.name for one in train}
+    for one in holdout:
+        if one.digest() in first:
+            raise StudyError(
+                f"{one.name} is held out and is the same measurement as {first[one.digest()]}, "
+                "which is for training: it can judge nothing. Take another run, or remove one."
+            )
+
+
+def _twins_within(runs: list[Measurement]) -> list[str]:
+    first: dict[str, str] = {}
+    notes = []
+    for one in runs:
+        digest = one.digest()
+        if digest in first:
+            notes.append(f"{one.name} is the same measurement as {first[digest]}: it counts twice.")
+        first.setdefault(digest, one.name)
+    return notes

@@ -1,0 +1,109 @@
+"""Parameters from noisy bench runs: the truth comes back, and z of the truth is 1."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bristle.compiled.bench import Bench
+from bristle.errors import RecordError
+from bristle.identify.fit import Model, Problem, Run, identify
+from bristle.identify.prepare import prepare, smooth_steps
+from bristle.identify.smooth import posterior_draws, smooth
+from bristle.physics.damper import LAWS
+from bristle.records.measurement import measurements_of_frame
+
+DT, N = 0.002, 4000
+T = np.arange(N) * DT
+
+
+def motion(seed):
+    """Return displacement, velocity, acceleration of a random multisine up to 8 Hz."""
+    random = np.random.default_rng(seed)
+    f, phase = random.uniform(0.5, 8.0, 12), random.uniform(0.0, 2.0 * np.pi, 12)
+    size = 0.006 / f**0.7 * random.uniform(0.3, 1.0, 12)
+    w = 2.0 * np.pi * f
+    angle = w[:, None] * T + phase[:, None]
+    x = size @ np.sin(angle)
+    return x, (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
+
+
+def truth_of(law):
+    random = np.random.default_rng(5)
+    return {
+        name: declared.value * (1.0 + 0.15 * random.uniform(-1.0, 1.0))
+        for name, declared in LAWS[law].parameters.items()
+        if name != "exponent"
+    }
+
+
+def bench_run(law, values, seed, noise=0.01):
+    """Return a run with noise on every channel but the voltage."""
+    random = np.random.default_rng(seed)
+    x, v, a = motion(seed)
+    V = 2.5 * (1.0 + np.sin(2.0 * np.pi * (0.5 + 0.4 * seed) * T))
+    force = Bench(law, []).force(x, v, a, V, DT, values)
+    sigma = [noise * np.std(y) for y in (x, v, force)]
+    measured = [
+        y + s * random.standard_normal(N) for y, s in zip((x, v, force), sigma, strict=True)
+    ]
+    smoothed = smooth(measured[0], measured[1], DT, (sigma[0], sigma[1]))
+    draws = np.zeros((10, N, 4))
+    draws[:, :, :3] = posterior_draws(
+        N, DT, (sigma[0], sigma[1]), smoothed.jerk, (True, True), 10, seed
+    )
+    return Run(
+        f"run {seed}", DT, smoothed.x, smoothed.v, smoothed.a, V, measured[2], sigma[2], draws
+    )
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_truth_comes_back_within_its_intervals(law):
+    truth = truth_of(law)
+    found = identify(Problem([bench_run(law, truth, seed) for seed in (1, 2, 3)]), law)
+    errors = {name: (found.model.values[name] - truth[name]) / found.std[name] for name in truth}
+    # Of seven parameters one may lie beyond three standard deviations once in fifty times.
+    assert max(map(abs, errors.values())) < 4.0, errors
+    assert all(found.std[name] < 0.1 * truth[name] for name in truth)
+    assert found.unidentified == ()
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_residual_of_the_truth_is_its_expected_noise(law):
+    truth = truth_of(law)
+    problem = Problem([bench_run(law, truth, seed) for seed in (4, 5)])
+    model = Model(law, (), truth)
+    for run, (bias, sigma, _) in zip(problem.runs, problem.expectation(model), strict=True):
+        z = ((run.force - problem.predict(model, run) - bias) / sigma)[run.skip :]
+        assert np.median(np.abs(z)) / 0.6745 == pytest.approx(1.0, abs=0.1)
+
+
+def test_smoother_is_as_certain_as_it_says():
+    x, v, _ = motion(7)
+    random = np.random.default_rng(7)
+    noise = (0.01 * np.std(x), 0.01 * np.std(v))
+    found = smooth(
+        x + noise[0] * random.standard_normal(N),
+        v + noise[1] * random.standard_normal(N),
+        DT,
+        noise,
+    )
+    assert np.std(found.x - x) < 1.2 * found.std[0] < 0.3 * noise[0]
+    assert np.std(found.v - v) < 1.2 * found.std[1] < 0.9 * noise[1]
+    assert found.mismatch == pytest.approx([1.0, 1.0], abs=0.1)
+
+
+def test_voltage_keeps_its_steps():
+    steps = np.repeat([0.0, 3.0, 1.0, 6.0], N // 4)
+    noisy = steps + 0.05 * np.random.default_rng(1).standard_normal(N)
+    smoothed, _ = smooth_steps(noisy, 0.05)
+    assert np.max(np.abs(smoothed - steps)) < 0.02
+
+
+def test_a_run_without_force_is_refused():
+    import pandas as pd
+
+    x, v, _ = motion(9)
+    frame = pd.DataFrame({"time [s]": T, "displacement [m]": x, "velocity [m/s]": v})
+    with pytest.raises(RecordError, match="force"):
+        prepare(measurements_of_frame(frame)[0])

@@ -1,0 +1,225 @@
+"""study.toml and model.toml: what they say, and every mistake with its line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from made import write_runs
+
+from bristle.records.measurement import ChannelSpec
+from bristle.study import StudyError, new_model, read_model, write_model
+from bristle.study.files import read_json, write_json, write_whole
+from bristle.study.settings import RunFile, Settings, read_settings, write_settings
+
+STUDY = """schema = 1
+title = "rig A"
+notes = "room at 21 degC"
+rig = "bench"
+
+[[runs]]
+file = "data/run_1.csv"
+role = "train"
+
+[[runs]]
+file = "data/run_2.csv"
+role = "holdout"
+
+[channels.time]
+column = "time [s]"
+[channels.displacement]
+column = "x [mm]"
+[channels.force]
+column = "F [N]"
+unit = "N"
+sign = -1
+noise = 0.02
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    write_runs(tmp_path / "data", 2)
+    (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
+    return tmp_path
+
+
+def edit(folder: Path, old: str, new: str) -> Path:
+    path = folder / "study.toml"
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path
+
+
+def test_settings_are_read(folder: Path) -> None:
+    settings = read_settings(folder / "study.toml")
+    assert settings.title == "rig A"
+    assert settings.runs == (
+        RunFile("data/run_1.csv", "train"),
+        RunFile("data/run_2.csv", "holdout"),
+    )
+    assert settings.channels["force"] == ChannelSpec("F [N]", "N", -1, 0.02)
+    assert settings.cut_off == 18.0
+
+
+def test_settings_come_back_as_written(folder: Path) -> None:
+    channels = {
+        "time": ChannelSpec(step=0.002),
+        "force": ChannelSpec('load "A"', "kN", -1, 0.5),
+        "velocity": ChannelSpec("v", "mm/s"),
+    }
+    runs = (RunFile("data/run_1.csv", "train"), RunFile("data/run_2.csv", "holdout"))
+    comments = {"force": "its name\ndoubtful: so could be another"}
+    settings = Settings("a", "bench", runs, channels, "two\nlines", 0.0, comments)
+    write_settings(folder / "study.toml", settings)
+    assert read_settings(folder / "study.toml") == replace(settings, comments={})
+    assert "# doubtful: so could be another" in (folder / "study.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("schema = 1", "schema = 2", "line 1: schema is 2"),
+        ("schema = 1\n", "", "schema is missing"),
+        ('rig = "bench"', 'rig = "bensch"', 'line 4: rig = "bensch"'),
+        ('title = "rig A"', "title = 5", "line 2: title = 5"),
+        ('title = "rig A"', 'titel = "x"', 'line 2: there is no key "titel".* "title"'),
+        ('role = "holdout"', 'role = "test"', 'line 12: role = "test"; "train" or "holdout"'),
+        ("run_2.csv", "run_9.csv", "line 11: there is no file"),
+        ("run_2.csv", "run_1.csv", "line 11: .* listed twice"),
+        ("[channels.force]", "[channels.forse]", 'line 18: there is no channel "forse".*"force"'),
+        ('unit = "N"', 'unit = "mm"', 'line 20: unit = "mm": force is in N'),
+        ('unit = "N"', 'unit = "Newt"', 'line 20: unit "Newt" is not known'),
+        ("sign = -1", "sign = 0", "line 21: sign = 0; 1 or -1"),
+        ("noise = 0.02", "noise = -1.0", "line 22: noise"),
+        ("noise = 0.02", "noise = nan", "line 22: noise is not a number"),
+        ('column = "F [N]"\n', "", "line 18: column is missing"),
+        ('column = "x [mm]"', 'column = "x [mm]"\nstep = 0.1', "step belongs to"),
+    ],
+)
+def test_mistakes_are_told_with_their_line(folder: Path, old: str, new: str, told: str) -> None:
+    with pytest.raises(StudyError, match=told):
+        read_settings(edit(folder, old, new))
+
+
+def test_all_mistakes_at_once(folder: Path) -> None:
+    edit(folder, "sign = -1", "sign = 2")
+    edit(folder, 'rig = "bench"', 'rig = "car"')
+    with pytest.raises(StudyError) as caught:
+        read_settings(folder / "study.toml")
+    assert "line 4" in str(caught.value)
+    assert "line 21" in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["schema = ", "schema = 1\nschema = 1", '[[runs]]\nfile="a"]'])
+def test_no_toml(folder: Path, text: str) -> None:
+    (folder / "study.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(StudyError, match="not TOML"):
+        read_settings(folder / "study.toml")
+
+
+def test_law_and_schema_suffice(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text('schema = 1\nlaw = "lugre"\n', encoding="utf-8")
+    model = read_model(path)
+    assert model.values()["sigma_a"] == 650.0
+    assert "sigma_a" in model.free()
+    assert "exponent" not in model.free()
+
+
+def test_standard_laws_lack_the_exponential(tmp_path: Path) -> None:
+    model = new_model("bingham_standard")
+    assert model.base_law == "bingham"
+    assert model.values()["exponent"] == 0.0
+    assert model.free() == ["f_c", "f_v", "c_0", "c_v"]
+
+
+def test_model_keeps_units_and_converts(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(
+        'schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nvalue = 0.7\nunit = "N/mm"\n'
+        "[effects.gas_spring]\nparameters = { k = { value = 81.2, std = 3.0, high = 1e3 } }\n",
+        encoding="utf-8",
+    )
+    model = read_model(path)
+    assert model.values()["sigma_a"] == pytest.approx(700.0)
+    assert model.flat()["gas_spring.k"].std == 3.0
+    fitted = model.with_values({"sigma_a": 650.0, "gas_spring.k": 90.0}, {"sigma_a": 12.0})
+    assert fitted.parameters["sigma_a"].value == pytest.approx(0.65)
+    assert fitted.parameters["sigma_a"].std == pytest.approx(0.012)
+    assert fitted.parameters["sigma_a"].origin == "identified"
+    write_model(path, fitted)
+    assert read_model(path) == fitted
+
+
+def test_comments_of_a_model_stay(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    write_model(path, new_model("bingham", ("gas_spring",)))
+    text = path.read_text(encoding="utf-8").replace("[parameters.f_c]", "# ours\n[parameters.f_c]")
+    path.write_text(text, encoding="utf-8")
+    model = read_model(path).with_effect("stribeck").with_values({"f_c": 2.5})
+    write_model(path, model)
+    assert "# ours" in path.read_text(encoding="utf-8")
+    assert read_model(path) == model
+    plain = replace(model, effects={})
+    write_model(path, plain)
+    assert read_model(path) == plain
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ('law = "lugre"', "schema is missing"),
+        ('schema = 1\nlaw = "lugree"', 'line 2: there is no law "lugree".* "lugre"'),
+        ('schema = 1\nlaw = "lugre"\n[parameters.f_c]\nvalue = 1.0', 'no parameter "f_c"'),
+        (
+            'schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nvalue = 1.0\nunit = "N"',
+            'line 5: sigma_a: "N/m"',
+        ),
+        (
+            'schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nvalue = 9.0\nhigh = 5.0',
+            "line 4: sigma_a = 9 is outside 0 to 5",
+        ),
+        (
+            'schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nlow = -5.0',
+            "sigma_a: -5 to .* leaves what is physical",
+        ),
+        ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nvalue = "x"', "a finite number"),
+        ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nfree = 1', "true or false"),
+        ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\norigin = "x"', 'no origin "x"'),
+        ('schema = 1\nlaw = "lugre"\n[parameters]\nsigma_a = 5.0', "value = ..."),
+        ('schema = 1\nlaw = "lugre"\n[effects.gas_sprin]', 'effect "gas_sprin".*"gas_spring"'),
+        ('schema = 1\nlaw = "lugre"\nbuilding = "b.toml"', "line 3: there is no file"),
+    ],
+)
+def test_mistakes_of_a_model(tmp_path: Path, text: str, told: str) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(StudyError, match=told):
+        read_model(path)
+
+
+def test_files_are_written_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "deep" / "a.json"
+    write_json(path, {"a": float("nan"), "b": (1, 2)})
+    assert read_json(path) == {"a": None, "b": [1, 2]}
+
+    def full(self: Path, target: Path) -> Path:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "replace", full)
+    with pytest.raises(StudyError, match="No space left"):
+        write_whole(path, "new")
+    assert [file.name for file in path.parent.iterdir()] == ["a.json"]
+
+
+def test_json_that_is_none(tmp_path: Path) -> None:
+    path = tmp_path / "verdict.json"
+    path.write_text("{", encoding="utf-8")
+    with pytest.raises(StudyError, match="no JSON"):
+        read_json(path)
+    path.write_text("[1]", encoding="utf-8")
+    with pytest.raises(StudyError, match="an object"):
+        read_json(path)
