@@ -1,12 +1,13 @@
 """The time march of the coupled system: written in plain Python, compiled by `jit`.
 
 In each substep the structures take their exact linear step and the dampers theirs, with the smooth
-forces linear in time and friction held at its new value; both are repeated until the forces
-agree (a sweep shrinks the error by substep x slope of the force / mass, about 0.01 at 0.2 ms).
-Friction that sticks takes whatever value brings the motion to rest, up to its limit (Moreau's time
-stepping: Moreau 1988, in Nonsmooth Mechanics and Applications, CISM 302).
+forces linear in time and friction held at its new value. The forces at the end are extrapolated
+from the last substeps, and corrected until motion and forces agree. Friction that sticks takes
+whatever value brings the motion to rest, up to its limit (Moreau's time stepping: Moreau 1988, in
+Nonsmooth Mechanics and Applications, CISM 302).
 
-All signals of the scenario stand in one vector; components hold the slots of their ports in it.
+All signals of the scenario stand in one vector `s`; each component is a record (`layout`) that
+holds its numbers and the slots of its ports in `s`.
 """
 
 from __future__ import annotations
@@ -27,176 +28,207 @@ signal_value = signals.value
 signal_rate = signals.rate
 
 TOLERANCE = 1e-6
-"""Change of a force between sweeps, as a share of the largest force so far, that ends them."""
+"""Disagreement of a force, as a share of the largest force so far, at which sweeps end."""
 
 MAX_SWEEPS = 40
 
-
-def sources(t, so, s):  # type: ignore[no-untyped-def]
-    """Write the sources' values at time t [s] into the signals."""
-    for i in range(len(so.kind)):
-        a, b = so.begin[i], so.end[i]
-        times, samples = so.times[a:b], so.samples[a:b]
-        s[so.out[i]] = so.scale[i] * signal_value(so.kind[i], t - so.delay[i], so.p[i], times, samples)
-        if so.rate_out[i] >= 0:
-            s[so.rate_out[i]] = signal_rate(so.kind[i], t, so.p[i], times, samples)
+INLINE = (
+    *("play", "start", "begin", "move", "resist", "end", "show_motion", "felt_voltage"),
+    *("step", "free_step", "add_force", "evaluate_law"),
+    *("LuGre.advance", "LuGre.viscous", "LuGre.bristle", "falling"),
+)
+"""What becomes part of its caller: it is short or has one caller. Saves time, twice."""
 
 
-def motion_outputs(b, st, x, s):  # type: ignore[no-untyped-def]
-    """Write the displacements and velocities of structure b into the signals."""
-    at = st.first_output[b]
-    for i in range(st.n[b]):
-        s[at] = x[i]
-        s[at + 1] = x[st.n[b] + i]
-        at += 3
-
-
-def other_outputs(b, st, x, s, loads, absolute):  # type: ignore[no-untyped-def]
-    """Write the accelerations, drifts and the holding force of structure b into the signals."""
-    n, isolated = st.n[b], st.isolated[b]
-    for i in range(n):
-        loads[i] = 0.0
-    if st.active[b]:
-        effect_forces(
-            n, isolated, st.stiffness[b], x, inf, 0.0, 0.0, st.z[b], st.p[b], st.on[b], loads
-        )
-    others = loads[0] + s[st.extra[b]]
-    loads[0] = others + s[st.force[b]]
-    accelerations(n, st.m_inverse[b], st.c[b], st.k[b], x, loads, absolute)
-    at = st.first_output[b]
-    for i in range(n):
-        s[at + 2] = absolute[i]
-        at += 3
-    for i in range(1 if isolated else 0, n):
-        s[at] = x[i] - (x[i - 1] if i > 0 else 0.0)
-        at += 1
-    s[at] = holding_force(n, st.c[b], st.k[b], st.mass[b], x, s[st.ground[b]], others)
-
-
-def felt_voltage(d, da, s):  # type: ignore[no-untyped-def]
-    """Return the voltage at damper d within the limits at which it saturates [V]."""
-    return min(max(s[da.V[d]], 0.0), da.v_max[d])
-
-
-def first_row(so, da, st, s, loads, absolute):  # type: ignore[no-untyped-def]
-    """Settle the signals at the begin: accelerations and forces may follow each other."""
-    for _ in range(3):
-        for b in range(len(st.n)):
-            motion_outputs(b, st, st.x[b], s)
-            other_outputs(b, st, st.x[b], s, loads, absolute)
-        for d in range(len(da.law)):
-            size = da.z.shape[1]
-            a = s[da.a[d]] if da.a[d] >= 0 else 0.0
-            s[da.force[d]] = damper_evaluate(
-                da.law[d], s[da.x[d]], s[da.v[d]], a, felt_voltage(d, da, s), inf, 0.0, 0.0, False,
-                da.z[d], da.p[d], da.on[d], da.work[0:size], da.work[size : 2 * size],
-            )[0]  # fmt: skip
-            s[da.stroke_ratio[d]] = abs(s[da.x[d]]) / da.stroke[d]
-
-
-def march(rows, substeps, h, so, da, st, s, outputs, table):  # type: ignore[no-untyped-def]
+def march(  # type: ignore[no-untyped-def]
+    rows, substeps, h, sources, times, samples, dampers, structures, s, outputs, table
+):
     """Fill `table` (rows + 1, m) with the signals `outputs` (m,), one row per `substeps` of h [s].
 
-    `so`, `da`, `st` are `model`'s named tuples of arrays for sources, dampers and structures, `s`
-    the signals with their start values.
+    `sources`, `dampers`, `structures` are arrays of records (see `layout`), `times` and `samples`
+    the samples of all sources one after another, `s` the signals with their start values.
 
     Returns
     -------
     tuple of int
-        The row at which a value stopped being finite (-1: none), and how many substeps ended
-        before the forces agreed.
+        The row at which a value stopped being finite (-1: none), how many substeps ended before
+        the forces agreed, the row of the first of them, and the number of sweeps.
     """
-    dampers, buildings = len(da.law), len(st.n)
-    loads, absolute = st.work[0:64].copy(), st.work[0:64].copy()
-    x1, free, sz1, z1 = st.x.copy(), st.x.copy(), st.z.copy(), da.z.copy()
-    friction = s * 0.0  # the part of each force signal that is friction
-    smooth, smooth_before = s * 0.0, s * 0.0
-    begin = s.copy()
-    ground0, f0 = st.mass * 0.0, st.mass * 0.0
-    a0, V0 = da.v_max * 0.0, da.v_max * 0.0
-    scale, unsettled = 1e-9, 0
-    sources(0.0, so, s)
-    first_row(so, da, st, s, loads, absolute)
-    for d in range(dampers):
-        a0[d] = s[da.a[d]] if da.a[d] >= 0 else 0.0
-        smooth[da.force[d]] = smooth_before[da.force[d]] = s[da.force[d]]
+    scale, unsettled, first_unsettled, sweeps = 1e-9, 0, -1, 0
+    play(sources, times, samples, 0.0, s)
+    start(dampers, structures, s)
     for j in range(len(outputs)):
         table[0, j] = s[outputs[j]]
     for row in range(rows):
+        # Sampled components (controllers) will act here, on the signals of the row.
         for k in range(substeps):
-            begin[:] = s
-            for b in range(buildings):
-                ground0[b] = s[st.ground[b]]
-                f0[b] = s[st.force[b]] + s[st.extra[b]] - friction[st.force[b]] - friction[st.extra[b]]
-            for d in range(dampers):
-                slot = da.force[d]
-                V0[d] = felt_voltage(d, da, s)
-                ahead = 2.0 * smooth[slot] - smooth_before[slot]
-                smooth_before[slot] = smooth[slot]
-                s[slot] = ahead + friction[slot]
-            sources((row * substeps + k + 1) * h, so, s)
-            for b in range(buildings):
-                if not st.active[b]:
-                    free_step(
-                        st.n[b], st.phi[b], st.held[b], st.ramp[b], st.x[b], ground0[b],
-                        s[st.ground[b]], free[b],
-                    )  # fmt: skip
-            settled = False
-            for _ in range(MAX_SWEEPS):
-                for b in range(buildings):
-                    rub = friction[st.force[b]] + friction[st.extra[b]]
-                    f1 = s[st.force[b]] + s[st.extra[b]]
-                    if st.active[b]:
-                        structure_step(
-                            st.n[b], st.isolated[b], st.stiffness[b], st.phi[b], st.held[b],
-                            st.ramp[b], h, st.x[b], ground0[b], s[st.ground[b]], f0[b] + rub, f1,
-                            0.0, st.z[b], st.p[b], st.on[b], True, x1[b], sz1[b], st.work,
-                        )  # fmt: skip
-                    else:
-                        for i in range(2 * st.n[b]):
-                            x1[b, i] = free[b, i]
-                        add_force(st.n[b], st.held[b], st.ramp[b], 0, f0[b] + rub, f1, x1[b])
-                    motion_outputs(b, st, x1[b], s)
-                    if st.feeds_acceleration[b]:
-                        other_outputs(b, st, x1[b], s, loads, absolute)
+            begin(dampers, structures, s)
+            play(sources, times, samples, (row * substeps + k + 1) * h, s)
+            sweep, change = 0, inf
+            while change > TOLERANCE * scale and sweep < MAX_SWEEPS:
+                for i in range(len(structures)):
+                    move(structures[i], sweep, h, s)
                 change = 0.0
-                for d in range(dampers):
-                    slot = da.force[d]
-                    v0, v1 = begin[da.v[d]], s[da.v[d]]
-                    a1 = s[da.a[d]] if da.a[d] >= 0 else (v1 - v0) / h
-                    halt, on = 0.0, da.on_structure[d]
-                    if on >= 0:
-                        halt = s[slot] - v1 / st.held[on, st.n[on] * (st.n[on] + 1)]
-                    force, rub = damper_step(
-                        da.law[d], begin[da.x[d]], v0, a0[d], V0[d], s[da.x[d]], v1, a1,
-                        felt_voltage(d, da, s), h, begin[da.energy[d]], halt, on >= 0, da.z[d],
-                        da.p[d], da.on[d], da.moving[d], da.n_moving[d], da.advances[d], z1[d],
-                        da.work,
-                    )  # fmt: skip
-                    change = max(change, abs(force - s[slot]))
-                    scale = max(scale, abs(force))
-                    s[slot], friction[slot], smooth[slot] = force, rub, force - rub
-                if not change > TOLERANCE * scale:
-                    settled = True
-                    break
-            if not settled:
+                for i in range(len(dampers)):
+                    change = max(change, resist(dampers[i], structures, sweep, h, s))
+                    scale = max(scale, abs(dampers[i].found))
+                sweep += 1
+            sweeps += sweep
+            if change > TOLERANCE * scale:
                 unsettled += 1
-            st.x[:] = x1
-            st.z[:] = sz1
-            da.z[:] = z1
-            for d in range(dampers):
-                v0, v1 = begin[da.v[d]], s[da.v[d]]
-                a0[d] = s[da.a[d]] if da.a[d] >= 0 else (v1 - v0) / h
-                power = begin[da.force[d]] * v0 + s[da.force[d]] * v1
-                s[da.energy[d]] += 0.5 * h * power
-        for b in range(buildings):
-            other_outputs(b, st, st.x[b], s, loads, absolute)
-        for d in range(dampers):
-            s[da.stroke_ratio[d]] = abs(s[da.x[d]]) / da.stroke[d]
+                first_unsettled = row + 1 if first_unsettled < 0 else first_unsettled
+            end(dampers, structures, h, s)
+        for i in range(len(structures)):
+            b = structures[i]
+            show_rest(b, b.x, b.z, s)
+        for i in range(len(dampers)):
+            s[dampers[i].stroke_ratio] = abs(s[dampers[i].x]) / dampers[i].stroke
         total = 0.0
         for j in range(len(outputs)):
             table[row + 1, j] = s[outputs[j]]
             total += s[outputs[j]]
         if not isfinite(total):
-            return row + 1, unsettled
-    return -1, unsettled
+            return row + 1, unsettled, first_unsettled, sweeps
+    return -1, unsettled, first_unsettled, sweeps
+
+
+def play(sources, times, samples, t, s):  # type: ignore[no-untyped-def]
+    """Write what the sources give at time t [s] into the signals."""
+    for i in range(len(sources)):
+        g = sources[i]
+        own_times, own = times[g.begin : g.end], samples[g.begin : g.end]
+        s[g.out] = g.scale * signal_value(g.kind, t - g.delay, g.p, own_times, own)
+        if g.rate_out >= 0:
+            s[g.rate_out] = signal_rate(g.kind, t - g.delay, g.p, own_times, own)
+
+
+def start(dampers, structures, s):  # type: ignore[no-untyped-def]
+    """Settle the signals at the begin: accelerations and forces may follow each other."""
+    for _ in range(3):
+        for i in range(len(structures)):
+            b = structures[i]
+            show_motion(b, b.x, s)
+            show_rest(b, b.x, b.z, s)
+        for i in range(len(dampers)):
+            d = dampers[i]
+            d.a0 = s[d.a] if d.a >= 0 else 0.0
+            resting = d.halts and s[d.v] == 0.0
+            halt = s[structures[d.on_structure].holding] / d.sharing if resting else 0.0
+            s[d.force] = damper_evaluate(
+                d.law, s[d.x], s[d.v], d.a0, felt_voltage(d, s), inf, 0.0, halt, resting,
+                d.z[:], d.p, d.on, d.z1[:], d.spare[:],
+            )[0]  # fmt: skip
+            d.smooth = d.smooth_1 = d.smooth_2 = s[d.force]
+            s[d.stroke_ratio] = abs(s[d.x]) / d.stroke
+
+
+def begin(dampers, structures, s):  # type: ignore[no-untyped-def]
+    """Keep what a substep begins from, and extrapolate the forces to its end."""
+    for i in range(len(structures)):
+        b = structures[i]
+        b.ground0 = s[b.ground]
+        b.smooth0 = s[b.force] + s[b.extra] - s[b.friction] - s[b.extra_friction]
+    for i in range(len(dampers)):
+        d = dampers[i]
+        d.x0, d.v0, d.V0, d.force0 = s[d.x], s[d.v], felt_voltage(d, s), s[d.force]
+        s[d.force] = 3.0 * (d.smooth - d.smooth_1) + d.smooth_2 + s[d.friction]
+        d.smooth_2, d.smooth_1 = d.smooth_1, d.smooth
+
+
+def move(b, sweep, h, s):  # type: ignore[no-untyped-def]
+    """Take a structure to the end of the substep under the forces of the present sweep."""
+    friction = s[b.friction] + s[b.extra_friction]
+    f0, f1 = b.smooth0 + friction, s[b.force] + s[b.extra]
+    x1 = b.x1
+    if b.active:
+        structure_step(
+            b.n, b.isolated, b.stiffness, b.phi, b.held, b.ramp, h, b.x, b.ground0, s[b.ground],
+            f0, f1, 0.0, b.z, b.p, b.on, True, x1, b.z1, b.work,
+        )  # fmt: skip
+    else:
+        free = b.free
+        if sweep == 0 or b.follows:
+            free_step(b.n, b.phi, b.held, b.ramp, b.x, b.ground0, s[b.ground], free)
+        for i in range(2 * b.n):
+            x1[i] = free[i]
+        add_force(b.n, b.held, b.ramp, 0, f0, f1, x1)
+    show_motion(b, x1, s)
+    if b.followed:
+        show_rest(b, x1, b.z1, s)
+
+
+def resist(d, structures, sweep, h, s):  # type: ignore[no-untyped-def]
+    """Take a damper to the end of the substep and correct its force; return its disagreement [N].
+
+    The correction is the secant's, from the second sweep on and while friction stays: a plain
+    exchange of forces converges slowly, or not at all, where a damper is stiff or has inertia.
+    """
+    tried, friction, v1 = s[d.force], s[d.friction], s[d.v]
+    a1 = s[d.a] if d.a >= 0 else (v1 - d.v0) / h
+    halt = 0.0
+    if d.halts:
+        halt = tried - v1 / (structures[d.on_structure].gain * d.sharing)
+    d.found, s[d.friction] = damper_step(
+        d.law, d.x0, d.v0, d.a0, d.V0, s[d.x], v1, a1, felt_voltage(d, s), h, s[d.energy], halt,
+        d.halts, d.z[:], d.p, d.on, d.moving, d.n_moving, d.advances, d.z1[:], d.work[:], d.active,
+    )  # fmt: skip
+    excess, slope = d.found - tried, -1.0
+    if sweep > 0 and tried != d.tried and s[d.friction] == friction:
+        slope = min((excess - d.excess) / (tried - d.tried), -0.5)
+    d.tried, d.excess = tried, excess
+    s[d.force] = tried - excess / slope
+    return abs(excess)
+
+
+def end(dampers, structures, h, s):  # type: ignore[no-untyped-def]
+    """Accept a substep."""
+    for i in range(len(structures)):
+        b = structures[i]
+        for j in range(2 * b.n):
+            b.x[j] = b.x1[j]
+        if b.active:
+            for j in range(len(b.z)):
+                b.z[j] = b.z1[j]
+    for i in range(len(dampers)):
+        d = dampers[i]
+        for j in range(d.n_states):
+            d.z[j] = d.z1[j]
+        s[d.force] = d.found
+        d.smooth = d.found - s[d.friction]
+        d.a0 = s[d.a] if d.a >= 0 else (s[d.v] - d.v0) / h
+        s[d.energy] += 0.5 * h * (d.force0 * d.v0 + d.found * s[d.v])
+
+
+def show_motion(b, x, s):  # type: ignore[no-untyped-def]
+    """Write the displacements and velocities of a structure in state x into the signals."""
+    at = b.first_output
+    for i in range(b.n):
+        s[at] = x[i]
+        s[at + 1] = x[b.n + i]
+        at += 3
+
+
+def show_rest(b, x, z, s):  # type: ignore[no-untyped-def]
+    """Write the accelerations, drifts and the holding force of a structure into the signals."""
+    n = b.n
+    loads, absolute = b.work[0:n], b.absolute
+    for i in range(n):
+        loads[i] = 0.0
+    if b.active:
+        effect_forces(n, b.isolated, b.stiffness, x, inf, 0.0, 0.0, z, b.p, b.on, loads)
+    others = loads[0] + s[b.extra]
+    loads[0] = others + s[b.force]
+    accelerations(n, b.m_inverse, b.c, b.k, x, loads, absolute)
+    at = b.first_output
+    for i in range(n):
+        s[at + 2] = absolute[i]
+        at += 3
+    for i in range(1 if b.isolated else 0, n):
+        s[at] = x[i] - (x[i - 1] if i > 0 else 0.0)
+        at += 1
+    s[b.holding] = holding_force(n, b.c, b.k, b.mass, x, s[b.ground], others)
+
+
+def felt_voltage(d, s):  # type: ignore[no-untyped-def]
+    """Return the voltage of a damper within the limits at which it saturates [V]."""
+    return min(max(s[d.V], 0.0), d.v_max)

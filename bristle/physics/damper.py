@@ -28,7 +28,7 @@ IMPLICIT_STEP = 5e-4
 MOST_TRIALS = 60
 """How many speeds of a joint are tried in a substep; about six are the rule."""
 
-DIRECTED = 2
+DIRECTED = 2.0
 """Stands for `halts` where `halt` is not a force but the direction of the friction, -1 to 1."""
 
 _GAMMA = 1.0 - 0.5 * 2.0**0.5
@@ -56,13 +56,13 @@ def _series_source(layout: Layout) -> str:
     return "\n".join([*lines, "    return -1, -1"])
 
 
-def _evaluate_source(layout: Layout) -> str:
+def _evaluate_source(layout: Layout, name: str) -> str:
     signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v", "halt")
     q = {name: name for name in signals}
     lugre = ", ".join(f"p[{i}]" for i in range(len(LuGre.parameters)))
     bingham = ", ".join(f"p[{i}]" for i in range(len(Bingham.parameters)))
     lines = [
-        "def evaluate(law, x, v, a, V, dt, energy, halt, halts, z, p, on, dz, z_next):",
+        f"def {name}(law, x, v, a, V, dt, energy, halt, halts, z, p, on, dz, z_next):",
         "    rod_x = x",
         "    rod_v = v",
         "    force = 0.0",
@@ -113,22 +113,23 @@ def _evaluate_source(layout: Layout) -> str:
 
 def reweave() -> None:
     """Weave the damper's functions anew; call it after effects were registered late."""
-    global LAYOUT, evaluate, inner_motion, series_element
+    global LAYOUT, evaluate, evaluate_law, inner_motion, series_element
     LAYOUT = Layout("damper", LAW_PARAMETERS, LAW_STATES)
     inner_motion = weave("inner_motion", _motion_source(LAYOUT), LAYOUT)
     series_element = weave("series_element", _series_source(LAYOUT), LAYOUT)
-    evaluate = weave(
-        "evaluate",
-        _evaluate_source(LAYOUT),
-        LAYOUT,
-        LuGreP=LUGRE_VALUES,
-        BinghamP=BINGHAM_VALUES,
-        LuGre_viscous=LuGre.viscous,
-        LuGre_bristle=LuGre.bristle,
-        LuGre_rate=LuGre.rate,
-        Bingham_viscous=Bingham.viscous,
-        Bingham_yielding=Bingham.yielding,
-    )
+    laws = {
+        "LuGreP": LUGRE_VALUES,
+        "BinghamP": BINGHAM_VALUES,
+        "LuGre_viscous": LuGre.viscous,
+        "LuGre_bristle": LuGre.bristle,
+        "LuGre_rate": LuGre.rate,
+        "Bingham_viscous": Bingham.viscous,
+        "Bingham_yielding": Bingham.yielding,
+    }
+    evaluate = weave("evaluate", _evaluate_source(LAYOUT, "evaluate"), LAYOUT, **laws)
+    # The same without any effect, for dampers that have none: it does not pay for the others.
+    none = Layout("", LAW_PARAMETERS, LAW_STATES)
+    evaluate_law = weave("evaluate_law", _evaluate_source(none, "evaluate_law"), none, **laws)
 
 
 def _values(law: Any) -> Any:
@@ -141,6 +142,7 @@ LUGRE_VALUES = _values(LuGre)
 BINGHAM_VALUES = _values(Bingham)
 LAYOUT: Layout
 evaluate: Any
+evaluate_law: Any
 inner_motion: Any
 series_element: Any
 reweave()
@@ -297,7 +299,7 @@ def joint_excess(
 def step(
     law: int, x0: float, v0: float, a0: float, V0: float, x1: float, v1: float, a1: float,
     V1: float, dt: float, energy: float, halt: float, halts: bool, z0: Row, p: Row, on: Row,
-    moving: Row, n_moving: int, advances: bool, z1: Row, work: Row,
+    moving: Row, n_moving: int, advances: bool, z1: Row, work: Row, active: bool = True,
 ) -> tuple[float, float]:  # fmt: skip
     """Advance a damper over dt [s]; return its force [N] at the end and the friction in it [N].
 
@@ -318,7 +320,14 @@ def step(
         Slots of the states that move by `rate`, how many, and whether any moves by `advance`.
     work : sequence of float
         Room for `work_size()` floats.
+    active : bool
+        Whether any effect is on; without, only the bristle (slot 0 of the state) is advanced.
     """
+    if not active:
+        z1[0] = lugre_advance(z0[0], 0.5 * (v0 + v1), dt, p[6]) if law == 1 else z0[0]
+        return evaluate_law(  # type: ignore[no-any-return]
+            law, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, work, z1
+        )
     size = len(z0)
     for i in range(size):
         z1[i] = z0[i]
@@ -402,6 +411,7 @@ class DamperModel:
         self.law = LAW_CODES[law]
         self.p = pack(law, values)
         self.on = [effect.name in effects for effect in LAYOUT.effects]
+        self.active = any(self.on)
         self.moving = moving_states(law, effects)
         self.advances = advances(effects)
         self.z = [0.0] * LAYOUT.z_size
@@ -410,7 +420,7 @@ class DamperModel:
             self.z[slot] = values.get(name + "_0", 0.0)
         self._spare = [0.0] * LAYOUT.z_size
         self._work = [0.0] * work_size()
-        self._end = [0.0] * LAYOUT.z_size
+        self._end = list(self.z)
 
     def force(
         self,
@@ -445,6 +455,7 @@ class DamperModel:
         force = step(
             self.law, x, v, a, V, x, v, a, V, dt, energy, halt, halts, self.z, self.p, self.on,
             self.moving, len(self.moving), self.advances, self._end, self._work,
+            self.active,
         )[0]  # fmt: skip
         self.z, self._end = self._end, self.z
         return force
