@@ -23,7 +23,7 @@ class HinfInverse(LinearSlave):
         super().rest()
         self.state.append(0.0)  # the bristle deflection, after the linear law's states
 
-    def law(self, y, v, f):
+    def act(self, y, v, f):
         u = self.command(v)
         voltage, applied, self.state[-1] = self.inverted(u, v, self.state[-1])
         self.move(y, self.anti_windup * (applied - u))

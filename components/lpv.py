@@ -15,7 +15,7 @@ class Lpv(LinearSlave):
         super().declare_law()
         declare_anti_windup(self, 200.0)
 
-    def law(self, y, v, f):
+    def act(self, y, v, f):
         w = self.command(v)
         voltage = signed_voltage(w, v, self.v_max)
         self.move(y, self.anti_windup * (applied_signed(voltage, v) - w))

@@ -15,7 +15,7 @@ class LqgClipped(LinearSlave):
         text = "commands of this size or less are not answered"
         self.add_parameter("f_min", 0.5, "N", text, (0.0, 1e9))
 
-    def law(self, y, v, f):
+    def act(self, y, v, f):
         u = self.command(v)
         self.move(y, f)
         return clipped_voltage(u, f, self.f_min, self.v_max), u

@@ -28,7 +28,7 @@ class Skyhook(ControllerSlave):
         super().rest()
         self.state = [0.0, 0.0, 0.0]  # absolute velocity, acceleration before, bristle deflection
 
-    def law(self, y, v, f):
+    def act(self, y, v, f):
         absolute, before, z = self.state
         corner = 2.0 * pi * self.integral_corner
         absolute = leaky_integral(absolute, before, y, corner, self.sample_period)

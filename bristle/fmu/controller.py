@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from math import ceil, floor, pi
 from typing import Any, ClassVar
+from xml.etree.ElementTree import Element
 
 from ..control import inverse, linear
 from ..control.controller import Controller, read_controller
@@ -110,6 +111,16 @@ class SampledSlave(Slave):
         for index, value in zip(self._outputs, self.shown):
             self._values[index] = value
 
+    def _structure(self, structure: Element) -> None:
+        """Say that the first sample follows motion; the damper's force it takes as it is given."""
+        super()._structure(structure)
+        motion = [index + 1 for index in self._inputs if self.vars[index].name != "damper_force"]
+        shown = {str(index + 1) for index in self._outputs}
+        for node in structure.iterfind("InitialUnknowns/Unknown"):
+            if node.attrib["index"] in shown:
+                known = [*motion, *map(int, node.attrib["dependencies"].split())]
+                node.set("dependencies", " ".join(map(str, sorted(known))))
+
     def get_inner(self) -> Any:
         clock = [self.origin, self.samples, list(self.measured), list(self.shown)]
         return [clock, self.get_law()]
@@ -124,7 +135,7 @@ class SampledSlave(Slave):
 class ControllerSlave(SampledSlave):
     """A controller: the ports that all share, limits, and the velocity it works with.
 
-    A component fills `law`; its own state goes into the list `self.state`.
+    A component fills `act`; its own state goes into the list `self.state`.
     """
 
     command_unit: ClassVar[str] = "N"
@@ -146,7 +157,7 @@ class ControllerSlave(SampledSlave):
         """Declare the sample period and the law's own parameters."""
         self.declare_period()
 
-    def law(self, y: float, v: float, f: float) -> tuple[float, float]:
+    def act(self, y: float, v: float, f: float) -> tuple[float, float]:
         """Return voltage [V] and raw command at floor acceleration, velocity, damper force."""
         raise NotImplementedError
 
@@ -169,7 +180,7 @@ class ControllerSlave(SampledSlave):
             low = low_passed(self.low[0], self.low[1], x, corner, self["sample_period"])
             self.low = [low, x]
             v = filtered_velocity(low, x, corner)
-        voltage, command = self.law(y, v, f)
+        voltage, command = self.act(y, v, f)
         return [voltage, command, v]
 
     def get_law(self) -> Any:
