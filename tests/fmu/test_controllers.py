@@ -337,6 +337,12 @@ def test_a_delay_between_two_samples_is_exact_for_a_ramp() -> None:
     assert readings[4:] == pytest.approx([10.0 * (k - 2.5) for k in range(4, 20)])
 
 
+def test_cut_off_halves_the_power_at_its_corner() -> None:
+    instrument = Instrument(0, 1, H, cut_off=5.0)
+    readings = [instrument(k, sin(2 * pi * 5.0 * k * H)) for k in range(2000)]
+    assert max(readings[1000:]) == pytest.approx(sqrt(0.5), rel=2e-3)
+
+
 def test_noise_has_its_density_its_seed_and_no_memory() -> None:
     density, n = 0.01, 20000
     instrument = Instrument(2, 7, H, noise_density=density)
