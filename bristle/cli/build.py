@@ -1,4 +1,4 @@
-"""Build a component into an FMU of its own: another building, a record baked in, another name."""
+"""Build a component into an FMU of its own: another building, a record or controller baked in."""
 
 from __future__ import annotations
 
@@ -28,6 +28,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="ground motion (PEER AT2, CSV or a name) to bake into a GroundMotion",
     )
+    parser.add_argument(
+        "--controller",
+        type=Path,
+        metavar="FILE",
+        help="controller file of `bristle design`, for a controller of its kind",
+    )
     parser.add_argument("--name", help="the model's name and the file's; else the component's")
     parser.add_argument(
         "--out",
@@ -49,6 +55,7 @@ def main(arguments: argparse.Namespace) -> int:
         name=arguments.name,
         building=arguments.building,
         record=arguments.record,
+        controller=arguments.controller,
     )
     target = arguments.out / f"{what.name}.fmu"
     fresh = built_guid(target) == what.guid()

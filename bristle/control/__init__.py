@@ -6,5 +6,6 @@ Laws take floats and flat sequences (lists inside FMUs, arrays under numba), one
     switching    clipped-optimal switch, signed voltage, limits
     linear       state-space controllers, one or a table of them, with anti-windup
     sensing      velocity from displacement and from acceleration, skyhook
+    instrument   what a sensor shows of a signal
     controller   the file that a design writes and a controller reads
 """

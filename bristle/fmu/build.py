@@ -27,12 +27,12 @@ from uuid import UUID, uuid5
 from ..errors import BuildError
 from ..resources import fmus_folder
 from . import catalogue
-from .slave import BAKED
+from .slave import BAKED, Slave
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _BUNDLED = (
     "errors.py", "units.py", "physics/**/*.py", "control/**/*.py",
-    "fmu/slave.py", "fmu/source.py", "fmu/damper.py",
+    "fmu/slave.py", "fmu/source.py", "fmu/damper.py", "fmu/controller.py",
 )  # fmt: skip
 _NAMESPACE = UUID("7c0b8c8e-3d0f-5d0a-9b55-62726973746c")
 _OPTIONS = {
@@ -99,6 +99,7 @@ def plan(
     record: Path | None = None,
     starts: Mapping[str, Any] | None = None,
     effects: Iterable[Path] = (),
+    controller: Path | None = None,
 ) -> Plan:
     """Return what to build.
 
@@ -116,10 +117,12 @@ def plan(
         Start values of parameters that differ from the component's.
     effects : iterable of path
         Files with effects of the user's own.
+    controller : path, optional
+        Controller file of a design, for a component that takes one of its kind.
 
     Raises
     ------
-    BuildError, PhysicsError, RecordError
+    BuildError, DesignError, PhysicsError, RecordError
         If a name or a file is wrong.
     """
     path = catalogue.source(component)
@@ -142,6 +145,8 @@ def plan(
             files[f"{stem}.csv"] = Path(found)
             found = stem
         baked["record"] = found
+    if controller is not None:
+        files[_design_file(component, kind, controller)] = controller
     if starts:
         baked["starts"] = _checked_starts(component, building, starts)
     effects = tuple(effects)
@@ -149,6 +154,22 @@ def plan(
         if not file.is_file():
             raise BuildError(f"{file}: there is no such file with an effect.")
     return Plan(chosen, path, baked, files, effects)
+
+
+def _design_file(component: str, kind: type[Slave], controller: Path) -> str:
+    """Return under which name a component takes a controller file; refuse one that is not right."""
+    from ..control.controller import read_controller
+
+    wanted = getattr(kind, "design", "")
+    if not wanted:
+        raise BuildError(f"a controller file goes into a designed controller, not {component}.")
+    found = read_controller(controller).kind
+    if found != wanted:
+        raise BuildError(
+            f"{controller}: a controller of the kind {found!r}; {component} takes {wanted!r}: "
+            f"design it with kind = {wanted!r}."
+        )
+    return f"{wanted}.json"
 
 
 def _checked_starts(

@@ -1,0 +1,96 @@
+"""A design in the frequency domain: loops, weights and the bound that gamma sets."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..design.margins import grid_rows
+from ..design.responses import responses
+from .style import BLUE, GREY, INK, Page, look, ramp
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..design.result import Result
+
+_PANELS = (
+    ("Weighted loop: largest singular value [1]", "open_loop", "closed_loop", ""),
+    ("Floor per ground acceleration [1]", "acceleration_open", "acceleration_closed",
+     "acceleration_bound"),
+    ("Command per ground [{}.s²/m]", "", "command", "command_bound"),
+)  # fmt: skip
+
+
+def draw_design(result: Result, path: Path) -> None:
+    """Draw a design's singular values with its weights into a file.
+
+    Parameters
+    ----------
+    result : Result
+        Of kind "hinf" or "lpv"; of a table, the rows at the grid's speeds are drawn.
+    path : Path
+        Its suffix is the format: png, svg, pdf.
+
+    Raises
+    ------
+    DesignError
+        For an LQG design, which has no weights of this kind.
+    RunError
+        If the file cannot be written.
+    """
+    gamma = result.facts["gamma"]
+    norm = result.facts.get("norm", result.facts.get("largest_norm"))
+    rows = grid_rows(result)
+    shown = [responses(result, _omega(result), k) for k in rows]
+    colours = ramp(len(rows)) if len(rows) > 1 else [BLUE]
+    title = f"{result.task.title or 'A design'}: closed-loop norm {norm:.4g}, gamma {gamma:.4g}"
+    subtitle = (
+        "Solid: closed loop. Dashed: without control. Dotted: gamma over the weight, which the "
+        "closed loop stays below."
+    )
+    if len(rows) > 1:
+        subtitle += " One curve per speed of the grid, which is held; dark: slow."
+    page = Page(10.5, 3.6, title, subtitle)
+    with look():
+        grid = page.grid(1, 3, left=0.5)
+        for i, (heading, without, closed, bound) in enumerate(_PANELS):
+            axes = page.figure.add_subplot(grid[0, i])
+            axes.set_title(heading.format(result.controller.command_unit))
+            _panel(axes, _omega(result), shown, colours, (without, closed, bound))
+            if not bound:
+                axes.axhline(gamma, color=INK, linestyle=":", linewidth=1.0)
+    page.save(path, dpi=150)
+
+
+def _omega(result: Result) -> Any:
+    """Return frequencies [rad/s] a decade beyond the building's on either side."""
+    from ..physics.building import frequencies
+
+    modes = 2.0 * np.pi * np.array(frequencies(result.task.building))
+    around = (modes[:, None] * (1.0 + np.linspace(-0.1, 0.1, 81))[None]).ravel()
+    return np.sort(np.concatenate([np.geomspace(modes[0] / 20, modes[-1] * 10, 600), around]))
+
+
+def _panel(
+    axes: Axes, omega: Any, shown: list[Any], colours: list[Any], names: tuple[str, str, str]
+) -> None:
+    from matplotlib.ticker import FuncFormatter
+
+    without, closed, bound = names
+    hertz = omega / (2.0 * np.pi)
+    for response, colour in zip(shown, colours, strict=True):
+        if without:
+            plain = GREY if len(shown) == 1 else colour
+            axes.loglog(hertz, response[without], color=plain, linestyle=(0, (3, 2)), linewidth=0.8)
+        axes.loglog(hertz, response[closed], color=colour)
+    if bound:
+        axes.loglog(hertz, shown[0][bound], color=INK, linestyle=":", linewidth=1.0)
+    axes.set_xlabel("frequency [Hz]")
+    top = max(float(response[name].max()) for response in shown for name in names if name)
+    low = min(float(np.min(response[closed])) for response in shown)
+    axes.set_ylim(max(low * 0.5, top * 1e-4), top * 2.0)
+    for axis in (axes.xaxis, axes.yaxis):  # powers of ten would need mathtext, which is off
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
