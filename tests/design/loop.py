@@ -66,14 +66,12 @@ def ahead(x, k, dt, out):  # type: ignore[no-untyped-def]
 
 
 def simulate(  # type: ignore[no-untyped-def]
-    law, ground, samples, matrices, n, rows, v_top, A, B, W, C, rate, p, bingham_p, level, out
+    law, ground, samples, matrices, n, rows, v_top, A, B, W, C, rate, p, bingham_p, level, work, out
 ):
     """Fill out (samples + 1, 4) with y, base displacement, force, voltage at each sample."""
     stiffness, damping, mass = matrices[:3], matrices[3:6], matrices[6]
     h = 0.002 / 10
-    x, at = np.zeros(7), np.zeros(7)
-    k1, k2, k3, k4 = np.zeros(7), np.zeros(7), np.zeros(7), np.zeros(7)
-    state, spare = np.zeros(n), np.zeros(n)
+    x, at, k1, k2, k3, k4, state, spare = work
     deflection, V = 0.0, level
     for k in range(samples + 1):
         v, y = x[3], 0.0
@@ -149,9 +147,10 @@ def run(
         flats = [
             np.array(values) for values in (controller.A, controller.B, controller.W, controller.C)
         ]
+    work = (*(np.zeros(7) for _ in range(6)), np.zeros(n), np.zeros(n))
     _compiled()(
         law, ground, samples, matrices, n, rows, v_top, *flats, rate, np.array(P),
-        np.array(BINGHAM_P), level, out,
+        np.array(BINGHAM_P), level, work, out,
     )  # fmt: skip
     y, drift, force, voltage = out.T
     return Run(
