@@ -332,7 +332,11 @@ def step(
     for i in range(size):
         z1[i] = z0[i]
     if advances:
-        evaluate(law, x1, v1, a1, V1, dt, energy, halt, halts, z0, p, on, work[0:size], z1)
+        # At the middle of the step: second order where the inputs move, exact where they are held.
+        evaluate(
+            law, 0.5 * (x0 + x1), 0.5 * (v0 + v1), 0.5 * (a0 + a1), 0.5 * (V0 + V1), dt, energy,
+            halt, halts, z0, p, on, work[0:size], z1,
+        )  # fmt: skip
     travel, joint = series_element(on)
     if joint >= 0:
         advance_joint(

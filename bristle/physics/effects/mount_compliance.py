@@ -17,6 +17,7 @@ class MountCompliance(Effect):
     needs = ("rod_x", "rod_v", "force")
     passive = True
     zero_at_rest = True
+    excludes = ("backlash",)
     source = "Makris & Constantinou (1991), J. Struct. Eng. 117(9), 2708-2724 (Maxwell element)"
     expect = (
         "the force turns late and softly after each reversal of the motion, by force over stiffness"

@@ -1,0 +1,1 @@
+"""Where and how the model fails, and which effect explains it."""

@@ -1,0 +1,53 @@
+"""Play in the joint between rod and structure."""
+
+from ..effect import Effect, Parameter
+
+
+class Backlash(Effect):
+    """Backlash: the joint carries no force until its gap is closed.
+
+        force outside = k s' + c ds'/dt,   s' = s beyond +-gap,   s = x_rod - x_joint
+
+    A small joint mass lets the fluid spring back inside the gap. Leaves out impact noise.
+    """
+
+    name = "backlash"
+    site = "damper"
+    needs = ("rod_x", "rod_v", "force")
+    passive = True
+    zero_at_rest = True
+    excludes = ("mount_compliance",)
+    source = "Nordin & Gutman (2002), Automatica 38(10), 1633-1649 (physical model of Nordin et al. 1997)"
+    expect = "after each reversal of the force no force at all over the width of the gap"
+    states = {"compression": "m", "joint_velocity": "m/s"}
+    joint = ("compression", "joint_velocity")
+    parameters = {
+        "gap": Parameter(2e-4, "m", (0.0, 0.05), "half the play"),
+        "k": Parameter(1e5, "N/m", (1e3, 1e9), "stiffness of the closed joint"),
+        "c": Parameter(80.0, "N.s/m", (0.0, 1e6), "damping of the closed joint"),
+        "mass": Parameter(0.004, "kg", (1e-5, 10.0), "mass of the joint"),
+    }
+
+    @staticmethod
+    def motion(q, z, p):
+        return q.rod_x - z.compression, z.joint_velocity
+
+    @staticmethod
+    def reaction(q, z, p):
+        beyond = z.compression - min(max(z.compression, -p.gap), p.gap)
+        if beyond == 0.0:
+            return 0.0
+        force = p.k * beyond + p.c * (q.rod_v - z.joint_velocity)
+        # A joint pushes and never pulls: damping may unload it, not turn the contact round.
+        return max(force, 0.0) if beyond > 0.0 else min(force, 0.0)
+
+    @staticmethod
+    def rate(q, z, p):
+        slip = q.rod_v - z.joint_velocity
+        beyond = z.compression - min(max(z.compression, -p.gap), p.gap)
+        force = 0.0
+        if beyond > 0.0:
+            force = max(p.k * beyond + p.c * slip, 0.0)
+        elif beyond < 0.0:
+            force = min(p.k * beyond + p.c * slip, 0.0)
+        return slip, (force - q.force) / p.mass
