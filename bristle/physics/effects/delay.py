@@ -4,7 +4,7 @@ from math import exp
 
 from ..effect import Effect, Parameter
 
-SLOTS = 96  # samples that the ring holds
+SLOTS = 64  # samples that the ring holds
 LAST = SLOTS - 1.001
 
 
@@ -13,7 +13,7 @@ class Delay(Effect):
 
         shown(t) = force(t - time),   a share `filtered` of the time in a low-pass of second order
 
-    The ring holds 96 samples; what is older is shown as the oldest. Between samples the force is
+    The ring holds 64 samples; what is older is shown as the oldest. Between samples the force is
     taken as linear. Leaves out a clock that drifts: doubt it when the lag grows through a run.
     """
 
