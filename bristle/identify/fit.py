@@ -56,8 +56,9 @@ class Model:
         """Return the names of the parameters that a fit moves."""
         names = [name for name in LAWS[self.law].parameters if name not in FIXED]
         for effect in self.effects:
+            fixed = FIXED if self.law == "lugre" else (*FIXED, *EFFECTS[effect].bristles)
             names += [
-                f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in FIXED
+                f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in fixed
             ]
         return [name for name in names if name not in self.held]
 
