@@ -90,7 +90,7 @@ class Effect:
     starts
         States that begin with the value of a signal where a measurement begins: {state: signal}.
     bristles
-        Parameters that count for laws with bristles alone; with others a fit leaves them as they are.
+        Parameters that count for laws with bristles alone; with others a fit leaves them.
     contact
         Of a structure's effect: its `force` is dry friction, which carries what holds the base
         (`q.halt`), or the push of a stop. It is found together with the motion, whatever its

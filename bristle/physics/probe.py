@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import traceback
+from functools import partial
 from itertools import product
 from math import copysign, inf, isfinite
 from typing import Any, Callable
@@ -22,7 +23,7 @@ JUMP = 1e-3
 """A change within nothing, by the whole range of a hook, that counts as a jump."""
 
 
-class Flaw(Exception):
+class FlawError(Exception):
     """What is wrong with an effect of a user's, and the line where."""
 
     def __init__(self, text: str, line: int = 0) -> None:
@@ -35,7 +36,7 @@ def probe(effect: type[Effect]) -> None:
 
     Raises
     ------
-    Flaw
+    FlawError
         If one raises, returns what is no finite number or too few of them, jumps with a signal or
         a parameter, or if a parameter moves nothing.
     """
@@ -86,7 +87,7 @@ def _state(effect: type[Effect], q: Q, values: dict[str, float]) -> Any:
 def _call(
     effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float], finite: bool = True
 ) -> tuple[float, ...]:
-    """Return what a hook gives, as a tuple; Flaw if that is not right."""
+    """Return what a hook gives, as a tuple; FlawError if that is not right."""
     function: Callable[..., Any] = getattr(effect, hook)
     line = function.__code__.co_firstlineno + 1
     p = effect.Values(**values)
@@ -95,7 +96,7 @@ def _call(
     except Exception as error:
         frames = traceback.extract_tb(error.__traceback__)
         inner = [f.lineno for f in frames if f.filename == function.__code__.co_filename]
-        raise Flaw(
+        raise FlawError(
             f"{hook} raises {type(error).__name__}: {error}, at {_place(effect, q, values)}.",
             (inner[-1] or 0) if inner else line,
         ) from None
@@ -103,14 +104,14 @@ def _call(
     if wanted is not None:
         if not isinstance(found, tuple) or len(found) != wanted:
             what = f"a tuple of {wanted}: the states" if hook != "motion" else "x, v"
-            raise Flaw(f"{hook} returns {found!r}; {what} is right.", line)
+            raise FlawError(f"{hook} returns {found!r}; {what} is right.", line)
     else:
         found = (found,)
     for value in found:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise Flaw(f"{hook} returns {value!r}; a number is right.", line)
+            raise FlawError(f"{hook} returns {value!r}; a number is right.", line)
         if finite and not isfinite(value):
-            raise Flaw(f"{hook} returns {value!r} at {_place(effect, q, values)}.", line)
+            raise FlawError(f"{hook} returns {value!r} at {_place(effect, q, values)}.", line)
     return tuple(float(value) for value in found)
 
 
@@ -125,38 +126,46 @@ def _smooth_in_signals(effect: type[Effect], values: dict[str, float]) -> None:
     for signal in effect.needs:
         if signal not in RANGES:
             continue
-        for begin, hook in product(_signals()[1:7], hooks):
-            z = _state(effect, begin, values)
-
-            def given(value: float, q: Q = begin, z: Any = z, hook: str = hook) -> tuple[float, ...]:
-                return _call(effect, hook, q._replace(**{signal: value}), z, values)
-
-            low = 0.0 if signal == "V" else -RANGES[signal]
+        low = 0.0 if signal == "V" else -RANGES[signal]
+        for q, hook in product(_signals()[1:7], hooks):
+            given = partial(_at_signal, effect, hook, q, _state(effect, q, values), values, signal)
             _refuse_jump(effect, hook, given, low, RANGES[signal], f"q.{signal}")
+
+
+def _at_signal(
+    effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float], signal: str,
+    value: float,
+) -> tuple[float, ...]:  # fmt: skip
+    return _call(effect, hook, q._replace(**{signal: value}), z, values)
 
 
 def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> None:
     for name, parameter in effect.parameters.items():
         low, high = parameter.bounds
-        logarithmic = low > 0.0 and high > 100.0 * low
-        if not logarithmic:  # near the default, for bounds may be far away
+        if not (low > 0.0 and high > 100.0 * low):  # near the default: bounds may be far away
             reach = 3.0 * abs(parameter.value) or 1.0
             low, high = max(low, parameter.value - reach), min(high, parameter.value + reach)
         moved = False
-        for begin, hook in product(_signals(), effect.hooks()):
-            z = _state(effect, begin, values)
-
-            def given(share: float, q: Q = begin, z: Any = z, hook: str = hook) -> tuple[float, ...]:
-                value = low * (high / low) ** share if logarithmic else low + (high - low) * share
-                return _call(effect, hook, q, z, {**values, name: value})
-
+        for q, hook in product(_signals(), effect.hooks()):
+            z = _state(effect, q, values)
+            given = partial(_at_parameter, effect, hook, q, z, values, name, low, high)
             if name in CHOICES:
                 moved = moved or given(0.0) != given(1.0)
             else:
                 moved = _refuse_jump(effect, hook, given, 0.0, 1.0, f"p.{name}", 24) or moved
         if not moved:
             line = getattr(effect, next(iter(effect.hooks()))).__code__.co_firstlineno
-            raise Flaw(f"p.{name} moves nothing: no measurement could tell it.", line)
+            raise FlawError(f"p.{name} moves nothing: no measurement could tell it.", line)
+
+
+def _at_parameter(
+    effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float], name: str, low: float,
+    high: float, share: float,
+) -> tuple[float, ...]:  # fmt: skip
+    """Call a hook with a parameter between low and high, by decades where they span many."""
+    by_decades = low > 0.0 and high > 100.0 * low
+    value = low * (high / low) ** share if by_decades else low + (high - low) * share
+    return _call(effect, hook, q, z, {**values, name: value})
 
 
 def _refuse_jump(
@@ -187,7 +196,7 @@ def _refuse_jump(
                 a, left = middle, between
         if abs(right - left) > JUMP * size:
             line = getattr(effect, hook).__code__.co_firstlineno + 1
-            raise Flaw(
+            raise FlawError(
                 f"{hook} jumps by {abs(right - left):.3g} with {what}: it is not differentiable, "
                 "and no fit could follow it. A smooth step such as tanh(v/v_s) is right.",
                 line,

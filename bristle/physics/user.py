@@ -21,7 +21,7 @@ from .. import units
 from ..errors import PhysicsError, UnitError
 from . import damper, structure
 from .effect import EFFECTS, HOOKS, Effect, Q
-from .probe import Flaw, probe
+from .probe import FlawError, probe
 
 PACKAGE = "bristle_own_effects"
 _MODULES = {"math": set(dir(math)), "bristle.physics.effect": {"Effect", "Parameter"}}
@@ -152,7 +152,7 @@ def _load(path: Path, shown: Path) -> tuple[Loaded, bool]:
     changed = path in _known and _forget(path)
     try:
         effect = _made(text, path, shown)
-    except Flaw as flaw:
+    except FlawError as flaw:
         where = f"{shown}, line {flaw.line}" if flaw.line else f"{shown}"
         loaded = Loaded(shown, None, f"{where}: {flaw}")
     else:
@@ -162,13 +162,13 @@ def _load(path: Path, shown: Path) -> tuple[Loaded, bool]:
 
 
 def _made(text: str, path: Path, shown: Path) -> type[Effect]:
-    """Return the effect that a file's text defines, registered; Flaw if it is not right."""
+    """Return the effect that a file's text defines, registered; FlawError if it is not right."""
     try:
         tree = ast.parse(text, str(shown), feature_version=(3, 9))
     except SyntaxError as error:
-        raise Flaw(f"this is no Python: {error.msg}.", error.lineno or 0) from None
+        raise FlawError(f"this is no Python: {error.msg}.", error.lineno or 0) from None
     except ValueError as error:  # a null byte
-        raise Flaw(f"this is no Python: {error}.") from None
+        raise FlawError(f"this is no Python: {error}.") from None
     _read(tree)
     other = EFFECTS.get(path.stem)
     if other is not None and other.own:  # of another folder: the one that is read last stays
@@ -186,11 +186,11 @@ def _made(text: str, path: Path, shown: Path) -> type[Effect]:
     except BaseException as error:
         EFFECTS.clear()
         EFFECTS.update(before)
-        if isinstance(error, Flaw):
+        if isinstance(error, FlawError):
             raise
         if not isinstance(error, Exception):
             raise
-        raise Flaw(_said(error), _line(error, path)) from None
+        raise FlawError(_said(error), _line(error, path)) from None
     effect.own = True
     return effect
 
@@ -218,9 +218,11 @@ def _only_one(module: ModuleType, path: Path, tree: ast.Module) -> type[Effect]:
     lines = [node.lineno for node in tree.body if isinstance(node, ast.ClassDef)]
     if len(found) != 1:
         line = lines[1] if len(lines) > 1 else 0
-        raise Flaw(f"{len(found)} effects are defined; one class Effect with a name is right.", line)
+        raise FlawError(
+            f"{len(found)} effects are defined; one class Effect with a name is right.", line
+        )
     if found[0].name != path.stem:
-        raise Flaw(
+        raise FlawError(
             f'the effect is named "{found[0].name}" and the file {path.name}; name = "{path.stem}" '
             "is right.",
             lines[0],
@@ -233,30 +235,32 @@ def _check(effect: type[Effect], tree: ast.Module) -> None:
     line = next(node.lineno for node in tree.body if isinstance(node, ast.ClassDef))
     for name, parameter in effect.parameters.items():
         if not name.isidentifier() or name == "on" or name.endswith("_0"):
-            raise Flaw(f'a parameter cannot be named "{name}"; a word such as "k" is right.', line)
+            raise FlawError(
+                f'a parameter cannot be named "{name}"; a word such as "k" is right.', line
+            )
         if not all(math.isfinite(bound) for bound in parameter.bounds):
-            raise Flaw(f"the bounds of {name}, {parameter.bounds}, must be finite.", line)
+            raise FlawError(f"the bounds of {name}, {parameter.bounds}, must be finite.", line)
     spelled = [p.unit for p in effect.parameters.values()] + list(effect.states.values())
     for unit in spelled:
         try:
             right = units.canonical(unit)
         except UnitError as error:
-            raise Flaw(f"{error}", line) from None
+            raise FlawError(f"{error}", line) from None
         if right != unit:
-            raise Flaw(f'unit "{unit}" is spelled "{right}" here.', line)
+            raise FlawError(f'unit "{unit}" is spelled "{right}" here.', line)
 
 
 def _read(tree: ast.Module) -> None:
     """Refuse what a hook must not do, as far as the text shows it."""
     names = set(_BUILTINS) | {"Effect", "Parameter"}
-    for node in tree.body:
-        names |= _defined(node)
+    for statement in tree.body:
+        names |= _defined(statement)
     for node in ast.walk(tree):
         why = _REFUSED.get(type(node))
         if why:
-            raise Flaw(f"{_word(node)}: {why}.", getattr(node, "lineno", 0))
+            raise FlawError(f"{_word(node)}: {why}.", getattr(node, "lineno", 0))
         if isinstance(node, ast.Attribute) and node.attr.startswith("__"):
-            raise Flaw(f"{node.attr} has no place here.", node.lineno)
+            raise FlawError(f"{node.attr} has no place here.", node.lineno)
     functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
     ready = set(names) - {function.name for function in functions}
     for function in functions:
@@ -267,9 +271,12 @@ def _read(tree: ast.Module) -> None:
         if isinstance(node, ast.Call) and id(node) not in inside:
             called = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
             if called not in names | {"dict.fromkeys"} and not called.startswith("math."):
-                raise Flaw(f"{called}(...) is called; math and plain numbers are right.", node.lineno)
-    for owner in (node for node in tree.body if isinstance(node, ast.ClassDef)):
-        _read_needs(owner)
+                raise FlawError(
+                    f"{called}(...) is called; math and plain numbers are right.", node.lineno
+                )
+    for owner in tree.body:
+        if isinstance(owner, ast.ClassDef):
+            _read_needs(owner)
 
 
 def _defined(node: ast.stmt) -> set[str]:
@@ -277,7 +284,7 @@ def _defined(node: ast.stmt) -> set[str]:
     if isinstance(node, ast.Import):
         for alias in node.names:
             if alias.name != "math" or alias.asname:
-                raise Flaw(_not_pure(alias.name), node.lineno)
+                raise FlawError(_not_pure(alias.name), node.lineno)
         return {"math"}
     if isinstance(node, ast.ImportFrom):
         if node.module == "__future__":
@@ -285,7 +292,7 @@ def _defined(node: ast.stmt) -> set[str]:
         allowed = _MODULES.get(node.module or "", set()) if not node.level else set()
         for alias in node.names:
             if alias.name not in allowed or alias.asname:
-                raise Flaw(_not_pure(f"{'.' * node.level}{node.module or ''}"), node.lineno)
+                raise FlawError(_not_pure(f"{'.' * node.level}{node.module or ''}"), node.lineno)
         return {alias.name for alias in node.names}
     if isinstance(node, (ast.FunctionDef, ast.ClassDef)):
         return {node.name}
@@ -294,7 +301,7 @@ def _defined(node: ast.stmt) -> set[str]:
         return {name.id for one in targets for name in ast.walk(one) if isinstance(name, ast.Name)}
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
         return set()
-    raise Flaw(
+    raise FlawError(
         "imports, constants, functions and one class Effect are right at the top of a file.",
         node.lineno,
     )
@@ -312,7 +319,9 @@ def _read_function(function: ast.FunctionDef, ready: set[str]) -> None:
     """Refuse containers, memory and unknown names inside a function."""
     spec = function.args
     if spec.defaults or spec.vararg or spec.kwarg or spec.kwonlyargs:
-        raise Flaw(f"{function.name}: plain arguments without defaults are right.", function.lineno)
+        raise FlawError(
+            f"{function.name}: plain arguments without defaults are right.", function.lineno
+        )
     local = {argument.arg for argument in spec.args}
     for node in ast.walk(function):
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
@@ -320,20 +329,22 @@ def _read_function(function: ast.FunctionDef, ready: set[str]) -> None:
     for node in ast.walk(function):
         line = getattr(node, "lineno", function.lineno)
         if isinstance(node, _CONTAINERS):
-            raise Flaw(f"{function.name}: {_word(node)}; a hook knows numbers and tuples.", line)
+            raise FlawError(
+                f"{function.name}: {_word(node)}; a hook knows numbers and tuples.", line
+            )
         if isinstance(node, (ast.Attribute, ast.Subscript)) and isinstance(node.ctx, ast.Store):
-            raise Flaw(
+            raise FlawError(
                 f"{function.name}: {ast.unparse(node)} is set; a hook returns what is new "
                 "and changes nothing.",
                 line,
             )
         if isinstance(node, (ast.FunctionDef, ast.ClassDef)) and node is not function:
-            raise Flaw(f"{function.name}: a definition inside a function.", line)
+            raise FlawError(f"{function.name}: a definition inside a function.", line)
         known = ready | local
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id not in known:
-            raise Flaw(
-                f"{function.name}: {node.id} is not defined above, and a hook is a pure function of "
-                "q, z and p.",
+            raise FlawError(
+                f"{function.name}: {node.id} is not defined above; a hook is a pure function of q, "
+                "z and p.",
                 line,
             )
 
@@ -351,17 +362,20 @@ def _read_needs(owner: ast.ClassDef) -> None:
         if hook.name not in HOOKS:
             continue
         if len(hook.args.args) != 3:
-            raise Flaw(f"{hook.name}: a hook takes q, z, p.", hook.lineno)
+            raise FlawError(f"{hook.name}: a hook takes q, z, p.", hook.lineno)
         if [ast.unparse(decorator) for decorator in hook.decorator_list] != ["staticmethod"]:
-            raise Flaw(f"{hook.name}: @staticmethod above it is right.", hook.lineno)
+            raise FlawError(f"{hook.name}: @staticmethod above it is right.", hook.lineno)
         q = hook.args.args[0].arg
-        for node in ast.walk(hook):
-            if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-                if node.value.id == q and node.attr not in Q._fields:
+        for inner in ast.walk(hook):
+            if isinstance(inner, ast.Attribute) and isinstance(inner.value, ast.Name):
+                if inner.value.id == q and inner.attr not in Q._fields:
                     offers = ", ".join(Q._fields)
-                    raise Flaw(f"{q} has no {node.attr}; it offers {offers}.", node.lineno)
-                if node.value.id == q and node.attr not in (stated or set()):
-                    raise Flaw(f'{hook.name} reads {q}.{node.attr}: add "{node.attr}" to needs.', node.lineno)
+                    raise FlawError(f"{q} has no {inner.attr}; it offers {offers}.", inner.lineno)
+                if inner.value.id == q and inner.attr not in (stated or set()):
+                    raise FlawError(
+                        f'{hook.name} reads {q}.{inner.attr}: add "{inner.attr}" to needs.',
+                        inner.lineno,
+                    )
 
 
 def _word(node: ast.AST) -> str:
