@@ -1,4 +1,4 @@
-"""Each effect tried inside the model: refitted on the training runs, judged on the held-out ones."""
+"""Each effect tried inside the model: refitted on training runs, judged on held-out ones."""
 
 from __future__ import annotations
 
@@ -166,7 +166,7 @@ def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
 
 @dataclass(frozen=True)
 class Begun:
-    """A candidate after its first, short search: the model and its mean loss on the training runs."""
+    """A candidate after its first, short search, with its mean loss on the training runs."""
 
     model: Model
     cost: float

@@ -22,7 +22,7 @@ CLEAN = 1.15
 ADEQUATE = 1.08
 """z up to which a model with an effect leaves nothing that matters."""
 
-SHARE = 0.9
+SHARE = 0.75
 """Share of the excess that an effect must explain where its model is not adequate: its form may
 differ from ours, and then the name is right and a residual remains."""
 

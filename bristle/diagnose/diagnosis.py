@@ -14,7 +14,7 @@ from ..identify.fit import Model, Problem, identify
 from ..identify.prepare import prepare
 from ..records.measurement import Measurement
 from .candidates import Trial, judge, refine, try_all
-from .decision import Decision, decide
+from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
 from .sensors import SensorFault, mended, sensor_faults

@@ -37,7 +37,8 @@ class Experiment:
         motion = (
             f"a sine of {1e3 * self.amplitude:.3g} mm at {self.low:.3g} Hz"
             if self.low == self.high
-            else f"a sweep of {1e3 * self.amplitude:.3g} mm from {self.low:.3g} to {self.high:.3g} Hz"
+            else f"a sweep of {1e3 * self.amplitude:.3g} mm from {self.low:.3g} to "
+            f"{self.high:.3g} Hz"
         )
         low, high = self.voltage
         drive = (

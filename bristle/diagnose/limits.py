@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem
-from ..physics.effect import EFFECTS
 from .candidates import Expected, Search, joinable, starts
 from .decision import GAIN
 

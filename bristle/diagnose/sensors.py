@@ -40,7 +40,8 @@ class SensorFault:
     """A fault of one channel.
 
     `fault` is "gain" [1], "sign" (-1), "delay" [s], "bias" or "clipping" [the channel's unit], or
-    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; `std` the uncertainty of `value`; `words` a sentence.
+    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; `std` the
+    uncertainty of `value`; `words` a sentence.
     """
 
     channel: str
