@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +14,16 @@ from ..physics.effect import EFFECTS, Parameter
 
 Array = NDArray[np.float64]
 
+OTHER_LAWS: dict[str, Any] = {}
+"""Laws that no damper has, by name: those of a building's parts join here."""
+
 FIXED = ("exponent", "mass", "which")
 """Parameters that a fit leaves alone: choices and regularisations, not measurements."""
 
 DRIVEN = {"bingham": ("f_v", "c_v"), "lugre": ("sigma_0", "sigma_b")}
 """Parameters that act through the voltage alone."""
+
+_STEADY = 1e-2  # of its level: what a voltage varies by without telling anything
 
 LOST = 1e4
 """Noise of a sample that was not measured, in noises of the force: it has no say."""
@@ -67,13 +73,13 @@ class Model:
 
     def free(self) -> list[str]:
         """Return the names of the parameters that a fit moves."""
-        names = [name for name in LAWS[self.law].parameters if name not in FIXED]
+        names = [name for name in law_parameters(self.law) if name not in FIXED]
         for effect in self.effects:
             names += [
                 f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in FIXED
             ]
-        if self.value("exponent") == 0.0:  # the standard law does not know it
-            names.remove("v_n")
+        if "v_n" in names and self.value("exponent") == 0.0:
+            names.remove("v_n")  # the standard law does not know it
         return [name for name in names if name not in self.held]
 
     def value(self, name: str) -> float:
@@ -92,7 +98,12 @@ def parameter(law: str, name: str) -> Parameter:
     if "." in name:
         effect, own = name.split(".", 1)
         return EFFECTS[effect].parameters[own]
-    declared: Parameter = LAWS[law].parameters[name]
+    return law_parameters(law)[name]
+
+
+def law_parameters(law: str) -> dict[str, Parameter]:
+    """Return the declarations of a law's own parameters by name."""
+    declared: dict[str, Parameter] = (LAWS[law] if law in LAWS else OTHER_LAWS[law]).parameters
     return declared
 
 
@@ -180,3 +191,9 @@ def without(model: Model, names: tuple[str, ...]) -> Model:
     values = {**model.values, **dict.fromkeys(names, 0.0)}
     held = tuple(dict.fromkeys((*model.held, *names)))
     return replace(model, values=values, held=held)
+
+
+def steady(problem: Problem) -> bool:
+    """Return whether the voltage stays where it is over all runs."""
+    V = np.concatenate([run.V for run in problem.runs])
+    return float(np.std(V)) <= _STEADY * float(np.max(np.abs(V), initial=0.0)) or not np.any(V)
