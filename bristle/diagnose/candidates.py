@@ -31,12 +31,6 @@ SEARCH: dict[str, dict[str, tuple[float, ...]]] = {
 }
 """Where a search begins, as factors on an effect's defaults scaled to the rig."""
 
-REFERENCE = {
-    "N": 4.0, "N/m": 800.0, "N/m2": 1.6e5, "N/m3": 3.2e7, "m": 5e-3, "m/s": 0.07, "N.s/m": 57.0,
-    "N.s2/m2": 816.0, "kg": 2.7, "J": 0.02, "V": 5.0,
-}  # fmt: skip
-"""Typical sizes on the rig of 10 N for which the effects' defaults are written."""
-
 QUICK = 4
 """Sweeps of the first, short search from each start."""
 
@@ -84,7 +78,7 @@ class Search:
         self.names = list(names)
         declared = [parameter(model.law, name) for name in self.names]
         value = np.array([model.value(name) for name in self.names])
-        bounds = np.array([d.bounds for d in declared], dtype=float).reshape(-1, 2)
+        bounds = np.array([model.bounds(name) for name in self.names], dtype=float).reshape(-1, 2)
         self.log = (bounds[:, 0] > 0.0) & (bounds[:, 1] > 50.0 * bounds[:, 0])
         sizes = np.array([problem.size(d.unit) for d in declared])
         self.scale = np.where(self.log, 1.0, np.maximum(np.abs(value), 1e-2 * sizes))
@@ -147,12 +141,9 @@ def _raw(problem: Problem, model: Model, expected: Expected) -> Iterable[Array]:
 
 def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
     """Return the models from which the search for an effect's parameters begins."""
-    values = {}
-    for name, declared in EFFECTS[effect].parameters.items():
-        reference = REFERENCE.get(declared.unit)
-        start = declared.value * (problem.size(declared.unit) / reference if reference else 1.0)
-        low, high = declared.bounds
-        values[name] = min(max(start, low), high)
+    values = {
+        name: problem.scaled(base.law, f"{effect}.{name}") for name in EFFECTS[effect].parameters
+    }
     factors = SEARCH.get(effect, {})
     out = []
     for combination in product(*factors.values()):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -108,6 +108,7 @@ def diagnose(
     effects: Sequence[str] = (),
     values: Mapping[str, float] | None = None,
     held: Sequence[str] = (),
+    limits: Mapping[str, tuple[float, float]] | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Return which effect a damper's model misses on a test bench.
@@ -119,7 +120,7 @@ def diagnose(
     effects : the effects that the model has already
     values : its parameters where they were identified before, by name in SI; else they are
         identified here
-    held : names of parameters that stay as they are
+    held, limits : parameters that stay as they are, and a user's bounds; see `identify.Model`
     progress : called with a sentence at each stage
 
     Raises
@@ -141,10 +142,12 @@ def diagnose(
     )
     say("fitting the present model")
     if values is None:
-        base = identify(problem, law, tuple(effects)).model
+        base = identify(
+            problem, law, tuple(effects), held=tuple(held), limits=dict(limits or {})
+        ).model
     else:
-        base = Model(law, tuple(effects), dict(values))
-    base = refine(replace(base, held=tuple(held)), problem)
+        base = Model(law, tuple(effects), dict(values), tuple(held), dict(limits or {}))
+        base = refine(base, problem)
     before = judge(base, problem, held_out)
     return _judged(before, problem, held_out, faults, noise, say)
 
