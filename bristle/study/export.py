@@ -158,7 +158,8 @@ def _bench(
     v, a = true_motion(fitted.effects, fitted.values, run.v, run.a, run.dt)
     run = replace(run, v=v, a=a)
     fine = max(1, ceil(run.dt / STEP - 1e-9))
-    step, stop = run.dt / fine, (len(run.x) - 1) * run.dt
+    step = float(f"{run.dt / fine:.12g}")
+    stop = float(f"{(len(run.x) - 1) * fine * step:.12g}")
     time = run.dt * np.arange(len(run.x))
     files = [_motion_file(run, fine, folder / "motion.csv")]
     rows = {"measured": ("force", "N", run.force)}
@@ -206,7 +207,7 @@ def _motion_file(run: Run, fine: int, path: Path) -> Path:
 
 def _signal_file(time: Array, values: Array, title: str, unit: str, path: Path) -> Path:
     rows = [f"time [s],{title} [{unit}]"]
-    rows += [f"{t:.9g},{value!r}" for t, value in zip(time.tolist(), values.tolist(), strict=True)]
+    rows += [f"{t:.12g},{value!r}" for t, value in zip(time.tolist(), values.tolist(), strict=True)]
     write_whole(path, "\n".join(rows) + "\n")
     return path
 
@@ -295,10 +296,12 @@ def _structure(
         )
         parts.append(_part("measured", "SignalSource", {"kind": "csv", "file": "measured.csv"}))
     parts.append(_part("damper", fmu.name, damper))
-    step = measurement.step / max(1, ceil(measurement.step / 2e-3 - 1e-9))
+    fine = max(1, ceil(measurement.step / 2e-3 - 1e-9))
+    step = float(f"{measurement.step / fine:.12g}")
+    stop = float(f"{(len(time) - 1) * fine * step:.12g}")
     text = _scenario(
         f"{study.name}: the building with the model's damper, ground of {measurement.name}",
-        "# The model's damper in the study's building.", float(time[-1]), step, parts, wires,
+        "# The model's damper in the study's building.", stop, step, parts, wires,
     )  # fmt: skip
     scenario = folder / "structure.toml"
     write_whole(scenario, text)
@@ -330,7 +333,7 @@ def _scenario(
     title: str, about: str, stop: float, step: float, parts: list[str], wires: Mapping[str, str]
 ) -> str:
     plain = title.replace("\\", "/").replace('"', "'")
-    head = f'{about}\n\nschema = 1\ntitle = "{plain}"\n\n[run]\nstop = {stop:.9g}\n'
-    head += f'step = {step:.9g}\nalgorithm = "gauss-seidel"\n'
+    head = f'{about}\n\nschema = 1\ntitle = "{plain}"\n\n[run]\nstop = {stop!r}\n'
+    head += f'step = {step!r}\nalgorithm = "gauss-seidel"\n'
     lines = [f'"{target}" = "{source}"' for target, source in wires.items()]
     return "\n".join([head, "\n\n".join(parts), "\n[connections]", *lines]) + "\n"

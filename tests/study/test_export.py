@@ -17,9 +17,7 @@ from bristle.compiled.bench import Bench
 from bristle.cosim.scenario import load_scenario
 from bristle.fmu.description import read_description
 from bristle.identify.prepare import prepare
-from bristle.physics.building import paper_building
 from bristle.study.export import AGREEMENT, export_study, prediction
-from bristle.study.model import new_model
 from bristle.study.study import Study
 
 STEP, LENGTH = 0.002, 1.5
@@ -135,7 +133,9 @@ def test_the_fmu_gives_the_prediction_alone_and_in_its_scenario(bench: Study) ->
     own = np.interp(run.dt * np.arange(len(run.x)), frame.index.to_numpy(), frame["damper.force"])
     assert rms(own - expected) < AGREEMENT * size
     # The measurement lies beside it: the truth has a softer field law, the rest is the delay.
-    measured = np.interp(run.dt * np.arange(len(run.x)), frame.index.to_numpy(), frame["measured.value"])
+    measured = np.interp(
+        run.dt * np.arange(len(run.x)), frame.index.to_numpy(), frame["measured.value"]
+    )
     np.testing.assert_allclose(measured, run.force, atol=1e-9)
     assert rms(frame["rod.velocity"].to_numpy()[:: round(run.dt / 5e-4)] - run.v) < 1e-9
     assert main(["conform", str(found.fmu)]) == 0

@@ -7,7 +7,7 @@ from ..effect import Effect, Parameter
 
 def thinned(T, curve):
     """Return what is left of a force at a relative temperature T [1]."""
-    if abs(curve) < 1e-6:
+    if abs(curve) < 1e-9:
         return max(exp(-min(T, 300.0)), 0.02)
     base = 1.0 + curve * T
     return max(base ** (-1.0 / curve), 0.02) if base > 0.0 else 0.02
