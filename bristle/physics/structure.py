@@ -255,9 +255,10 @@ def balance_contact(
 ) -> float:  # fmt: skip
     """Add to x1 the contacts' force on the first level that goes with it; return that force [N].
 
-    It is that of the middle of the step; where a contact closes, that of its end (the middle's would
-    create energy); and where one sticks, what brings the level to rest (Moreau's time stepping). The more force, the less motion into the contact: so the balance has one
-    solution, found by regula falsi (Illinois) at any stiffness.
+    It is that of the middle of the step; where a contact closes, that of its end (the middle's
+    would create energy); where one sticks, what brings the level to rest (Moreau's time stepping).
+    The more force, the less motion into the contact: so the balance has one solution, found by
+    regula falsi (Illinois) at any stiffness.
     """
     closed = contact_force(n, isolated, stiffnesses, x0, h, energy, 0.0, z0, p, on) != 0.0
     part = 0.5 if closed else 1.0
