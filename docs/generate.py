@@ -107,8 +107,8 @@ def _use_of(name: str, site: str, told: dict[str, Any]) -> list[str]:
         return [
             "## Use it",
             "In a study, beside the damper's own effects: `bristle add STUDY "
-            f"{name}`. It acts on the {EFFECTS[name].shows} channel of the measurement; no exported "
-            "damper carries it.",
+            f"{name}`. It acts on the {EFFECTS[name].shows} channel of the measurement; no "
+            "exported damper carries it.",
         ]
     text = f'[components.{site}]\nparameters = {{ "{name}.on" = true, "{name}.{first}" = {value} }}'
     return [
