@@ -8,6 +8,7 @@ that correlation in time counts in the intervals as well.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from ..physics.damper import LAWS
 from ..physics.effect import EFFECTS, Parameter
 
 Array = NDArray[np.float64]
+
+OTHER_LAWS: dict[str, Any] = {}
+"""Laws that no damper has, by name: those of a building's parts join here."""
 
 FIXED = ("exponent", "mass", "which")
 """Parameters that a fit leaves alone: choices and regularisations, not measurements."""
@@ -53,7 +57,7 @@ class Model:
 
     def free(self) -> list[str]:
         """Return the names of the parameters that a fit moves."""
-        names = [name for name in LAWS[self.law].parameters if name not in FIXED]
+        names = [name for name in law_parameters(self.law) if name not in FIXED]
         for effect in self.effects:
             names += [
                 f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in FIXED
@@ -72,7 +76,12 @@ def parameter(law: str, name: str) -> Parameter:
     if "." in name:
         effect, own = name.split(".", 1)
         return EFFECTS[effect].parameters[own]
-    declared: Parameter = LAWS[law].parameters[name]
+    return law_parameters(law)[name]
+
+
+def law_parameters(law: str) -> dict[str, Parameter]:
+    """Return the declarations of a law's own parameters by name."""
+    declared: dict[str, Parameter] = (LAWS[law] if law in LAWS else OTHER_LAWS[law]).parameters
     return declared
 
 
