@@ -45,7 +45,7 @@ def smooth(
 
     Parameters
     ----------
-    x, v : (n,) m, m/s; either may be None
+    x, v : (n,) m, m/s; either may be None; what is not finite counts as not measured
     dt : float, s
     noise : standard deviations of the two channels [m, m/s]
     jerk : intensity of the white jerk [m2/s5]; 0: by maximum likelihood
@@ -72,7 +72,8 @@ def smooth(
 def _likeliest(y: Array, r: Array, have: NDArray[np.bool_], dt: float) -> float:
     """Return the intensity of the white jerk that makes the measurement likeliest."""
     spare, cov, loss = np.zeros((1, 3)), np.zeros(3), np.zeros(2)
-    third = np.diff(y[:, 0] if have[0] else np.cumsum(y[:, 1]) * dt, n=3) / dt**3
+    path = y[:, 0] if have[0] else np.cumsum(np.nan_to_num(y[:, 1])) * dt
+    third = np.diff(path[np.isfinite(path)], n=3) / dt**3
     top = np.log10(np.var(third) * dt + 1e-30)
 
     def cost(exponent: float) -> float:
