@@ -16,6 +16,7 @@ from ..physics.effect import EFFECTS
 Array = NDArray[np.float64]
 
 effect_forces = structure.effect_forces
+contact_force = structure.contact_force
 advance_effects = structure.advance_effects
 
 
@@ -153,13 +154,23 @@ def forces_along(
                 z[i] = z1[i]
         effect_forces(n, isolated, stiffnesses, level, dt, 0.0, halt, z, p, on, forces)
         out[k] = forces[n - 1]
+        if n == 1:
+            out[k] += contact_force(n, isolated, stiffnesses, level, dt, 0.0, halt, z, p, on)
+
+
+def compiled_forces() -> Callable[..., None]:
+    """Return the compiled `forces_along`; the first call on a machine takes seconds."""
+    return _compiled(structure.effect_forces)
 
 
 @cache
-def compiled_forces() -> Callable[..., None]:
-    """Return the compiled `forces_along`; the first call on a machine takes seconds."""
+def _compiled(effect_forces_now: Any) -> Callable[..., None]:
+    """Compile with the woven functions of now: there are new ones after a new effect."""
+    global effect_forces, contact_force, advance_effects
     from .jit import compiled
 
+    effect_forces = effect_forces_now
+    contact_force, advance_effects = structure.contact_force, structure.advance_effects
     function: Callable[..., None] = compiled(forces_along)
     return function
 

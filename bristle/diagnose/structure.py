@@ -15,31 +15,52 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
-from ..identify.fit import Fit, Model, Problem, fit, identify
+from ..identify.fit import Fit, identify
+from ..identify.model import Model, Problem
 from ..identify.response import Response, responses
 from ..identify.structure import (
     LinearLayer,
     LinearStorey,
     StructureProblem,
     fit_line,
+    layer_run,
     problems_of,
+    thinned,
 )
 from ..physics.building import Building
 from ..physics.effect import EFFECTS, effects_of
 from ..records.measurement import Measurement
-from .candidates import Trial, judge, starts, try_all
-from .evidence import organised, paired, z_of
+from .candidates import Search, Trial, judge, refine, starts, try_all
+from .decision import Decision, decide
+from .evidence import paired
 from .sensors import SensorFault, sensor_faults
-from .verdict import CLEAN, GAIN, Verdict, decide
 
 Array = NDArray[np.float64]
+
+GAIN = 0.03
+"""Smallest share by which an effect must lower z on held-out runs to be missing at a site."""
+
+CLEAN = 1.15
+"""z above which something is missing at a site, whether an effect explains it or not."""
 
 SHARE = 0.7
 """Share of a site's excess that an effect must explain where its form leaves more than `CLEAN`."""
 
 NEARLY = 0.02
 """Rivals whose z lies that close together are not told apart."""
+
+OWN = 0.5
+"""Where its form leaves more than `CLEAN`, what an effect's excess must be below, as a share of
+the next one's: two forms that are both wrong cannot decide otherwise."""
+
+SURE = 40.0
+"""Gain of the log-likelihood that no chance brings: what happens in a few samples only, such as a
+stop that is met once, is seen in no resampling of blocks."""
+
+QUICK = 8
+"""Sweeps of the first, short search from each start, on every fifth sample."""
 
 LOOKALIKE = {
     "gas_spring": ("duffing",),
@@ -74,25 +95,78 @@ class Finding:
     share: float
     detectable: float
     coordinate: str = ""
-    fit: Fit | None = None
+    model: Model | None = None
     trials: tuple[Trial, ...] = ()
+
+
+_NOTHING = Finding("", "none", (), 1.0, 1.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class DamperVerdict:
+    """What the damper's law lacks: the decision, and the trials that it rests on."""
+
+    decision: Decision
+    before: Trial
+    trials: tuple[Trial, ...]
 
 
 @dataclass(frozen=True)
 class StructureDiagnosis:
     """The verdict on a building's rig and what it rests on.
 
-    `findings` by site; `damper` the damper's law as fitted, and `damper_verdict` what it lacks.
-    `reconstructed` says whether the damper's force was reconstructed.
+    `kind`, `effects`, ... as in verdict.json; `sites` says at which site each effect was found.
+    `findings` by site; `damper` the damper's law as fitted and `damper_verdict` what it lacks;
+    `reconstructed` whether the damper's force was reconstructed.
     """
 
-    verdict: Verdict
+    kind: str
+    effects: tuple[str, ...]
+    words: str
+    z_before: float
+    z_after: float
+    coordinate: str
+    detectable: float
+    untestable: tuple[str, ...]
+    sites: dict[str, str]
     findings: dict[str, Finding]
     damper: Fit | None
-    damper_verdict: Verdict | None
+    damper_verdict: DamperVerdict | None
     reconstructed: bool
     sensors: tuple[SensorFault, ...] = ()
     problems: dict[str, tuple[StructureProblem, StructureProblem]] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content of verdict.json."""
+        ranking = []
+        for site, trials, before in self._tried():
+            ranking += [
+                {
+                    "effect": t.effects[-1], "site": site, "z_holdout": round(t.z, 4),
+                    "gain": round(1.0 - t.z / before, 4),
+                }
+                for t in trials
+            ]  # fmt: skip
+        out: dict[str, Any] = {
+            "schema": 1, "kind": self.kind, "effects": list(self.effects),
+            "ranking": sorted(ranking, key=lambda row: -row["gain"]),
+            "z_holdout_before": round(self.z_before, 4), "z_holdout_after": round(self.z_after, 4),
+            "untestable": list(self.untestable), "sites": self.sites,
+            "sensors": [
+                {"channel": f.channel, "fault": f.fault, "value": f.value} for f in self.sensors
+            ],
+            "force": "reconstructed" if self.reconstructed else "measured", "words": self.words,
+        }  # fmt: skip
+        if np.isfinite(self.detectable):
+            out["detectable"] = round(self.detectable, 5)
+        if self.coordinate:
+            out["coordinate"] = self.coordinate
+        return out
+
+    def _tried(self) -> list[tuple[str, tuple[Trial, ...], float]]:
+        sites = [(f.site, f.trials, f.z_before) for f in self.findings.values()]
+        own = self.damper_verdict
+        return sites if own is None else [*sites, ("damper", own.trials, own.before.z)]
 
 
 Say = Callable[[str], None]
@@ -130,41 +204,47 @@ def diagnose_structure(
         if site != "damper":
             say(f"{site}: effects of the structure")
             findings[site] = look_at(site, own, other)
-    late = None
-    if "layer" in findings and findings["layer"].kind != "none" and "damper" in problems:
+    if "damper" in problems and findings.get("layer", _NOTHING).kind != "none":
         say("layer: the load cell")
         late = load_cell(findings["layer"], ours, theirs, building, law)
-    if late is not None:
-        findings["layer"], (ours, theirs) = late[0], late[1]
-        problems = {**problems_of(ours, theirs, building, law), "layer": problems["layer"]}
+        if late is not None:
+            findings["layer"], (ours, theirs) = late
+            problems = problems_of(ours, theirs, building, law)
     softer = any(f.kind != "none" for s, f in findings.items() if s.startswith("storey"))
     if softer and "damper" in problems and problems["damper"][0].reconstructed:
         problems = problems_of(ours, theirs, building, law, linear_storeys=False)
+    base, verdict = None, None
+    if "damper" in problems:
+        say("damper: its law, then effects")
+        base = identify(problems["damper"][0], law)
+        verdict = damper_verdict(base, *problems["damper"])
     sensors = tuple(sensor_faults([_as_bench(one, building) for one in train]))
-    if "damper" not in problems:
-        return StructureDiagnosis(
-            combine(findings, None, False), findings, None, None, False, sensors, problems
-        )
-    own, other = problems["damper"]
-    say("damper: its law, then effects")
-    base = identify(own, law)
-    verdict = damper_verdict(base, own, other)
-    return StructureDiagnosis(
-        combine(findings, verdict, own.reconstructed), findings, base, verdict, own.reconstructed,
-        sensors, problems,
-    )  # fmt: skip
+    return combine(findings, base, verdict, problems, sensors)
 
 
-def damper_verdict(base: Fit, train: StructureProblem, held_out: StructureProblem) -> Verdict:
-    """Return the damper's verdict; with a reconstructed force the layer's effects take part."""
-    before = judge(base.model.effects, base, train, held_out)
-    trials = try_all(base, train, held_out)
-    if train.reconstructed:
-        for effect in effects_of("structure"):
-            if "force" in effect.hooks():
-                trials.append(try_effect(effect.name, base, train, held_out))
-        trials.sort(key=lambda trial: float(trial.loss.mean()))
-    return decide(base, before, trials, train, held_out)
+def damper_verdict(base: Fit, train: StructureProblem, held_out: StructureProblem) -> DamperVerdict:
+    """Return what the damper lacks; with a reconstructed force the layer's effects take part."""
+    model = refine(base.model, train)
+    before = judge(model, train, held_out)
+    return _decided(before, train, held_out)
+
+
+def _decided(
+    before: Trial, train: StructureProblem, held_out: StructureProblem
+) -> DamperVerdict:
+    def grown(first: Trial) -> list[Trial]:
+        trials = try_all(first.model, train, held_out)
+        if train.reconstructed:
+            taken = first.model.effects
+            trials += [
+                try_effect(effect.name, first.model, train, held_out)
+                for effect in effects_of("structure")
+                if "force" in effect.hooks() and effect.name not in taken
+            ]
+        return sorted(trials, key=lambda trial: trial.z)
+
+    trials = grown(before)
+    return DamperVerdict(decide(before, trials, grown), before, tuple(trials))
 
 
 def look_at(site: str, train: StructureProblem, held_out: StructureProblem) -> Finding:
@@ -172,26 +252,28 @@ def look_at(site: str, train: StructureProblem, held_out: StructureProblem) -> F
     linear = LinearLayer if site == "layer" else LinearStorey
     hook = "force" if site == "layer" else "spring"
     base = fit_line(train, linear.name)
-    before = judge((), base, train, held_out)
-    trials = [
-        try_effect(effect.name, base, train, held_out)
-        for effect in effects_of("structure")
-        if hook in effect.hooks() or (site == "storey1" and hook == "force" and train.storey == 1)
-    ]
-    trials.sort(key=lambda trial: float(trial.loss.mean()))
-    return judge_site(site, base, before, trials, train, held_out)
+    before = judge(base.model, train, held_out)
+    names = [e.name for e in effects_of("structure") if hook in e.hooks()]
+    if before.z <= 1.0 + 0.5 * GAIN and before.train <= CLEAN:
+        names = []  # a line leaves nothing that a further effect could explain
+    trials = [try_effect(name, base.model, train, held_out) for name in names]
+    trials.sort(key=lambda trial: trial.z)
+    return judge_site(site, base, before, trials, held_out)
 
 
-def try_effect(effect: str, base: Fit, train: Problem, held_out: Problem) -> Trial:
+def try_effect(
+    effect: str, base: Model, train: StructureProblem, held_out: StructureProblem
+) -> Trial:
     """Refit a model with one more effect of the structure from several starts; judge the best."""
-    expected = train.expectation(base.model)
-    begun = [
-        fit(train, model, expectation=expected, max_evaluations=6, with_std=False)
-        for model in structure_starts(effect, base.model, train)
-    ]
-    best = min(begun, key=lambda one: one.cost)
-    best = fit(train, best.model, expectation=expected, max_evaluations=30)
-    return judge((*base.model.effects, effect), best, train, held_out)
+    few = thinned(train)
+    light = few.expectation(base)
+    begun = []
+    for model in structure_starts(effect, base, train):
+        found, ended = Search(few, model, light, model.free()).run(QUICK)
+        begun.append((ended.cost, found))
+    best = min(begun, key=lambda pair: pair[0])[1]
+    best, _ = Search(train, best, train.expectation(base), best.free()).run(25)
+    return judge(best, train, held_out)
 
 
 def structure_starts(effect: str, base: Model, train: Problem) -> list[Model]:
@@ -200,18 +282,22 @@ def structure_starts(effect: str, base: Model, train: Problem) -> list[Model]:
     Lengths are shares of the largest motion, for a stop beyond it has no force at all.
     """
     reach = max(float(np.max(np.abs(run.x))) for run in train.runs)
-    force = train.size("N")
-    stiffness = train.size("N/m")
+    speed = max(float(np.max(np.abs(run.v))) for run in train.runs)
+    force, stiffness = train.size("N"), train.size("N/m")
+    damping = train.size("N.s/m")
     grid: dict[str, dict[str, tuple[float, ...]]] = {
-        "base_friction": {"limit": (0.02 * force, 0.2 * force)},
-        "duffing": {"k_3": (0.3 * stiffness / reach**2, -0.1 * stiffness / reach**2)},
+        "base_friction": {
+            "limit": (0.1 * force,), "x_s": (0.0, 0.05 * reach), "v_r": (0.1 * speed,),
+        },
+        "duffing": {
+            "k_3": (0.3 * stiffness / reach**2, -0.1 * stiffness / reach**2), "shape": (3.0, 5.0),
+        },
         "end_stop": {
             "clearance": (0.55 * reach, 0.75 * reach, 0.9 * reach),
-            "k": (0.5 * stiffness, 5.0 * stiffness),
-            "c": (1e-3 * train.size("N.s/m"),),
+            "k": (1.0 * stiffness,), "c": (1e-3 * damping,),
         },
         "storey_softening": {"d_half": (0.7 * reach, 2.5 * reach), "which": (0.0,)},
-    }
+    }  # fmt: skip
     if effect not in grid:  # a user's own
         return starts(effect, base, train)
     own = {name: p.value for name, p in EFFECTS[effect].parameters.items()}
@@ -224,32 +310,44 @@ def structure_starts(effect: str, base: Model, train: Problem) -> list[Model]:
 
 
 def judge_site(
-    site: str, base: Fit, before: Trial, trials: list[Trial], train: StructureProblem,
-    held_out: StructureProblem,
-) -> Finding:  # fmt: skip
+    site: str, base: Fit, before: Trial, trials: list[Trial], held_out: StructureProblem
+) -> Finding:
     """Return the finding that a site's trials lead to; held-out runs decide."""
-    z_0 = z_of(before.loss)
-    seen = detectable(held_out)
-    tried = tuple(trials)
+    seen, tried = detectable(held_out), tuple(trials)
     best = trials[0] if trials else None
-    z_1 = z_of(best.loss) if best else z_0
-    share = (z_0**2 - z_1**2) / max(z_0**2 - 1.0, 1e-9)
-    helps = best is not None and paired(before.loss, best.loss).low > 0.0
-    if not helps or best is None or 1.0 - z_1 / z_0 < GAIN:
-        if z_0 <= CLEAN:
-            return Finding(site, "none", (), z_0, z_0, 0.0, seen, fit=base, trials=tried)
-        where = coordinate_of(before.residual, held_out)
-        return Finding(site, "unknown", (), z_0, z_0, 0.0, seen, where, base, tried)
-    if z_1 > CLEAN and share < SHARE:
-        where = coordinate_of(best.residual, held_out)
-        return Finding(site, "unknown", (), z_0, z_1, share, seen, where, best.fit, tried)
+    if best is None or not better(before, best) or 1.0 - best.z / before.z < GAIN:
+        kind = "none" if before.z <= CLEAN else "unknown"
+        where = coordinate_of(before.residual, held_out) if kind == "unknown" else ""
+        return Finding(site, kind, (), before.z, before.z, 0.0, seen, where, before.model, tried)
+    share = 1.0 - excess(best) / excess(before)
+    found = Finding(site, "unknown", (), before.z, best.z, share, seen, "", best.model, tried)
+    if best.z > CLEAN and share < SHARE:
+        return replace(found, coordinate=coordinate_of(best.residual, held_out))
     rivals = [best.effects[-1]]
     for other in trials[1:]:
-        close = z_of(other.loss) / z_1 - 1.0 < NEARLY
-        if close or paired(other.loss, best.loss).low <= 0.0:
-            rivals.append(other.effects[-1])
+        if best.z > CLEAN:
+            rival = excess(best) > OWN * excess(other)
+        else:
+            rival = other.z / best.z - 1.0 < NEARLY or not better(other, best)
+        rivals += [other.effects[-1]] if rival else []
     kind = "effect" if len(rivals) == 1 else "class"
-    return Finding(site, kind, tuple(rivals[:3]), z_0, z_1, share, seen, "", best.fit, tried)
+    return replace(found, kind=kind, effects=tuple(rivals[:3]))
+
+
+def excess(trial: Trial) -> float:
+    """Return z^2 - 1, never below a hundredth: noise is not known better."""
+    return max(trial.z**2 - 1.0, 0.01)
+
+
+def better(first: Trial, second: Trial) -> bool:
+    """Return whether the second trial errs less than the first on held-out runs, beyond chance.
+
+    A site's noise is white, so where the second model is adequate its gain in likelihood counts.
+    """
+    if paired(first.losses, second.losses).low > 0.0:
+        return True
+    gain = float(np.sum(first.losses - second.losses))
+    return second.z <= CLEAN and gain > SURE
 
 
 def detectable(held_out: StructureProblem) -> float:
@@ -271,10 +369,18 @@ def coordinate_of(residual: Array, problem: Problem) -> str:
     shares = {}
     for name, parts in shown.items():
         values = np.concatenate([p[r.skip :] for p, r in zip(parts, runs, strict=True)])
-        share, chance = organised(residual, values)
-        shares[name] = share - chance
-    best = max(shares, key=lambda name: shares[name])
-    return best if shares[best] > 0.0 else "time"
+        shares[name] = _organised(residual, values)
+    return max(shares, key=lambda name: shares[name])
+
+
+def _organised(residual: Array, coordinate: Array, bins: int = 24) -> float:
+    """Return the share of a residual's power that its means in bins of equal count hold."""
+    label = np.empty(len(residual), dtype=np.int64)
+    label[np.argsort(coordinate, kind="stable")] = np.arange(len(residual)) * bins // len(residual)
+    cut = np.clip(residual, -8.0, 8.0)
+    sums = np.bincount(label, weights=cut, minlength=bins)
+    counts = np.maximum(np.bincount(label, minlength=bins), 1)
+    return float(np.sum(sums**2 / counts) / max(float(np.sum(cut**2)), 1e-300))
 
 
 def load_cell(
@@ -291,11 +397,10 @@ def load_cell(
         if best is None or found[0] < best[0]:
             best = found
     assert best is not None
-    loss, delay, gain, finding = best
-    own = min((float(t.loss.mean()) for t in layer.trials), default=np.inf)
-    z_1 = z_of(np.array([loss]))
-    share = (layer.z_before**2 - z_1**2) / max(layer.z_before**2 - 1.0, 1e-9)
-    if loss >= own or 1.0 - z_1 / layer.z_before < GAIN or (z_1 > CLEAN and share < SHARE):
+    z_1, delay, gain, finding = best
+    own = min((trial.z for trial in layer.trials), default=np.inf)
+    share = 1.0 - max(z_1**2 - 1.0, 0.01) / max(layer.z_before**2 - 1.0, 0.01)
+    if z_1 >= own or 1.0 - z_1 / layer.z_before < GAIN or (z_1 > CLEAN and share < SHARE):
         return None
     name = "delay" if delay else "force_gain"
     right = tuple([_corrected(r, delay, gain) for r in part] for part in (train, holdout))
@@ -309,13 +414,9 @@ def load_cell(
 def _search_cell(
     what: str, train: list[Response], holdout: list[Response], building: Building, law: str
 ) -> tuple[float, float, float, Finding]:
-    """Return loss on held-out runs, delay [s], gain and finding of the best delay or gain."""
-    from scipy.optimize import minimize_scalar
-
+    """Return z on held-out runs, delay [s], gain and finding of the best delay or gain."""
     def problem(value: float, part: list[Response]) -> StructureProblem:
         delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
-        from ..identify.structure import layer_run
-
         return StructureProblem([layer_run(_corrected(r, delay, gain), building) for r in part])
 
     def cost(value: float) -> float:
@@ -334,12 +435,10 @@ def _search_cell(
     )
     own, other = problem(value, train), problem(value, holdout)
     base = fit_line(own, LinearLayer.name)
-    after = judge((), base, own, other)
-    finding = Finding(
-        "force", "none", (), 0.0, z_of(after.loss), 0.0, detectable(other), fit=base
-    )
+    after = judge(base.model, own, other)
+    finding = Finding("force", "none", (), 0.0, after.z, 0.0, detectable(other), "", base.model)
     delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
-    return float(after.loss.mean()), delay, gain, finding
+    return after.z, delay, gain, finding
 
 
 def _corrected(response: Response, delay: float, gain: float) -> Response:
@@ -351,85 +450,65 @@ def _corrected(response: Response, delay: float, gain: float) -> Response:
 
 
 def combine(
-    findings: Mapping[str, Finding], damper: Verdict | None, reconstructed: bool
-) -> Verdict:
-    """Return one verdict from what the sites show."""
-    named: list[str] = []
-    rivals: list[str] = []
-    unknown = [f for f in findings.values() if f.kind == "unknown"]
-    for finding in findings.values():
-        if finding.kind == "effect":
-            named += [e for e in finding.effects if e not in named]
-        elif finding.kind == "class":
-            rivals += [e for e in finding.effects if e not in rivals]
-    worst = max(findings.values(), key=lambda f: f.z_before, default=None)
-    z_before = worst.z_before if worst else float("nan")
-    z_after = worst.z_after if worst else float("nan")
-    coordinate = unknown[0].coordinate if unknown else ""
-    ranking: list[dict[str, Any]] = []
-    trial = None
-    alike: list[str] = []
-    if damper is not None:
-        ranking = list(damper.ranking)
-        if damper.kind == "unknown":
-            coordinate = coordinate or damper.coordinate
-        elif damper.kind in ("effect", "class"):
-            own, alike = lookalikes(damper) if reconstructed else (list(damper.effects), [])
-            if damper.kind == "effect" and not alike:
-                named += [e for e in own if e not in named]
-            else:
-                rivals += [e for e in [*own, *alike] if e not in rivals]
-        trial = damper.trial
-        if not (named or rivals or unknown) or z_before < damper.z_before:
-            z_before, z_after = damper.z_before, damper.z_after
-    kind = "none"
-    if unknown or (damper is not None and damper.kind == "unknown"):
-        kind = "unknown"
-    elif rivals:
-        kind = "class"
-    elif named:
-        kind = "effect"
-    effects = tuple([*named, *rivals])
-    evidence = {
-        "sites": {
-            site: {"kind": f.kind, "effects": f.effects, "z": (f.z_before, f.z_after)}
-            for site, f in findings.items()
-        },
-        "reconstructed": reconstructed,
-    }
-    untestable = damper.untestable if damper is not None else ()
-    if reconstructed:
-        untestable = (*untestable, *(e for e in ("base_friction",) if e not in effects))
-    return Verdict(
-        kind, effects[:3] if kind == "class" else effects, ranking, z_before, z_after, coordinate,
-        max((f.detectable for f in findings.values()), default=float("nan")), untestable,
-        words(kind, effects, findings, alike, coordinate), trial, evidence,
+    findings: dict[str, Finding],
+    damper: Fit | None,
+    verdict: DamperVerdict | None,
+    problems: dict[str, tuple[StructureProblem, StructureProblem]],
+    sensors: tuple[SensorFault, ...] = (),
+) -> StructureDiagnosis:
+    """Return one diagnosis from what the sites show."""
+    reconstructed = "damper" in problems and problems["damper"][0].reconstructed
+    parts = [(f.site, f.kind, f.effects, f.z_before, f.z_after) for f in findings.values()]
+    if verdict is not None:
+        made = verdict.decision
+        parts.append(("damper", made.kind, made.effects, verdict.before.z, made.best.z))
+    named, rivals, alike = [], [], []
+    sites: dict[str, str] = {}
+    for site, kind, effects, _, _ in parts:
+        twins = lookalikes(effects) if reconstructed and site == "damper" else []
+        alike += twins
+        sure = kind == "effect" and not twins
+        (named if sure else rivals).extend([*effects, *twins] if kind != "unknown" else [])
+        sites.update({effect: sites.get(effect, site) for effect in effects})
+    effects = tuple(dict.fromkeys([*named, *rivals]))
+    unknown = [part for part in parts if part[1] == "unknown"]
+    kind = "unknown" if unknown else "class" if rivals else "effect" if named else "none"
+    coordinate = ""
+    if unknown:
+        site = unknown[0][0]
+        coordinate = findings[site].coordinate if site in findings else ""
+        if site == "damper" and verdict is not None:
+            coordinate = coordinate_of(verdict.before.residual, problems["damper"][1])
+    worst = max(parts, key=lambda part: part[3], default=("", "none", (), np.nan, np.nan))
+    untestable = ("base_friction",) if reconstructed and "base_friction" not in effects else ()
+    return StructureDiagnosis(
+        kind, effects[:3] if kind == "class" else effects,
+        words(kind, effects, sites, alike, coordinate), float(worst[3]), float(worst[4]), coordinate,
+        max((f.detectable for f in findings.values()), default=float("nan")), untestable, sites,
+        findings, damper, verdict, reconstructed, sensors, problems,
     )  # fmt: skip
 
 
-def lookalikes(verdict: Verdict) -> tuple[list[str], list[str]]:
-    """Return the effects of a verdict and what else would do the same to a reconstructed force."""
-    own = list(verdict.effects)
-    alike = [twin for e in own for twin in LOOKALIKE.get(e, ()) if twin not in own]
-    return own, list(dict.fromkeys(alike))
+def lookalikes(effects: tuple[str, ...]) -> list[str]:
+    """Return what else would do the same to a reconstructed force as these effects."""
+    twins = [twin for effect in effects for twin in LOOKALIKE.get(effect, ())]
+    return [twin for twin in dict.fromkeys(twins) if twin not in effects]
 
 
 def words(
-    kind: str, effects: tuple[str, ...], findings: Mapping[str, Finding], alike: list[str],
-    coordinate: str,
-) -> str:  # fmt: skip
+    kind: str, effects: tuple[str, ...], sites: Mapping[str, str], alike: list[str], coordinate: str
+) -> str:
     """Return the verdict as sentences."""
-    where = {e: f.site for f in findings.values() for e in f.effects}
     told = []
     if kind == "none":
         told.append("No effect is missing at any site that these runs test.")
     elif kind == "effect":
-        sites = ", ".join(f"{e} ({where.get(e, 'damper')})" for e in effects)
-        told.append(f"Missing: {sites}.")
+        told.append(f"Missing: {', '.join(f'{e} ({sites[e]})' for e in effects)}.")
     elif kind == "class":
         told.append(f"Missing is one of {', '.join(effects)}; these runs cannot say which.")
     else:
         told.append(f"Something is missing that no effect explains, along {coordinate}.")
+        told += [f"Besides, {e} is missing ({sites[e]})." for e in effects if e in sites]
     for twin in alike:
         reason = WHY.get(twin, "both add up to one force")
         told.append(f"Without a measured force {reason}: a load cell at the damper would tell.")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,8 +11,12 @@ from numpy.typing import NDArray
 from ..compiled.bench import Bench
 from ..physics.damper import LAWS
 from ..physics.effect import EFFECTS, Parameter
+from .instruments import shown_force, true_motion
 
 Array = NDArray[np.float64]
+
+OTHER_LAWS: dict[str, Any] = {}
+"""Laws that no damper has, by name: those of a building's parts join here."""
 
 FIXED = ("exponent", "mass", "which")
 """Parameters that a fit leaves alone: choices and regularisations, not measurements."""
@@ -67,7 +72,7 @@ class Model:
 
     def free(self) -> list[str]:
         """Return the names of the parameters that a fit moves."""
-        names = [name for name in LAWS[self.law].parameters if name not in FIXED]
+        names = [name for name in law_parameters(self.law) if name not in FIXED]
         for effect in self.effects:
             names += [
                 f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in FIXED
@@ -92,7 +97,12 @@ def parameter(law: str, name: str) -> Parameter:
     if "." in name:
         effect, own = name.split(".", 1)
         return EFFECTS[effect].parameters[own]
-    declared: Parameter = LAWS[law].parameters[name]
+    return law_parameters(law)[name]
+
+
+def law_parameters(law: str) -> dict[str, Parameter]:
+    """Return the declarations of a law's own parameters by name."""
+    declared: dict[str, Parameter] = (LAWS[law] if law in LAWS else OTHER_LAWS[law]).parameters
     return declared
 
 
@@ -130,7 +140,9 @@ class Problem:
         if draw is not None:
             e = run.draws[draw]
             x, v, a, V = x + e[:, 0], v + e[:, 1], a + e[:, 2], V + e[:, 3]
-        return self.bench(model).force(x, v, a, V, run.dt, model.values)
+        v, a = true_motion(model.effects, model.values, v, a, run.dt)
+        force = self.bench(model).force(x, v, a, V, run.dt, model.values)
+        return shown_force(model.effects, model.values, force, run.dt)
 
     def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:
         """Return per run: bias (n,) [N] of the prediction, noise (n,) [N], draws (d, n) [N].

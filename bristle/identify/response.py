@@ -22,7 +22,8 @@ from ..compiled.response import smooth_level
 from ..errors import RecordError
 from ..physics.building import Building
 from ..records.measurement import Measurement
-from .prepare import SHORTEST, smooth_steps
+from .drive import smooth_steps
+from .prepare import SHORTEST
 
 Array = NDArray[np.float64]
 
@@ -142,7 +143,7 @@ def _response(
             m.noise.get(channel, 0.0) if own[-1] else float(np.hypot(level["std"][2], noise_ground))
         )
     drive = next((c for c in ("voltage", "current") if m.has(c)), None)
-    V, left = smooth_steps(m[drive], m.noise.get(drive, 0.0)) if drive else (np.zeros(n), 0.0)
+    V, left = smooth_steps(m[drive], m.noise.get(drive, 0.0), m.step) if drive else (np.zeros(n), 0.0)
     return Response(
         m.name, m.step,
         np.array([level["state"][:, 0] for level in levels]),

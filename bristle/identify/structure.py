@@ -19,7 +19,8 @@ from ..errors import RecordError
 from ..physics.building import Building
 from ..physics.effect import EFFECTS, Parameter
 from ..records.measurement import Measurement
-from .fit import OTHER_LAWS, Fit, Model, Problem, Run
+from .fit import Fit
+from .model import OTHER_LAWS, Model, Problem, Run
 from .response import Response, base_equilibrium, responses, shear
 
 Array = NDArray[np.float64]
@@ -27,6 +28,9 @@ Array = NDArray[np.float64]
 SLIDING = 3.0
 """Where dry friction may act, slower samples than so many standard deviations are left out: the
 base may be held there, and the force is then whatever holds it."""
+
+BESIDE = 3
+"""Samples on either side of such a one that are left out with it."""
 
 _WIDE = (-1e12, 1e12)
 _STIFFNESS = Parameter(1000.0, "N/m", (0.0, 1e12), "stiffness")
@@ -64,11 +68,11 @@ OTHER_LAWS.update({law.name: law for law in (LinearLayer, LinearStorey)})
 class StructureRun(Run):
     """A run of a building as one of its problems sees it.
 
-    The arrays of `Run` hold the samples that count; `whole` (x, v, a, V, each (m,), and draws
-    (d, m, 4)) all of them, for models with memory, and `keep` which ones count.
+    The arrays of `Run` hold the samples that count; `whole` is the run with all of them, for models
+    with memory, and `keep` says which ones count.
     """
 
-    whole: tuple[Array, Array, Array, Array, Array] = field(default=(), repr=False)  # type: ignore[assignment]
+    whole: Run | None = field(default=None, repr=False)
     keep: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
@@ -103,8 +107,13 @@ class StructureProblem(Problem):
         structure = tuple(e for e in model.effects if EFFECTS[e].site == "structure")
         damper = tuple(e for e in model.effects if EFFECTS[e].site != "structure")
         linear = model.law in OTHER_LAWS
-        memory = any(EFFECTS[e].states for e in structure)
-        x, v, a, V = _motion(run, draw, whole=not linear or memory)
+        memory = any(EFFECTS[e].states for e in model.effects)
+        assert run.whole is not None
+        seen = run.whole if memory or not linear else run
+        x, v, a = seen.x, seen.v, seen.a
+        if draw is not None:
+            e = seen.draws[draw]
+            x, v, a = x + e[:, 0], v + e[:, 1], a + e[:, 2]
         if linear:
             stiffness = model.value("k")
             force = stiffness * x + model.value("c") * v + model.value("offset")
@@ -112,24 +121,11 @@ class StructureProblem(Problem):
                 force = force + model.value("added_mass") * a
         else:
             stiffness = 0.0
-            force = self.bench(replace(model, effects=damper)).force(
-                x, v, a, V, run.dt, model.values
-            )
+            force = super().predict(replace(model, effects=damper), seen, draw)
         if structure:
-            extra = self.along(structure).force(x, v, run.dt, stiffness, model.values)
-            force = force + extra
-        return force if linear and not memory else force[run.keep]
-
-
-def _motion(run: StructureRun, draw: int | None, whole: bool) -> tuple[Array, Array, Array, Array]:
-    if whole:
-        x, v, a, V, draws = run.whole
-    else:
-        x, v, a, V, draws = run.x, run.v, run.a, run.V, run.draws
-    if draw is None:
-        return x, v, a, V
-    e = draws[draw]
-    return x + e[:, 0], v + e[:, 1], a + e[:, 2], V + e[:, 3]
+            along = self.along(structure)
+            force = force + along.force(x, v, run.dt, stiffness, model.values)
+        return force if seen is run else force[run.keep]
 
 
 def structure_run(
@@ -137,14 +133,30 @@ def structure_run(
     draws: Array, keep: NDArray[np.bool_] | None = None,
 ) -> StructureRun:  # fmt: skip
     """Return a run of the samples in `keep` (n,); the first ones are the smoother's and skipped."""
-    n = len(force)
-    index = np.arange(n) if keep is None else np.flatnonzero(keep)
-    index = index[index >= Run.skip] if keep is not None else index
+    whole = Run(name, dt, *motion, force, noise, draws)
+    if keep is None:
+        index, skip = np.arange(len(force)), whole.skip
+    else:
+        index, skip = np.flatnonzero(keep & (np.arange(len(force)) >= whole.skip)), 0
     x, v, a, V = (part[index] for part in motion)
     return StructureRun(
-        name, dt, x, v, a, V, force[index], noise, draws[:, index],
-        skip=0 if keep is not None else Run.skip, whole=(*motion, draws), keep=index,
-    )  # fmt: skip
+        name, dt, x, v, a, V, force[index], noise, draws[:, index], skip, whole=whole, keep=index
+    )
+
+
+def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
+    """Return the problem with every so many samples: enough to choose among starts."""
+    runs = []
+    for run in problem.runs:
+        assert isinstance(run, StructureRun)
+        part = slice(run.skip, None, stride)
+        runs.append(
+            replace(
+                run, x=run.x[part], v=run.v[part], a=run.a[part], V=run.V[part],
+                force=run.force[part], draws=run.draws[:, part], skip=0, keep=run.keep[part],
+            )
+        )  # fmt: skip
+    return StructureProblem(runs, problem.storey, problem.reconstructed)
 
 
 def storey_run(response: Response, building: Building, level: int) -> StructureRun:
@@ -188,8 +200,13 @@ def layer_run(response: Response, building: Building) -> StructureRun:
 
 
 def sliding(response: Response) -> NDArray[np.bool_]:
-    """Return where the first level surely moves, (n,)."""
-    return np.abs(response.v[0]) > SLIDING * float(response.std[0, 1])
+    """Return where the first level surely moves, and so do the samples beside, (n,).
+
+    Beside a stop or a start the velocity is smoothed over a bend, and less certain than elsewhere.
+    """
+    moves = np.abs(response.v[0]) > SLIDING * float(response.std[0, 1])
+    held = np.convolve(~moves, np.ones(2 * BESIDE + 1), mode="same") > 0.5
+    return ~held
 
 
 def damper_run(
