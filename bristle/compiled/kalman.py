@@ -102,7 +102,7 @@ def kalman_smooth(y, r, have, dt, jerk, backward, state, cov, loss):  # type: ig
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def _start(y, r, have, dt):  # type: ignore[no-untyped-def]
-    """Return x, v, a before the first sample and their covariance (6,), wide where nothing tells."""
+    """Return x, v, a before the first sample and their covariance (6,), wide if nothing tells."""
     n = len(y)
     c = 0 if have[0] else 1
     first, before, fastest = 0.0, 0.0, 0.0

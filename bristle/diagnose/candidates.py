@@ -1,4 +1,4 @@
-"""Each effect tried inside the model: refitted on the training runs, judged on the held-out ones."""
+"""Each effect tried inside the model: refitted on training runs, judged on held-out ones."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from os import cpu_count
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.fit import Model, Problem, Run, parameter
-from ..identify.search import Descent, descend, loss
+from ..identify.fit import Model, Problem, parameter
+from ..identify.search import Descent, descend, jacobian, loss
 from ..physics.effect import EFFECTS, effects_of
 
 Array = NDArray[np.float64]
@@ -40,7 +40,7 @@ REFERENCE = {
 QUICK = 4
 """Sweeps of the first, short search from each start."""
 
-PROMISING = 0.35
+PROMISING = 0.5
 """Share of the best gain on the training runs below which a candidate is not refined."""
 
 
@@ -107,6 +107,11 @@ class Search:
         """Return the normalised residuals of all runs (n,)."""
         return residuals(self.problem, self.at(theta), self.expected)
 
+    def sensitivities(self) -> Array:
+        """Return how the normalised residuals change with the parameters (n, p), there."""
+        here = self.residuals(self.start)
+        return jacobian(self.residuals, self.start, here, self.low, self.high)
+
     def run(self, sweeps: int) -> tuple[Model, Descent]:
         """Search from the model's own values."""
         found = descend(self.residuals, self.start, self.low, self.high, sweeps)
@@ -127,9 +132,7 @@ def judge(model: Model, train: Problem, held_out: Problem, refined: bool = True)
     expected = held_out.expectation(model)
     z = residuals(held_out, model, expected)
     own = residuals(train, model, train.expectation(model))
-    raw = np.concatenate(
-        [z_ for z_ in _raw(held_out, model, expected)]
-    )
+    raw = np.concatenate(list(_raw(held_out, model, expected)))
     losses = loss(z)
     return Trial(
         model, z_of(float(np.mean(loss(own)))), z_of(float(np.mean(losses))),
@@ -163,7 +166,7 @@ def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
 
 @dataclass(frozen=True)
 class Begun:
-    """A candidate after its first, short search: the model and its mean loss on the training runs."""
+    """A candidate after its first, short search, with its mean loss on the training runs."""
 
     model: Model
     cost: float

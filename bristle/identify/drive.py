@@ -50,8 +50,8 @@ def smooth_drive(V: Array, noise: float, dt: float, draws: int, seed: int) -> tu
         else:
             found = smooth(piece, None, dt, (noise, 1.0))
             out[part] = found.x
-            own = (noise, 1.0), found.jerk, (True, False)
-            error[:, part] = posterior_draws(end - begin, dt, *own, draws, seed + begin)[:, :, 0]
+            own = (noise, 1.0), found.jerk, (True, False), draws, seed + begin, found
+            error[:, part] = posterior_draws(end - begin, dt, *own)[:, :, 0]
     return out, error
 
 

@@ -13,13 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from .model import DRIVEN, FIXED, Model, Problem, Run, parameter, sizes, without
+from .model import (
+    DRIVEN, FIXED, OTHER_LAWS, Model, Problem, Run, law_parameters, parameter, sizes, steady,
+    without,
+)  # fmt: skip
 from .search import descend
 from .starts import start_model, start_models
 
 __all__ = [
-    "FIXED", "Fit", "Model", "Problem", "Run", "fit", "huber", "identify", "parameter", "sizes",
-    "start_model",
+    "FIXED", "OTHER_LAWS", "Expected", "Fit", "Model", "Problem", "Run", "Scaled", "fit", "huber",
+    "identify", "law_parameters", "parameter", "sizes", "start_model",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -54,7 +57,7 @@ def huber(z: Array, k: float = 2.0) -> Array:
     return np.where(size <= k, 0.5 * z * z, k * size - 0.5 * k * k)
 
 
-class _Scaled:
+class Scaled:
     """A model's free parameters as numbers of order one, and the residuals over them."""
 
     def __init__(self, problem: Problem, model: Model, expected: Expected) -> None:
@@ -110,7 +113,7 @@ def fit(
         sandwich formula with the drawn noise.
     """
     expected = expectation or problem.expectation(model)
-    scaled = _Scaled(problem, model, expected)
+    scaled = Scaled(problem, model, expected)
     if not scaled.names:
         cost = float(np.mean(huber(scaled.residuals(np.zeros(0)))))
         return Fit(model, {}, cost)
@@ -125,7 +128,7 @@ def fit(
     return Fit(best, std, found.cost, lost, found.sweeps)
 
 
-def _intervals(scaled: _Scaled, theta: Array) -> tuple[dict[str, float], tuple[str, ...]]:
+def _intervals(scaled: Scaled, theta: Array) -> tuple[dict[str, float], tuple[str, ...]]:
     """Return the standard deviations by name, and the names that the data cannot tell.
 
     Covariance A^-1 B A^-1 of an M-estimator (Huber 1981, Robust Statistics, ch. 7): A = J'J over
@@ -162,7 +165,7 @@ def _intervals(scaled: _Scaled, theta: Array) -> tuple[dict[str, float], tuple[s
 
 
 def _lost(
-    scaled: _Scaled, value: Array, std: Array, norms: Array, directions: Array
+    scaled: Scaled, value: Array, std: Array, norms: Array, directions: Array
 ) -> tuple[str, ...]:
     """Name what does not move the force, is mixed up with others, or is wider than its size."""
     lost = []
@@ -203,7 +206,7 @@ def identify(
         for own in _parameters(effect)
     } | dict(values or {})
     model = Model(law, effects, given, held, dict(limits or {}))
-    silent = tuple(name for name in DRIVEN[law] if name not in held) if _steady(problem) else ()
+    silent = tuple(name for name in DRIVEN[law] if name not in held) if steady(problem) else ()
     model = without(model, silent)
     trials = start_models(problem, model, starts)
     expected = problem.expectation(trials[0])
@@ -225,9 +228,3 @@ def _parameters(effect: str) -> list[str]:
     from ..physics.effect import EFFECTS
 
     return list(EFFECTS[effect].parameters)
-
-
-def _steady(problem: Problem) -> bool:
-    """Return whether the voltage stays where it is over all runs."""
-    V = np.concatenate([run.V for run in problem.runs])
-    return float(np.std(V)) <= 1e-2 * float(np.max(np.abs(V), initial=0.0)) or not np.any(V)

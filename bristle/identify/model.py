@@ -24,6 +24,8 @@ FIXED = ("exponent", "mass", "which")
 DRIVEN = {"bingham": ("f_v", "c_v"), "lugre": ("sigma_0", "sigma_b")}
 """Parameters that act through the voltage alone."""
 
+_STEADY = 1e-2  # of its level: what a voltage varies by without telling anything
+
 LOST = 1e4
 """Noise of a sample that was not measured, in noises of the force: it has no say."""
 
@@ -77,8 +79,8 @@ class Model:
             names += [
                 f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in FIXED
             ]
-        if self.value("exponent") == 0.0:  # the standard law does not know it
-            names.remove("v_n")
+        if "v_n" in names and self.value("exponent") == 0.0:
+            names.remove("v_n")  # the standard law does not know it
         return [name for name in names if name not in self.held]
 
     def value(self, name: str) -> float:
@@ -192,3 +194,9 @@ def without(model: Model, names: tuple[str, ...]) -> Model:
     values = {**model.values, **dict.fromkeys(names, 0.0)}
     held = tuple(dict.fromkeys((*model.held, *names)))
     return replace(model, values=values, held=held)
+
+
+def steady(problem: Problem) -> bool:
+    """Return whether the voltage stays where it is over all runs."""
+    V = np.concatenate([run.V for run in problem.runs])
+    return float(np.std(V)) <= _STEADY * float(np.max(np.abs(V), initial=0.0)) or not np.any(V)

@@ -11,14 +11,12 @@ from .drive import smooth_drive, smooth_steps
 from .fit import Run
 from .smooth import posterior_draws, smooth
 
-__all__ = ["prepare", "smooth_steps"]
+__all__ = ["prepare", "saturated", "smooth_steps"]
 
 Array = NDArray[np.float64]
 
 SHORTEST = 200
 """Fewest samples of a run that a fit makes sense of."""
-
-_SATURATED = 0.05  # share of samples at one and the same extreme of the force
 
 
 def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
@@ -35,7 +33,7 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     Raises
     ------
     RecordError
-        If a channel that is needed is missing, does not change or is saturated, or there are fewer
+        If a channel that is needed is missing, is not finite or does not change, or there are fewer
         than `SHORTEST` samples.
     """
     _refuse(measurement)
@@ -45,7 +43,9 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     have = (x is not None, v is not None)
     motion = smooth(x, v, dt, noise)
     error = np.zeros((draws, n, 4))
-    error[:, :, :3] = posterior_draws(n, dt, noise, motion.jerk, have, draws, seed)
+    error[:, :, :3] = posterior_draws(
+        n, dt, noise, motion.jerk, have, draws, seed, motion
+    )
     drive = next((c for c in ("voltage", "current") if measurement.has(c)), None)
     V = np.zeros(n)
     if drive:
@@ -95,17 +95,11 @@ def _refuse(measurement: Measurement) -> None:
                 f"{name}: {channel} is {values[0]:g} {measurement.units.get(channel, '')} "
                 "throughout; nothing can be identified from it. Leave the run or the channel out."
             )
-    share = _at_an_extreme(measurement["force"])
-    if share > _SATURATED:
-        raise RecordError(
-            f"{name}: {share:.0%} of the force's samples stand at its extremes: the load cell or "
-            "its amplifier is saturated. Measure with a wider range, or cut the run."
-        )
 
 
-def _at_an_extreme(y: Array) -> float:
-    """Return the share of samples that repeat an extreme in rows of five or more."""
-    count = 0
+def saturated(measurement: Measurement) -> float:
+    """Return the share of the force's samples that repeat an extreme in rows of five or more."""
+    y, count = measurement["force"], 0
     for extreme in (y.max(), y.min()):
         at = np.concatenate([[0], (y == extreme).astype(np.int8), [0]])
         edges = np.flatnonzero(np.diff(at))

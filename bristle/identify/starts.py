@@ -65,7 +65,8 @@ class _Net:
         self.a_0 = np.ones(1)
         if model.law == "lugre":
             self.a_0 = self._nodes("a_0", _A_0 * problem.size("1/m"))
-        columns, self.place = [], {}
+        columns: list[Array] = []
+        self.place: dict[tuple[str, int], int] = {}
         for name in self.linear:
             viscous = name in ("c_0", "c_v", "sigma_2", "sigma_b")
             for k, shape in enumerate(self.v_n if viscous else self.a_0):
