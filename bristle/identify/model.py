@@ -76,8 +76,9 @@ class Model:
         """Return the names of the parameters that a fit moves."""
         names = [name for name in law_parameters(self.law) if name not in FIXED]
         for effect in self.effects:
+            fixed = FIXED if self.law == "lugre" else (*FIXED, *EFFECTS[effect].bristles)
             names += [
-                f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in FIXED
+                f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in fixed
             ]
         if "v_n" in names and self.value("exponent") == 0.0:
             names.remove("v_n")  # the standard law does not know it
