@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .scale import z_scale
+
 if TYPE_CHECKING:
     from .held import Held
 
@@ -16,6 +18,7 @@ Array = NDArray[np.float64]
 
 _CYCLES = 3  # of the lowest band's frequency in a run, so that it holds enough lines
 _MOST = 9
+_SPIKE = 4.0  # times noise (or the whole error) beyond which a sample is cut: no line of a spectrum
 _HANN = 1.94  # equivalent lines that a Hann window joins, in variance (Welch 1967)
 
 
@@ -55,13 +58,17 @@ def spectrum(held: Sequence[Held]) -> Spectrum:
     size = min(1024, *(len(one.residual) for one in held))
     rate = 1.0 / held[0].dt
     lines = None
+    limit = _SPIKE * max(1.0, z_scale(np.concatenate([one.normalised for one in held])))
+    errors = [
+        np.clip(one.normalised, -limit, limit) * one.sigma[one.skip :] for one in held
+    ]
     total = sum(len(one.residual) for one in held)
     sums = np.zeros((4, size // 2 + 1))
     cross = np.zeros(size // 2 + 1, dtype=complex)
-    for one in held:
-        weight = len(one.residual) / total
+    for one, error in zip(held, errors, strict=True):
+        weight = len(error) / total
         options = {"fs": 1.0 / one.dt, "nperseg": size}
-        lines, residual = welch(one.residual, **options)
+        lines, residual = welch(error, **options)
         white = 2.0 * one.noise**2 * one.dt
         carried = np.mean(welch(one.carried, **options, axis=-1)[1], axis=0)
         predicted = one.predicted[one.skip :]
@@ -70,11 +77,11 @@ def spectrum(held: Sequence[Held]) -> Spectrum:
         sums[1] += weight * (white + carried)
         sums[2] += weight * welch(measured, **options)[1]
         sums[3] += weight * welch(predicted, **options)[1]
-        cross += weight * csd(one.residual, predicted, **options)[1]
+        cross += weight * csd(error, predicted, **options)[1]
     assert lines is not None
     with np.errstate(invalid="ignore", divide="ignore"):
         coherence = np.nan_to_num(np.abs(cross) ** 2 / (sums[0] * sums[3]))
-    bands = _bands(held, rate, lines, coherence, sums[0])
+    bands = _bands(held, errors, rate, lines, coherence, sums[0])
     return Spectrum(lines, sums[0], sums[1], sums[2], bands)
 
 
@@ -90,15 +97,15 @@ def edges(rate: float, duration: float) -> Array:
 
 
 def _bands(
-    held: Sequence[Held], rate: float, lines: Array, coherence: Array, power: Array
+    held: Sequence[Held], errors: Sequence[Array], rate: float, lines: Array, coherence: Array, power: Array
 ) -> tuple[Band, ...]:
     """Return the bands, from one tapered periodogram per run: its lines are nearly independent."""
     from scipy.stats import chi2
 
     cuts = edges(rate, min(len(one.residual) * one.dt for one in held))
     found, expected, freedom = (np.zeros(len(cuts) - 1) for _ in range(3))
-    for one in held:
-        f, mine = _periodogram(one.residual, one.dt)
+    for one, error in zip(held, errors, strict=True):
+        f, mine = _periodogram(error, one.dt)
         white = np.full(len(f), 2.0 * one.noise**2 * one.dt)
         noise = white + np.mean([_periodogram(d, one.dt)[1] for d in one.carried], axis=0)
         width = f[1] - f[0]

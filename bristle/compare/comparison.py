@@ -24,9 +24,10 @@ Array = NDArray[np.float64]
 class RunError:
     """The error on one run.
 
-    `z` RMS(residual)/noise expected of a true model, by a robust scale; `rms`, `noise`,
-    `numerical`, `signal` [unit]: RMS of the residual, of the noise expected, of what half the
-    step changes, and of the measured output. `noise_own` the part of the channel itself.
+    `z` RMS(residual)/noise expected of a true model, by a robust scale; `numerical_z` the same of
+    what half the step changes. `rms`, `noise`, `numerical`, `signal` [unit]: plain RMS of the
+    residual, of the noise expected, of what half the step changes, of the measured output;
+    `noise_own` that of the channel's own noise.
     """
 
     name: str
@@ -36,17 +37,13 @@ class RunError:
     noise: float
     noise_own: float
     numerical: float
+    numerical_z: float
     signal: float
 
     @property
     def share(self) -> float:
         """RMS of the residual over that of the measured output [1]."""
         return self.rms / self.signal if self.signal > 0.0 else float("nan")
-
-    @property
-    def numerical_z(self) -> float:
-        """The numerical error in units of the noise [1]."""
-        return self.numerical / self.noise if self.noise > 0.0 else float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +149,8 @@ def compare_held(
     second = None
     if found and found[0].significant:
         left = finder.without(finder.normalised, found[0])
-        rest = finder.ranked(left, [found[0].coordinate])
+        raw = finder.without(finder.raw, found[0])
+        rest = finder.ranked(left, raw, [found[0].coordinate])
         second = rest[0] if rest and rest[0].significant else None
     comparison = Comparison(
         held[0].quantity, held[0].unit, runs, _run_error("all runs", held),
@@ -189,9 +187,10 @@ def _run_error(name: str, held: Sequence[Held]) -> RunError:
     sigma = np.concatenate([one.sigma[one.skip :] for one in held])
     own = np.concatenate([np.full(len(one.residual), one.noise) for one in held])
     tried = [one.numerical[one.skip :] for one in held if one.numerical is not None]
+    moved = np.concatenate(tried) if len(tried) == len(held) else np.full(1, np.nan)
     return RunError(
         name, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
-        rms(np.concatenate(tried)) if len(tried) == len(held) else float("nan"),
+        rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
         rms(np.concatenate([one.measured[one.skip :] for one in held])),
     )  # fmt: skip
 
@@ -209,7 +208,7 @@ def _interval(normalised: Sequence[Array], finder: Finder) -> tuple[float, float
 
 
 def _run_dict(run: RunError) -> dict[str, Any]:
-    return {**asdict(run), "share": run.share, "numerical_z": run.numerical_z}
+    return {**asdict(run), "share": run.share}
 
 
 def _place_dict(place: Place) -> dict[str, Any]:

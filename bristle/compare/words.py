@@ -26,6 +26,10 @@ NAMES = {
     "time": "time",
     "direction": "the direction of motion",
 }
+FAINT = 0.02
+"""Share of an error's power below which its pattern is not worth a sentence."""
+_STEP = 0.3  # numerical error, in units of the noise, that is worth a word
+_SPIKY = 1.4  # plain over robust RMS from which spikes carry the error
 _RIPPLES = 4  # changes of sign along a coordinate from which it goes up and down
 _ALIKE = 0.25  # parts of a pattern's size by which it may differ between voltages
 
@@ -48,8 +52,10 @@ def _how_wrong(comparison: Comparison) -> str:
     if total.share == total.share:
         size += f" ({_percent(total.share)} of the {what})"
     step = ""
-    if total.numerical_z > 0.1:
-        step = f"; the step of the calculation alone accounts for {total.numerical:.1g} {unit}"
+    if total.numerical_z > _STEP:
+        step = f"; the step of the calculation alone makes {total.numerical_z:.2g} times the noise"
+    if total.rms > _SPIKY * total.z * total.noise:
+        size += ", much of it in short spikes"
     if total.z > CLOSE:
         times = f"{total.z:.3g}" if total.z < 100.0 else f"{total.z:.0f}"
         return (
@@ -61,17 +67,17 @@ def _how_wrong(comparison: Comparison) -> str:
 
 def _where(comparison: Comparison, finder: Finder) -> str:
     first = comparison.first
-    if first is None:
+    if first is None or first.share < FAINT:
         if comparison.z <= CLOSE:
             return "What is left looks like noise along every coordinate."
         return (
             "No coordinate organises the error beyond chance"
             + (f": {_loudest(comparison)}." if _loudest(comparison) else ".")
         )
-    if comparison.z <= CLOSE and first.share < 0.05:
+    if comparison.z <= CLOSE:
         return (
-            f"A faint pattern is left with {name_of(first.coordinate)}, "
-            f"{_percent(first.share)} of the error's power: {_pattern(first, comparison.unit)}."
+            f"A pattern is left with {name_of(first.coordinate)}, {_percent(first.share)} of the "
+            f"error's power: {_pattern(first, comparison.unit)}."
         )
     also = ""
     if first.alike:
@@ -153,13 +159,15 @@ def _hot(place: Place) -> list[tuple[int, int]]:
     """Return stretches of bins (first, last) where the mean is large and clear, largest first."""
     mean = place.mean
     top = float(np.max(np.abs(mean)))
-    large = (np.abs(mean) >= 0.5 * top) & (np.abs(mean) > 2.0 * place.std)
+    large = np.abs(mean) >= 0.5 * top
+    clear = np.abs(mean) > 2.0 * place.std
     out: list[tuple[int, int]] = []
     for i in np.flatnonzero(large):
         if out and out[-1][1] == i - 1 and mean[i] * mean[i - 1] > 0.0:
             out[-1] = (out[-1][0], int(i))
         else:
             out.append((int(i), int(i)))
+    out = [(i, j) for i, j in out if clear[i : j + 1].any()]
     return sorted(out, key=lambda pair: -float(np.sum(np.abs(mean[pair[0] : pair[1] + 1]))))
 
 
@@ -168,7 +176,10 @@ def _mirrored(place: Place, hot: list[tuple[int, int]], unit: str) -> str:
     if len(hot) < 2 or place.coordinate not in ("displacement", "velocity", "acceleration"):
         return ""
     (a, b), (c, d) = sorted(hot[:2])
-    if a != 0 or d != len(place.mean) - 1 or place.high[b] >= 0.0 or place.low[c] <= 0.0:
+    ends = max(1, len(place.mean) // 16)  # the outermost bins may hold too few blocks
+    if a > ends or d < len(place.mean) - 1 - ends:
+        return ""
+    if place.high[b] >= 0.0 or place.low[c] <= 0.0:
         return ""
     factor, shown = SHOWN[place.coordinate]
     edge = factor * 0.5 * float(place.low[c] - place.high[b])
