@@ -109,13 +109,14 @@ def _of_study(arguments: argparse.Namespace) -> int:
 def _of_fmu(arguments: argparse.Namespace) -> int:
     from ..compare.fmu import compare_fmu
     from ..report.comparison import draw_comparison
+    from ..study.new import parse_channel
 
     found: FmuComparison = compare_fmu(
         arguments.fmu,
         arguments.data,
         values=_pairs(arguments.values, "--set"),
         maps=_pairs(arguments.maps, "--map"),
-        channels=arguments.channel,
+        channels=dict(parse_channel(text) for text in arguments.channel),
         timeout=arguments.timeout,
     )
     picture = arguments.out or Path(f"{arguments.fmu.stem}_{arguments.data.stem}.png")

@@ -30,6 +30,11 @@ FAINT = 0.02
 """Share of an error's power below which its pattern is not worth a sentence."""
 _STEP = 0.3  # numerical error, in units of the noise, that is worth a word
 _SPIKY = 1.4  # plain over robust RMS from which spikes carry the error
+_WHICH = {
+    None: "In this measurement",
+    False: "On runs it has not seen",
+    True: "On the runs that it was fitted to",
+}
 _RIPPLES = 4  # changes of sign along a coordinate from which it goes up and down
 _ALIKE = 0.25  # parts of a pattern's size by which it may differ between voltages
 
@@ -47,7 +52,7 @@ def sentences(comparison: Comparison, finder: Finder) -> tuple[str, ...]:
 def _how_wrong(comparison: Comparison) -> str:
     total = comparison.total
     what, unit = comparison.quantity.replace("_", " "), comparison.unit
-    where = "On the runs that it was fitted to" if comparison.seen else "On runs it has not seen"
+    where = f"{_WHICH[comparison.seen]} the model misses"
     size = f"{total.rms:.2g} {unit} RMS"
     if total.share == total.share:
         size += f" ({_percent(total.share)} of the {what})"
@@ -59,10 +64,10 @@ def _how_wrong(comparison: Comparison) -> str:
     if total.z > CLOSE:
         times = f"{total.z:.3g}" if total.z < 100.0 else f"{total.z:.0f}"
         return (
-            f"{where} the model misses the {what} by {size}, {times} times what its noise would "
+            f"{where} the {what} by {size}, {times} times what its noise would "
             f"explain{step}."
         )
-    return f"{where} the model misses the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}."
+    return f"{where} the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}."
 
 
 def _where(comparison: Comparison, finder: Finder) -> str:
