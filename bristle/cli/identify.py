@@ -1,0 +1,148 @@
+"""Fit the model of a study to its training runs, and judge it on those held out."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..study.identification import Identified
+
+HELP = "fit a study's model: parameters with intervals, what the data cannot tell, errors of laws"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle identify`."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument("--law", help="another law than the model's: bingham, lugre, ..._standard")
+    parser.add_argument(
+        "--cutoff",
+        type=float,
+        metavar="HZ",
+        help="low-pass on measured and predicted force for the errors; 0 for none; else "
+        "study.toml's cut_off (18 Hz)",
+    )
+    parser.add_argument(
+        "--starts", type=int, default=4, metavar="N", help="starting points of the fit; else 4"
+    )
+    parser.add_argument(
+        "--no-table", action="store_true", help="leave out the table that compares the laws"
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="show what would be found; leave the study as it is"
+    )
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Identify, write the step and the picture, print the tables."""
+    from ..progress import Progress
+    from ..study.identification import STAGES, identify_study
+    from ..study.identify_picture import identify_png
+    from ..study.study import Study
+
+    study = Study(arguments.folder)
+    with Progress("identifying", STAGES, not arguments.json) as progress:
+        found = identify_study(
+            study,
+            law=arguments.law,
+            cutoff=arguments.cutoff,
+            starts=arguments.starts,
+            table=not arguments.no_table,
+            write=not arguments.dry_run,
+            show=progress.show,
+        )
+    picture = None
+    if not arguments.dry_run:
+        picture = study.write_report("identify.png", identify_png(found))
+    if arguments.json:
+        import json
+
+        answer = {**found.as_dict(), "picture": str(picture.absolute()) if picture else None}
+        print(json.dumps(answer, indent=2, ensure_ascii=False))
+        return 0
+    print(text(found, arguments.folder))
+    if picture:
+        print(f"Picture: {picture}")
+    return 0
+
+
+def text(found: Identified, folder: Path) -> str:
+    """Return the tables as text."""
+    title = " + ".join([found.model.law, *found.model.effects])
+    lines = [f"{title}, {found.fit.agreed} of {found.fit.starts} starts agree", ""]
+    lines += _parameters(found)
+    if found.unidentified:
+        lines += ["", f"These data cannot tell: {', '.join(found.unidentified)}."]
+    lines += ["", *_errors(found)]
+    if found.table:
+        lines += ["", *_laws(found)]
+    for note in found.notes:
+        lines += ["", f"Note: {note}"]
+    return "\n".join([*lines, "", *_next(found, folder)])
+
+
+def _parameters(found: Identified) -> list[str]:
+    rows = []
+    for row in found.parameters():
+        if row["how"] == "held" and row["name"].endswith(("exponent", "mass", "which")):
+            continue
+        half = row["interval95"]
+        if half is not None:
+            size = abs(row["value"])
+            told = f"+- {half:.2g}" + (f"  {100.0 * half / size:.2g} %" if size else "")
+        else:
+            told = row["how"]
+        rows.append(f"  {row['name']:24} {row['value']:>12.6g} {row['unit']:11} {told}")
+    return [f"  {'parameter':24} {'value':>12} {'unit':11} 95 % interval", *rows]
+
+
+def _errors(found: Identified) -> list[str]:
+    low = f"below {found.cutoff:g} Hz" if found.cutoff else "without a filter"
+    lines = [f"  {'error of the force ' + low:34} {'before':>22} {'after':>22}"]
+    for role, name in (("train", "training runs"), ("holdout", "held-out runs")):
+        if f"rms_{role}" not in found.after:
+            continue
+        cells = [
+            f"{errors[f'rms_{role}']:.4g} N ({errors[f'share_{role}']:.1%})"
+            for errors in (found.before, found.after)
+        ]
+        lines.append(f"  {name:34} {cells[0]:>22} {cells[1]:>22}")
+    for role, name in (("train", "z, training runs"), ("holdout", "z, held-out runs")):
+        if f"z_{role}" in found.after:
+            before, after = found.before[f"z_{role}"], found.after[f"z_{role}"]
+            lines.append(f"  {name:34} {before:>22.3g} {after:>22.3g}")
+    return [*lines, "  z: error over the noise that a true model would show; a true model has 1."]
+
+
+def _laws(found: Identified) -> list[str]:
+    """Return the table of laws: a section as in the paper."""
+    lines = [
+        f"  {'law':18} {'training':>11} {'held out':>11} {'of force':>9} {'|v| > 1 mm/s':>13} "
+        f"{'starts':>8}"
+    ]
+    for row in found.table:
+        holdout = f"{row.holdout:.4g} N" if row.holdout == row.holdout else "-"
+        lines.append(
+            f"  {row.law:18} {row.train:>9.4g} N {holdout:>11} {row.share:>9.1%} "
+            f"{row.moving:>11.4g} N {row.agreed:>3} of {row.starts}"
+        )
+    own = {row.law: row.holdout if row.holdout == row.holdout else row.train for row in found.table}
+    for law in ("bingham", "lugre"):
+        standard = own.get(f"{law}_standard")
+        if standard and law in own:
+            lines.append(
+                f"  {law}: the exponential lowers the error by {1.0 - own[law] / standard:.1%}."
+            )
+    return [*lines, "  Each law fitted by least squares of the low-passed force, without effects."]
+
+
+def _next(found: Identified, folder: Path) -> list[str]:
+    z = found.after.get("z_holdout", found.after["z_train"])
+    if z > 1.15:
+        return [
+            f"The error is {z:.3g} times what noise explains. Next: where it lives,  bristle "
+            f"compare {folder} ; what is missing,  bristle diagnose {folder}"
+        ]
+    return [f"Noise explains the error. Next:  bristle diagnose {folder} , which says what it saw."]

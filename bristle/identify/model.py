@@ -1,0 +1,199 @@
+"""Runs, models, and how a model predicts a run and what it cannot know of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled.bench import Bench
+from ..physics.damper import LAWS
+from ..physics.effect import EFFECTS, Parameter
+
+Array = NDArray[np.float64]
+
+OTHER_LAWS: dict[str, Any] = {}
+"""Laws that no damper has, by name: those of a building's parts join here."""
+
+FIXED = ("exponent", "mass", "which")
+"""Parameters that a fit leaves alone: choices and regularisations, not measurements."""
+
+DRIVEN = {"bingham": ("f_v", "c_v"), "lugre": ("sigma_0", "sigma_b")}
+"""Parameters that act through the voltage alone."""
+
+_STEADY = 1e-2  # of its level: what a voltage varies by without telling anything
+
+LOST = 1e4
+"""Noise of a sample that was not measured, in noises of the force: it has no say."""
+
+REFERENCE = {
+    "N": 4.0, "N/m": 800.0, "N/m2": 1.6e5, "N/m3": 3.2e7, "m": 5e-3, "m/s": 0.07, "N.s/m": 57.0,
+    "N.s2/m2": 816.0, "kg": 2.7, "J": 0.02, "V": 5.0,
+}  # fmt: skip
+"""Typical sizes on the rig of 10 N for which the effects' defaults are written."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A measured run, its motion smoothed.
+
+    `x`, `v`, `a`, `V`, `force` (n,) in SI, evenly spaced by `dt` [s]; `noise` the force channel's
+    standard deviation [N]; `draws` (d, n, 4) draws of the error of x, v, a, V; `measured` (n,)
+    False where a sample was filled in, None if none was.
+    """
+
+    name: str
+    dt: float
+    x: Array
+    v: Array
+    a: Array
+    V: Array
+    force: Array
+    noise: float
+    draws: Array
+    skip: int = 25
+    measured: NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True)
+class Model:
+    """A law with effects and the values of their parameters by name, in SI.
+
+    `held` names parameters that a fit leaves alone; `limits` are a user's bounds by name, inside
+    of what is physical.
+    """
+
+    law: str
+    effects: tuple[str, ...] = ()
+    values: dict[str, float] = field(default_factory=dict)
+    held: tuple[str, ...] = ()
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def free(self) -> list[str]:
+        """Return the names of the parameters that a fit moves."""
+        names = [name for name in law_parameters(self.law) if name not in FIXED]
+        for effect in self.effects:
+            names += [
+                f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in FIXED
+            ]
+        if "v_n" in names and self.value("exponent") == 0.0:
+            names.remove("v_n")  # the standard law does not know it
+        return [name for name in names if name not in self.held]
+
+    def value(self, name: str) -> float:
+        """Return a parameter's value, its default where none is given."""
+        return float(self.values.get(name, parameter(self.law, name).value))
+
+    def bounds(self, name: str) -> tuple[float, float]:
+        """Return the bounds of a parameter [SI]: the user's, else those of what is physical."""
+        low, high = parameter(self.law, name).bounds
+        own = self.limits.get(name, (low, high))
+        return max(low, own[0]), min(high, own[1])
+
+
+def parameter(law: str, name: str) -> Parameter:
+    """Return the declaration of a law's or effect's parameter."""
+    if "." in name:
+        effect, own = name.split(".", 1)
+        return EFFECTS[effect].parameters[own]
+    return law_parameters(law)[name]
+
+
+def law_parameters(law: str) -> dict[str, Parameter]:
+    """Return the declarations of a law's own parameters by name."""
+    declared: dict[str, Parameter] = (LAWS[law] if law in LAWS else OTHER_LAWS[law]).parameters
+    return declared
+
+
+class Problem:
+    """Runs held against a model: predictions, and the noise that a true model would show."""
+
+    def __init__(self, runs: list[Run]) -> None:
+        self.runs = runs
+        self._benches: dict[tuple[str, tuple[str, ...]], Bench] = {}
+        self._sizes: dict[str, float] = {}
+
+    def size(self, unit: str) -> float:
+        """Return the typical size on this rig of a parameter of some unit, in SI."""
+        if not self._sizes:
+            self._sizes = sizes(self.runs)
+        return self._sizes.get(unit, 1.0)
+
+    def scaled(self, law: str, name: str) -> float:
+        """Return a parameter's default brought to the size of this rig, within its bounds."""
+        declared = parameter(law, name)
+        reference = REFERENCE.get(declared.unit)
+        value = declared.value * (self.size(declared.unit) / reference if reference else 1.0)
+        return min(max(value, declared.bounds[0]), declared.bounds[1])
+
+    def bench(self, model: Model) -> Bench:
+        """Return what predicts a model's force, made once."""
+        key = (model.law, model.effects)
+        if key not in self._benches:
+            self._benches[key] = Bench(model.law, list(model.effects))
+        return self._benches[key]
+
+    def predict(self, model: Model, run: Run, draw: int | None = None) -> Array:
+        """Return the model's force (n,) [N] for a run, or for one draw of its motion."""
+        x, v, a, V = run.x, run.v, run.a, run.V
+        if draw is not None:
+            e = run.draws[draw]
+            x, v, a, V = x + e[:, 0], v + e[:, 1], a + e[:, 2], V + e[:, 3]
+        return self.bench(model).force(x, v, a, V, run.dt, model.values)
+
+    def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:
+        """Return per run: bias (n,) [N] of the prediction, noise (n,) [N], draws (d, n) [N].
+
+        What a true model would show: its prediction from the smoothed motion is off by `bias` in
+        the mean, and scatters about that by `noise`, the force's own and the motion's; `draws` are
+        the motion's part alone. Samples that were not measured get a noise of `LOST`.
+        """
+        return [self._expected(model, run, draws) for run in self.runs]
+
+    def _expected(self, model: Model, run: Run, draws: int) -> tuple[Array, Array, Array]:
+        middle = self.predict(model, run)
+        spread = np.array(
+            [self.predict(model, run, d) - middle for d in range(min(draws, len(run.draws)))]
+        )
+        if not len(spread):
+            spread = np.zeros((1, len(middle)))
+        bias = spread.mean(axis=0)
+        noise = np.sqrt(run.noise**2 + np.mean((spread - bias) ** 2, axis=0))
+        if run.measured is not None:
+            noise = np.where(run.measured, noise, LOST * noise)
+        return bias, noise, spread - bias
+
+
+def sizes(runs: list[Run]) -> dict[str, float]:
+    """Return the typical size of a quantity on a rig by unit, from what was measured."""
+    force = _spread([r.force for r in runs])
+    x = _spread([r.x - r.x.mean() for r in runs])
+    v = _spread([r.v for r in runs])
+    a = _spread([r.a for r in runs])
+    V = max(max(float(r.V.max()) for r in runs), 1e-9)
+    return {
+        "N": force, "N/m": force / x, "N/m2": force / x**2, "N/m3": force / x**3, "m": x, "m/s": v,
+        "N.s/m": force / v, "N.s2/m2": force / v**2, "kg": force / a, "J": force * x, "V": V,
+        "N/V": force / V, "N/(m.V)": force / (x * V), "N.s/(m.V)": force / (v * V), "1/m": 1.0 / x,
+        "s": 0.05, "1": 1.0,
+    }  # fmt: skip
+
+
+def _spread(parts: list[Array]) -> float:
+    """Return a standard deviation that may be divided by."""
+    return max(float(np.std(np.concatenate(parts))), 1e-12)
+
+
+def without(model: Model, names: tuple[str, ...]) -> Model:
+    """Return a model with more parameters held at zero."""
+    values = {**model.values, **dict.fromkeys(names, 0.0)}
+    held = tuple(dict.fromkeys((*model.held, *names)))
+    return replace(model, values=values, held=held)
+
+
+def steady(problem: Problem) -> bool:
+    """Return whether the voltage stays where it is over all runs."""
+    V = np.concatenate([run.V for run in problem.runs])
+    return float(np.std(V)) <= _STEADY * float(np.max(np.abs(V), initial=0.0)) or not np.any(V)

@@ -1,0 +1,168 @@
+"""Errors of the laws as Shirazi et al. (2012), section III-C, judge them.
+
+The quadratic error of the force, measured and predicted force low-passed alike, is minimised from
+several starting points; standard laws lack the exponential.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordError
+from .model import DRIVEN, Model, Problem, Run, steady, without
+from .search import descend
+from .starts import start_models
+
+Array = NDArray[np.float64]
+
+CUTOFF = 18.0
+"""Hz, of the paper's low-pass (section III-C)."""
+
+ORDER = 4
+"""Of the Butterworth filter; run forth and back it has no phase and twice the steepness."""
+
+REST = 1e-3
+"""Speed [m/s] below which a law with a sign is not valid: the damper may be stuck there."""
+
+LAWS_OF_TABLE = ("bingham", "lugre", "bingham_standard", "lugre_standard")
+
+_ALIKE = 1e-3
+_QUADRATIC = 1e3  # residuals divided by this stay where the search's loss is quadratic
+
+
+@dataclass(frozen=True)
+class LawError:
+    """The error of one law, fitted to the training runs.
+
+    `train`, `holdout` the RMS error of the low-passed force [N], `nan` where there is no run;
+    `moving` that of held-out samples (else of training samples) faster than `REST`; `share` the
+    error on held-out (else training) runs over the RMS of the force; `starts`, `agreed` how many
+    starts were tried and how many came to the same end.
+    """
+
+    law: str
+    model: Model
+    train: float
+    holdout: float
+    moving: float
+    share: float
+    starts: int
+    agreed: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        numbers = {key: getattr(self, key) for key in ("train", "holdout", "moving", "share")}
+        finite = {key: value if np.isfinite(value) else None for key, value in numbers.items()}
+        return {
+            "law": self.law, **finite, "starts": self.starts, "agreed": self.agreed,
+            "parameters": {name: self.model.value(name) for name in self.model.free()},
+        }  # fmt: skip
+
+
+def low_pass(y: Array, dt: float, cutoff: float = CUTOFF) -> Array:
+    """Return a signal (n,) low-passed without phase: Butterworth of order `ORDER`, forth and back.
+
+    Parameters
+    ----------
+    dt : sampling step [s]
+    cutoff : Hz; 0, or half the sampling rate and above, leaves the signal as it is
+
+    Raises
+    ------
+    RecordError
+        If the cut-off is negative or not a number.
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    if not cutoff >= 0.0:
+        raise RecordError(f"cut-off {cutoff} Hz; 0 for none, or a positive number is right.")
+    if cutoff == 0.0 or cutoff >= 0.5 / dt:
+        return np.asarray(y, dtype=float)
+    sections = butter(ORDER, cutoff, fs=1.0 / dt, output="sos")
+    pad = min(len(y) - 1, max(30, int(1.0 / (cutoff * dt))))
+    return np.asarray(sosfiltfilt(sections, y, padlen=pad), dtype=float)
+
+
+def error_table(
+    train: Problem,
+    holdout: Problem | None,
+    cutoff: float = CUTOFF,
+    *,
+    laws: tuple[str, ...] = LAWS_OF_TABLE,
+    starts: int = 4,
+) -> list[LawError]:
+    """Return the errors of the laws, in the order asked for.
+
+    Parameters
+    ----------
+    train, holdout : the runs that laws are fitted to, and those they are judged on, if any
+    cutoff : Hz, of the low-pass on measured and predicted force; 0 for none
+    """
+    return [_law_error(train, holdout, cutoff, law, starts) for law in laws]
+
+
+def _law_error(
+    train: Problem, holdout: Problem | None, cutoff: float, law: str, starts: int
+) -> LawError:
+    base = law.removesuffix("_standard")
+    model = Model(base, (), {"exponent": 0.0 if base != law else 1.0})
+    if steady(train):
+        model = without(model, DRIVEN[base])
+    ends = [_fit_filtered(train, one, cutoff) for one in start_models(train, model, starts)]
+    best, cost = min(ends, key=lambda end: end[1])
+    judged = holdout if holdout is not None and holdout.runs else train
+    errors = filtered_errors(judged, best, cutoff)
+    moving = [
+        e[np.abs(run.v[run.skip :]) >= REST] for e, run in zip(errors, judged.runs, strict=True)
+    ]
+    force = [low_pass(run.force, run.dt, cutoff)[run.skip :] for run in judged.runs]
+    held_out = _rms(errors)
+    return LawError(
+        law, best, _rms(filtered_errors(train, best, cutoff)),
+        held_out if judged is not train else float("nan"), _rms(moving), held_out / _rms(force),
+        len(ends), sum(end[1] <= cost * (1.0 + _ALIKE) for end in ends),
+    )  # fmt: skip
+
+
+def filtered_errors(problem: Problem, model: Model, cutoff: float = CUTOFF) -> list[Array]:
+    """Return per run the error (n - skip,) [N] of the force, both low-passed."""
+    return [
+        low_pass(run.force - problem.predict(model, run), run.dt, cutoff)[run.skip :]
+        for run in problem.runs
+    ]
+
+
+def force_rms(runs: list[Run], cutoff: float = CUTOFF) -> float:
+    """Return the RMS of the low-passed force over runs [N]."""
+    return _rms([low_pass(run.force, run.dt, cutoff)[run.skip :] for run in runs])
+
+
+def error_rms(problem: Problem, model: Model, cutoff: float = CUTOFF) -> float:
+    """Return the RMS of the low-passed error of the force over all runs [N]."""
+    return _rms(filtered_errors(problem, model, cutoff))
+
+
+def _rms(parts: list[Array]) -> float:
+    whole = np.concatenate(parts)
+    return float(np.sqrt(np.mean(whole * whole))) if len(whole) else float("nan")
+
+
+def _fit_filtered(problem: Problem, model: Model, cutoff: float) -> tuple[Model, float]:
+    """Return the least-squares fit of the low-passed force from one start, and its RMS error."""
+    from .fit import Scaled
+
+    none = [(np.zeros(1), np.ones(1), np.zeros((1, 1))) for _ in problem.runs]
+    scaled = Scaled(problem, model, none)
+    unit = _QUADRATIC * force_rms(problem.runs, cutoff)
+
+    def residuals(theta: Array) -> Array:
+        errors = filtered_errors(problem, scaled.at(theta), cutoff)
+        return np.nan_to_num(np.concatenate(errors) / unit, nan=1e3, posinf=1e3, neginf=-1e3)
+
+    found = descend(residuals, scaled.start, scaled.low, scaled.high, 20, tolerance=1e-5)
+    best = scaled.at(found.theta)
+    return replace(best, values=dict(best.values)), error_rms(problem, best, cutoff)

@@ -1,0 +1,342 @@
+"""Identify the model of a study: fit it to the training runs, judge it on those held out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..identify.fit import Fit, Model, Problem, identify
+from ..identify.prepare import prepare, saturated
+from ..identify.table import LawError, error_rms, error_table, force_rms
+from ..records.channels import DRIVE
+from ..records.measurement import Measurement
+from ..units import convert
+from .errors import StudyError
+from .history import Step
+from .judged import robust_z
+from .model import LAW_NAMES, STANDARD, StudyModel, new_model
+from .study import Runs, Study
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Show = Callable[[int], None]
+
+STAGES = 4
+"""How many stages `identify_study` reports to `show`."""
+
+_SATURATED = 0.05  # share of samples at one and the same extreme of the force
+_LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
+
+
+@dataclass(frozen=True)
+class Identified:
+    """What an identification found.
+
+    `fit` in SI; `model` the study's model with the values; `table` the errors of the laws after
+    the low-pass at `cutoff` [Hz]; `before`, `after` errors of the two models; `notes` what to
+    know; `step` the history's new step, None where nothing was written; `train`, `holdout` the
+    runs as they were fitted and judged.
+    """
+
+    fit: Fit
+    model: StudyModel
+    table: list[LawError]
+    cutoff: float
+    before: dict[str, float]
+    after: dict[str, float]
+    notes: tuple[str, ...]
+    step: Step | None
+    train: Problem
+    holdout: Problem | None
+
+    @property
+    def unidentified(self) -> tuple[str, ...]:
+        """Names of the parameters that the data cannot tell."""
+        return self.fit.unidentified
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        rows = {row["name"]: row for row in self.parameters()}
+        return {
+            "schema": 1,
+            "law": self.model.law,
+            "effects": list(self.model.effects),
+            "parameters": {
+                name: {key: row[key] for key in row if key != "name"} for name, row in rows.items()
+            },
+            "unidentified": list(self.unidentified),
+            "starts": self.fit.starts,
+            "agreed": self.fit.agreed,
+            "cut_off": self.cutoff,
+            "before": self.before,
+            "after": self.after,
+            "table": [row.as_dict() for row in self.table],
+            "notes": list(self.notes),
+            "step": self.step.number if self.step else None,
+        }
+
+    def parameters(self) -> list[dict[str, Any]]:
+        """Return one row per parameter: name, value, unit, half of its 95 % interval, how."""
+        rows = []
+        for name, value in self.model.flat().items():
+            if name in self.fit.unidentified:
+                how = "cannot be told"
+            elif name in self.fit.std:
+                how = "identified"
+            else:
+                how = "held"
+            half = 1.96 * value.std if value.std is not None and how == "identified" else None
+            rows.append(
+                {
+                    "name": name, "value": value.value, "unit": value.unit, "interval95": half,
+                    "how": how,
+                }
+            )  # fmt: skip
+        return rows
+
+
+def identify_study(
+    study: Study,
+    *,
+    law: str | None = None,
+    cutoff: float | None = None,
+    starts: int = 4,
+    table: bool = True,
+    write: bool = True,
+    show: Show | None = None,
+) -> Identified:
+    """Identify the present model of a study on its training runs, its effects included.
+
+    Parameters
+    ----------
+    law : another law to take than the model's; its effects stay where they can join it
+    cutoff : Hz, of the low-pass for the table of errors; None takes the study's
+    starts : how many starting points are tried
+    table : whether to compare the laws as the paper does
+    write : whether to make the result the present model, as a step of the history
+    show : is told how many of `STAGES` are done
+
+    Raises
+    ------
+    StudyError
+        If the law is not known, the data cannot carry an identification, or the study cannot be
+        written.
+    RecordError
+        If a file cannot be read, or a channel that is needed is missing.
+    """
+    if starts < 1:
+        raise StudyError(f"starts = {starts}; 1 or more is right.")
+    identifier = IDENTIFIERS.get(study.settings.rig)
+    if identifier is None:
+        raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not identified yet.')
+    model = _of_law(study.model(), law)
+    cutoff = study.settings.cut_off if cutoff is None else cutoff
+    found = identifier(study, model, cutoff, starts, table, show or (lambda done: None))
+    if not write:
+        return found
+    step = study.add_step(
+        f"identify {found.model.law}" + "".join(f" + {e}" for e in found.model.effects),
+        _why(study, found), found.model, found.before, found.after,
+    )  # fmt: skip
+    return replace(found, step=step)
+
+
+def identify_bench(
+    study: Study, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show
+) -> Identified:
+    """Identify a damper on a test bench: motion prescribed, force measured."""
+    runs = study.runs()
+    return _identify(runs, model, cutoff, starts, table, show)
+
+
+IDENTIFIERS: dict[
+    str, Callable[[Study, StudyModel, float, int, bool, Show], Identified]
+] = {"bench": identify_bench}
+"""What identifies a study, by its rig."""
+
+
+def identify_frames(
+    frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame],
+    law: str = "lugre",
+    *,
+    effects: tuple[str, ...] = (),
+    holdout: Mapping[str, pd.DataFrame] | list[pd.DataFrame] | None = None,
+    cutoff: float = 18.0,
+    starts: int = 4,
+    table: bool = False,
+) -> Identified:
+    """Identify a damper from pandas frames.
+
+    Parameters
+    ----------
+    frames : one frame per run, with columns named by channel: `time`, `displacement`, `velocity`,
+        `voltage` or `current`, `force`, in SI, or in the unit that a title gives: `force [kN]`
+    holdout : runs to judge on; None splits a single run in time, and else judges on the training
+        runs alone
+
+    Raises
+    ------
+    RecordError, StudyError
+        As `identify_study`.
+    """
+    train = _measurements(frames, "frame")
+    held = _measurements(holdout, "held out") if holdout else []
+    if not train:
+        raise StudyError("no frame is given; one run or more is right.")
+    model = _of_law(new_model(law, effects) if law in LAW_NAMES else new_model(), law)
+    notes = () if held else ("No run is held out: errors are those of the fit itself.",)
+    runs = Runs(train, held, notes)
+    return _identify(runs, model, cutoff, starts, table, lambda done: None)
+
+
+def _measurements(
+    frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame], stem: str
+) -> list[Measurement]:
+    from ..records.channels import channel_unit, is_channel
+    from ..records.measurement import ChannelSpec, measurements_of_frame
+
+    named = (
+        dict(frames)
+        if isinstance(frames, Mapping)
+        else {f"{stem} {number}": frame for number, frame in enumerate(frames, 1)}
+    )
+    found = []
+    for name, frame in named.items():
+        plain = [str(column) for column in frame.columns]
+        channels: dict[str, ChannelSpec] = {}
+        for title in plain:
+            channel = title.split("[")[0].strip()
+            if is_channel(channel):
+                given = "[" in title or channel in frame.attrs.get("units", {})
+                channels[channel] = ChannelSpec(title, "" if given else channel_unit(channel))
+        found += measurements_of_frame(frame, name, channels or None)
+    return found
+
+
+def _of_law(model: StudyModel, law: str | None) -> StudyModel:
+    """Return the model with another law, its effects kept where they can join."""
+    if law is None or law == model.law:
+        return model
+    if law not in LAW_NAMES:
+        raise StudyError(f'law "{law}"; there are: {", ".join(LAW_NAMES)}.')
+    from ..physics.effect import EFFECTS
+
+    other = new_model(law, (), model.building)
+    base = STANDARD.get(law, law)
+    unfit = [name for name in model.effects if base not in EFFECTS[name].laws]
+    if unfit:
+        raise StudyError(f'{", ".join(unfit)} cannot join the law "{law}": undo the step first.')
+    return replace(other, effects=dict(model.effects))
+
+
+def _identify(
+    runs: Runs, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show
+) -> Identified:
+    notes = [*runs.notes, *_doubts(runs.all)]
+    train = Problem([prepare(one, seed=31 * k) for k, one in enumerate(runs.train)])
+    held = [prepare(one, seed=31 * k + 7) for k, one in enumerate(runs.holdout)]
+    holdout = Problem(held) if held else None
+    show(1)
+    start = as_model(model)
+    fit = identify(
+        train, start.law, start.effects, starts, values=start.values, held=start.held,
+        limits=start.limits,
+    )  # fmt: skip
+    show(2)
+    found = _with_fit(model, fit)
+    before = errors_of(train, holdout, start, cutoff)
+    after = errors_of(train, holdout, fit.model, cutoff)
+    show(3)
+    rows: list[LawError] = []
+    if table and sum(len(run.force) for run in train.runs) <= _LONGEST_TABLE:
+        rows = error_table(train, holdout, cutoff, starts=starts)
+    show(4)
+    if not any(one.has(*(c,)) for one in runs.all for c in DRIVE):
+        notes.append("Neither voltage nor current was measured: the parameters hold at its level.")
+    return Identified(
+        fit, found, rows, cutoff, before, after, tuple(notes), None, train, holdout
+    )
+
+
+def as_model(model: StudyModel) -> Model:
+    """Return a study's model as the fit takes it: values, held parameters and bounds in SI."""
+    held, limits = [], {}
+    for name, value in model.flat().items():
+        unit = model.declared(name).unit
+        if not value.free:
+            held.append(name)
+        limits[name] = (convert(value.low, value.unit, unit), convert(value.high, value.unit, unit))
+    return Model(model.base_law, tuple(model.effects), model.values(), tuple(held), limits)
+
+
+def errors_of(
+    train: Problem, holdout: Problem | None, model: Model, cutoff: float
+) -> dict[str, float]:
+    """Return z and RMS error [N, after the low-pass] on training and held-out runs."""
+    out = {"z_train": robust_z(train, model), "rms_train": error_rms(train, model, cutoff)}
+    out["share_train"] = out["rms_train"] / force_rms(train.runs, cutoff)
+    if holdout is not None:
+        out["z_holdout"] = robust_z(holdout, model)
+        out["rms_holdout"] = error_rms(holdout, model, cutoff)
+        out["share_holdout"] = out["rms_holdout"] / force_rms(holdout.runs, cutoff)
+    return out
+
+
+def _with_fit(model: StudyModel, fit: Fit) -> StudyModel:
+    """Return the study's model with the values found; what the data cannot tell has no interval."""
+    flat = model.flat()
+    told = [name for name in fit.std if name not in fit.unidentified]
+    found = model.with_values(
+        {name: _inside(model, name, fit.model.values[name]) for name in told},
+        {name: fit.std[name] for name in told},
+    )
+    silent = [name for name in fit.unidentified if flat[name].free]
+    return found.with_values(
+        {name: _inside(model, name, fit.model.value(name)) for name in silent}, origin="assumed"
+    )
+
+
+def _inside(model: StudyModel, name: str, value: float) -> float:
+    """Return a value that rounding has not put outside of its bounds."""
+    own, unit = model.flat()[name], model.declared(name).unit
+    low, high = (convert(bound, own.unit, unit) for bound in (own.low, own.high))
+    return float(np.clip(value, low, high))
+
+
+def _doubts(runs: list[Measurement]) -> list[str]:
+    """Refuse a saturated force; say what weakens an identification."""
+    notes = []
+    for run in runs:
+        share = saturated(run)
+        if share > _SATURATED:
+            raise StudyError(
+                f"{run.name}: {share:.0%} of the force's samples stand at its extremes: the load "
+                "cell or its amplifier is saturated. Measure with a wider range, or leave the run "
+                "out in study.toml."
+            )
+        if share > 0.0:
+            notes.append(f"{run.name}: {share:.1%} of the force's samples stand at its extremes.")
+        estimated = [
+            c for c, fact in run.noise_facts.items()
+            if fact is not None and fact.colour in ("hidden", "rough", "blue")
+        ]  # fmt: skip
+        if estimated:
+            notes.append(
+                f"{run.name}: the noise of {', '.join(estimated)} cannot be told well from the "
+                "signal; give it in study.toml, for z and intervals rest on it."
+            )
+    return notes
+
+
+def _why(study: Study, found: Identified) -> str:
+    runs, held = len(found.train.runs), len(found.holdout.runs) if found.holdout else 0
+    lost = ", ".join(found.unidentified)
+    return (
+        f"fit to {runs} training run{'s' * (runs != 1)}, judged on {held} held out; "
+        f"{found.fit.agreed} of {found.fit.starts} starts agree"
+        + (f"; the data cannot tell {lost}" if lost else "")
+    )
