@@ -183,6 +183,7 @@ def _refuse(held: Sequence[Held]) -> None:
 
 
 def _run_error(name: str, held: Sequence[Held]) -> RunError:
+    """Return the error over some runs."""
     residual = np.concatenate([one.residual for one in held])
     sigma = np.concatenate([one.sigma[one.skip :] for one in held])
     own = np.concatenate([np.full(len(one.residual), one.noise) for one in held])

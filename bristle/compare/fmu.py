@@ -23,7 +23,7 @@ from ..records.table import Table, read_table
 from ..units import conversion
 from .comparison import Comparison, compare_held
 from .coordinates import coordinates_of
-from .held import Held, _between
+from .held import Held, between
 from .ports import PortMap, map_ports
 from .scale import rms
 from .stepping import Job, step_through
@@ -231,7 +231,7 @@ def _job(
     for piece in pieces:
         add(piece.dt, piece.values)
         finer = {
-            name: _between(y, piece.values.get(piece.rates.get(name, "")), piece.dt)
+            name: between(y, piece.values.get(piece.rates.get(name, "")), piece.dt)
             for name, y in piece.values.items()
         }
         add(0.5 * piece.dt, finer)

@@ -1,57 +1,68 @@
-"""A study's model as a fit uses it, its runs prepared, and both held against each other."""
+"""A study's model held against its runs."""
 
 from __future__ import annotations
 
-from ..compare.comparison import Comparison, compare
-from ..identify.fit import FIXED, Model, Problem
+from collections.abc import Callable
+
+from ..compare.comparison import Comparison, compare_held
+from ..compare.held import Held, held_runs
+from ..identify.fit import Problem
 from ..identify.prepare import prepare
 from ..physics.effect import EFFECTS
 from .errors import StudyError
-from .model import STANDARD, StudyModel
+from .identification import as_model
+from .model import StudyModel
 from .study import Study
 
-
-def fit_model(model: StudyModel) -> Model:
-    """Return a study's model as `bristle.identify` uses it: values in SI, what is held.
-
-    Raises
-    ------
-    StudyError
-        If an effect is not one of the damper: a bench has no structure and no instruments.
-    """
-    foreign = [name for name in model.effects if EFFECTS[name].site != "damper"]
-    if foreign:
-        raise StudyError(
-            f"{', '.join(foreign)}: not of the damper, and on a bench there is nothing else. Take "
-            "it out of model.toml."
-        )
-    free = set(model.free())
-    values = model.values()
-    held = tuple(name for name in values if name not in free and name not in FIXED)
-    if model.law in STANDARD:
-        values["exponent"] = 0.0
-    return Model(model.base_law, tuple(model.effects), values, held)
+Holder = Callable[[StudyModel], list[Held]]
 
 
-def problem_of(study: Study, role: str = "holdout", draws: int = 12) -> Problem:
-    """Return the runs of one role, "train" or "holdout", prepared for a fit or a comparison.
+def holder(study: Study, role: str = "holdout") -> Holder:
+    """Return what holds models against the runs of one role, "holdout" or "train".
+
+    The runs are read and prepared once, so that several models can be held against them.
 
     Raises
     ------
     StudyError
-        If the rig is a structure: its force follows from equilibrium, not from one channel.
+        If this rig cannot be compared yet.
     RecordError
-        If a run lacks a channel that is needed.
+        If a run cannot be read or lacks a channel that is needed.
     """
-    if study.settings.rig != "bench":
-        raise StudyError(f'{study.folder}: rig = "{study.settings.rig}"; this compares a "bench".')
-    runs = study.runs()
-    return Problem([prepare(run, draws) for run in getattr(runs, role)])
+    make = HOLDERS.get(study.settings.rig)
+    if make is None:
+        raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not compared yet.')
+    return make(study, role)
+
+
+def hold_bench(study: Study, role: str) -> Holder:
+    """Return what holds dampers against bench runs: motion prescribed, force measured."""
+    shift = 7 if role == "holdout" else 0  # the same draws as an identification
+    runs = getattr(study.runs(), role)
+    problem = Problem([prepare(run, seed=31 * k + shift) for k, run in enumerate(runs)])
+
+    def hold(model: StudyModel) -> list[Held]:
+        foreign = [name for name in model.effects if EFFECTS[name].site == "structure"]
+        if foreign:
+            raise StudyError(f"{', '.join(foreign)}: of a structure, and on a bench there is none.")
+        return held_runs(problem, as_model(model))
+
+    return hold
+
+
+HOLDERS: dict[str, Callable[[Study, str], Holder]] = {"bench": hold_bench}
+"""What holds models against measured runs, by the rig."""
 
 
 def compare_study(
     study: Study, model: StudyModel | None = None, *, role: str = "holdout"
 ) -> Comparison:
-    """Hold a study's model, the present one by default, against its runs; see `compare`."""
-    chosen = fit_model(model or study.model())
-    return compare(problem_of(study, role), chosen, seen=role == "train")
+    """Hold a study's model, the present one by default, against its runs of one role.
+
+    Raises
+    ------
+    StudyError, RecordError
+        As `holder`, and if nothing tells what error is large.
+    """
+    held = holder(study, role)(model or study.model())
+    return compare_held(held, seen=role == "train")
