@@ -70,9 +70,7 @@ def follow_up(case: Recorded, answer: dict[str, Any]) -> dict[str, Any]:
 def resolve(case: Recorded, made: Any, rivals: list[str]) -> dict[str, float]:
     """Return for each rival of the hidden effect how well these data resolve the two."""
     true = str(case.truth["effects"][0]["effect"])
-    noisy = Problem(
-        [prepare(m) for m in subject.measurements(case.part("holdout"), case.channels)]
-    )
+    noisy = Problem([prepare(m) for m in subject.measurements(case.part("holdout"), case.channels)])
     train, held = (
         Problem([as_run(run, case.channels, noisy.runs[0].noise) for run in made.clean(role)])
         for role in ("train", "holdout")

@@ -40,7 +40,10 @@ def perform(case: Recorded, made: Any, experiment: dict[str, Any]) -> dict[str, 
             None if level is None else float(level), **how,
         )  # fmt: skip
         runs.append(made.perform(run, case.task.seed + len(runs), f"{role}_extra"))
-    parts = {role: case.part(role) + [r for r in runs if r["role"] == role] for role in ("train", "holdout")}
+    parts = {
+        role: case.part(role) + [r for r in runs if r["role"] == role]
+        for role in ("train", "holdout")
+    }
     train, holdout = (subject.measurements(parts[role], case.channels) for role in parts)
     answer = subject.diagnosed(train, holdout, case.task.law)
     return {name: answer[name] for name in ("kind", "effects", "z_after")}

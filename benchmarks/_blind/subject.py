@@ -57,9 +57,7 @@ def ask(case: Recorded) -> dict[str, Any]:
     return answer
 
 
-def diagnosed(
-    train: list[Measurement], holdout: list[Measurement], law: str
-) -> dict[str, Any]:
+def diagnosed(train: list[Measurement], holdout: list[Measurement], law: str) -> dict[str, Any]:
     import bristle.diagnose
 
     if not hasattr(bristle.diagnose, "diagnose"):
@@ -84,9 +82,7 @@ def diagnosed(
     }
 
 
-def _first_form(
-    train: list[Measurement], holdout: list[Measurement], law: str
-) -> dict[str, Any]:
+def _first_form(train: list[Measurement], holdout: list[Measurement], law: str) -> dict[str, Any]:
     """The same before the package's own entry point exists."""
     from bristle.diagnose.sensors import sensor_faults
     from bristle.diagnose.verdict import diagnose
@@ -124,7 +120,9 @@ def intervals(fit: Fit | None) -> dict[str, Any]:
 
 def true_model(task_law: str, truth: dict[str, Any]) -> Model | None:
     """Return the hidden truth as a model; None for forms or effects that bristle lacks."""
-    values = {name: value for name, value in truth["base"].items() if name in LAWS[task_law].parameters}
+    values = {
+        name: value for name, value in truth["base"].items() if name in LAWS[task_law].parameters
+    }
     names = []
     for found in truth["effects"]:
         own = true_values(found)
@@ -152,4 +150,3 @@ def z_of_truth(case: Recorded, holdout: list[Measurement]) -> float | None:
         return None
     model = true_model(case.task.law, case.truth)
     return None if model is None else z_of(model, Problem([prepare(m) for m in holdout]))
-
