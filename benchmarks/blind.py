@@ -122,7 +122,7 @@ def peer_figures(path: Path, tasks: list[plan.Task]) -> list[table.Figure]:
 
 
 def run() -> list[Row]:
-    """Return the rows of the last record for `python -m benchmarks`; nothing is run, it takes hours."""
+    """Return the rows of the last record for `python -m benchmarks`; it runs nothing, for hours."""
     seed = record.newest()
     if seed is None:
         return [Row("hidden effects found", "not run yet: python benchmarks/blind.py")]

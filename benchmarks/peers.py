@@ -8,8 +8,8 @@ stepwise        forward selection of terms. Textbook: polynomial terms of the ra
                 writes for each effect, channels through 18 Hz, kept where they lower the held-out
                 error by 3 %; "unknown" where more than 1.15 times the noise is left.
 sparse          sequentially thresholded least squares (Brunton, Proctor & Kutz 2016, PNAS 113,
-                3932-3937), by pysindy where it is installed, else written here. Textbook: polynomial
-                terms and threshold 0.1 on normalised terms. Informed: the expert's terms, the
+                3932-3937), by pysindy where it is installed, else written here. Textbook:
+                polynomial terms and threshold 0.1 on normalised terms. Informed: the expert's terms, the
                 threshold chosen on held-out runs, most sparse within 3 % of the best.
 correlation     auto-correlation of the residuals and cross-correlation with velocity and voltage
                 against 99 % bounds (Ljung 1999, System Identification, ch. 16; the plot of MATLAB's
@@ -68,7 +68,7 @@ def _rig(case: Recorded) -> Rig:
 
 
 def low_passed(run: Signals, cut: float = CUT) -> Signals:
-    """Return a run whose motion went through a zero-phase low-pass, its voltage through a median."""
+    """Return a run, its motion through a zero-phase low-pass, its voltage through a median."""
     rate = 1.0 / float(run["time"][1] - run["time"][0])
     sections = butter(2, cut, fs=rate, output="sos")
     motion = {n: sosfiltfilt(sections, run[n]) for n in ("displacement", "velocity")}
@@ -149,7 +149,8 @@ def textbook_terms(run: Signals, rig: Rig, predicted: Array) -> dict[str, tuple[
         "V^2 sgn v": ("saturation", V**2 * np.sign(v)), "V^2 v": ("saturation", V**2 * v),
         "V v^3": ("flattening", V * v**3), "V x": ("gas_spring", V * x),
         "a": ("fluid_inertia", a), "V' sgn v": ("coil_lag", rate * np.sign(v)),
-        "t sgn v": ("temperature", run["time"] * np.sign(v)), "t v": ("temperature", run["time"] * v),
+        "t sgn v": ("temperature", run["time"] * np.sign(v)),
+        "t v": ("temperature", run["time"] * v),
     }  # fmt: skip
 
 
@@ -313,7 +314,7 @@ def correlation_alarms(base: BaseFit, held: list[Signals]) -> dict[str, bool]:
 
 
 def simulated(base: BaseFit, noisy: list[Signals]) -> list[list[Signals]]:
-    """Return draws of the runs as the fitted base law would have answered, noise on all channels."""
+    """Return draws of the runs as the fitted base law would have answered, with fresh noise."""
     rng = np.random.default_rng(7)
     quiet = [low_passed(run) for run in noisy]
     forces = []

@@ -49,7 +49,7 @@ SAME: dict[tuple[str, str], Callable[[Fields], Values]] = {
 """The generator's (effect, form) that bristle has, and what its parameters are there."""
 
 LIMITS = ("asymmetry.v_s", "gas_spring.preload", "gas_spring.k_2", "gas_spring.k_3")
-"""True values at zero or at a limit: an interval about them says nothing of coverage in per cent."""
+"""True values at zero or at a limit: an interval about them says nothing of coverage."""
 
 
 def is_same(effect: str, form: str) -> bool:

@@ -6,7 +6,7 @@ With r_t left by the true effect and r_b by the rival, both over the noise s of 
 log-likelihood of the data prefers the true effect by D = sum(r_b^2 - r_t^2)/(2 s^2) on average,
 with the standard deviation of sum (r_b - r_t) n / s^2, n the noise. The best test there is
 (Neyman & Pearson 1933, Phil. Trans. R. Soc. A 231, 289-337) then resolves the two by
-D over that deviation. Below `RESOLVED` they are inseparable on these data.
+D over that deviation. Below `score.RESOLVED` they are inseparable on these data.
 """
 
 from __future__ import annotations
@@ -16,17 +16,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.diagnose.candidates import try_effect
-from bristle.identify.fit import Fit, Model, Problem, Run, fit, identify
+from bristle.diagnose.candidates import begin, refine
+from bristle.identify.fit import Model, Problem, Run, identify
 from bristle.identify.prepare import prepare
 
 from . import cases, separate, subject
 from .cases import Recorded
 
 Array = NDArray[np.float64]
-
-RESOLVED = 3.0
-"""Standard deviations from which on two effects count as separable."""
 
 
 def resolution(
@@ -52,7 +49,7 @@ def resolution(
     return gain / float(spread) if spread > 0.0 else 0.0
 
 
-def follow_up(case: Recorded, answer: dict[str, Any]) -> dict[str, Any]:
+def follow_up(case: Recorded, answer: dict[str, Any], experiment: Any) -> dict[str, Any]:
     """Return what only the generator can add to a class: can it be told apart, what did a run do.
 
     `resolved` rival -> standard deviations; `separated` the verdict after the proposed experiment.
@@ -62,8 +59,8 @@ def follow_up(case: Recorded, answer: dict[str, Any]) -> dict[str, Any]:
         return {}
     made = cases.make(case.task)
     more: dict[str, Any] = {"resolved": resolve(case, made, answer["effects"])}
-    if answer["experiment"]:
-        more["separated"] = separate.perform(case, made, answer["experiment"])
+    if experiment is not None:
+        more["separated"] = separate.perform(case, made, experiment)
     return more
 
 
@@ -75,10 +72,10 @@ def resolve(case: Recorded, made: Any, rivals: list[str]) -> dict[str, float]:
         Problem([as_run(run, case.channels, noisy.runs[0].noise) for run in made.clean(role)])
         for role in ("train", "holdout")
     )
-    base = identify(train, case.task.law, starts=2)
-    fits = {name: _best(name, base, train, held) for name in (true, *rivals)}
-    expected = noisy.expectation(fits[true].model)
-    left = {name: _left(one.model, held) for name, one in fits.items()}
+    base = identify(train, case.task.law, starts=2).model
+    fits = {name: _best(name, base, train) for name in (true, *rivals)}
+    expected = noisy.expectation(fits[true])
+    left = {name: _left(one, held) for name, one in fits.items()}
     skip = [run.skip for run in held.runs]
     noise = [e[1][k:] for e, k in zip(expected, skip, strict=True)]
     draws = [e[2][:, k:] for e, k in zip(expected, skip, strict=True)]
@@ -90,10 +87,9 @@ def resolve(case: Recorded, made: Any, rivals: list[str]) -> dict[str, float]:
     }
 
 
-def _best(name: str, base: Fit, train: Problem, held: Problem) -> Fit:
-    found = try_effect(name, base, train, held).fit
-    again = fit(train, found.model, max_evaluations=40, with_std=False)
-    return min(found, again, key=lambda one: one.cost)
+def _best(name: str, base: Model, train: Problem) -> Model:
+    begun = begin(name, base, train, train.expectation(base))
+    return refine(begun.model, train, sweeps=24)
 
 
 def _left(model: Model, problem: Problem) -> list[Array]:

@@ -164,10 +164,8 @@ def _faults(seed: int) -> Iterator[dict[str, Any]]:
         and (fault, channel) not in INVISIBLE
     ]
     beds = _shuffled([(rig, law) for rig in RIGS for law in LAWS], rng)
-    turn = 0
-    for fault, channel in _shuffled(kinds, rng):
+    for turn, (fault, channel) in enumerate(_shuffled(kinds, rng), 1):
         rig, law = next(beds)
-        turn += 1
         strength = STRENGTHS[turn % len(STRENGTHS)]
         yield {"effect": fault, "form": channel, "strength": strength, "rig": rig, "law": law}
 

@@ -15,7 +15,6 @@ import numpy as np
 from tests.independent.effects import FORMS
 
 from .forms import LIMITS, true_values
-from .inseparable import RESOLVED
 from .plan import Task
 
 Line = dict[str, Any]
@@ -25,6 +24,9 @@ BINS = {"5 %": (0.025, 0.0866), "15 %": (0.0866, 0.245), "40 %": (0.245, float("
 
 FAMILY = ("presliding", "mount_compliance", "backlash")
 """Effects that count as one where the row says so."""
+
+RESOLVED = 3.0
+"""Standard deviations from which on the data tell two effects apart (see `inseparable`)."""
 
 LARGEST_CLASS = 3
 AT_95 = 1.959964

@@ -1,49 +1,36 @@
-"""The experiment that a class proposes, performed by the generator on the same specimen.
-
-A verdict says it in numbers as `experiment`, all entries optional but `motion`:
-
-    motion      "sine", "triangle", "chirp", "multisine", "random" or "swelling_sine"
-    size        share of the rig's top speed (or of 0.8 of the stroke, the tighter one), default 1
-    frequency   Hz, of sine and triangle;  low, high  Hz, of chirp, multisine and random
-    voltage     "constant", "sine", "steps" or "random_steps"
-    level       V, of a constant voltage;  stay  s, of a step;  duration  s, default 12
-"""
+"""The experiment that a class proposes, performed by the generator on the same specimen."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
-from tests.independent.experiments import bench_experiment
+from tests.independent.experiments import RATE, proposed
 
 from . import subject
 from .cases import Recorded
 
-HOW = ("low", "high", "frequency", "rise", "stay")
+ROLES = ("train", "holdout")
 
 
-def perform(case: Recorded, made: Any, experiment: dict[str, Any]) -> dict[str, Any]:
+def perform(case: Recorded, made: Any, experiment: Any) -> dict[str, Any]:
     """Return the verdict once two further runs of the proposed kind are there.
 
-    One joins the training runs, the other the held-out ones.
+    `experiment` is a `bristle.diagnose.experiments.Experiment`. One run joins the training runs,
+    one the held-out ones, the latter with the motion turned round. The velocity and voltage are
+    kept within what the rig can do, as a laboratory would.
     """
-    rng = np.random.default_rng([case.task.seed, 31])
-    how = {name: float(experiment[name]) for name in HOW if experiment.get(name) is not None}
-    level = experiment.get("level")
-    runs = []
-    for role in ("train", "holdout"):
-        run = bench_experiment(
-            made.specimen.rig, rng, str(experiment["motion"]),
-            str(experiment.get("voltage", "random_steps")), role,
-            float(experiment.get("duration", 12.0)), float(experiment.get("size", 1.0)),
-            None if level is None else float(level), **how,
-        )  # fmt: skip
-        runs.append(made.perform(run, case.task.seed + len(runs), f"{role}_extra"))
-    parts = {
-        role: case.part(role) + [r for r in runs if r["role"] == role]
-        for role in ("train", "holdout")
-    }
-    train, holdout = (subject.measurements(parts[role], case.channels) for role in parts)
-    answer = subject.diagnosed(train, holdout, case.task.law)
+    x, _, _, volts = experiment.signals(1.0 / RATE)
+    rig = made.specimen.rig
+    x = x - x.mean()
+    x = x * min(1.0, 0.9 * rig.stroke / float(np.max(np.abs(x - x[0]))))
+    volts = np.clip(volts, 0.0, 8.0)  # a smoothed voltage strays from the range by its noise
+    parts = {role: case.part(role) for role in ROLES}
+    for sign, role in zip((1.0, -1.0), ROLES, strict=True):
+        run = proposed(rig, (sign * x, volts), role, asdict(experiment))
+        parts[role] = [*parts[role], made.perform(run, case.task.seed, f"{role}_extra")]
+    train, holdout = (subject.measurements(parts[role], case.channels) for role in ROLES)
+    answer = subject.packed(subject.diagnosed(train, holdout, case.task.law))
     return {name: answer[name] for name in ("kind", "effects", "z_after")}

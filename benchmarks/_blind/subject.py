@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bristle.identify.fit import Fit, Model, Problem, huber
+from bristle.diagnose import Diagnosis, diagnose
+from bristle.identify.fit import Model, Problem, huber
 from bristle.identify.prepare import prepare
 from bristle.physics.damper import LAWS
 from bristle.physics.effect import EFFECTS
@@ -46,75 +47,51 @@ def measurements(runs: list[dict[str, Any]], channels: tuple[str, ...]) -> list[
     return out
 
 
-def ask(case: Recorded) -> dict[str, Any]:
-    """Return what the diagnoser says of a case, and how the true model does on it."""
+def diagnosed(train: list[Measurement], holdout: list[Measurement], law: str) -> Diagnosis:
+    """Return the diagnosis that a user gets who knows the law and nothing else."""
+    return diagnose(train, holdout, law=law)
+
+
+def ask(case: Recorded) -> tuple[dict[str, Any], Diagnosis]:
+    """Return what the diagnoser says of a case and how the true model does on it; the diagnosis."""
     train = measurements(case.part("train"), case.channels)
     holdout = measurements(case.part("holdout"), case.channels)
     before = time.perf_counter()
-    answer = diagnosed(train, holdout, case.task.law)
-    answer["seconds"] = time.perf_counter() - before
-    answer["z_true"] = z_of_truth(case, holdout)
-    return answer
+    found = diagnosed(train, holdout, case.task.law)
+    seconds = time.perf_counter() - before
+    z_true = z_of_truth(case, holdout)
+    return packed(found) | {"seconds": seconds, "z_true": z_true}, found
 
 
-def diagnosed(train: list[Measurement], holdout: list[Measurement], law: str) -> dict[str, Any]:
-    import bristle.diagnose
-
-    if not hasattr(bristle.diagnose, "diagnose"):
-        return _first_form(train, holdout, law)
-    found = bristle.diagnose.diagnose(train, holdout, law=law)
-    said = found.verdict.as_dict()
+def packed(found: Diagnosis) -> dict[str, Any]:
+    """Return what scoring needs of a diagnosis, as plain data."""
+    said = found.as_dict()
     return {
         "kind": said["kind"],
         "effects": list(said["effects"]),
-        "ranking": [dict(row) for row in said["ranking"][:KEPT]],
+        "ranking": said["ranking"][:KEPT],
         "coordinate": said.get("coordinate", ""),
-        "sensors": said.get("sensors", []),
-        "untestable": list(said.get("untestable", [])),
+        "organised": said.get("organised", [])[:3],
+        "sensors": said["sensors"],
+        "untestable": said["untestable"],
         "detectable": said.get("detectable"),
         "separate_by": said.get("separate_by", ""),
-        "experiment": _experiment(found.verdict),
-        "words": said.get("words", ""),
-        "z_before": float(found.z_before),
-        "z_after": float(found.z_after),
-        "base": intervals(found.base),
-        "best": intervals(found.best),
+        "words": said["words"],
+        "z_before": said.get("z_holdout_before"),
+        "z_after": said.get("z_holdout_after"),
+        "best": intervals(found),
     }
 
 
-def _first_form(train: list[Measurement], holdout: list[Measurement], law: str) -> dict[str, Any]:
-    """The same before the package's own entry point exists."""
-    from bristle.diagnose.sensors import sensor_faults
-    from bristle.diagnose.verdict import diagnose
-    from bristle.identify.fit import identify
-
-    first, second = (Problem([prepare(m) for m in runs]) for runs in (train, holdout))
-    base = identify(first, law)
-    said = diagnose(base, first, second)
-    faults = sensor_faults([*train, *holdout])
-    return {
-        "kind": said.kind, "effects": list(said.effects), "ranking": said.ranking[:KEPT],
-        "coordinate": said.coordinate, "sensors": [vars(one) for one in faults],
-        "untestable": list(said.untestable), "detectable": None, "separate_by": "",
-        "experiment": {}, "words": str(said.evidence)[:300], "z_before": said.z_before,
-        "z_after": said.z_after, "base": intervals(base),
-        "best": intervals(said.trial.fit if said.trial else base),
-    }  # fmt: skip
-
-
-def _experiment(verdict: Any) -> dict[str, Any]:
-    """Return the experiment of `separate_by` in numbers, empty where a verdict has none."""
-    return dict(getattr(verdict, "experiment", None) or {})
-
-
-def intervals(fit: Fit | None) -> dict[str, Any]:
-    """Return value and standard deviation by parameter, those that the data cannot tell left out."""
-    if fit is None:
+def intervals(found: Diagnosis) -> dict[str, list[float]]:
+    """Return value and standard deviation by parameter of the model that the verdict names."""
+    trial = found.after or found.before
+    if trial is None:
         return {}
     return {
-        name: [float(fit.model.value(name)), float(fit.std[name])]
-        for name in fit.model.free()
-        if name in fit.std and name not in fit.unidentified
+        name: [float(trial.model.value(name)), float(std)]
+        for name, std in found.std.items()
+        if np.isfinite(std)
     }
 
 

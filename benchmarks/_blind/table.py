@@ -104,15 +104,25 @@ def main_rows(lines: list[Line], noise: float, group: str) -> list[Figure]:
         ("single effect right, 15 and 40 %", count(strong, score.names_effect), 95.0, False),
         ("single effect right, 5 %", count(weak, score.names_effect), 85.0, False),
         ("named and nothing else, 15 and 40 %", count(strong, score.names_it_alone), 90.0, False),
-        ("false alarms on none", count(of_kind(lines, "none", noise), score.false_alarm), 0.0, True),
+        (
+            "false alarms on none",
+            count(of_kind(lines, "none", noise), score.false_alarm),
+            0.0,
+            True,
+        ),
         ("outside effect unknown, 15 and 40 %", count(seen, score.calls_unknown), 90.0, False),
-        ("its coordinate right, of those unknown", count(unknown, score.coordinate_right), 80.0, False),
+        (
+            "its coordinate right, of those unknown",
+            count(unknown, score.coordinate_right),
+            80.0,
+            False,
+        ),
         ("class becomes the effect by separate_by", count(tried, score.separated), 70.0, False),
         ("sensor fault reported, no effect named", count(faults, score.reports_fault), 90.0, False),
         ("library effect called unknown", count(single, score.calls_unknown), 3.0, True),
         ("pair: both named, nothing else", count(pairs, score.names_both), 60.0, False),
         ("pair: one at least, nothing wrong", count(pairs, score.names_one_at_least), 90.0, False),
-    ]  # fmt: skip
+    ]
     return [share(name, found, goal, group, most) for name, found, goal, most in rows]
 
 
@@ -135,12 +145,36 @@ def parameter_rows(lines: list[Line], noise: float, group: str) -> list[Figure]:
     true = [z for z in (score.answer(line).get("z_true") for line in known) if z is not None]
     inside = Count(sum(0.9 <= z <= 1.1 for z in true), len(true))
     rows: list[Figure] = [
-        number("held-out z after adding, same form, median", score.quantile(same, 0.5), len(same), 1.05, group),
-        number("held-out z after adding, same form, 95th percentile", score.quantile(same, 0.95), len(same), 1.15, group),
-        number("held-out z after adding, other form, median", score.quantile(other, 0.5), len(other), None, group),
-        number("held-out z after adding, other form, 95th percentile", score.quantile(other, 0.95), len(other), None, group),
+        number(
+            "held-out z after adding, same form, median",
+            score.quantile(same, 0.5),
+            len(same),
+            1.05,
+            group,
+        ),
+        number(
+            "held-out z after adding, same form, 95th percentile",
+            score.quantile(same, 0.95),
+            len(same),
+            1.15,
+            group,
+        ),
+        number(
+            "held-out z after adding, other form, median",
+            score.quantile(other, 0.5),
+            len(other),
+            None,
+            group,
+        ),
+        number(
+            "held-out z after adding, other form, 95th percentile",
+            score.quantile(other, 0.95),
+            len(other),
+            None,
+            group,
+        ),
         share("z of the true model in 0.9 to 1.1", inside, 90.0, group),
-    ]  # fmt: skip
+    ]
     return rows + interval_rows([*single, *of_kind(lines, "none", noise)], group)
 
 
@@ -159,8 +193,14 @@ def interval_rows(lines: list[Line], group: str) -> list[Figure]:
     wide = 100.0 * score.quantile((w for _, _, w in strong), 0.5)
     return [
         Figure(row.name, row.value, row.counts, row.interval, "90-99 %", fair, group),
-        number("median width of the effect's intervals, 15 and 40 %, per cent of the value", wide, len(strong), 30.0, group),
-    ]  # fmt: skip
+        number(
+            "median width of the effect's intervals, 15 and 40 %, per cent of the value",
+            wide,
+            len(strong),
+            30.0,
+            group,
+        ),
+    ]
 
 
 def time_rows(lines: list[Line], times: dict[str, float]) -> list[Figure]:
@@ -181,20 +221,29 @@ def time_rows(lines: list[Line], times: dict[str, float]) -> list[Figure]:
 
 
 def part_rows(lines: list[Line]) -> list[Figure]:
-    """Return the parts of the main rows: bins, laws, rigs, forms, effects, and what was set aside."""
+    """Return the parts of the main rows: bins, laws, rigs, forms, effects; what was set aside."""
     single, outside = of_kind(lines, "effect", 0.01), of_kind(lines, "outside", 0.01)
     both = [*single, *outside]
     rows = [
-        share("share reached below 2.5 %, set aside", count(both, lambda x: not score.bin_of(x)), group="parts"),
-        share("strength not reachable within physical bounds", count(both, score.unreachable), group="parts"),
+        share(
+            "share reached below 2.5 %, set aside",
+            count(both, lambda x: not score.bin_of(x)),
+            group="parts",
+        ),
+        share(
+            "strength not reachable within physical bounds",
+            count(both, score.unreachable),
+            group="parts",
+        ),
         share("errors", count(lines, lambda x: "error" in x), group="parts"),
-    ]  # fmt: skip
+    ]
     splits: list[tuple[str, Callable[[Line], Any]]] = [
-        ("bin", score.bin_of), ("law", lambda x: x["task"]["law"]),
+        ("bin", score.bin_of),
+        ("law", lambda x: x["task"]["law"]),
         ("rig", lambda x: x["task"]["rig"]),
         ("form", lambda x: "same" if score.task(x).same_form else "other"),
         ("effect", lambda x: x["task"]["effect"]),
-    ]  # fmt: skip
+    ]
     counted = [line for line in single if score.bin_of(line)]
     for what, of in splits:
         for value in sorted({str(of(line)) for line in counted}):
@@ -232,7 +281,7 @@ def part_rows(lines: list[Line]) -> list[Figure]:
             group="parts",
         )
     )
-    return rows  # fmt: skip
+    return rows
 
 
 def as_json(rows: list[Figure]) -> list[dict[str, Any]]:

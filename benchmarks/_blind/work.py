@@ -54,8 +54,8 @@ def _answer(part: str, case: Any) -> dict[str, Any]:
         return peers.ask(case)
     from . import inseparable, subject
 
-    answer = subject.ask(case)
-    return answer | inseparable.follow_up(case, answer)
+    answer, found = subject.ask(case)
+    return answer | inseparable.follow_up(case, answer, found.experiment)
 
 
 def slim(truth: dict[str, Any]) -> dict[str, Any]:
