@@ -9,8 +9,8 @@ stepwise        forward selection of terms. Textbook: polynomial terms of the ra
                 error by 3 %; "unknown" where more than 1.15 times the noise is left.
 sparse          sequentially thresholded least squares (Brunton, Proctor & Kutz 2016, PNAS 113,
                 3932-3937), by pysindy where it is installed, else written here. Textbook:
-                polynomial terms and threshold 0.1 on normalised terms. Informed: the expert's terms, the
-                threshold chosen on held-out runs, most sparse within 3 % of the best.
+                polynomial terms, threshold 0.1 on normalised terms. Informed: the expert's terms,
+                the threshold chosen on held-out runs, most sparse within 3 % of the best.
 correlation     auto-correlation of the residuals and cross-correlation with velocity and voltage
                 against 99 % bounds (Ljung 1999, System Identification, ch. 16; the plot of MATLAB's
                 `resid`). Textbook: any of the 25 lags beyond 2.58/sqrt(n). Calibrated: beyond the
