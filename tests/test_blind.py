@@ -41,6 +41,7 @@ def line(
     told = {"kind": "none", "effects": [], "sensors": [], "coordinate": "", "ranking": []}
     truth = {
         "base": {"v_n": 0.02},
+        "scales": {"force": 10.0},
         "effects": hidden,
         "fault": fault,
         "share": share,

@@ -18,6 +18,12 @@ def _blasius(f: Fields) -> Values:
     return {"c_2": f["quad_b"] * f["quad_w"] ** (2.0 - f["quad_p"]), "shape": f["quad_p"]}
 
 
+def _rigid(f: Fields) -> Values:
+    # The limit of a stiff contact: it gives by 2 % of the gap under the largest force.
+    k = 50.0 * f["force"] / f["se_gap"]
+    return {"gap": f["se_gap"], "k": k, "c": (k * f["se_m"]) ** 0.5, "mass": f["se_m"]}
+
+
 SAME: dict[tuple[str, str], Callable[[Fields], Values]] = {
     ("stribeck", "gaussian"): lambda f: {"rise": f["st_s"], "v_s": f["st_w"], "shape": 2.0},
     ("stribeck", "exponential"): lambda f: {"rise": f["st_s"], "v_s": f["st_w"], "shape": 1.0},
@@ -39,7 +45,7 @@ SAME: dict[tuple[str, str], Callable[[Fields], Values]] = {
     },
     ("fluid_inertia", "mass"): lambda f: {"m_f": f["mass"]},
     ("mount_compliance", "kelvin_voigt"): lambda f: {"k": f["se_k"], "c": f["se_c"]},
-    ("backlash", "rigid"): lambda f: {"gap": f["se_gap"]},
+    ("backlash", "rigid"): _rigid,
     ("coil_lag", "first_order"): lambda f: {"tau": f["coil_up"]},
     ("remanence", "play"): lambda f: {"width": f["rem_r"]},
     ("saturation", "froehlich"): lambda f: {"V_s": f["sat_v"], "shape": 1.0},
@@ -48,7 +54,10 @@ SAME: dict[tuple[str, str], Callable[[Fields], Values]] = {
 }  # fmt: skip
 """The generator's (effect, form) that bristle has, and what its parameters are there."""
 
-LIMITS = ("asymmetry.v_s", "gas_spring.preload", "gas_spring.k_2", "gas_spring.k_3")
+LIMITS = (
+    "asymmetry.v_s", "gas_spring.preload", "gas_spring.k_2", "gas_spring.k_3", "backlash.k",
+    "backlash.c", "backlash.mass",
+)  # fmt: skip
 """True values at zero or at a limit: an interval about them says nothing of coverage."""
 
 
@@ -57,13 +66,13 @@ def is_same(effect: str, form: str) -> bool:
     return (effect, form) in SAME
 
 
-def true_values(found: dict[str, Any]) -> Values | None:
+def true_values(found: dict[str, Any], force: float) -> Values | None:
     """Return bristle's parameters of a hidden effect, `effect.name` to SI; None for other forms.
 
-    `found` is one entry of the truth's effects.
+    `found` is one entry of the truth's effects, `force` [N] about the rig's largest.
     """
     convert = SAME.get((found["effect"], found["form"]))
     if convert is None:
         return None
-    own = convert(found["parameters"])
+    own = convert({**found["parameters"], "force": force})
     return {f"{found['effect']}.{name}": float(value) for name, value in own.items()}

@@ -221,7 +221,7 @@ def truths(line: Line) -> dict[str, float] | None:
     """Return the true values of all parameters in bristle's names; None for other forms."""
     values = dict(line["truth"]["base"])
     for one in line["truth"]["effects"]:
-        own = true_values(one)
+        own = true_values(one, line["truth"]["scales"]["force"])
         if own is None:
             return None
         values |= own

@@ -102,7 +102,7 @@ def true_model(task_law: str, truth: dict[str, Any]) -> Model | None:
     }
     names = []
     for found in truth["effects"]:
-        own = true_values(found)
+        own = true_values(found, truth["scales"]["force"])
         if own is None or found["effect"] not in EFFECTS:
             return None
         if any(name.split(".")[1] not in EFFECTS[found["effect"]].parameters for name in own):

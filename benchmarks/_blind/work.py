@@ -60,7 +60,10 @@ def _answer(part: str, case: Any) -> dict[str, Any]:
 
 def slim(truth: dict[str, Any]) -> dict[str, Any]:
     """Return the part of a truth that scoring needs."""
-    kept = ("base", "effects", "fault", "share", "share_holdout", "share_low_passed", "wanted")
+    kept = (
+        "base", "scales", "effects", "fault", "share", "share_holdout", "share_low_passed",
+        "wanted",
+    )  # fmt: skip
     return {name: truth[name] for name in kept}
 
 

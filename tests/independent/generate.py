@@ -323,6 +323,9 @@ def make_case(
             }
         )
     specimen = Specimen(bed, fields)
+    for one in found:  # the specimen may need more damping in series than was drawn
+        if "se_c" in one["parameters"]:
+            one["parameters"]["se_c"] = float(specimen.plant[0]["se_c"])
     clean = [_shown(specimen, run) for run in plan]
     fault, fault_share = None, 0.0
     if effect in FAULTS:
