@@ -128,6 +128,8 @@ def cut(values: Array, bins: int = BINS) -> Bins | None:
         filled += int(count)
         if alone:
             number, filled = number + 1, 0
+    if number and 0 < filled < 0.4 * share:  # a few samples at the end are no bin
+        group[group == number] = number - 1
     label = group[np.searchsorted(present, levels)]
     label = np.unique(label, return_inverse=True)[1].astype(np.int64)
     count = np.bincount(label)

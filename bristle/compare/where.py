@@ -193,14 +193,22 @@ class Finder:
         }
         self.bins = {name: one for name, one in cuts.items() if one is not None}
 
-    def ranked(self, normalised: Array, leave_out: Sequence[str] = ()) -> list[Place]:
-        """Return the places of a residual (n,), the most telling one first."""
+    def ranked(
+        self, normalised: Array, raw: Array | None = None, leave_out: Sequence[str] = ()
+    ) -> list[Place]:
+        """Return the places of a residual (n,), the most telling one first.
+
+        `raw` (n,) is the same in its unit, by default that of the runs.
+        """
+        raw = self.raw if raw is None else raw
         found: list[Place] = []
         scores: list[Array] = []
         for name, bins in self.bins.items():
             if name in leave_out:
                 continue
-            options = [self._place(name, bins, normalised, turned) for turned in self._ways(name)]
+            options = [
+                self._place(name, bins, normalised, raw, turned) for turned in self._ways(name)
+            ]
             scores += [score for _, score in options]
             best = max(range(len(options)), key=lambda i: options[i][0].share)
             found.append(options[best][0])
@@ -246,7 +254,7 @@ class Finder:
         return self.direction
 
     def _place(
-        self, name: str, bins: Bins, normalised: Array, turned: bool
+        self, name: str, bins: Bins, normalised: Array, raw: Array, turned: bool
     ) -> tuple[Place, Array]:
         """Return a place, its `p` yet its score, and the scores that chance gives (flips,)."""
         values = normalised * self._turn(turned)
@@ -261,7 +269,7 @@ class Finder:
         share = max(0.0, (mine - middle) / max(1.0 - middle, 1e-9))
         power = rms(normalised) ** 2
         excess = share * power / (power - 1.0) if power > 1.1 else float("nan")
-        raw = self.raw * self._turn(turned)
+        raw = raw * self._turn(turned)
         mean = np.bincount(bins.label, weights=raw, minlength=bins.count) / counts
         place = Place(
             name, turned, share, min(excess, 1.0) if excess == excess else excess,
@@ -311,5 +319,5 @@ def organised(
     finder = Finder([residual], [residual], [{"it": coordinate}], flips, seed)
     if "it" not in finder.bins:
         return 0.0, 0.0
-    place, _ = finder._place("it", finder.bins["it"], finder.normalised, False)
+    place, _ = finder._place("it", finder.bins["it"], finder.normalised, residual, False)
     return float(np.sqrt(place.raw)), float(np.sqrt(place.chance))

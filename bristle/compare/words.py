@@ -26,6 +26,15 @@ NAMES = {
     "time": "time",
     "direction": "the direction of motion",
 }
+FAINT = 0.02
+"""Share of an error's power below which its pattern is not worth a sentence."""
+_STEP = 0.3  # numerical error, in units of the noise, that is worth a word
+_SPIKY = 1.4  # plain over robust RMS from which spikes carry the error
+_WHICH = {
+    None: "In this measurement",
+    False: "On runs it has not seen",
+    True: "On the runs that it was fitted to",
+}
 _RIPPLES = 4  # changes of sign along a coordinate from which it goes up and down
 _ALIKE = 0.25  # parts of a pattern's size by which it may differ between voltages
 
@@ -43,35 +52,37 @@ def sentences(comparison: Comparison, finder: Finder) -> tuple[str, ...]:
 def _how_wrong(comparison: Comparison) -> str:
     total = comparison.total
     what, unit = comparison.quantity.replace("_", " "), comparison.unit
-    where = "On the runs that it was fitted to" if comparison.seen else "On runs it has not seen"
+    where = f"{_WHICH[comparison.seen]} the model misses"
     size = f"{total.rms:.2g} {unit} RMS"
     if total.share == total.share:
         size += f" ({_percent(total.share)} of the {what})"
     step = ""
-    if total.numerical_z > 0.1:
-        step = f"; the step of the calculation alone accounts for {total.numerical:.1g} {unit}"
+    if total.numerical_z > _STEP:
+        step = f"; the step of the calculation alone makes {total.numerical_z:.2g} times the noise"
+    if total.rms > _SPIKY * total.z * total.noise:
+        size += ", much of it in short spikes"
     if total.z > CLOSE:
         times = f"{total.z:.3g}" if total.z < 100.0 else f"{total.z:.0f}"
         return (
-            f"{where} the model misses the {what} by {size}, {times} times what its noise would "
+            f"{where} the {what} by {size}, {times} times what its noise would "
             f"explain{step}."
         )
-    return f"{where} the model misses the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}."
+    return f"{where} the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}."
 
 
 def _where(comparison: Comparison, finder: Finder) -> str:
     first = comparison.first
-    if first is None:
+    if first is None or first.share < FAINT:
         if comparison.z <= CLOSE:
             return "What is left looks like noise along every coordinate."
         return (
             "No coordinate organises the error beyond chance"
             + (f": {_loudest(comparison)}." if _loudest(comparison) else ".")
         )
-    if comparison.z <= CLOSE and first.share < 0.05:
+    if comparison.z <= CLOSE:
         return (
-            f"A faint pattern is left with {name_of(first.coordinate)}, "
-            f"{_percent(first.share)} of the error's power: {_pattern(first, comparison.unit)}."
+            f"A pattern is left with {name_of(first.coordinate)}, {_percent(first.share)} of the "
+            f"error's power: {_pattern(first, comparison.unit)}."
         )
     also = ""
     if first.alike:
