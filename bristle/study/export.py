@@ -200,8 +200,8 @@ def _motion_file(run: Run, fine: int, path: Path) -> Path:
     count = (len(run.x) - 1) * fine + 1
     steps = h * np.arange(count)
     v = np.interp(steps, run.dt * np.arange(len(run.v)), run.v)
-    nodes = np.concatenate([[0.0], steps + 0.5 * h])
-    x = run.x[0] + np.concatenate([[0.0], np.cumsum(v * np.diff(nodes))])
+    nodes: Array = np.concatenate([[0.0], steps + 0.5 * h])
+    x: Array = run.x[0] + np.concatenate([[0.0], np.cumsum(v * np.diff(nodes))])
     return _signal_file(nodes, x, "displacement", "m", path)
 
 

@@ -221,3 +221,23 @@ def test_what_cannot_be_exported_is_said(
     assert "cannot be written" in capsys.readouterr().err
     assert main(["export", str(tmp_path / "nowhere")]) == 2
     assert "no study" in capsys.readouterr().err
+
+
+def test_a_bad_effect_of_ones_own_is_left_out_with_a_note(
+    bench: Study, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from bristle.study import learning
+
+    (bench.effects_folder / "own_spring.py").write_text(OWN.replace("p.k * q.x", "p.k / q.x"))
+    said: list[str] = []
+    monkeypatch.setitem(learning.DIAGNOSERS, "bench", lambda study, model, say: "a diagnosis")
+    study = Study(bench.folder)
+    assert learning.diagnose_study(study, write=False, say=said.append) == "a diagnosis"
+    assert len(said) == 1
+    assert "own_spring.py, line" in said[0]
+    assert "ZeroDivisionError" in said[0]
+    # A model that names it says the same, with its line.
+    text = (bench.folder / "model.toml").read_text() + "\n[effects.own_spring]\nparameters = {}\n"
+    (bench.folder / "model.toml").write_text(text)
+    assert main(["export", str(bench.folder)]) == 2
+    assert "ZeroDivisionError" in capsys.readouterr().err
