@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -205,7 +206,9 @@ def _motion_file(run: Run, fine: int, path: Path) -> Path:
     return _signal_file(nodes, x, "displacement", "m", path)
 
 
-def _signal_file(time: Array, values: Array, title: str, unit: str, path: Path) -> Path:
+def _signal_file(
+    time: NDArray[Any], values: NDArray[Any], title: str, unit: str, path: Path
+) -> Path:
     rows = [f"time [s],{title} [{unit}]"]
     rows += [f"{t:.12g},{value!r}" for t, value in zip(time.tolist(), values.tolist(), strict=True)]
     write_whole(path, "\n".join(rows) + "\n")

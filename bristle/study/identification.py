@@ -138,9 +138,11 @@ def identify_study(
     identifier = IDENTIFIERS.get(study.settings.rig)
     if identifier is None:
         raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not identified yet.')
+    left_out = tuple(f"Left out: {why}" for why in study.usable_effects())
     model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     found = identifier(study, model, cutoff, starts, table, show or (lambda done: None), begin)
+    found = replace(found, notes=(*found.notes, *left_out))
     if not write:
         return found
     step = study.add_step(
