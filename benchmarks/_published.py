@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 _FILE = Path(__file__).resolve().parents[1] / "tests" / "reference" / "model.toml"
 MODEL: dict[str, Any] = tomllib.loads(_FILE.read_text(encoding="utf-8"))
 
+DRIFT = "structure.base_displacement"
 SECOND_FLOOR = "structure.floor2_acceleration_absolute"
 PEAKS = {
-    "structure.base_displacement": "max |x_b| m",
+    DRIFT: "max |x_b| m",
     "structure.drift2": "max |x_2 - x_1| m",
     "structure.base_acceleration_absolute": "max |base acceleration| m/s2",
     SECOND_FLOOR: "max |y| m/s2",
@@ -19,26 +24,52 @@ PEAKS = {
     "damper.force": "max |f| N",
 }
 
-_NO_DAMPER = {f"damper.{name}": 0.0 for name in ("sigma_a", "sigma_0", "sigma_1")}
-_NO_DAMPER |= {"damper.sigma_2": 0.0, "damper.sigma_b": 0.0}
+_COEFFICIENTS = ("sigma_a", "sigma_0", "sigma_1", "sigma_2", "sigma_b")
 
 
-def half_sine() -> list[tuple[str, dict[str, float], dict[str, float], float]]:
-    """Return the cases of the half-sine pulse.
+@dataclass(frozen=True)
+class Case:
+    """One row of the half-sine table.
 
-    Each is its name, the overrides that make it of the stock scenario, the peak of each column,
-    and x_b(10 s) [m]. A damper whose coefficients are all 0 stands for no damper.
+    `overrides` make the case of the stock scenario; a damper whose coefficients are all 0 stands
+    for none. `peaks` by column, `times` [s] of the two peaks for which the table gives them, `end`
+    the base displacement at the end [m].
     """
+
+    name: str
+    overrides: dict[str, Any]
+    peaks: dict[str, float]
+    times: dict[str, float]
+    end: float
+
+
+def half_sine() -> list[Case]:
+    """Return the cases of the half-sine pulse."""
     table = MODEL["half_sine"]
     cases = []
     for row in table["rows"]:
-        named = dict(zip(table["columns"], row, strict=True))
+        entries = dict(zip(table["columns"], row, strict=True))
         voltage = row[0]
-        overrides = {"voltage.level": voltage} if voltage >= 0.0 else _NO_DAMPER
-        name = f"{voltage:g} V" if voltage >= 0.0 else "no damper"
-        peaks = {column: named[entry] for column, entry in PEAKS.items() if named[entry]}
-        cases.append((name, overrides, peaks, named["x_b(10 s) m"]))
+        name, overrides = f"{voltage:g} V", {"voltage.level": voltage}
+        if voltage < 0.0:
+            name, overrides = "no damper", {f"damper.{c}": 0.0 for c in _COEFFICIENTS}
+        peaks = {column: entries[entry] for column, entry in PEAKS.items() if entries[entry]}
+        times = {c: row[table["columns"].index(PEAKS[c]) + 1] for c in (DRIFT, SECOND_FLOOR)}
+        cases.append(Case(name, overrides, peaks, times, entries["x_b(10 s) m"]))
     return cases
+
+
+def symbol(column: str) -> str:
+    """Return the table's symbol of a column: "y" of "max |y| m/s2"."""
+    return PEAKS[column].split("|")[1]
+
+
+def peak_errors(case: Case, columns: Mapping[str, Any]) -> dict[str, float]:
+    """Return how far the peak of each column lies from the table, as a share."""
+    return {
+        name: abs(float(np.abs(columns[name]).max()) / peak - 1.0)
+        for name, peak in case.peaks.items()
+    }
 
 
 def passive() -> dict[tuple[float, float], float]:
