@@ -153,9 +153,9 @@ def identify_bench(
     return _identify(runs, model, cutoff, starts, table, show)
 
 
-IDENTIFIERS: dict[
-    str, Callable[[Study, StudyModel, float, int, bool, Show], Identified]
-] = {"bench": identify_bench}
+IDENTIFIERS: dict[str, Callable[[Study, StudyModel, float, int, bool, Show], Identified]] = {
+    "bench": identify_bench
+}
 """What identifies a study, by its rig."""
 
 
@@ -257,9 +257,7 @@ def _identify(
     show(4)
     if not any(one.has(*(c,)) for one in runs.all for c in DRIVE):
         notes.append("Neither voltage nor current was measured: the parameters hold at its level.")
-    return Identified(
-        fit, found, rows, cutoff, before, after, tuple(notes), None, train, holdout
-    )
+    return Identified(fit, found, rows, cutoff, before, after, tuple(notes), None, train, holdout)
 
 
 def as_model(model: StudyModel) -> Model:
