@@ -7,6 +7,7 @@ from math import pi
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
 from ..identify.table import CUTOFF, LawError, error_table, low_pass
@@ -17,7 +18,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
     from matplotlib.gridspec import GridSpec
-    from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 SCENARIO = "identification_chirp"
 
@@ -75,13 +77,17 @@ def _title(cases: list[_Case]) -> str:
 
 def _subtitle(cases: list[_Case]) -> str:
     better = all(case.errors["lugre"].train < case.errors["bingham"].train for case in cases)
-    order = "LuGre is better than Bingham with both bristles, as the text says" if better else "LuGre is not better than Bingham with both bristles"
+    order = (
+        "LuGre is better than Bingham with both bristles, as the text says"
+        if better
+        else "LuGre is not better than Bingham with both bristles"
+    )
     return (
         "Synthetic experiment of section III-C: table chirp of 1 to 10 Hz in 70 s, voltage a sine "
         f"of 2 Hz up to 5 V, {NOISE:.0%} noise on the force; measured and predicted force below "
         f"{CUTOFF:g} Hz, least squares from several starts. Grey: the damper; blue: Bingham; red: "
-        f"LuGre; dashed: standard laws. {order}; which bristle is the paper's, its lost table would "
-        "tell."
+        f"LuGre; dashed: standard laws. {order}; which bristle is the paper's, its lost table "
+        "would tell."
     )
 
 
@@ -98,10 +104,8 @@ def _case(runs: Runs, name: str) -> _Case:
 def _run(frame: pd.DataFrame, name: str) -> Run:
     """Return the experiment as a measured run, with noise on its force."""
     time = frame.index.to_numpy(dtype=float)
-    x, v, force = (
-        frame[column].to_numpy(dtype=float)
-        for column in ("structure.base_displacement", "structure.base_velocity", "damper.force")
-    )
+    columns = ("structure.base_displacement", "structure.base_velocity", "damper.force")
+    x, v, force = (np.asarray(frame[name], dtype=np.float64) for name in columns)
     dt = float(time[1] - time[0])
     noise = NOISE * float(np.sqrt(np.mean(force**2)))
     measured = force + noise * np.random.default_rng(6).standard_normal(len(force))
@@ -121,7 +125,7 @@ def _errors(case: _Case) -> pd.DataFrame:
     return pd.DataFrame(rows, columns=[*columns, "starts that agree", "starts"])
 
 
-def _sine(model: Model) -> tuple[NDArray[np.float64], ...]:
+def _sine(model: Model) -> tuple[Array, Array, Array, Array]:
     """Return time, displacement, velocity, force of the fifth cycle at 2 Hz, 0.1 m/s, 4 V."""
     dt, w = 5e-4, 4.0 * pi
     t = np.arange(5001) * dt
@@ -129,7 +133,8 @@ def _sine(model: Model) -> tuple[NDArray[np.float64], ...]:
     V, none = np.full_like(t, 4.0), np.zeros((0, len(t), 4))
     run = Run("sine", dt, x, v, a, V, np.zeros_like(t), 1.0, none)
     force = Problem([run]).predict(model, run)
-    return tuple(values[-1001:] for values in (t, x, v, force))
+    last = slice(-1001, None)
+    return t[last], x[last], v[last], np.asarray(force[last])
 
 
 def _loop(page: Page, grid: GridSpec, column: int, case: _Case) -> pd.DataFrame:

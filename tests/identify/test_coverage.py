@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from truths import true_case
 
 from bristle.identify.fit import identify
 from bristle.study.judged import robust_z
-
-from .truths import true_case
 
 RIGS = ("bench_10N", "bench_2kN")
 NOISES = (0.01, 0.03)

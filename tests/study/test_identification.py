@@ -28,7 +28,7 @@ def bench_frame(seed, force=1.0, speed=1.0, length=1.0, volts=None, law="bingham
     size = 0.04 * speed / w
     x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
     V = 2.5 * (1.0 + np.sin(2.0 * np.pi * (0.7 + 0.2 * seed) * T)) if volts is None else volts
-    V = np.broadcast_to(np.asarray(V, dtype=float), T.shape)
+    V = np.zeros(N) + V
     values = {
         "bingham": {
             "f_c": 1.3 * force, "f_v": 0.83 * force, "c_0": 100.0 * force / speed,
@@ -42,9 +42,7 @@ def bench_frame(seed, force=1.0, speed=1.0, length=1.0, volts=None, law="bingham
     }[law]  # fmt: skip
     F = Bench(law, []).force(x, v, a, V, DT, values)
     columns = {"displacement": x, "velocity": v, "voltage": V, "force": F}
-    noisy = {
-        name: y + noise * np.std(y) * random.standard_normal(N) for name, y in columns.items()
-    }
+    noisy = {name: y + noise * np.std(y) * random.standard_normal(N) for name, y in columns.items()}
     return pd.DataFrame({"time": T, **noisy}), values
 
 
