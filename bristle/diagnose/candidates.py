@@ -1,7 +1,8 @@
-"""Each effect tried inside the model: refitted on the training runs, judged on the held-out ones."""
+"""Each effect tried inside the model: refitted on training runs, judged on held-out ones."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
@@ -10,56 +11,139 @@ from os import cpu_count
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.fit import FIXED, Fit, Model, Problem, Run, fit, huber, parameter
+from ..identify.fit import Model, Problem, parameter
+from ..identify.search import Descent, descend, jacobian, loss
 from ..physics.effect import EFFECTS, effects_of
 
 Array = NDArray[np.float64]
+Expected = list[tuple[Array, Array, Array]]
 
-# Where a search begins, as factors on an effect's defaults scaled to the rig.
-SEARCH = {
+SEARCH: dict[str, dict[str, tuple[float, ...]]] = {
     "stribeck": {"v_s": (0.3, 1.0, 3.0)},
-    "flattening": {"v_f": (0.3, 1.0, 4.0)},
+    "flattening": {"v_f": (0.5, 3.0)},
     "saturation": {"V_s": (0.4, 1.0)},
     "coil_lag": {"tau": (0.5, 2.0)},
     "temperature": {"E_0": (0.5, 4.0), "tau": (0.2,)},
-    "presliding": {"x_s": (0.3, 2.0)},
-    "mount_compliance": {"k": (0.3, 2.0)},
-    "backlash": {"gap": (0.5, 2.0)},
+    "presliding": {"x_s": (0.1, 0.6)},
+    "mount_compliance": {"k": (1.0,)},
+    "backlash": {"gap": (0.3, 1.0)},
+    "remanence": {},
 }
+"""Where a search begins, as factors on an effect's defaults scaled to the rig."""
+
+QUICK = 4
+"""Sweeps of the first, short search from each start."""
+
+PROMISING = 0.5
+"""Share of the best gain on the training runs below which a candidate is not refined."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A model tried: its fit on the training runs and its errors on the held-out ones.
+    """A model tried: fitted on the training runs, judged on the held-out ones.
 
-    `z` is the robust RMS of residual over expected noise, per held-out run; `loss` (n,) the robust
-    loss per sample over all held-out runs, `residual` (n,) the normalised residuals.
+    `train`, `z` the robust RMS of residual over expected noise there; `losses` (n,) the robust loss
+    per held-out sample, `residual` (n,) the normalised residuals, `rms` [N] their plain size.
+    `refined` is False where the first, short search already showed that it gains too little.
     """
 
-    effects: tuple[str, ...]
-    fit: Fit
+    model: Model
+    train: float
     z: float
-    z_train: float
     rms: float
-    loss: Array
+    losses: Array
     residual: Array
+    refined: bool = True
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """The effects of the model."""
+        return self.model.effects
 
 
-REFERENCE = {
-    "N": 4.0, "N/m": 800.0, "N/m2": 1.6e5, "N/m3": 3.2e7, "m": 5e-3, "m/s": 0.07, "N.s/m": 57.0,
-    "N.s2/m2": 816.0, "kg": 2.7, "J": 0.02, "V": 5.0,
-}  # fmt: skip
-"""Typical sizes on the rig of 10 N for which the effects' defaults are written."""
+HUBER_AT_ONE = 0.494231
+"""Mean Huber loss (k = 2) of a standard normal variable."""
+
+
+def z_of(mean_loss: float) -> float:
+    """Return RMS(residual)/noise from a mean robust loss: 1 for Gaussian noise of that size."""
+    return float(np.sqrt(max(mean_loss, 0.0) / HUBER_AT_ONE))
+
+
+class Search:
+    """The search for a model's free parameters on runs: logarithms where a bound is above zero."""
+
+    def __init__(self, problem: Problem, model: Model, expected: Expected, names: Sequence[str]):
+        self.problem, self.model, self.expected = problem, model, expected
+        self.names = list(names)
+        declared = [parameter(model.law, name) for name in self.names]
+        value = np.array([model.value(name) for name in self.names])
+        bounds = np.array([model.bounds(name) for name in self.names], dtype=float).reshape(-1, 2)
+        self.log = (bounds[:, 0] > 0.0) & (bounds[:, 1] > 50.0 * bounds[:, 0])
+        sizes = np.array([problem.size(d.unit) for d in declared])
+        self.scale = np.where(self.log, 1.0, np.maximum(np.abs(value), 1e-2 * sizes))
+        self.low, self.high = self._to(bounds[:, 0]), self._to(bounds[:, 1])
+        self.start = self._to(np.clip(value, bounds[:, 0], bounds[:, 1]))
+
+    def _to(self, value: Array) -> Array:
+        safe = np.where(self.log, np.maximum(value, 1e-300), 1.0)
+        return np.where(self.log, np.log(safe), value / self.scale)
+
+    def at(self, theta: Array) -> Model:
+        """Return the model with these parameters."""
+        value = np.where(self.log, np.exp(np.where(self.log, theta, 0.0)), theta * self.scale)
+        return replace(
+            self.model,
+            values={**self.model.values, **dict(zip(self.names, value.tolist(), strict=True))},
+        )
+
+    def residuals(self, theta: Array) -> Array:
+        """Return the normalised residuals of all runs (n,)."""
+        return residuals(self.problem, self.at(theta), self.expected)
+
+    def sensitivities(self) -> Array:
+        """Return how the normalised residuals change with the parameters (n, p), there."""
+        here = self.residuals(self.start)
+        return jacobian(self.residuals, self.start, here, self.low, self.high)
+
+    def run(self, sweeps: int) -> tuple[Model, Descent]:
+        """Search from the model's own values."""
+        found = descend(self.residuals, self.start, self.low, self.high, sweeps)
+        return self.at(found.theta), found
+
+
+def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
+    """Return the residuals of all runs over the noise expected there (n,)."""
+    parts = []
+    for run, (bias, sigma, _) in zip(problem.runs, expected, strict=True):
+        z = (run.force - problem.predict(model, run) - bias) / sigma
+        parts.append(np.nan_to_num(z[run.skip :], nan=1e6, posinf=1e6, neginf=-1e6))
+    return np.concatenate(parts)
+
+
+def judge(model: Model, train: Problem, held_out: Problem, refined: bool = True) -> Trial:
+    """Return how a fitted model does on the runs that it was fitted to and on the others."""
+    expected = held_out.expectation(model)
+    z = residuals(held_out, model, expected)
+    own = residuals(train, model, train.expectation(model))
+    raw = np.concatenate(list(_raw(held_out, model, expected)))
+    losses = loss(z)
+    return Trial(
+        model, z_of(float(np.mean(loss(own)))), z_of(float(np.mean(losses))),
+        float(np.sqrt(np.mean(raw**2))), losses, z, refined,
+    )  # fmt: skip
+
+
+def _raw(problem: Problem, model: Model, expected: Expected) -> Iterable[Array]:
+    for run, (bias, _, _) in zip(problem.runs, expected, strict=True):
+        yield (run.force - problem.predict(model, run) - bias)[run.skip :]
 
 
 def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
     """Return the models from which the search for an effect's parameters begins."""
-    values = {}
-    for name, declared in EFFECTS[effect].parameters.items():
-        reference = REFERENCE.get(declared.unit)
-        start = declared.value * (problem.size(declared.unit) / reference if reference else 1.0)
-        low, high = declared.bounds
-        values[name] = min(max(start, low), high)
+    values = {
+        name: problem.scaled(base.law, f"{effect}.{name}") for name in EFFECTS[effect].parameters
+    }
     factors = SEARCH.get(effect, {})
     out = []
     for combination in product(*factors.values()):
@@ -71,48 +155,80 @@ def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
     return out
 
 
-def judge(effects: tuple[str, ...], found: Fit, train: Problem, held_out: Problem) -> Trial:
-    """Return how a fitted model does on runs that it has not seen."""
-    residuals, raw = [], []
-    for run, (bias, sigma, _) in zip(held_out.runs, held_out.expectation(found.model), strict=True):
-        error = run.force - held_out.predict(found.model, run) - bias
-        raw.append(error[run.skip :])
-        residuals.append((error / sigma)[run.skip :])
-    z = np.concatenate(residuals)
-    return Trial(
-        effects, found, robust(z), np.sqrt(2.0 * found.cost), float(np.sqrt(np.mean(np.concatenate(raw) ** 2))),
-        huber(z), z,
-    )  # fmt: skip
+@dataclass(frozen=True)
+class Begun:
+    """A candidate after its first, short search, with its mean loss on the training runs."""
+
+    model: Model
+    cost: float
 
 
-def robust(z: Array) -> float:
-    """Return the robust RMS, the median of |z| over 0.6745; tails beyond 3 count in full."""
-    tail = np.sqrt(np.mean(np.minimum(np.abs(z), 6.0) ** 2))
-    return float(
-        max(np.median(np.abs(z)) / 0.6745, 0.5 * tail + 0.5 * np.median(np.abs(z)) / 0.6745)
-    )
+def begin(effect: str, base: Model, train: Problem, expected: Expected) -> Begun:
+    """Search shortly from every start of an effect, its own parameters first; return the best."""
+    found = []
+    few = lighter(train, effect)
+    light = [expected[i] for i in few]
+    part = Problem([train.runs[i] for i in few])
+    for model in starts(effect, base, train):
+        own = [name for name in model.free() if name.startswith(effect + ".")]
+        model, _ = Search(part, model, light, own).run(QUICK)
+        model, ended = Search(part, model, light, model.free()).run(QUICK)
+        found.append(Begun(model, ended.cost))
+    best = min(found, key=lambda one: one.cost)
+    if len(few) < len(train.runs):
+        return Begun(best.model, float(np.mean(loss(residuals(train, best.model, expected)))))
+    return best
 
 
-def try_effect(effect: str, base: Fit, train: Problem, held_out: Problem) -> Trial:
-    """Refit the model with one more effect from several starts and judge the best."""
-    expected = train.expectation(base.model)
-    begun = [
-        fit(train, model, expectation=expected, max_evaluations=5, with_std=False)
-        for model in starts(effect, base.model, train)
-    ]
-    best = min(begun, key=lambda one: one.cost)
-    best = fit(train, best.model, expectation=expected, max_evaluations=20, with_std=False)
-    best = fit(train, best.model, expectation=train.expectation(best.model), max_evaluations=8)
-    return judge((*base.model.effects, effect), best, train, held_out)
+def lighter(problem: Problem, effect: str) -> list[int]:
+    """Return which runs a short search uses: a series element costs thirty times as much."""
+    count = len(problem.runs)
+    return list(range(count)) if not EFFECTS[effect].joint else list(range(0, count, 2))
 
 
-def try_all(base: Fit, train: Problem, held_out: Problem) -> list[Trial]:
-    """Try every effect that can join the law, on all cores; best first."""
+def refine(begun: Model, train: Problem, sweeps: int = 12) -> Model:
+    """Fit all free parameters, the noise expected of the model renewed on the way."""
+    model = begun
+    for share in (0.5, 1.0):
+        model, _ = Search(train, model, train.expectation(model), model.free()).run(
+            max(3, int(share * sweeps))
+        )
+    return model
+
+
+def joinable(base: Model) -> list[str]:
+    """Return the effects that can join a model, the slow ones first."""
+    taken = set(base.effects)
+    for name in base.effects:
+        taken |= set(EFFECTS[name].excludes)
     names = [
-        e.name for e in effects_of("damper", base.model.law) if e.name not in base.model.effects
+        e.name
+        for e in effects_of("damper", base.law)
+        if e.name not in taken and not set(e.excludes) & set(base.effects)
     ]
-    slow = [n for n in names if "rate" in EFFECTS[n].hooks()]
-    order = slow + [n for n in names if n not in slow]
+    return sorted(names, key=lambda name: not EFFECTS[name].joint)
+
+
+def try_all(
+    base: Model, train: Problem, held_out: Problem, progress: Callable[[str], None] | None = None
+) -> list[Trial]:
+    """Try every effect that can join the model, on all cores; best on the held-out runs first.
+
+    Every effect is searched shortly from several starts; those that gain a fair share of what the
+    best one gains on the training runs are refined.
+    """
+    expected = train.expectation(base)
+    before = float(np.mean(loss(residuals(train, base, expected))))
+    names = joinable(base)
     with ThreadPoolExecutor(cpu_count()) as pool:
-        trials = list(pool.map(lambda name: try_effect(name, base, train, held_out), order))
-    return sorted(trials, key=lambda trial: trial.loss.mean())
+        begun = list(pool.map(lambda name: begin(name, base, train, expected), names))
+        most = max(before - one.cost for one in begun)
+        worth = [before - one.cost >= PROMISING * most for one in begun]
+
+        def finish(pair: tuple[Begun, bool]) -> Trial:
+            one, fine = pair
+            model = refine(one.model, train) if fine else one.model
+            return judge(model, train, held_out, fine)
+
+        trials = list(pool.map(finish, zip(begun, worth, strict=True)))
+    return sorted(trials, key=lambda trial: trial.z)

@@ -69,7 +69,7 @@ def descend(
     damping, normal, small = 1e-3, np.zeros((len(theta), len(theta))), 0
     for sweep in range(sweeps):
         weight = np.minimum(1.0, HUBER / np.maximum(np.abs(r), 1e-12))
-        J = _jacobian(residuals, theta, r, low, high)
+        J = jacobian(residuals, theta, r, low, high)
         weighted = J * weight[:, None]
         normal, gradient = weighted.T @ J, weighted.T @ r
         moved = False
@@ -90,9 +90,10 @@ def descend(
     return Descent(theta, cost, normal, sweeps)
 
 
-def _jacobian(
+def jacobian(
     residuals: Callable[[Array], Array], theta: Array, r: Array, low: Array, high: Array
 ) -> Array:
+    """Return the derivatives of `residuals` at theta (n, p) by differences, inside the bounds."""
     J = np.empty((len(r), len(theta)))
     for i in range(len(theta)):
         nudge = _NUDGE * max(1.0, abs(theta[i]))

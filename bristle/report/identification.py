@@ -128,7 +128,7 @@ def _errors(case: _Case) -> pd.DataFrame:
 def _sine(model: Model) -> tuple[Array, Array, Array, Array]:
     """Return time, displacement, velocity, force of the fifth cycle at 2 Hz, 0.1 m/s, 4 V."""
     dt, w = 5e-4, 4.0 * pi
-    t: Array = np.arange(5001) * dt
+    t = dt * np.arange(5001, dtype=np.float64)
     x, v, a = 0.1 / w * np.sin(w * t), 0.1 * np.cos(w * t), -0.1 * w * np.sin(w * t)
     V, none = np.full_like(t, 4.0), np.zeros((0, len(t), 4))
     run = Run("sine", dt, x, v, a, V, np.zeros_like(t), 1.0, none)

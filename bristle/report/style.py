@@ -174,6 +174,17 @@ class Page:
             raise not_usable(f"{path}: cannot be written: {error.strerror or error}.") from error
 
 
+def png(page: Page, dpi: int = 160) -> bytes:
+    """Return a page as the bytes of a PNG; the same drawing gives the same bytes."""
+    import io
+
+    file = io.BytesIO()
+    with look(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        page.figure.savefig(file, format="png", dpi=dpi)
+    return file.getvalue()
+
+
 def _broken(text: str, width: float, per_inch: float) -> str:
     """Return a text broken into lines that fit; characters per inch follow from the font size."""
     return "\n".join(

@@ -1,0 +1,18 @@
+"""Where the residual of a model lives, in units of the noise, and what an engineer would say."""
+
+from __future__ import annotations
+
+from .comparison import Comparison, RunError, compare, compare_held
+from .held import Held, held_runs
+from .where import Place, organised
+
+__all__ = [
+    "Comparison",
+    "Held",
+    "Place",
+    "RunError",
+    "compare",
+    "compare_held",
+    "held_runs",
+    "organised",
+]

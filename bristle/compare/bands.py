@@ -1,0 +1,141 @@
+"""Where a residual lives in frequency: its power against that of the noise, band by band."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scale import z_scale
+
+if TYPE_CHECKING:
+    from .held import Held
+
+Array = NDArray[np.float64]
+
+_CYCLES = 3  # of the lowest band's frequency in a run, so that it holds enough lines
+_MOST = 9
+_SPIKE = 4.0  # times noise (or the whole error) beyond which a sample is cut: no line of a spectrum
+_HANN = 1.94  # equivalent lines that a Hann window joins, in variance (Welch 1967)
+
+
+@dataclass(frozen=True)
+class Band:
+    """One octave: `low`, `high` Hz; `z` the residual's RMS over that of the noise in it.
+
+    `rms` the residual's in the unit of the output; `share` of all power beyond the noise; `p` the
+    chance of such a `z` under a true model; `coherence` in 0 .. 1 with the predicted output: near 1
+    a linear correction of the model would carry it.
+    """
+
+    low: float
+    high: float
+    z: float
+    rms: float
+    share: float
+    p: float
+    coherence: float
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Power spectral densities (k,) over `frequency` (k,) Hz, in unit^2/Hz; and the bands."""
+
+    frequency: Array
+    residual: Array
+    noise: Array
+    measured: Array
+    bands: tuple[Band, ...]
+
+
+def spectrum(held: Sequence[Held]) -> Spectrum:
+    """Return the spectrum of residual, expected noise and measured output over all runs."""
+    from scipy.signal import csd, welch
+
+    size = min(1024, *(len(one.residual) for one in held))
+    rate = 1.0 / held[0].dt
+    lines = None
+    limit = _SPIKE * max(1.0, z_scale(np.concatenate([one.normalised for one in held])))
+    errors = [
+        np.clip(one.normalised, -limit, limit) * one.sigma[one.skip :] for one in held
+    ]
+    total = sum(len(one.residual) for one in held)
+    sums = np.zeros((4, size // 2 + 1))
+    cross = np.zeros(size // 2 + 1, dtype=complex)
+    for one, error in zip(held, errors, strict=True):
+        weight = len(error) / total
+        options = {"fs": 1.0 / one.dt, "nperseg": size}
+        lines, residual = welch(error, **options)
+        white = 2.0 * one.noise**2 * one.dt
+        carried = np.mean(welch(one.carried, **options, axis=-1)[1], axis=0)
+        predicted = one.predicted[one.skip :]
+        measured = one.measured[one.skip :]
+        sums[0] += weight * residual
+        sums[1] += weight * (white + carried)
+        sums[2] += weight * welch(measured, **options)[1]
+        sums[3] += weight * welch(predicted, **options)[1]
+        cross += weight * csd(error, predicted, **options)[1]
+    assert lines is not None
+    with np.errstate(invalid="ignore", divide="ignore"):
+        coherence = np.nan_to_num(np.abs(cross) ** 2 / (sums[0] * sums[3]))
+    bands = _bands(held, errors, rate, lines, coherence, sums[0])
+    return Spectrum(lines, sums[0], sums[1], sums[2], bands)
+
+
+def edges(rate: float, duration: float) -> Array:
+    """Return the edges [Hz] of octaves from where runs hold some cycles to half the rate."""
+    lowest = 2.0 ** np.ceil(np.log2(_CYCLES / duration))
+    inner = []
+    f = lowest
+    while f < 0.4 * rate and len(inner) < _MOST - 1:
+        inner.append(f)
+        f *= 2.0
+    return np.array([0.0, *inner, 0.5 * rate])
+
+
+def _bands(
+    held: Sequence[Held], errors: Sequence[Array], rate: float, lines: Array, coherence: Array, power: Array
+) -> tuple[Band, ...]:
+    """Return the bands, from one tapered periodogram per run: its lines are nearly independent."""
+    from scipy.stats import chi2
+
+    cuts = edges(rate, min(len(one.residual) * one.dt for one in held))
+    found, expected, freedom = (np.zeros(len(cuts) - 1) for _ in range(3))
+    for one, error in zip(held, errors, strict=True):
+        f, mine = _periodogram(error, one.dt)
+        white = np.full(len(f), 2.0 * one.noise**2 * one.dt)
+        noise = white + np.mean([_periodogram(d, one.dt)[1] for d in one.carried], axis=0)
+        width = f[1] - f[0]
+        weight = len(one.residual) / sum(len(other.residual) for other in held)
+        label = np.clip(np.searchsorted(cuts, f, side="right") - 1, 0, len(cuts) - 2)
+        found += weight * np.bincount(label, weights=mine, minlength=len(cuts) - 1) * width
+        expected += weight * np.bincount(label, weights=noise, minlength=len(cuts) - 1) * width
+        # A band whose noise sits in few lines has few degrees of freedom (Satterthwaite 1946).
+        top = np.bincount(label, weights=noise, minlength=len(cuts) - 1) ** 2
+        under = np.bincount(label, weights=noise**2, minlength=len(cuts) - 1)
+        freedom += 2.0 * top / np.maximum(under, 1e-300) / _HANN
+    excess = np.maximum(found - expected, 0.0)
+    ratio = found / np.maximum(expected, 1e-300)
+    p = chi2.sf(ratio * freedom, np.maximum(freedom, 1.0))
+    out = []
+    for i, (low, high) in enumerate(zip(cuts[:-1], cuts[1:], strict=True)):
+        inside = (lines >= low) & (lines < high)
+        weights = power[inside]
+        shared = float(np.average(coherence[inside], weights=weights)) if weights.sum() else 0.0
+        out.append(
+            Band(
+                float(low), float(high), float(np.sqrt(ratio[i])), float(np.sqrt(found[i])),
+                float(excess[i] / max(excess.sum(), 1e-300)), float(p[i]), shared,
+            )
+        )  # fmt: skip
+    return tuple(out)
+
+
+def _periodogram(y: Array, dt: float) -> tuple[Array, Array]:
+    from scipy.signal import periodogram
+
+    f, power = periodogram(y, fs=1.0 / dt, window="hann", detrend=False)
+    return np.asarray(f), np.asarray(power)

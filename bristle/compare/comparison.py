@@ -1,0 +1,220 @@
+"""A model held against runs that it has not seen: how wrong, where, and where not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordError
+from ..identify.fit import Fit, Model, Problem, huber
+from .bands import Spectrum, spectrum
+from .held import Held, held_runs
+from .regimes import Regime, regimes
+from .scale import HUBER_AT_ONE, rms, z_scale
+from .where import FLIPS, Finder, Place
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class RunError:
+    """The error on one run.
+
+    `z` RMS(residual)/noise expected of a true model, by a robust scale; `numerical_z` the same of
+    what half the step changes. `rms`, `noise`, `numerical`, `signal` [unit]: plain RMS of the
+    residual, of the noise expected, of what half the step changes, of the measured output;
+    `noise_own` that of the channel's own noise.
+    """
+
+    name: str
+    samples: int
+    z: float
+    rms: float
+    noise: float
+    noise_own: float
+    numerical: float
+    numerical_z: float
+    signal: float
+
+    @property
+    def share(self) -> float:
+        """RMS of the residual over that of the measured output [1]."""
+        return self.rms / self.signal if self.signal > 0.0 else float("nan")
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A prediction held against measured runs.
+
+    `runs` the error of each, `total` over all; `z_interval` the 95 % interval of the total z;
+    `places` where the residual lives, the most telling coordinate first; `second` the most
+    telling one of what is left after that, None where chance explains the rest; `spectrum` the
+    residual's against the noise's; `regimes` classes of speed and voltage; `held` the runs
+    themselves; `sentences` what an engineer would say; `seen` whether the runs were those of the
+    fit, None where nobody knows.
+    """
+
+    quantity: str
+    unit: str
+    runs: tuple[RunError, ...]
+    total: RunError
+    z_interval: tuple[float, float]
+    places: tuple[Place, ...]
+    second: Place | None
+    spectrum: Spectrum
+    regimes: tuple[Regime, ...]
+    held: tuple[Held, ...] = field(repr=False)
+    sentences: tuple[str, ...] = ()
+    seen: bool | None = False
+
+    @property
+    def z(self) -> float:
+        """RMS(residual)/noise expected of a true model, over all runs."""
+        return self.total.z
+
+    @property
+    def first(self) -> Place | None:
+        """The coordinate that organises the residual most, None where chance explains all."""
+        return self.places[0] if self.places and self.places[0].significant else None
+
+    @property
+    def worst(self) -> Held:
+        """The run with the largest z."""
+        name = max(self.runs, key=lambda run: run.z).name
+        return next(one for one in self.held if one.name == name)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the comparison as JSON has it, without the samples."""
+        return {
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "held_out": None if self.seen is None else not self.seen,
+            "sentences": list(self.sentences),
+            "z": self.z,
+            "z_interval": list(self.z_interval),
+            "total": _run_dict(self.total),
+            "runs": [_run_dict(run) for run in self.runs],
+            "places": [_place_dict(one) for one in self.places],
+            "second": _place_dict(self.second) if self.second else None,
+            "bands": [asdict(band) for band in self.spectrum.bands],
+            "regimes": [{**asdict(one), "right": one.right} for one in self.regimes],
+        }
+
+
+def compare(
+    problem: Problem, model: Fit | Model, *, draws: int = 12, seen: bool = False, seed: int = 0
+) -> Comparison:
+    """Hold a damper's model against measured runs.
+
+    Parameters
+    ----------
+    problem : Problem
+        The runs; held-out ones, unless `seen`.
+    model : Fit or Model
+    draws : int
+        How many draws of the inputs' error are carried through the model.
+    seen : bool
+        Whether the model was fitted to these runs; the sentences then say so.
+
+    Returns
+    -------
+    Comparison
+        The same for the same runs and model, whatever else ran before.
+
+    Raises
+    ------
+    RecordError
+        If there is no run, or a residual is not finite.
+    """
+    chosen = model.model if isinstance(model, Fit) else model
+    return compare_held(held_runs(problem, chosen, draws), seen=seen, seed=seed)
+
+
+def compare_held(
+    held: Sequence[Held], *, seen: bool | None = False, seed: int = 0, flips: int = FLIPS
+) -> Comparison:
+    """Compare one output, measured and predicted, whatever predicted it; see `compare`."""
+    from .words import sentences
+
+    _refuse(held)
+    normalised = [one.normalised for one in held]
+    along = [one.along() for one in held]
+    runs = tuple(_run_error(one.name, [one]) for one in held)
+    finder = Finder(normalised, [one.residual for one in held], along, flips, seed)
+    found = finder.ranked(finder.normalised)
+    second = None
+    if found and found[0].significant:
+        left = finder.without(finder.normalised, found[0])
+        raw = finder.without(finder.raw, found[0])
+        rest = finder.ranked(left, raw, [found[0].coordinate])
+        second = rest[0] if rest and rest[0].significant else None
+    comparison = Comparison(
+        held[0].quantity, held[0].unit, runs, _run_error("all runs", held),
+        _interval(normalised, finder), tuple(found), second, spectrum(held),
+        tuple(regimes(normalised, along)), tuple(held), seen=seen,
+    )  # fmt: skip
+    return replace(comparison, sentences=sentences(comparison, finder))
+
+
+def _refuse(held: Sequence[Held]) -> None:
+    if not held:
+        raise RecordError("there is no run to compare with.")
+    for one in held:
+        if len(one.measured) <= one.skip + 100:
+            raise RecordError(
+                f"{one.name}: {len(one.measured)} samples; a comparison needs {one.skip + 100}."
+            )
+        for what, values in (("predicted", one.predicted), ("measured", one.measured)):
+            bad = np.flatnonzero(~np.isfinite(values))
+            if len(bad):
+                raise RecordError(
+                    f"{one.name}: the {what} {one.quantity} is {values[bad[0]]} at "
+                    f"{one.time[bad[0]]:g} s. Look at the model's values there."
+                )
+        if not np.min(one.sigma) > 0.0:
+            raise RecordError(
+                f"{one.name}: the noise of the {one.quantity} is zero: nothing tells what error "
+                f"is large. Give one in study.toml, noise = ... in [channels.{one.quantity}]."
+            )
+
+
+def _run_error(name: str, held: Sequence[Held]) -> RunError:
+    """Return the error over some runs."""
+    residual = np.concatenate([one.residual for one in held])
+    sigma = np.concatenate([one.sigma[one.skip :] for one in held])
+    own = np.concatenate([np.full(len(one.residual), one.noise) for one in held])
+    tried = [one.numerical[one.skip :] for one in held if one.numerical is not None]
+    moved = np.concatenate(tried) if len(tried) == len(held) else np.full(1, np.nan)
+    return RunError(
+        name, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
+        rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
+        rms(np.concatenate([one.measured[one.skip :] for one in held])),
+    )  # fmt: skip
+
+
+def _interval(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
+    """Return the 95 % interval of z over all runs, by the scatter of the loss from block to block."""
+    loss = huber(np.concatenate(list(normalised)))
+    blocks = finder.blocks
+    counts = np.bincount(blocks.label)
+    means = np.bincount(blocks.label, weights=loss) / np.maximum(counts, 1)
+    mean = float(loss.mean())
+    std = float(np.std(means)) / np.sqrt(max(len(means) - 1, 1))
+    low, high = max(mean - 1.96 * std, 0.0), mean + 1.96 * std
+    return float(np.sqrt(low / HUBER_AT_ONE)), float(np.sqrt(high / HUBER_AT_ONE))
+
+
+def _run_dict(run: RunError) -> dict[str, Any]:
+    return {**asdict(run), "share": run.share}
+
+
+def _place_dict(place: Place) -> dict[str, Any]:
+    found = asdict(place)
+    for key in ("centre", "low", "high", "mean", "std"):
+        found[key] = [float(value) for value in found[key]]
+    del found["raw"], found["chance"]
+    return {**found, "alike": list(place.alike), "significant": place.significant}

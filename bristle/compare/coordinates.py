@@ -1,0 +1,146 @@
+"""The coordinates along which a residual may be organised, and the bins of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
+
+RECENT = 0.05
+"""Time over which a change of the voltage counts as its rate [s]."""
+BINS = 16
+FINE = {"displacement": 40}
+"""Bins of coordinates along which a force may ripple."""
+SLOW = ("time", "dissipated_energy")
+"""Coordinates that only grow over a run: few blocks of samples fall into each of their bins."""
+_TIED = 1e-4  # share of the range below which two values are one level
+
+# (factor from SI, unit) in which an engineer reads a coordinate
+SHOWN: dict[str, tuple[float, str]] = {
+    "displacement": (1e3, "mm"),
+    "velocity": (1e3, "mm/s"),
+    "speed": (1e3, "mm/s"),
+    "acceleration": (1.0, "m/s2"),
+    "voltage": (1.0, "V"),
+    "voltage_rate": (1.0, "V/s"),
+    "direction": (1.0, ""),
+    "time": (1.0, "s"),
+    "dissipated_energy": (1.0, "J"),
+    "time_since_reversal": (1e3, "ms"),
+}
+
+
+def coordinates_of(
+    dt: float,
+    x: Array | None,
+    v: Array | None,
+    a: Array | None,
+    V: Array | None,
+    force: Array | None,
+) -> dict[str, Array]:
+    """Return the coordinates (n,) of one run in SI that its signals allow.
+
+    Parameters
+    ----------
+    dt : float, s
+    x, v, a, V, force : (n,) m, m/s, m/s2, V, N or None; smoothed, for noise blurs the bins
+    """
+    found: dict[str, Array] = {}
+    if x is not None:
+        found["displacement"] = x
+    if v is not None:
+        found["velocity"] = v
+        found["speed"] = np.abs(v)
+        found["direction"] = np.where(v < 0.0, -1.0, 1.0)
+        found["time_since_reversal"] = since_reversal(v, dt)
+    if a is not None:
+        found["acceleration"] = a
+    if V is not None:
+        found["voltage"] = V
+        found["voltage_rate"] = recent_rate(V, dt)
+    if v is not None and force is not None:
+        found["dissipated_energy"] = np.cumsum(np.abs(force * v)) * dt
+    given = next((y for y in (x, v, a, V, force) if y is not None), np.zeros(0))
+    found["time"] = np.arange(len(given)) * dt
+    return found
+
+
+def since_reversal(v: Array, dt: float) -> Array:
+    """Return the time (n,) [s] since a velocity (n,) last changed sign."""
+    turned = np.concatenate([[True], v[1:] * v[:-1] <= 0.0])
+    index = np.arange(len(v))
+    return np.asarray((index - np.maximum.accumulate(np.where(turned, index, 0))) * dt, dtype=float)
+
+
+def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
+    """Return how fast a drive signal (n,) has changed of late, per second.
+
+    The change since its own first-order lag: a step shows for some `over` seconds, where a
+    difference from sample to sample shows it once.
+    """
+    keep = float(np.exp(-dt / over))
+    lagged = np.empty_like(V)
+    lagged[0] = V[0]
+    from scipy.signal import lfilter
+
+    lagged[1:], _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
+    return np.asarray((V - lagged) / over, dtype=float)
+
+
+@dataclass(frozen=True)
+class Bins:
+    """A coordinate cut into bins: `label` (n,) of each sample, `centre`, `low`, `high` (b,)."""
+
+    label: Labels
+    centre: Array
+    low: Array
+    high: Array
+
+    @property
+    def count(self) -> int:
+        """How many bins there are."""
+        return len(self.centre)
+
+
+def cut(values: Array, bins: int = BINS) -> Bins | None:
+    """Cut a coordinate (n,) into bins of about equal count; None where it does not vary.
+
+    A level that holds more than its share, as a constant voltage does, is a bin of its own: ties
+    that were spread over bins would be told apart by time.
+    """
+    span = float(np.ptp(values)) if len(values) else 0.0
+    if not span > 1e-12 * max(float(np.max(np.abs(values), initial=0.0)), 1e-300):
+        return None
+    levels = np.round((values - values.min()) / (_TIED * span)).astype(np.int64)
+    present, counts = np.unique(levels, return_counts=True)
+    share = len(values) / bins
+    group = np.zeros(len(present), dtype=np.int64)
+    number, filled = 0, 0
+    for i, count in enumerate(counts):
+        alone = count >= share
+        if filled and (alone or filled + 0.5 * count > share):
+            number, filled = number + 1, 0
+        group[i] = number
+        filled += int(count)
+        if alone:
+            number, filled = number + 1, 0
+    if number and 0 < filled < 0.4 * share:  # a few samples at the end are no bin
+        group[group == number] = number - 1
+    label = group[np.searchsorted(present, levels)]
+    label = np.unique(label, return_inverse=True)[1].astype(np.int64)
+    count = np.bincount(label)
+    if len(count) < 2:
+        return None
+    order = np.argsort(label, kind="stable")
+    edges = np.concatenate([[0], np.cumsum(count)])
+    parts = [values[order[begin:end]] for begin, end in zip(edges[:-1], edges[1:], strict=True)]
+    return Bins(
+        label,
+        np.array([part.mean() for part in parts]),
+        np.array([part.min() for part in parts]),
+        np.array([part.max() for part in parts]),
+    )

@@ -1,0 +1,91 @@
+"""In which regimes of speed and voltage a model is right within its noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .scale import z_scale
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+RIGHT = 1.1
+"""z up to which a model is right within its noise, when so many samples are asked."""
+_FEWEST = 200  # samples of a regime that says something
+
+
+@dataclass(frozen=True)
+class Regime:
+    """A part of the samples by speed, voltage or both: `words` as in "at low speed and 0 V"."""
+
+    words: str
+    speed: str
+    voltage: str
+    z: float
+    samples: int
+
+    @property
+    def right(self) -> bool:
+        """Whether the model is right within its noise there."""
+        return self.z <= RIGHT
+
+
+def regimes(
+    normalised: Sequence[Array], coordinates: Sequence[Mapping[str, Array]]
+) -> list[Regime]:
+    """Return the regimes with their z: classes of speed, of voltage, and of both together."""
+    r = np.concatenate(list(normalised))
+
+    def joined(name: str) -> Array | None:
+        if not all(name in one for one in coordinates):
+            return None
+        return np.concatenate([one[name] for one in coordinates])
+
+    speeds = speed_classes(joined("speed"))
+    volts = voltage_classes(joined("voltage"))
+    cells = [*((s, None) for s in speeds), *((None, V) for V in volts)]
+    cells += [(s, V) for s in speeds for V in volts]
+    out = []
+    for s, V in cells:
+        chosen = np.ones(len(r), dtype=bool)
+        words = []
+        for kind in (s, V):
+            if kind is not None:
+                chosen &= kind[1]
+                words.append(kind[0])
+        if chosen.sum() >= _FEWEST:
+            name = [kind[0] if kind else "" for kind in (s, V)]
+            out.append(
+                Regime(" and ".join(words), *name, z_scale(r[chosen]), int(chosen.sum()))
+            )
+    return out
+
+
+def speed_classes(speed: Array | None) -> list[tuple[str, Mask]]:
+    """Return low, middle and high speed, cut at a quarter and 60 % of its high values."""
+    if speed is None or not np.ptp(speed) > 0.0:
+        return []
+    top = float(np.quantile(speed, 0.98))
+    low, high = 0.25 * top, 0.6 * top
+    return [
+        (f"at low speed (below {1e3 * low:.2g} mm/s)", speed < low),
+        ("at middle speed", (speed >= low) & (speed < high)),
+        (f"at high speed (above {1e3 * high:.2g} mm/s)", speed >= high),
+    ]
+
+
+def voltage_classes(V: Array | None) -> list[tuple[str, Mask]]:
+    """Return the voltage off, low and high; nothing where it does not vary."""
+    if V is None or not np.ptp(V) > 1e-3 * max(float(np.max(np.abs(V))), 1e-12):
+        return []
+    top = float(np.quantile(V, 0.98))
+    off, middle = 0.05 * top, 0.5 * top
+    return [
+        ("at 0 V", V <= off),
+        (f"at low voltage (below {middle:.2g} V)", (V > off) & (V < middle)),
+        (f"at high voltage (above {middle:.2g} V)", V >= middle),
+    ]

@@ -1,0 +1,244 @@
+"""A diagnosis: from measurements to a verdict, with the evidence for every claim."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..compare.coordinates import coordinates_of
+from ..compare.where import Place, places
+from ..identify.fit import Model, Problem, identify
+from ..identify.prepare import prepare
+from ..records.measurement import Measurement
+from .candidates import Trial, judge, refine, try_all
+from .decision import decide
+from .experiments import Experiment, separating
+from .limits import detectable, untestable
+from .sensors import SensorFault, mended, sensor_faults
+
+Progress = Callable[[str], None]
+
+STRONG = 0.12
+"""Share of a residual's power along a coordinate (a correlation of 0.35) that is no accident."""
+
+FLIPS = 499
+"""Random patterns of signs that say what chance would organise."""
+
+QUIETEST = 3.0
+"""A force must exceed its noise by this factor for a verdict to mean anything."""
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The verdict on a model, and what it rests on.
+
+    `kind`, `effects`, ... as in verdict.json; `before` the trial of the model as it was, refitted;
+    `after` the one of the model that the verdict names; `trials` all single effects, best first.
+    """
+
+    kind: str
+    effects: tuple[str, ...]
+    words: str
+    before: Trial | None = None
+    after: Trial | None = None
+    trials: tuple[Trial, ...] = ()
+    sensors: tuple[SensorFault, ...] = ()
+    untestable: tuple[str, ...] = ()
+    detectable: float = float("nan")
+    coordinate: str = ""
+    places: tuple[Place, ...] = ()
+    experiment: Experiment | None = None
+    noise: Mapping[str, float] = field(default_factory=dict)
+    explained: float = 0.0
+    std: Mapping[str, float] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the content of verdict.json."""
+        before = self.before
+        ranking = [
+            {
+                "effect": trial.effects[-1],
+                "z_holdout": round(trial.z, 4),
+                "gain": round(1.0 - trial.z / before.z, 4) if before else None,
+                "refined": trial.refined,
+            }
+            for trial in self.trials
+        ]
+        answer: dict[str, Any] = {
+            "schema": 1,
+            "kind": self.kind,
+            "effects": list(self.effects),
+            "ranking": ranking,
+            "noise_floor": {name: float(value) for name, value in self.noise.items()},
+            "untestable": list(self.untestable),
+            "sensors": [fault.as_dict() for fault in self.sensors],
+            "words": self.words,
+        }
+        if before is not None:
+            after = self.after or before
+            answer["z_holdout_before"] = round(before.z, 4)
+            answer["z_holdout_after"] = round(after.z, 4)
+            answer["z_train_before"] = round(before.train, 4)
+            answer["z_train_after"] = round(after.train, 4)
+            answer["rms_holdout_before"] = before.rms
+            answer["rms_holdout_after"] = after.rms
+            answer["explained"] = round(self.explained, 4)
+        if np.isfinite(self.detectable):
+            answer["detectable"] = round(self.detectable, 5)
+        if self.coordinate:
+            answer["coordinate"] = self.coordinate
+        if self.places:
+            answer["organised"] = [
+                {"coordinate": one.coordinate, "share": round(one.share, 4), "p": one.p}
+                for one in self.places[:5]
+            ]
+        if self.experiment is not None:
+            answer["separate_by"] = self.experiment.words()
+        return answer
+
+
+def diagnose(
+    train: Sequence[Measurement],
+    holdout: Sequence[Measurement],
+    *,
+    law: str = "lugre",
+    effects: Sequence[str] = (),
+    values: Mapping[str, float] | None = None,
+    held: Sequence[str] = (),
+    limits: Mapping[str, tuple[float, float]] | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Return which effect a damper's model misses on a test bench.
+
+    Parameters
+    ----------
+    train, holdout : measurements to fit to, and those that decide
+    law : {"bingham", "lugre"}
+    effects : the effects that the model has already
+    values : its parameters where they were identified before, by name in SI; else they are
+        identified here
+    held, limits : parameters that stay as they are, and a user's bounds; see `identify.Model`
+    progress : called with a sentence at each stage
+
+    Raises
+    ------
+    RecordError
+        If a run lacks a channel that is needed, or is too short for a fit.
+    """
+    say = progress or (lambda _text: None)
+    say("looking for sensor faults")
+    faults = sensor_faults([*train, *holdout])
+    lacking = _lacking([*train, *holdout], faults)
+    noise = _noise([*train, *holdout])
+    if lacking:
+        return Diagnosis("insufficient", (), " ".join(lacking), sensors=tuple(faults), noise=noise)
+    say("smoothing the motion")
+    problem, held_out = (
+        Problem([prepare(one, seed=seed + i) for i, one in enumerate(mended(runs, faults))])
+        for runs, seed in ((train, 0), (holdout, 1000))
+    )
+    say("fitting the present model")
+    if values is None:
+        base = identify(
+            problem, law, tuple(effects), held=tuple(held), limits=dict(limits or {})
+        ).model
+    else:
+        base = Model(law, tuple(effects), dict(values), tuple(held), dict(limits or {}))
+        base = refine(base, problem)
+    before = judge(base, problem, held_out)
+    return _judged(before, problem, held_out, faults, noise, say)
+
+
+def _judged(
+    before: Trial,
+    problem: Problem,
+    held_out: Problem,
+    faults: list[SensorFault],
+    noise: dict[str, float],
+    say: Progress,
+) -> Diagnosis:
+    say("trying every effect inside the model")
+    trials = try_all(before.model, problem, held_out)
+
+    def grow(first: Trial) -> list[Trial]:
+        say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
+        return try_all(first.model, problem, held_out)
+
+    rest = where(before, held_out)
+    strong = bool(rest) and rest[0].significant and rest[0].share > STRONG
+    decision = decide(before, trials, grow, strong)
+    expected = problem.expectation(before.model)
+    visible = detectable(problem, expected)
+    hidden = untestable(before.model, problem, expected, visible)
+    kind, words = decision.kind, list(decision.reasons)
+    if kind == "unknown" and before.train <= 1.1:
+        kind = "insufficient"
+        words.append(
+            "The model fits the runs that it was fitted to: the others differ from them in "
+            "something that no channel shows."
+        )
+    experiment = None
+    if kind == "class":
+        members = [t.model for t in trials if set(t.effects) & set(decision.effects)]
+        experiment = separating(members, problem)
+    words += [fault.words for fault in faults]
+    if kind == "none":
+        words.append(f"An effect that leaves {visible:.2%} of the force would have been seen.")
+    coordinate = rest[0].coordinate if kind == "unknown" and rest else ""
+    if coordinate:
+        words.append(f"What is unexplained is organised by {coordinate.replace('_', ' ')}.")
+    return Diagnosis(
+        kind, decision.effects, " ".join(words), before, decision.best, tuple(trials),
+        tuple(faults), tuple(hidden), visible, coordinate, tuple(rest), experiment, noise,
+        decision.explained,
+    )  # fmt: skip
+
+
+def where(trial: Trial, held_out: Problem) -> list[Place]:
+    """Return along which coordinates a trial's residual is organised, the most telling first."""
+    normalised, raw, coordinates, begin = [], [], [], 0
+    for run in held_out.runs:
+        size = len(run.force) - run.skip
+        normalised.append(trial.residual[begin : begin + size])
+        raw.append(normalised[-1] * run.noise)
+        along = coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force)
+        coordinates.append({name: values[run.skip :] for name, values in along.items()})
+        begin += size
+    return places(normalised, raw, coordinates, flips=FLIPS)
+
+
+def _noise(runs: Sequence[Measurement]) -> dict[str, float]:
+    """Return the median noise of each channel over the runs, in SI."""
+    names = dict.fromkeys(name for run in runs for name in run.noise)
+    return {
+        name: float(np.median([run.noise[name] for run in runs if name in run.noise]))
+        for name in names
+    }
+
+
+def _lacking(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> list[str]:
+    """Return what keeps these data from carrying a verdict, in sentences."""
+    out = []
+    force = np.concatenate([run["force"] for run in runs if run.has("force")] or [np.zeros(1)])
+    spread = float(np.std(force))
+    noise = float(np.median([run.noise.get("force", 0.0) for run in runs]))
+    if spread <= 0.0:
+        out.append("The force is constant: there is nothing to explain.")
+    elif spread < QUIETEST * noise:
+        out.append(
+            f"The force's noise, {noise:.3g} N, is nearly the force itself, {spread:.3g} N RMS: "
+            f"at least {QUIETEST:g} times are needed."
+        )
+    for channel in ("displacement", "velocity"):
+        able = [run[channel] for run in runs if run.has(channel)]
+        if able and float(np.ptp(np.concatenate(able))) == 0.0:
+            out.append(f"The {channel} does not change: without motion no damper shows anything.")
+    cut = [fault for fault in faults if fault.channel == "force" and fault.fault == "clipping"]
+    if cut:
+        share = float(np.mean(np.abs(force) >= cut[0].value * (1.0 - 1e-9)))
+        if share > 0.2:
+            out.append(f"The force stands at the end of its range in {share:.0%} of the samples.")
+    return out

@@ -1,0 +1,135 @@
+"""The tables of a study's report: parameters, data, noise, errors, evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import floor, isfinite, log10
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .tables import run_table
+
+if TYPE_CHECKING:
+    from ..compare.comparison import Comparison
+    from ..records.measurement import Measurement
+    from ..study.model import StudyModel, Value
+    from ..study.study import Study
+
+_RANKED = 8
+_COLOURS = {
+    "white": "estimated from the samples: white",
+    "low-passed": "estimated from the samples: white, low-passed above",
+    "blue": "estimated from the samples: it grows with frequency, so this is an upper limit",
+    "resting": "estimated where the channel is at rest",
+    "hidden": "estimated: it cannot be told well from the signal, so this is a lower limit",
+    "rough": "estimated: the signal itself is rough, so this is an upper limit",
+    "none": "none seen",
+}
+
+
+def parameter_table(model: StudyModel) -> tuple[list[str], list[list[str]], list[str]]:
+    """Return header, rows and notes of a model's parameters with their 95 % intervals."""
+    header = ["parameter", "value", "95 % interval", "unit", "origin", "what it is"]
+    rows, edges = [], []
+    for name, value in model.flat().items():
+        text, half = with_interval(value.value, value.std)
+        origin = value.origin if value.free else f"{value.origin}, held"
+        rows.append([name, text, half, "" if value.unit == "1" else value.unit, origin,
+                     model.declared(name).text])  # fmt: skip
+        if value.free and value.std is not None and _at_bound(value):
+            edges.append(name)
+    notes = ["Intervals: 1.96 standard deviations, the noise of force and measured motion both counted."]
+    if edges:
+        notes.append(
+            f"{', '.join(edges)}: at the edge of what is allowed, so the interval says little."
+        )
+    silent = [
+        n for n, v in model.flat().items() if v.free and v.std is None and v.origin == "assumed"
+    ]
+    if silent:
+        notes.append(f"Not identified, or not told by these data: {', '.join(silent)}.")
+    return header, rows, notes
+
+
+def with_interval(value: float, std: float | None) -> tuple[str, str]:
+    """Return a value with the digits that its interval leaves, and the interval: "± 12"."""
+    if std is None or not isfinite(std) or std <= 0.0:
+        return f"{value:.5g}", "-"
+    half = 1.96 * std
+    digits = 1 - floor(log10(half))
+    if -4 < digits < 8 and abs(value) < 1e7:
+        places = max(digits, 0)
+        rounded = round(half, digits)
+        return f"{value:.{places}f}", f"± {rounded:.{places}f}"
+    return f"{value:.4g}", f"± {half:.2g}"
+
+
+def _at_bound(value: Value) -> bool:
+    room = 1e-6 * max(abs(value.high - value.low), 1e-300)
+    return value.value <= value.low + room or value.value >= value.high - room
+
+
+def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows: a line per run, or per piece where gaps have cut it."""
+    roles = {run.file.rpartition("/")[2]: run.role for run in study.settings.runs}
+    single = len(study.settings.runs) == 1
+    header = ["run", "role", "duration [s]", "rate [Hz]", "samples", "channels"]
+    rows = []
+    for run in measured:
+        file = run.source.replace("\\", "/").rpartition("/")[2]
+        role = ("held out" if "last" in run.name else "train") if single else roles.get(file, "")
+        rows.append(
+            [
+                run.name, "held out" if role == "holdout" else role, f"{run.duration:.4g}",
+                f"{run.sampling.rate:.5g}", str(len(run.time)), ", ".join(run.channels),
+            ]
+        )  # fmt: skip
+    return header, rows
+
+
+def data_words(measured: Sequence[Measurement]) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows: the noise of each channel over all runs, and how it was found."""
+    header = ["channel", "noise", "of its RMS", "how it was found"]
+    rows = []
+    for channel in dict.fromkeys(name for run in measured for name in run.channels):
+        having = [run for run in measured if channel in run.channels]
+        noise = float(np.median([run.noise.get(channel, 0.0) for run in having]))
+        size = float(np.median([np.std(run[channel]) for run in having]))
+        facts = [run.noise_facts.get(channel) for run in having]
+        found = dict.fromkeys("given" if f is None else _COLOURS.get(f.colour, f.colour) for f in facts)
+        unit = having[0].units[channel]
+        share = f"{noise / size:.2%}" if size > 0.0 else "-"
+        rows.append([channel, f"{noise:.3g} {unit}", share, "; ".join(found)])
+    return header, rows
+
+
+def run_errors(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows of the error on each held-out run."""
+    _, header, rows = run_table(comparison)
+    return header, rows
+
+
+def ranking_table(
+    verdict: dict[str, Any] | None,
+) -> tuple[list[str], list[list[str]], list[int]] | None:
+    """Return header, rows and the rows of the effects that the verdict names; None without any."""
+    ranking = (verdict or {}).get("ranking") or []
+    named = set((verdict or {}).get("effects") or [])
+    rows, strong = [], []
+    for entry in ranking[:_RANKED]:
+        effect = str(entry.get("effect", ""))
+        if effect in named:
+            strong.append(len(rows))
+        rows.append([effect, number(entry.get("z_holdout")), share(entry.get("gain"))])
+    return (["with this effect", "z held-out", "lower by"], rows, strong) if rows else None
+
+
+def number(value: Any) -> str:
+    """Return a number of a JSON file as text, "-" where it is none."""
+    return f"{value:.3g}" if isinstance(value, int | float) else "-"
+
+
+def share(value: Any) -> str:
+    """Return a share of a JSON file as text in percent, "-" where it is none."""
+    return f"{value:.1%}" if isinstance(value, int | float) else "-"
