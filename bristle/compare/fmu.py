@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -117,7 +118,9 @@ def compare_fmu(
     path = Path(fmu)
     description = read_description(path)
     table = read_table(data)
-    structural = any(v.name.startswith(("ground_", "base_", "floor")) for v in description.variables.values())
+    structural = any(
+        v.name.startswith(("ground_", "base_", "floor")) for v in description.variables.values()
+    )
     pieces, notes = signals_of(table, channels or {}, "structure" if structural else "bench")
     given = _typed(description, values or {})
     ports = map_ports(description, pieces[0].units, maps or {}, given)
@@ -180,14 +183,17 @@ def _signals(
     raw = {**one.channels, **extra}
     unit = {**{name: channel_unit(name) for name in one.channels}, **units}
     noise = dict(one.noise) | {name: estimate_noise(y).std for name, y in extra.items()}
-    values, errors, rates, derived = dict(raw), {}, {}, []
+    values, errors, derived = dict(raw), {}, []
+    rates: dict[str, str] = {}
     for prefix in ("", "base_"):
         x, v = raw.get(f"{prefix}displacement"), raw.get(f"{prefix}velocity")
         if x is None and v is None:
             continue
         sizes = (noise.get(f"{prefix}displacement", 0.0), noise.get(f"{prefix}velocity", 0.0))
         motion = smooth(x, v, dt, sizes)
-        drawn = posterior_draws(n, dt, sizes, motion.jerk, (x is not None, v is not None), DRAWS, seed)
+        drawn = posterior_draws(
+            n, dt, sizes, motion.jerk, (x is not None, v is not None), DRAWS, seed
+        )
         names = [f"{prefix}{kind}" for kind in _KINEMATIC]
         for i, (name, y) in enumerate(zip(names, (motion.x, motion.v, motion.a), strict=True)):
             if prefix and kind_of(name) == "acceleration":
@@ -196,7 +202,7 @@ def _signals(
                 derived.append(name)
             values[name], errors[name] = y, drawn[:, :, i]
             unit[name] = PLAIN[kind_of(name)]
-        rates |= dict(zip(names[:2], names[1:], strict=True))
+        rates |= dict(itertools.pairwise(names))
     for name in DRIVE:
         if name in raw:
             values[name], left = smooth_steps(raw[name], noise[name])
@@ -269,7 +275,7 @@ def _one(
     if noise < floor:
         noise = floor
         notes.append(
-            f"{signal} has no noise to speak of: errors are measured against {SILENT:.1%} of its RMS"
+            f"{signal} has no noise to speak of: errors are in units of {SILENT:.1%} of its RMS"
         )
     spread = draws - predicted
     bias = spread.mean(axis=0)
@@ -286,7 +292,8 @@ def _coordinates(piece: Signals, signal: str, ports: PortMap) -> dict[str, Array
     prefix = "" if "velocity" in piece.values else "base_"
     force = piece.raw.get("force") if signal != "force" else piece.raw[signal]
     found = coordinates_of(
-        piece.dt, get(f"{prefix}displacement"), get(f"{prefix}velocity"), get(f"{prefix}acceleration"),
+        piece.dt, get(f"{prefix}displacement"), get(f"{prefix}velocity"),
+        get(f"{prefix}acceleration"),
         get("voltage", get("current")), force if force is not None else piece.raw.get(signal),
     )  # fmt: skip
     for port in ports.inputs:
@@ -313,7 +320,9 @@ def _typed(description: Description, values: Mapping[str, str]) -> dict[str, Val
             else:
                 out[name] = text
         except (ValueError, KeyError):
-            raise FmuError(f"--set {name}={text}: {name} is {kind} in {description.name}.") from None
+            raise FmuError(
+                f"--set {name}={text}: {name} is {kind} in {description.name}."
+            ) from None
     return out
 
 

@@ -107,7 +107,7 @@ class Blocks:
         """Return the sums (blocks, bins) of values (n,)."""
         index = self.label * bins.count + bins.label
         flat = np.bincount(index, weights=values, minlength=self.count * bins.count)
-        return flat.reshape(self.count, bins.count)
+        return np.asarray(flat.reshape(self.count, bins.count), dtype=float)
 
     def spread(self, values: Array, bins: Bins) -> Array:
         """Return the standard deviation (bins,) of the means of values in bins, over blocks."""

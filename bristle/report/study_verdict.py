@@ -7,12 +7,12 @@ from typing import Any
 
 from ..compare.words import name_of
 from ..physics.effect import EFFECTS
-from .study_tables import number, share
+from .study_tables import in_lab_unit, number, share
 
 Verdict = Mapping[str, Any]
 
 _BADGES = {
-    "none": ("Nothing is missing", "green"),
+    "none": ("Nothing found missing", "green"),
     "effect": ("Missing physics found", "blue"),
     "class": ("One of a few is missing", "purple"),
     "unknown": ("Something unknown is missing", "red"),
@@ -53,7 +53,9 @@ def words(verdict: Verdict | None, name: str) -> list[str]:
 def _first(verdict: Verdict) -> str:
     kind, effects = verdict.get("kind"), [str(one) for one in verdict.get("effects") or []]
     if kind == "effect":
-        return f"The model misses {_joined(effects, 'and')}: {'; '.join(_about(e) for e in effects)}."
+        return (
+            f"The model misses {_joined(effects, 'and')}: {'; '.join(_about(e) for e in effects)}."
+        )
     if kind == "class":
         return f"The model misses one of {_joined(effects, 'or')}; these data cannot say which."
     if kind == "unknown":
@@ -86,7 +88,7 @@ def noise_floor(verdict: Verdict | None) -> str:
         return ""
     units = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "force": "N",
              "voltage": "V", "current": "A"}  # fmt: skip
-    parts = [f"{name} {number(value)} {units.get(name, '')}".strip() for name, value in floor.items()
+    parts = [f"{name} {in_lab_unit(value, units.get(name, ''))}".strip() for name, value in floor.items()
              if isinstance(value, int | float)]  # fmt: skip
     return f"Noise that the verdict rests on: {', '.join(parts)}." if parts else ""
 
@@ -112,5 +114,9 @@ def separating(verdict: Verdict | None) -> str:
     """Return the experiment that would separate rivals, "" where none is named."""
     found = (verdict or {}).get("separate_by")
     if isinstance(found, Mapping):
-        return str(found.get("words") or found.get("text") or ", ".join(f"{k}: {v}" for k, v in found.items()))
+        return str(
+            found.get("words")
+            or found.get("text")
+            or ", ".join(f"{k}: {v}" for k, v in found.items())
+        )
     return str(found or "")

@@ -193,6 +193,16 @@ def _broken(text: str, width: float, per_inch: float) -> str:
     )
 
 
+def percent(share: float, digits: int = 1) -> str:
+    """Return a share as text: "8.6 %"."""
+    return f"{100.0 * share:.{digits}f} %"
+
+
+def short_z(z: float) -> str:
+    """Return z as text, with the digits that tell it from 1."""
+    return f"{z:.2f}" if z < 10.0 else f"{z:.3g}" if z < 100.0 else f"{z:.0f}"
+
+
 def zero_lines(axes: Axes) -> None:
     """Draw the axes through the origin."""
     axes.axhline(0.0, color=PALE, linewidth=0.8, zorder=1)
