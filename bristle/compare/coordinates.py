@@ -84,11 +84,12 @@ def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
     difference from sample to sample shows it once.
     """
     keep = float(np.exp(-dt / over))
-    lagged = np.empty(len(V))
+    lagged = np.empty(len(V), dtype=np.float64)
     lagged[0] = V[0]
     from scipy.signal import lfilter
 
-    lagged[1:] = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])[0]
+    rest, _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
+    lagged[1:] = np.asarray(rest, dtype=float)
     return np.asarray((V - lagged) / over, dtype=float)
 
 

@@ -169,9 +169,9 @@ def draw_regimes(axes: Axes, comparison: Comparison) -> None:
 
 
 def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, Array] | None:
-    """Return mean normalised error over displacement and velocity: edges (b + 1,), (b + 1,), (b, b).
+    """Return the mean normalised error (b, b) over displacement and velocity, after their edges.
 
-    Edges in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
+    Edges (b + 1,) in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
     """
     along = [one.along() for one in comparison.held]
     if not all("displacement" in one and "velocity" in one for one in along):

@@ -85,8 +85,8 @@ def staircase(steps: Sequence[Step], noise_floor: float = 1.0) -> Staircase:
     Parameters
     ----------
     steps : list of Step
-        Their `after` holds "z_holdout", "z_train", "rms_holdout" [N]; a step without is "not judged",
-        unless the next one's `before` holds them.
+        Their `after` holds "z_holdout", "z_train", "rms_holdout" [N]; a step without is "not
+        judged", unless the next one's `before` holds them.
     noise_floor : float
         z that noise alone explains.
 

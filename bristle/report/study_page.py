@@ -123,9 +123,9 @@ def render(content: Content) -> str:
         _reproduce(content),
     ]
     foot = (
-        f"bristle {html.escape(__version__)}. z is the error over the noise that a true model would "
-        "show, force and measured motion together, by a scale that a few large errors do not carry: "
-        "1 is as good as these data can tell."
+        f"bristle {html.escape(__version__)}. z is the error over the noise that a true model "
+        "would show, force and measured motion together, by a scale that a few large errors do not "
+        "carry: 1 is as good as these data can tell."
     )
     return html.page(settings.title, [part for part in body if part], foot)
 
@@ -195,8 +195,8 @@ def _where(content: Content) -> str:
     if now.second:
         along = "the coordinate that organises it most, and what is left after that along the next"
     caption = (
-        f"Above: the error along {along}; dots are samples, the line the mean with its 95 % interval, the blue band "
-        "twice the expected noise. Below: its spectrum against that of the noise; z by speed and "
+        f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
+        "interval, the blue band twice the expected noise. Below: its spectrum against that of the noise; z by speed and "
         "voltage."
     )
     title, say = headline(now), now.sentences
@@ -234,9 +234,9 @@ def _history(content: Content) -> str:
         picture = html.figure(
             png(staircase_page(judged)),
             f"The staircase of the history: z on held-out runs {fall}",
-            "The error of each model of the history, on runs that no fit has seen (blue) and on those "
-            f"that it was fitted to (grey), over what noise explains; forces are RMS errors{low}. A "
-            "model at the green floor cannot be told from the truth by these data.",
+            "The error of each model of the history, on runs that no fit has seen (blue) and on "
+            "those that it was fitted to (grey), over what noise explains; forces are RMS "
+            f"errors{low}. A model at the green floor cannot be told from the truth by these data.",
         )  # fmt: skip
     return html.section("How the error fell", picture, html.table(header, rows, numbers=(2, 3, 4)))
 
@@ -263,8 +263,8 @@ def _before_after(content: Content) -> str:
         maps = html.figure(
             png(page),
             "The error over displacement and velocity",
-            "Where the error is, over displacement and velocity, in units of the expected noise: red "
-            "where the measured force is above the model's, blue where it is below. A true model "
+            "Where the error is, over displacement and velocity, in units of the expected noise: "
+            "red where the measured force is above the model's, blue where it is below. A true model "
             "leaves a pale map without a pattern.",
         )
     return html.section(title, loops, maps)

@@ -1,4 +1,4 @@
-"""The pictures of a study's report: the staircase, loops and maps before and after, the error now."""
+"""The pictures of a study's report: staircase, loops and maps before and after, the error now."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from .comparison import telling_places
 from .panels import draw_loop, draw_map, draw_place, draw_regimes, draw_spectrum, residual_map
-from .style import BLUE, GREEN, GREY, INK, PALE, VERMILION, Page, label, look, short_z
+from .style import BLUE, GREEN, GREY, INK, PALE, VERMILION, MINUS, Page, label, look, short_z
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -87,7 +87,7 @@ def _tread(axes: Axes, i: int, one: Tread, before: float | None, unit: str) -> N
         return
     change = one.z / before - 1.0
     # In units of the noise: what there was above it, and what is left of that.
-    text = f"{100.0 * change:+.0f} %".replace("-", "−")
+    text = f"{100.0 * change:+.0f} %".replace("-", MINUS)
     colour = GREEN if change < 0.0 else VERMILION
     axes.annotate(
         text, (i - 0.5, float(np.sqrt(one.z * before))), xytext=(5, 0), textcoords="offset points",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .style import percent
+from .style import MINUS, TIMES, percent
 from .tables import run_table
 
 if TYPE_CHECKING:
@@ -66,8 +66,8 @@ def with_interval(value: float, std: float | None) -> tuple[str, str]:
     scaled, width = value / 10.0**power, half / 10.0**power
     digits = 1 - floor(log10(width))
     places = max(digits, 0)
-    tail = f" × 10{str(power).translate(_RAISED)}" if power else ""
-    texts = (f"{round(one, digits):.{places}f}".replace("-", "−") for one in (scaled, width))
+    tail = f" {TIMES} 10{str(power).translate(_RAISED)}" if power else ""
+    texts = (f"{round(one, digits):.{places}f}".replace("-", MINUS) for one in (scaled, width))
     told, wide = texts
     return f"{told}{tail}", f"± {wide}{tail}"
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..compare.words import name_of
 from ..physics.effect import EFFECTS
+from ..records.channels import PLAIN
 from .study_tables import in_lab_unit, number, share
 
 Verdict = Mapping[str, Any]
@@ -45,7 +46,11 @@ def words(verdict: Verdict | None, name: str) -> list[str]:
             continue
         out.append(
             str(fault.get("words") or "")
-            or f"Sensor: {fault.get('fault')} of {fault.get('channel')}, {number(fault.get('value'))}."
+            or "Sensor: {fault} of {channel}, {value}.".format(
+                fault=fault.get("fault"),
+                channel=fault.get("channel"),
+                value=number(fault.get("value")),
+            )
         )
     return list(dict.fromkeys(out))
 
@@ -57,7 +62,12 @@ def _first(verdict: Verdict) -> str:
             f"The model misses {_joined(effects, 'and')}: {'; '.join(_about(e) for e in effects)}."
         )
     if kind == "class":
-        return f"The model misses one of {_joined(effects, 'or')}; these data cannot say which."
+        which = (
+            f"either {effects[0]} or {effects[1]}"
+            if len(effects) == 2
+            else (f"one of {_joined(effects, 'and')}")
+        )
+        return f"The model misses {which}; these data cannot say which."
     if kind == "unknown":
         along = str(verdict.get("coordinate") or "")
         tail = f"; it is organised by {name_of(along)}" if along else ""
@@ -86,15 +96,16 @@ def noise_floor(verdict: Verdict | None) -> str:
     floor = (verdict or {}).get("noise_floor")
     if not isinstance(floor, Mapping) or not floor:
         return ""
-    units = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "force": "N",
-             "voltage": "V", "current": "A"}  # fmt: skip
-    parts = [f"{name} {in_lab_unit(value, units.get(name, ''))}".strip() for name, value in floor.items()
-             if isinstance(value, int | float)]  # fmt: skip
+    parts = [
+        f"{name} {in_lab_unit(value, PLAIN.get(name, ''))}".strip()
+        for name, value in floor.items()
+        if isinstance(value, int | float)
+    ]
     return f"Noise that the verdict rests on: {', '.join(parts)}." if parts else ""
 
 
 def untestable(verdict: Verdict | None) -> list[list[str]]:
-    """Return rows of the effects that could not be tested: name, what it does, what it would show."""
+    """Return rows of the effects that could not be tested: name, what it does and would show."""
     rows = []
     for name in (verdict or {}).get("untestable") or []:
         effect = EFFECTS.get(str(name))

@@ -23,6 +23,8 @@ BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 INK, GREY, PALE = "#222222", "#666666", "#b8b8b8"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 
+MINUS, TIMES = "\u2212", "\u00d7"
+
 MARGIN = 0.16
 """Space between text and the edge of a figure [in]."""
 

@@ -37,7 +37,8 @@ def run_table(comparison: Comparison) -> Table:
 def _run(run: RunError) -> list[str]:
     numerical = f"{run.numerical_z:.2g}" if run.numerical_z == run.numerical_z else "not tried"
     return [
-        run.name, short_z(run.z), f"{run.rms:.3g}", percent(run.share), f"{run.noise:.3g}", numerical,
+        run.name, short_z(run.z), f"{run.rms:.3g}", percent(run.share), f"{run.noise:.3g}",
+        numerical,
     ]  # fmt: skip
 
 
