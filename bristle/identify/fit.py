@@ -14,7 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .model import (
-    DRIVEN, FIXED, OTHER_LAWS, Model, Problem, Run, law_parameters, parameter, sizes, steady,
+    DRIVEN,
+    FIXED,
+    OTHER_LAWS,
+    Model,
+    Problem,
+    Run,
+    law_parameters,
+    parameter,
+    sizes,
+    steady,
     without,
 )  # fmt: skip
 from .search import descend

@@ -196,8 +196,8 @@ def _where(content: Content) -> str:
         along = "the coordinate that organises it most, and what is left after that along the next"
     caption = (
         f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
-        "interval, the blue band twice the expected noise. Below: its spectrum against that of the noise; z by speed and "
-        "voltage."
+        "interval, the blue band twice the expected noise. Below: its spectrum against that of "
+        "the noise; z by speed and voltage."
     )
     title, say = headline(now), now.sentences
     return html.section(
@@ -264,8 +264,8 @@ def _before_after(content: Content) -> str:
             png(page),
             "The error over displacement and velocity",
             "Where the error is, over displacement and velocity, in units of the expected noise: "
-            "red where the measured force is above the model's, blue where it is below. A true model "
-            "leaves a pale map without a pattern.",
+            "red where the measured force is above the model's, blue where it is below. A true "
+            "model leaves a pale map without a pattern.",
         )
     return html.section(title, loops, maps)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from .comparison import telling_places
 from .panels import draw_loop, draw_map, draw_place, draw_regimes, draw_spectrum, residual_map
-from .style import BLUE, GREEN, GREY, INK, PALE, VERMILION, MINUS, Page, label, look, short_z
+from .style import BLUE, GREEN, GREY, INK, MINUS, PALE, VERMILION, Page, label, look, short_z
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
