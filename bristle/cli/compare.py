@@ -76,10 +76,11 @@ def main(arguments: argparse.Namespace) -> int:
         return _of_fmu(arguments)
     fmu_only = [f"--{n}" for n in ("data", "values", "maps", "channel") if getattr(arguments, n)]
     if arguments.folder is None or fmu_only:
-        lacking = "a study's folder, or --fmu and --data, are needed"
-        what = f"{fmu_only[0].replace('values', 'set').replace('maps', 'map')} needs --fmu"
+        wrong = "a study's folder, or --fmu and --data, are needed"
+        if fmu_only:
+            wrong = f"{fmu_only[0].replace('values', 'set').replace('maps', 'map')} needs --fmu"
         raise StudyError(
-            f"{what if fmu_only else lacking}: bristle compare FOLDER, or bristle compare --fmu "
+            f"{wrong}: bristle compare FOLDER, or bristle compare --fmu "
             "FILE.fmu --data run.csv"
         )
     return _of_study(arguments)

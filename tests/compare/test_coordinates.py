@@ -43,7 +43,7 @@ def test_levels_of_a_voltage_are_bins_of_their_own():
     assert bins.centre == pytest.approx([0.0, 2.0, 4.0, 6.0])
     # Equal values share a bin: else samples of one level would be told apart by time.
     for level in (0.0, 2.0, 4.0, 6.0):
-        assert len(set(bins.label[V == level])) == 1
+        assert len(set(bins.label[level == V])) == 1
 
 
 def test_a_mostly_constant_signal_keeps_its_tails_apart():
