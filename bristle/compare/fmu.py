@@ -97,8 +97,9 @@ def compare_fmu(
 
     It is stepped in a process of its own at a quarter of the measurement's step, inputs between
     samples interpolated; inputs of t_k+1 are set before the step from t_k. The numerical error is
-    what the last halving of the step has changed. Displacement and velocity are joined into one smoothed motion first, for the
-    noise of inputs would be taken for errors of the FMU; what stays uncertain is carried through.
+    what the last halving of the step has changed. Displacement and velocity are joined into one
+    smoothed motion first, for the noise of inputs would be taken for errors of the FMU; what stays
+    uncertain is carried through.
 
     Parameters
     ----------
@@ -160,10 +161,8 @@ def signals_of(
                 raise RecordError(f'{table.source}: "{column.text}" has no numbers or no unit.')
             continue
         factor, offset = conversion(unit, channel_unit(name))
-        columns[name] = (
-            spec.sign * (factor * table.values[column.text] + offset),
-            channel_unit(name),
-        )
+        si = spec.sign * (factor * table.values[column.text] + offset)
+        columns[name] = si, channel_unit(name)
     taken = {table.find(spec.column).text for spec in chosen.values()}
     for column in table.columns:
         if column.text in taken or column.text in table.words or column.name in columns:
