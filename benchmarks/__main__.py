@@ -1,6 +1,8 @@
 """Measure every figure and print one table: `python -m benchmarks [NAME ...] [--json]`.
 
-A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them.
+A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them. `blind`
+named first has options of its own (`python -m benchmarks blind --help`): it takes hours, and the
+table here shows what its last run found.
 """
 
 from __future__ import annotations
@@ -18,6 +20,10 @@ from ._rows import Row
 
 def main() -> int:
     """Print the table; return 0 whatever is reached, for times depend on the machine."""
+    if sys.argv[1:2] == ["blind"] and len(sys.argv) > 2:
+        from .blind import main as blind
+
+        return blind(sys.argv[2:])
     names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")

@@ -11,7 +11,7 @@ class Structure(EffectSlave):
     def declare(self):
         data = self.baked.get("building")
         self.building = from_data(data) if data else paper_building()
-        forces = ["damper_force", "extra_force"]
+        forces = ["ground_acceleration", "damper_force", "extra_force"]
         self.add_input(
             "ground_acceleration", "m/s2", "acceleration of the ground, positive along +x"
         )
@@ -57,12 +57,16 @@ class Structure(EffectSlave):
 
     def refresh(self):
         values, at = self._values, self.first_output + 2
-        for absolute in self.model.absolute_accelerations(self.damper_force + self.extra_force):
+        for absolute in self._absolute():
             values[at] = absolute
             at += 3
         self.holding_force = self.model.holding_force(self.ground_acceleration, self.extra_force)
         if not self.stepping:  # before the first step the ground has no earlier value
             self.ground_before = self.ground_acceleration
+
+    def _absolute(self):
+        force = self.damper_force + self.extra_force
+        return self.model.absolute_accelerations(force, self.ground_acceleration)
 
     def get_inner(self):
         return [list(self.model.x), list(self.model.z), self.ground_before]

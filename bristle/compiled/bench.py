@@ -38,11 +38,18 @@ def force_history(
             z[i] = z1[i]
 
 
-@cache
 def compiled_history() -> Callable[..., None]:
     """Return the compiled `force_history`; the first call on a machine takes seconds."""
+    return _compiled(damper.evaluate)
+
+
+@cache
+def _compiled(evaluate: Any) -> Callable[..., None]:
+    """Compile the history with this woven function: there is a new one after a new effect."""
+    global damper_evaluate
     from .jit import compiled
 
+    damper_evaluate = evaluate
     function: Callable[..., None] = compiled(force_history)
     return function
 
@@ -75,14 +82,18 @@ class Bench:
         """Return the force (n,) [N] for a motion x, v, a (n,) [m, m/s, m/s2] and V (n,) [V].
 
         `values` are the parameters by name in SI; missing ones take their defaults. The start
-        values of states end in `_0`.
+        values of states end in `_0`; those that start with a signal take its first value.
         """
         layout = damper.LAYOUT
         p = np.array(damper.pack(self.law, values))
         z = np.zeros(layout.z_size)
         z[0] = values.get("bristle_deflection_0", 0.0)
-        for name, slot in layout.states.items():
-            z[slot] = values.get(name + "_0", 0.0)
+        first = {"x": x[0], "v": v[0], "a": a[0], "V": V[0]}
+        for effect in layout.effects:
+            for state in effect.states:
+                name = f"{effect.name}.{state}"
+                begin = first.get(effect.starts.get(state, ""), 0.0)
+                z[layout.states[name]] = values.get(name + "_0", begin)
         out = np.empty(len(x))
         self._history(
             self._code, x, v, a, V, dt, z, p, self._on, self._moving, self._n_moving,

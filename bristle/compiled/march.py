@@ -23,7 +23,7 @@ free_step = structure.free_step
 add_force = structure.add_force
 accelerations = structure.accelerations
 holding_force = structure.holding_force
-effect_forces = structure.effect_forces
+rest_forces = structure.rest_forces
 signal_value = signals.value
 signal_rate = signals.rate
 
@@ -214,10 +214,15 @@ def show_rest(b, x, z, s):  # type: ignore[no-untyped-def]
     loads, absolute = b.work[0:n], b.absolute
     for i in range(n):
         loads[i] = 0.0
+    devices = s[b.force] + s[b.extra]
     if b.active:
-        effect_forces(n, b.isolated, b.stiffness, x, inf, 0.0, 0.0, z, b.p, b.on, loads)
-    others = loads[0] + s[b.extra]
-    loads[0] = others + s[b.force]
+        hold = rest_forces(
+            n, b.isolated, b.stiffness, b.c, b.k, b.mass, x, s[b.ground], devices, z, b.p, b.on,
+            loads,
+        )  # fmt: skip
+    else:
+        hold = holding_force(n, b.c, b.k, b.mass, x, s[b.ground], 0.0)
+    loads[0] += devices
     accelerations(n, b.m_inverse, b.c, b.k, x, loads, absolute)
     at = b.first_output
     for i in range(n):
@@ -226,7 +231,7 @@ def show_rest(b, x, z, s):  # type: ignore[no-untyped-def]
     for i in range(1 if b.isolated else 0, n):
         s[at] = x[i] - (x[i - 1] if i > 0 else 0.0)
         at += 1
-    s[b.holding] = holding_force(n, b.c, b.k, b.mass, x, s[b.ground], others)
+    s[b.holding] = hold - s[b.extra]
 
 
 def felt_voltage(d, s):  # type: ignore[no-untyped-def]

@@ -550,7 +550,8 @@ class EffectSlave(Slave):
 
     def add_effects(self, site: str, law: str = "") -> None:
         """Declare `EFFECT.on`, `EFFECT.PARAMETER`, `EFFECT.STATE_0` for the effects of a site."""
-        self._effects = effects_of(site, law)
+        own = self.baked.get("own", [])  # a user's, in this process; an FMU's are its library's
+        self._effects = tuple(e for e in effects_of(site, law) if not e.own or e.name in own)
         for effect in self._effects:
             self.add_parameter(effect.name + ".on", False, None, effect.first_line())
             for name, parameter in effect.parameters.items():

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..compiled.bench import Bench
 from ..physics.damper import LAWS
 from ..physics.effect import EFFECTS, Parameter
+from .instruments import shown_force, true_motion
 
 Array = NDArray[np.float64]
 
@@ -75,8 +76,9 @@ class Model:
         """Return the names of the parameters that a fit moves."""
         names = [name for name in law_parameters(self.law) if name not in FIXED]
         for effect in self.effects:
+            fixed = FIXED if self.law == "lugre" else (*FIXED, *EFFECTS[effect].bristles)
             names += [
-                f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in FIXED
+                f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in fixed
             ]
         if "v_n" in names and self.value("exponent") == 0.0:
             names.remove("v_n")  # the standard law does not know it
@@ -141,7 +143,9 @@ class Problem:
         if draw is not None:
             e = run.draws[draw]
             x, v, a, V = x + e[:, 0], v + e[:, 1], a + e[:, 2], V + e[:, 3]
-        return self.bench(model).force(x, v, a, V, run.dt, model.values)
+        v, a = true_motion(model.effects, model.values, v, a, run.dt)
+        force = self.bench(model).force(x, v, a, V, run.dt, model.values)
+        return shown_force(model.effects, model.values, force, run.dt)
 
     def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:
         """Return per run: bias (n,) [N] of the prediction, noise (n,) [N], draws (d, n) [N].

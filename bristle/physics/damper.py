@@ -46,6 +46,19 @@ def _motion_source(layout: Layout) -> str:
     return "\n".join(lines)
 
 
+def _reach_source(layout: Layout) -> str:
+    q = {name: name for name in ("x", "v", "dt", "energy", "rod_x", "rod_v")}
+    lines = [
+        "def slip_reach(x, v, dt, energy, z, p, on):",
+        "    rod_x = x",
+        "    rod_v = v",
+        "    reach = 1.0",
+        *switched(layout, "reach", "reach *= {call}", **q),
+        "    return reach",
+    ]
+    return "\n".join(lines)
+
+
 def _series_source(layout: Layout) -> str:
     lines = ["def series_element(on):"]
     for effect in layout.effects:
@@ -70,11 +83,13 @@ def _evaluate_source(layout: Layout, name: str) -> str:
         *switched(layout, "motion", "x, v = {call}", **q),
         "    yield_factor = 1.0",
         "    viscous_factor = 1.0",
+        "    reach = 1.0",
         "    added = 0.0",
         "    direction = 0.0",
         "    directed = False",
         *switched(layout, "yield_factor", "yield_factor *= {call}", **q),
         *switched(layout, "viscous_factor", "viscous_factor *= {call}", **q),
+        *switched(layout, "reach", "reach *= {call}", **q),
         *switched(layout, "yield_force", "direction = {call}; directed = True", **q),
         *switched(layout, "force", "added += {call}", **q),
         "    factor = 1.0",
@@ -83,13 +98,13 @@ def _evaluate_source(layout: Layout, name: str) -> str:
         f"        lugre = LuGreP({lugre})",
         "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
         "        friction = 0.0",
-        "        bristle = LuGre_bristle(z[0], v, V, lugre) * yield_factor",
+        "        bristle = LuGre_bristle(z[0], v, V, lugre, reach) * yield_factor",
         "        rest = (bristle + viscous) * factor + added",
-        "        dz[0] = LuGre_rate(z[0], v, lugre)",
+        "        dz[0] = LuGre_rate(z[0], v, lugre, reach)",
         "    else:",
         f"        bingham = BinghamP({bingham})",
         "        rest = Bingham_viscous(v, V, bingham) * viscous_factor * factor + added",
-        "        limit = Bingham_yielding(V, bingham) * yield_factor * factor",
+        "        limit = Bingham_yielding(V, bingham) * yield_factor * reach * factor",
         "        if directed:",
         "            friction = limit * direction",
         f"        elif halts == {DIRECTED}:",
@@ -113,9 +128,10 @@ def _evaluate_source(layout: Layout, name: str) -> str:
 
 def reweave() -> None:
     """Weave the damper's functions anew; call it after effects were registered late."""
-    global LAYOUT, evaluate, evaluate_law, inner_motion, series_element
+    global LAYOUT, evaluate, evaluate_law, inner_motion, series_element, slip_reach
     LAYOUT = Layout("damper", LAW_PARAMETERS, LAW_STATES)
     inner_motion = weave("inner_motion", _motion_source(LAYOUT), LAYOUT)
+    slip_reach = weave("slip_reach", _reach_source(LAYOUT), LAYOUT)
     series_element = weave("series_element", _series_source(LAYOUT), LAYOUT)
     laws = {
         "LuGreP": LUGRE_VALUES,
@@ -145,6 +161,7 @@ evaluate: Any
 evaluate_law: Any
 inner_motion: Any
 series_element: Any
+slip_reach: Any
 reweave()
 
 
@@ -291,7 +308,9 @@ def joint_excess(
     y[joint] = inner
     y[travel] = z[travel] + 0.5 * h * (begin - z[joint] + v - inner)
     if law == 1:
-        y[0] = lugre_advance(z[0], 0.5 * (z[joint] + inner), h, p[6])
+        middle = 0.5 * (z[joint] + inner)
+        slip = p[6] / slip_reach(x - y[travel], middle, h, energy, z, p, on)
+        y[0] = lugre_advance(z[0], middle, h, slip)
     evaluate(law, x, v, a, V, h, energy, direction, DIRECTED, y, p, on, dz, unused)
     return inner - z[joint] - h * dz[joint]  # type: ignore[no-any-return]
 
@@ -337,15 +356,19 @@ def step(
             law, 0.5 * (x0 + x1), 0.5 * (v0 + v1), 0.5 * (a0 + a1), 0.5 * (V0 + V1), dt, energy,
             halt, halts, z0, p, on, work[0:size], z1,
         )  # fmt: skip
+        # And on to the end, without time: what depends on a signal alone ends where that does.
+        evaluate(law, x1, v1, a1, V1, 0.0, energy, halt, halts, z1, p, on, work[0:size], z1)
     travel, joint = series_element(on)
     if joint >= 0:
         advance_joint(
             law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, z1, p, on, travel, joint, work
         )
     elif law == 1 and n_moving == 0:
-        _, vs = inner_motion(x0, v0, a0, V0, dt, energy, z0, p, on)
-        _, ve = inner_motion(x1, v1, a1, V1, dt, energy, z1, p, on)
-        z1[0] = lugre_advance(z0[0], 0.5 * (vs + ve), dt, p[6])
+        xs, vs = inner_motion(x0, v0, a0, V0, dt, energy, z0, p, on)
+        xe, ve = inner_motion(x1, v1, a1, V1, dt, energy, z1, p, on)
+        middle = 0.5 * (vs + ve)
+        slip = p[6] / slip_reach(0.5 * (xs + xe), middle, dt, energy, z0, p, on)
+        z1[0] = lugre_advance(z0[0], middle, dt, slip)
     if n_moving > 0:
         advance_implicit(
             law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, moving,

@@ -15,12 +15,16 @@ from ..errors import PhysicsError
 
 SITES = ("damper", "structure", "sensor")
 
+CHANNELS = ("force", "velocity")
+"""Channels whose instrument a sensor's effect may be."""
+
 # In the order in which an evaluation calls them.
 HOOKS = (
     "voltage",
     "motion",
     "yield_factor",
     "viscous_factor",
+    "reach",
     "yield_force",
     "force",
     "spring",
@@ -35,10 +39,12 @@ HOOKS = (
 class Q(NamedTuple):
     """What a hook may ask for. Damper: motion across the fluid; structure: motion of the base.
 
-    `rod_x`, `rod_v` are the damper's motion before any `motion` hook. `force` is the force of this
-    same evaluation (`rate`, `advance`), `halt` the force that would bring the motion to rest within
-    the step (what a stuck contact carries), `stiffness` the linear stiffness of the storey at hand,
-    `storey` its number (1 above the base), `value` the signal that an instrument is about to show.
+    `dt` is the step; `advance` is called with `dt` = 0 too, at the end of a step, so that states
+    which do not depend on time end where their signals do. `rod_x`, `rod_v` are the damper's motion
+    before any `motion` hook. `force` is the force of this same evaluation (`rate`, `advance`),
+    `halt` the force that would bring the motion to rest within the step (what a stuck contact
+    carries), `stiffness` the linear stiffness of the storey at hand (in `force`: of the isolation),
+    `storey` its number (1 above the base), `value` the signal that an instrument is to show.
     """
 
     x: float  # m
@@ -81,9 +87,21 @@ class Effect:
         Names of the signals in `q` that the hooks use.
     states, parameters
         `{name: unit}` and `{name: Parameter}`; start values of states are zero.
+    starts
+        States that begin with the value of a signal where a measurement begins: {state: signal}.
+    bristles
+        Parameters that count for laws with bristles alone; with others a fit leaves them.
+    contact
+        Of a structure's effect: its `force` is dry friction, which carries what holds the base
+        (`q.halt`), or the push of a stop. It is found together with the motion, whatever its
+        stiffness, and held over a step; other forces are linear over it.
+    shows
+        Of a sensor's effect: the channel whose instrument it is, "force" or "velocity".
     joint
         Of a series element: the names of two states, the travel between rod and fluid [m] and the
         velocity across the fluid [m/s]; the integrator finds both, from the second one's `rate`.
+    own
+        Whether it is a user's own, outside the library; `user.load_effects` sets it.
     passive, zero_at_rest, excludes, source, expect
         See each effect; conformance tests hold the first two.
     """
@@ -94,6 +112,11 @@ class Effect:
     needs: ClassVar[tuple[str, ...]] = ()
     states: ClassVar[dict[str, str]] = {}
     parameters: ClassVar[dict[str, Parameter]] = {}
+    starts: ClassVar[dict[str, str]] = {}
+    bristles: ClassVar[tuple[str, ...]] = ()
+    contact: ClassVar[bool] = False
+    shows: ClassVar[str] = "force"
+    own: ClassVar[bool] = False
     joint: ClassVar[tuple[str, ...]] = ()
     passive: ClassVar[bool] = False
     zero_at_rest: ClassVar[bool] = True
@@ -109,6 +132,7 @@ class Effect:
             cls.State = namedtuple("State", tuple(cls.states))  # type: ignore[misc]
             cls.Values = namedtuple("Values", tuple(cls.parameters))  # type: ignore[misc]
             _check(cls)
+            _refuse_twin(cls)
             EFFECTS[cls.name] = cls
 
     @classmethod
@@ -132,6 +156,13 @@ def _check(effect: type[Effect]) -> None:
     unknown = [need for need in effect.needs if need not in Q._fields]
     if unknown:
         raise PhysicsError(f"{where}: needs {unknown}; q offers {list(Q._fields)}.")
+    if effect.site == "sensor" and effect.shows not in CHANNELS:
+        raise PhysicsError(f"{where}: shows = {effect.shows!r} is none of {CHANNELS}.")
+    if (effect.site == "sensor") != ("channel" in effect.hooks()):
+        raise PhysicsError(f"{where}: the hook `channel` belongs to the site sensor, to it alone.")
+    wrong = [name for name in effect.starts if name not in effect.states]
+    if wrong:
+        raise PhysicsError(f"{where}: starts names {wrong}; its states are {list(effect.states)}.")
     if not effect.hooks():
         raise PhysicsError(f"{where}: defines no hook; there are {list(HOOKS)}.")
     if "rate" in effect.hooks() and "advance" in effect.hooks():
@@ -146,6 +177,16 @@ def _check(effect: type[Effect]) -> None:
         low, high = parameter.bounds
         if not low <= parameter.value <= high:
             raise PhysicsError(f"{where}: {name} = {parameter.value} lies outside {(low, high)}.")
+
+
+def _refuse_twin(effect: type[Effect]) -> None:
+    """Refuse a second effect of a name, unless its own file defines it anew."""
+    known = EFFECTS.get(effect.name)
+    if known is not None and known.__module__ != effect.__module__:
+        raise PhysicsError(
+            f"effect {effect.name!r} ({effect.__module__}.{effect.__qualname__}): the name is "
+            f"taken by {known.__module__}.{known.__qualname__}. Another name is right."
+        )
 
 
 def effects_of(site: str, law: str = "") -> tuple[type[Effect], ...]:

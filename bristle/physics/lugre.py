@@ -34,9 +34,13 @@ class LuGre:
     }
 
     @staticmethod
-    def bristle(z: float, v: float, V: float, p: Any) -> float:
-        """Return the bristles' force [N] at deflection z [m], velocity v [m/s], voltage V [V]."""
-        return (p.sigma_a + p.sigma_0 * V) * z + p.sigma_1 * (v - p.a_0 * abs(v) * z)  # type: ignore[no-any-return]
+    def bristle(z: float, v: float, V: float, p: Any, reach: float = 1.0) -> float:
+        """Return the bristles' force [N] at deflection z [m], velocity v [m/s], voltage V [V].
+
+        `reach` is the factor by which an effect moves the deflection at which they slip.
+        """
+        rate = v - p.a_0 / reach * abs(v) * z
+        return (p.sigma_a + p.sigma_0 * V) * z + p.sigma_1 * rate  # type: ignore[no-any-return]
 
     @staticmethod
     def viscous(v: float, V: float, p: Any) -> float:
@@ -44,9 +48,9 @@ class LuGre:
         return (p.sigma_2 + p.sigma_b * V) * v * falling(v, p.v_n, p.exponent)  # type: ignore[no-any-return]
 
     @staticmethod
-    def rate(z: float, v: float, p: Any) -> float:
-        """Return the rate of the bristle deflection [m/s]."""
-        return v - p.a_0 * abs(v) * z  # type: ignore[no-any-return]
+    def rate(z: float, v: float, p: Any, reach: float = 1.0) -> float:
+        """Return the rate of the bristle deflection [m/s]; `reach` as in `bristle`."""
+        return v - p.a_0 / reach * abs(v) * z  # type: ignore[no-any-return]
 
     @staticmethod
     def advance(z: float, v: float, dt: float, a_0: float) -> float:

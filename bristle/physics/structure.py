@@ -21,6 +21,9 @@ EFFECT_STEP = 5e-4
 SWEEPS = 3
 """How often the forces of effects are iterated in a substep."""
 
+MOST_TRIALS = 40
+"""How many forces of a contact are tried in a sweep; one to three are the rule."""
+
 
 class StepMatrices(NamedTuple):
     """Exact step of x = [q, q'] over h: x_1 = phi x_0 + held u_0 + ramp (u_1 - u_0), u = (f, a_g).
@@ -125,6 +128,7 @@ def holding_force(n: int, C: Row, K: Row, mass: float, x: Row, a_g: float, other
 
 _SHARED = {"dt": "dt", "energy": "energy", "halt": "halt"}
 _BASE = {"x": "x[0]", "v": "x[n]", **_SHARED}
+_ISOLATION = {**_BASE, "stiffness": "stiffnesses[0] if isolated else 0.0"}
 _STOREY = {
     "drift": "drift",
     "drift_rate": "drift_rate",
@@ -135,12 +139,13 @@ _STOREY = {
 
 
 def _forces_source(layout: Layout) -> str:
+    smooth = layout.only(lambda effect: not effect.contact)
     spring = ["    " + line for line in switched(layout, "spring", "pull += {call}", **_STOREY)]
     lines = [
         "def effect_forces(n, isolated, stiffnesses, x, dt, energy, halt, z, p, on, forces):",
         "    for i in range(n):",
         "        forces[i] = 0.0",
-        *switched(layout, "force", "forces[0] += {call}", **_BASE),
+        *switched(smooth, "force", "forces[0] += {call}", **_ISOLATION),
         "    for i in range(1 if isolated else 0, n):",
         "        drift = x[i] - (x[i - 1] if i > 0 else 0.0)",
         "        drift_rate = x[n + i] - (x[n + i - 1] if i > 0 else 0.0)",
@@ -150,6 +155,17 @@ def _forces_source(layout: Layout) -> str:
         "        forces[i] += pull",
         "        if i > 0:",
         "            forces[i - 1] -= pull",
+    ]
+    return "\n".join(lines)
+
+
+def _contact_source(layout: Layout) -> str:
+    contact = layout.only(lambda effect: effect.contact)
+    lines = [
+        "def contact_force(n, isolated, stiffnesses, x, dt, energy, halt, z, p, on):",
+        "    total = 0.0",
+        *switched(contact, "force", "total += {call}", **_ISOLATION),
+        "    return total",
     ]
     return "\n".join(lines)
 
@@ -174,14 +190,16 @@ def _advance_source(layout: Layout) -> str:
 
 def reweave() -> None:
     """Weave the structure's functions anew; call it after effects were registered late."""
-    global LAYOUT, effect_forces, advance_effects
+    global LAYOUT, effect_forces, contact_force, advance_effects
     LAYOUT = Layout("structure", 0, 0)
     effect_forces = weave("effect_forces", _forces_source(LAYOUT), LAYOUT)
+    contact_force = weave("contact_force", _contact_source(LAYOUT), LAYOUT)
     advance_effects = weave("advance_effects", _advance_source(LAYOUT), LAYOUT)
 
 
 LAYOUT: Layout
 effect_forces: Any
+contact_force: Any
 advance_effects: Any
 reweave()
 
@@ -208,11 +226,11 @@ def step(
         return
     size = 2 * n
     g0, g1 = work[0:n], work[n : 2 * n]
-    free = work[size : 2 * size]
+    free, middle = work[size : 2 * size], work[2 * size : 3 * size]
     for i in range(size):
         free[i] = x1[i]
-    # A stuck contact carries what brings the first level to rest within the step.
-    gain = held[n * (n + 1)]
+    # Smooth forces go linearly from begin to end; a contact's is held over the step.
+    contact = 0.0
     effect_forces(n, isolated, stiffnesses, x0, h, energy, 0.0, z0, p, on, g0)
     for i in range(n):
         g1[i] = g0[i]
@@ -221,14 +239,71 @@ def step(
             x1[i] = free[i]
         for i in range(n):
             add_force(n, held, ramp, i, g0[i], g1[i], x1)
-        halt = g1[0] - x1[n] / gain
-        advance_effects(n, x1, h, energy, halt, g1[0], z0, p, on, z1)
-        effect_forces(n, isolated, stiffnesses, x1, h, energy, halt, z1, p, on, g1)
+        contact = balance_contact(
+            n, isolated, stiffnesses, held, ramp, h, x0, energy, z0, p, on, contact, x1, z1, middle
+        )
+        effect_forces(n, isolated, stiffnesses, x1, h, energy, contact, z1, p, on, g1)
+    for i in range(size):
+        middle[i] = 0.5 * (x0[i] + x1[i])
+    force = 0.5 * (g0[0] + g1[0]) + contact
+    advance_effects(n, middle, h, energy, contact, force, z0, p, on, z1)
+
+
+def balance_contact(
+    n: int, isolated: bool, stiffnesses: Row, held: Row, ramp: Row, h: float, x0: Row,
+    energy: float, z0: Row, p: Row, on: Row, guess: float, x1: Row, z1: Row, middle: Row,
+) -> float:  # fmt: skip
+    """Add to x1 the contacts' force on the first level that goes with it; return that force [N].
+
+    It is that of the middle of the step, or, where a contact sticks, what brings the level to rest
+    at its end (Moreau's time stepping). The more force, the less motion into the contact: so the
+    balance has one solution, found by regula falsi (Illinois) at any stiffness.
+    """
+    gain = held[n * (n + 1)]
+    tried, low, at_low, high, at_high, last = guess, 0.0, 0.0, 0.0, 0.0, 0
+    add_force(n, held, ramp, 0, tried, tried, x1)
+    for _ in range(MOST_TRIALS):
+        for i in range(2 * n):
+            middle[i] = 0.5 * (x0[i] + x1[i])
+        halt = tried - x1[n] / gain
+        advance_effects(n, middle, h, energy, halt, tried, z0, p, on, z1)
+        found = contact_force(n, isolated, stiffnesses, middle, h, energy, halt, z1, p, on)
+        excess = found - tried
+        if abs(excess) <= 1e-10 * (1.0 + abs(found)):
+            break
+        new = found
+        if excess > 0.0:
+            at_high *= 0.5 if last > 0 else 1.0
+            low, at_low, last = tried, excess, 1
+        else:
+            at_low *= 0.5 if last < 0 else 1.0
+            high, at_high, last = tried, excess, -1
+        if at_low > 0.0 and at_high < 0.0:
+            new = (low * at_high - high * at_low) / (at_high - at_low)
+        add_force(n, held, ramp, 0, new - tried, new - tried, x1)
+        tried = new
+    return tried
+
+
+def rest_forces(
+    n: int, isolated: bool, stiffnesses: Row, C: Row, K: Row, mass: float, x: Row, a_g: float,
+    devices: float, z: Row, p: Row, on: Row, forces: Row,
+) -> float:  # fmt: skip
+    """Fill `forces` (n,) with what the effects exert at a state; return the holding force [N].
+
+    A contact that sticks carries what the devices' force [N] leaves of the holding force, for the
+    devices hold first.
+    """
+    effect_forces(n, isolated, stiffnesses, x, inf, 0.0, 0.0, z, p, on, forces)
+    hold = holding_force(n, C, K, mass, x, a_g, forces[0])
+    halt = hold - devices + mass * x[n] / EFFECT_STEP
+    forces[0] += contact_force(n, isolated, stiffnesses, x, inf, 0.0, halt, z, p, on)
+    return hold
 
 
 def work_size(n: int) -> int:
     """Return how many floats `step` needs as room to work."""
-    return 4 * n
+    return 6 * n
 
 
 def default_building() -> Building:
@@ -259,6 +334,7 @@ class StructureModel:
         self.x = [0.0] * (2 * self.m.n)
         self.on = [effect.name in effects for effect in LAYOUT.effects]
         self.active = any(self.on)
+        self.touches = any(e.contact and e.name in effects for e in LAYOUT.effects)
         self.p = [0.0] * LAYOUT.p_size
         for effect in LAYOUT.effects:
             for name, parameter in effect.parameters.items():
@@ -309,9 +385,18 @@ class StructureModel:
         accelerations(m.n, m.M_inverse, m.C, m.K, self.x, loads, self._unloaded)
         self._hold = holding_force(m.n, m.C, m.K, m.mass, self.x, 0.0, loads[0])
 
-    def absolute_accelerations(self, force: float) -> list[float]:
-        """Return q'' + a_g (n,) [m/s2] under the devices' force [N] on the first level."""
-        n, inertia = self.m.n, self.m.M_inverse
+    def absolute_accelerations(self, force: float, a_g: float = 0.0) -> list[float]:
+        """Return q'' + a_g (n,) [m/s2] under the devices' force [N] on the first level.
+
+        The ground's acceleration [m/s2] counts where a contact sticks: the level then has it too.
+        """
+        m = self.m
+        n, inertia = m.n, m.M_inverse
+        if self.touches:
+            halt = self._hold - m.mass * a_g - force + m.mass * self.x[n] / EFFECT_STEP
+            force += contact_force(
+                n, m.isolated, m.stiffnesses, self.x, inf, 0.0, halt, self.z, self.p, self.on
+            )
         return [self._unloaded[i] - inertia[i * n] * force for i in range(n)]
 
     def holding_force(self, a_g: float, others: float) -> float:

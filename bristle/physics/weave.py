@@ -8,6 +8,8 @@ parameters, `z` for states, `on` for switches; a `Layout` says which is where.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from copy import copy
 from typing import Any
 
 from .effect import Effect, Q, effects_of
@@ -46,6 +48,12 @@ class Layout:
             for name in effect.states:
                 self.states[effect.name + "." + name] = self.z_size
                 self.z_size += 1
+
+    def only(self, keep: Callable[[type[Effect]], bool]) -> Layout:
+        """Return the same layout with those effects alone that are to be kept."""
+        part = copy(self)
+        part.effects = tuple(effect for effect in self.effects if keep(effect))
+        return part
 
     def values(self, effect: type[Effect]) -> str:
         """Return the source that makes the effect's parameter tuple from `p`."""

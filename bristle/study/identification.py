@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..identify.fit import Fit, Model, Problem, identify
+from ..identify.fit import fit as fit_model
 from ..identify.prepare import prepare, saturated
 from ..identify.table import LawError, error_rms, error_table, force_rms
 from ..records.channels import DRIVE
@@ -103,6 +104,8 @@ def identify_study(
     study: Study,
     *,
     law: str | None = None,
+    model: StudyModel | None = None,
+    begin: Mapping[str, float] | None = None,
     cutoff: float | None = None,
     starts: int = 4,
     table: bool = True,
@@ -114,6 +117,8 @@ def identify_study(
     Parameters
     ----------
     law : another law to take than the model's; its effects stay where they can join it
+    model : a model to take in place of the present one
+    begin : values in SI by name from which one more fit begins; the better one counts
     cutoff : Hz, of the low-pass for the table of errors; None takes the study's
     starts : how many starting points are tried
     table : whether to compare the laws as the paper does
@@ -133,9 +138,9 @@ def identify_study(
     identifier = IDENTIFIERS.get(study.settings.rig)
     if identifier is None:
         raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not identified yet.')
-    model = _of_law(study.model(), law)
+    model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    found = identifier(study, model, cutoff, starts, table, show or (lambda done: None))
+    found = identifier(study, model, cutoff, starts, table, show or (lambda done: None), begin)
     if not write:
         return found
     step = study.add_step(
@@ -146,15 +151,17 @@ def identify_study(
 
 
 def identify_bench(
-    study: Study, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show
-) -> Identified:
+    study: Study, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show,
+    begin: Mapping[str, float] | None = None,
+) -> Identified:  # fmt: skip
     """Identify a damper on a test bench: motion prescribed, force measured."""
     runs = study.runs()
-    return _identify(runs, model, cutoff, starts, table, show)
+    return _identify(runs, model, cutoff, starts, table, show, begin)
 
 
 IDENTIFIERS: dict[
-    str, Callable[[Study, StudyModel, float, int, bool, Show], Identified]
+    str,
+    Callable[[Study, StudyModel, float, int, bool, Show, Mapping[str, float] | None], Identified],
 ] = {"bench": identify_bench}
 """What identifies a study, by its rig."""
 
@@ -183,8 +190,8 @@ def identify_frames(
     RecordError, StudyError
         As `identify_study`.
     """
-    train = _measurements(frames, "frame")
-    held = _measurements(holdout, "held out") if holdout else []
+    train = measurements_of_frames(frames, "frame")
+    held = measurements_of_frames(holdout, "held out") if holdout else []
     if not train:
         raise StudyError("no frame is given; one run or more is right.")
     model = _of_law(new_model(law, effects) if law in LAW_NAMES else new_model(), law)
@@ -193,9 +200,10 @@ def identify_frames(
     return _identify(runs, model, cutoff, starts, table, lambda done: None)
 
 
-def _measurements(
+def measurements_of_frames(
     frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame], stem: str
 ) -> list[Measurement]:
+    """Return the measurements in frames whose columns are named by channel."""
     from ..records.channels import channel_unit, is_channel
     from ..records.measurement import ChannelSpec, measurements_of_frame
 
@@ -234,8 +242,9 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
 
 
 def _identify(
-    runs: Runs, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show
-) -> Identified:
+    runs: Runs, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show,
+    begin: Mapping[str, float] | None = None,
+) -> Identified:  # fmt: skip
     notes = [*runs.notes, *_doubts(runs.all)]
     train = Problem([prepare(one, seed=31 * k) for k, one in enumerate(runs.train)])
     held = [prepare(one, seed=31 * k + 7) for k, one in enumerate(runs.holdout)]
@@ -246,6 +255,9 @@ def _identify(
         train, start.law, start.effects, starts, values=start.values, held=start.held,
         limits=start.limits,
     )  # fmt: skip
+    if begin is not None:
+        other = fit_model(train, replace(fit.model, values={**fit.model.values, **begin}))
+        fit = other if other.cost < fit.cost else fit
     show(2)
     found = _with_fit(model, fit)
     before = errors_of(train, holdout, start, cutoff)
@@ -257,9 +269,7 @@ def _identify(
     show(4)
     if not any(one.has(*(c,)) for one in runs.all for c in DRIVE):
         notes.append("Neither voltage nor current was measured: the parameters hold at its level.")
-    return Identified(
-        fit, found, rows, cutoff, before, after, tuple(notes), None, train, holdout
-    )
+    return Identified(fit, found, rows, cutoff, before, after, tuple(notes), None, train, holdout)
 
 
 def as_model(model: StudyModel) -> Model:

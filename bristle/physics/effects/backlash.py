@@ -8,7 +8,8 @@ class Backlash(Effect):
 
         force outside = k s' + c ds'/dt,   s' = s beyond +-gap,   s = x_rod - x_joint
 
-    A small joint mass lets the fluid spring back inside the gap. Leaves out impact noise.
+    A small joint mass lets the fluid spring back inside the gap. Leaves out the rattle of the
+    impacts: doubt it when the force rings after a gap has closed.
     """
 
     name = "backlash"
@@ -17,7 +18,9 @@ class Backlash(Effect):
     passive = True
     zero_at_rest = True
     excludes = ("mount_compliance",)
-    source = "Nordin & Gutman (2002), Automatica 38(10), 1633-1649 (physical model of Nordin et al. 1997)"
+    source = (
+        "Nordin & Gutman (2002), Automatica 38(10), 1633-1649 (physical model, Nordin et al. 1997)"
+    )
     expect = "after each reversal of the force no force at all over the width of the gap"
     states = {"compression": "m", "joint_velocity": "m/s"}
     joint = ("compression", "joint_velocity")

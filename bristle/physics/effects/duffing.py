@@ -2,25 +2,37 @@
 
 from ..effect import Effect, Parameter
 
+X_REF = 0.01  # m; keeps the unit of k_3 for every shape
+
 
 class Duffing(Effect):
     """Duffing spring: the isolation springs grow stiffer, or softer, with displacement.
 
-    F = k_3 |x|^(shape - 1) x,   shape 3 for Duffing's cubic
+        F = k_3 X_r^2 (|x|/X_r)^(shape-1) x,   X_r = 10 mm;   shape 3 is Duffing's cubic
+
+    A softening spring (k_3 < 0) gives F/(1 + |F/(k_b x)|) beside the linear stiffness k_b, so that
+    it never pushes outwards. Leaves out the rubber's own damping: doubt it when the loop of the
+    isolation has area.
     """
 
     name = "duffing"
     site = "structure"
-    needs = ("x",)
+    needs = ("x", "stiffness")
     passive = True
     zero_at_rest = True
-    source = "Duffing (1918), Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz"
+    source = (
+        "Duffing (1918), Erzwungene Schwingungen bei veraenderlicher Eigenfrequenz; to shape 5: "
+        "Kelly (1997), Earthquake-Resistant Design with Rubber"
+    )
     expect = "a force in phase with base displacement that grows faster than it"
     parameters = {
-        "k_3": Parameter(1e6, "N/m3", (-1e12, 1e12), "coefficient (for shape 3)"),
-        "shape": Parameter(3.0, "1", (2.0, 5.0), "exponent"),
+        "k_3": Parameter(1e6, "N/m3", (-1e10, 1e10), "coefficient, at X_r for every shape"),
+        "shape": Parameter(3.0, "1", (2.0, 7.0), "exponent: 3 cubic, 5 late in the stroke"),
     }
 
     @staticmethod
     def force(q, z, p):
-        return p.k_3 * abs(q.x) ** (p.shape - 1.0) * q.x
+        added = p.k_3 * X_REF**2 * (abs(q.x) / X_REF) ** (p.shape - 1.0)
+        if added >= 0.0:
+            return added * q.x
+        return added * q.x / (1.0 - added / q.stiffness) if q.stiffness > 0.0 else 0.0

@@ -2,11 +2,16 @@
 
 from ..effect import Effect, Parameter
 
+D_REF = 1e-3  # m; keeps the unit of k for every shape
+
 
 class EndStop(Effect):
-    """End stop: beyond the clearance a buffer pushes back, with a spring and a dashpot.
+    """End stop: beyond the clearance a buffer pushes back, with a spring and a loss.
 
-    F = k d^shape + c v,   d = |x| - clearance > 0;   never pulling
+        F = k D_r (d/D_r)^shape (1 + loss d') + c d',   d = |x| - clearance > 0,   D_r = 1 mm
+
+    It never pulls. Leaves out the ringing of what is hit: doubt it when accelerations go on after
+    the contact.
     """
 
     name = "end_stop"
@@ -14,13 +19,18 @@ class EndStop(Effect):
     needs = ("x", "v")
     passive = True
     zero_at_rest = True
-    source = "Anagnostopoulos (1988), Earthq. Eng. Struct. Dyn. 16(3), 443-456"
+    contact = True
+    source = (
+        "Anagnostopoulos (1988), Earthq. Eng. Struct. Dyn. 16(3), 443-456; loss: Hunt & Crossley "
+        "(1975), J. Appl. Mech. 42(2), 440-445"
+    )
     expect = "spikes of force and acceleration at the largest displacements"
     parameters = {
         "clearance": Parameter(0.02, "m", (1e-4, 10.0), "travel before contact, to either side"),
-        "k": Parameter(5e3, "N/m", (0.0, 1e9), "stiffness of the buffer (for shape 1)"),
+        "k": Parameter(5e3, "N/m", (0.0, 1e9), "stiffness of the buffer, at D_r for every shape"),
         "c": Parameter(10.0, "N.s/m", (0.0, 1e7), "damping of the buffer"),
-        "shape": Parameter(1.0, "1", (1.0, 2.5), "1 linear, 1.5 Hertz"),
+        "shape": Parameter(1.0, "1", (1.0, 3.0), "1 linear, 1.5 Hertz"),
+        "loss": Parameter(0.0, "s/m", (0.0, 100.0), "loss by the closing speed"),
     }
 
     @staticmethod
@@ -29,4 +39,5 @@ class EndStop(Effect):
         if beyond <= 0.0:
             return 0.0
         side = 1.0 if q.x > 0.0 else -1.0
-        return side * max(p.k * beyond**p.shape + p.c * side * q.v, 0.0)
+        push = p.k * D_REF * (beyond / D_REF) ** p.shape * (1.0 + p.loss * side * q.v)
+        return side * max(push + p.c * side * q.v, 0.0)

@@ -2,14 +2,17 @@
 
 from ..effect import Effect, Parameter
 
+S_REF = 1e-3  # m
+
 
 class MountCompliance(Effect):
     """Mount compliance: a spring and a dashpot in series with the fluid, with a small joint mass.
 
-        mass v_joint' = k s + c s' - F_fluid,   s = x_rod - x_joint,   force outside = k s + c s'
+        mass v_joint' = F - F_fluid,   F = k s (1 + (s/s_h)^2) + c s',   s = x_rod - x_joint
 
-    The joint's mass regularises the falling branch of the viscous part, on which a bare spring
-    would jump. Leaves out play (see backlash).
+    `hard` is (1 mm/s_h)^2: 0 a linear spring, more a rubber bush that stiffens. The joint's mass
+    regularises the falling branch of the viscous part, on which a bare spring would jump.
+    Leaves out play: doubt it when no force at all comes after a reversal (see backlash).
     """
 
     name = "mount_compliance"
@@ -26,6 +29,7 @@ class MountCompliance(Effect):
     joint = ("compression", "joint_velocity")
     parameters = {
         "k": Parameter(2e4, "N/m", (1e2, 1e9), "stiffness of the mount"),
+        "hard": Parameter(0.0, "1", (0.0, 1e4), "growth of the stiffness per square millimetre"),
         "c": Parameter(60.0, "N.s/m", (0.0, 1e6), "damping of the mount"),
         "mass": Parameter(0.004, "kg", (1e-5, 10.0), "mass of the joint"),
     }
@@ -36,9 +40,11 @@ class MountCompliance(Effect):
 
     @staticmethod
     def reaction(q, z, p):
-        return p.k * z.compression + p.c * (q.rod_v - z.joint_velocity)
+        bent = p.k * z.compression * (1.0 + p.hard * (z.compression / S_REF) ** 2)
+        return bent + p.c * (q.rod_v - z.joint_velocity)
 
     @staticmethod
     def rate(q, z, p):
         slip = q.rod_v - z.joint_velocity
-        return slip, (p.k * z.compression + p.c * slip - q.force) / p.mass
+        bent = p.k * z.compression * (1.0 + p.hard * (z.compression / S_REF) ** 2)
+        return slip, (bent + p.c * slip - q.force) / p.mass

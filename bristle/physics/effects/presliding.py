@@ -10,8 +10,8 @@ class Presliding(Effect):
 
         d(w)/d|x| = -w^shape / x_s,   w = 1 - direction * s,   s = sgn(v);   |direction| <= 1
 
-    Dahl's model for shape 1, an elastic-plastic spring for shape 0; exact in the travel. Leaves
-    out rate: doubt it when the build-up differs between slow and fast reversals.
+    Dahl's model for shape 1, an elastic-plastic spring for shape 0; exact in the travel.
+    Leaves out rate: doubt it when the build-up differs between slow and fast reversals.
     """
 
     name = "presliding"
@@ -25,7 +25,7 @@ class Presliding(Effect):
     states = {"direction": "1"}
     parameters = {
         "x_s": Parameter(5e-4, "m", (1e-7, 0.1), "travel over which the yield force builds up"),
-        "shape": Parameter(1.0, "1", (0.0, 2.0), "0 elastic-plastic, 1 Dahl"),
+        "shape": Parameter(1.0, "1", (0.0, 3.0), "0 elastic-plastic, 1 Dahl, above: a long tail"),
     }
 
     @staticmethod

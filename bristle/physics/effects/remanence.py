@@ -6,9 +6,11 @@ from ..effect import Effect, Parameter
 class Remanence(Effect):
     """Remanence: the field lags behind the voltage by a fixed width, however slowly it moves.
 
-    The play operator: V_felt rests while the voltage moves inside V_felt +- width, and is carried
-    along at the edges; never below zero. Leaves out minor loops of other width and
-    demagnetisation by vibration.
+        V_felt = mean of four play operators of the widths width (1 + spread (-3, -1, 1, 3)/4)
+
+    A play rests while the voltage moves inside V_felt +- width and is carried along at the edges;
+    V_felt is never below zero. Spread 0 is one play, 1 a loop that rounds off like iron's.
+    Leaves out demagnetisation by vibration: doubt it when the loop shrinks over time.
     """
 
     name = "remanence"
@@ -16,15 +18,31 @@ class Remanence(Effect):
     needs = ("V",)
     passive = True
     zero_at_rest = True
-    source = "Visintin (1994), Differential Models of Hysteresis, ch. III (play operator)"
+    source = (
+        "Visintin (1994), Differential Models of Hysteresis, ch. III (play, and Prandtl and "
+        "Ishlinskii's sums of it)"
+    )
     expect = "at one voltage two forces, the larger one while the voltage falls"
-    states = {"voltage": "V"}
-    parameters = {"width": Parameter(0.5, "V", (0.0, 10.0), "half the width of the loop")}
+    states = {"voltage": "V", "second": "V", "third": "V", "fourth": "V"}
+    parameters = {
+        "width": Parameter(0.5, "V", (0.0, 10.0), "half the width of the loop"),
+        "spread": Parameter(
+            0.0, "1", (0.0, 1.3), "spread of the widths: 0 one, 1 from zero to twice"
+        ),
+    }
 
     @staticmethod
     def voltage(q, z, p):
-        return max(z.voltage, 0.0)
+        return max(0.25 * (z.voltage + z.second + z.third + z.fourth), 0.0)
 
     @staticmethod
     def advance(q, z, p):
-        return (min(max(z.voltage, q.V - p.width), q.V + p.width),)
+        small = max(p.width * (1.0 - 0.75 * p.spread), 0.0)
+        middle, large = p.width * (1.0 - 0.25 * p.spread), p.width * (1.0 + 0.25 * p.spread)
+        largest = p.width * (1.0 + 0.75 * p.spread)
+        return (
+            min(max(z.voltage, q.V - small), q.V + small),
+            min(max(z.second, q.V - middle), q.V + middle),
+            min(max(z.third, q.V - large), q.V + large),
+            min(max(z.fourth, q.V - largest), q.V + largest),
+        )

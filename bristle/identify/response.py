@@ -1,0 +1,273 @@
+"""The response of a building, as measured: one motion per level, and what its inertia says.
+
+Every level's displacement, velocity and acceleration are joined by a Kalman smoother with white
+jerk. Where dry friction lets the acceleration jump, the jerk is given that jump: else the velocity
+would be smoothed across it, and a yield force would be held against the wrong side of v = 0.
+
+Equilibrium is taken sample by sample from the accelerations as measured, for they and the forces
+jump together; their noise is white and known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from ..compiled.kalman import random_walk
+from ..compiled.response import smooth_level
+from ..errors import RecordError
+from ..physics.building import Building
+from ..records.measurement import Measurement
+from .drive import smooth_steps
+from .prepare import SHORTEST
+
+Array = NDArray[np.float64]
+
+JUMP = 6.0
+"""A change of acceleration that is so many times what is usual from sample to sample is a jump."""
+
+
+@dataclass(frozen=True)
+class Response:
+    """A run of a building, its motion smoothed.
+
+    `x`, `v`, `a` (levels, n): displacement, velocity [m, m/s] relative to the table, smoothed, and
+    absolute acceleration [m/s2] as measured (or, for a level without an accelerometer, smoothed:
+    `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper, None
+    where it was not measured; `V` (n,) [V]. `noise_a` (levels,), `noise_force`, `noise_ground`
+    standard deviations; `std` (levels, 3) what the smoother leaves uncertain of x, v and relative
+    acceleration; `draws` (levels, d, n, 3) draws of that error; `V_left` the noise left on V.
+    """
+
+    name: str
+    dt: float
+    x: Array
+    v: Array
+    a: Array
+    ground: Array
+    force: Array | None
+    V: Array
+    noise_a: Array
+    noise_force: float
+    noise_ground: float
+    accelerometer: NDArray[np.bool_]
+    std: Array
+    draws: Array
+    V_left: float
+    driven: bool
+
+
+def check_channels(measurement: Measurement, building: Building) -> None:
+    """Raise a RecordError that names every channel that is missing.
+
+    A building's response needs the ground acceleration and, of each level, the displacement or
+    velocity; a level without accelerometer needs one of them all the more.
+    """
+    missing = []
+    if not measurement.has("ground_acceleration"):
+        missing.append("ground_acceleration")
+    levels = building.levels()
+    for level in levels:
+        if not (measurement.has(f"{level}_displacement") or measurement.has(f"{level}_velocity")):
+            missing.append(f"{level}_displacement")
+    if missing:
+        raise RecordError(
+            f"{measurement.name}: {', '.join(missing)} missing. A run of {building.name!r} needs "
+            f"ground_acceleration and the displacement or velocity of {', '.join(levels)}."
+        )
+    known = {f"{level}_" for level in levels}
+    beyond = sorted(
+        channel
+        for channel in measurement.channels
+        if channel.startswith(("base_", "floor"))
+        and not any(channel.startswith(level) for level in known)
+    )
+    if beyond:
+        raise RecordError(
+            f"{measurement.name}: {', '.join(beyond)} measured, but {building.name!r} has the levels "
+            f"{', '.join(levels)}. Give the building.toml of the structure that was tested."
+        )
+    if len(measurement.time) < SHORTEST:
+        raise RecordError(
+            f"{measurement.name}: {len(measurement.time)} samples; a fit needs {SHORTEST} or more."
+        )
+
+
+def respond(measurement: Measurement, building: Building, draws: int = 12) -> Response:
+    """Return a measurement as a response; see `responses` for several of one rig."""
+    return responses([measurement], building, draws)[0]
+
+
+def responses(
+    measurements: list[Measurement], building: Building, draws: int = 12, seed: int = 0
+) -> list[Response]:
+    """Return the measurements of one rig as responses.
+
+    The smoother's jerk is each run's own; the draws of its error are made once per level.
+
+    Raises
+    ------
+    RecordError
+        If a channel is missing, or the building has other levels than were measured.
+    """
+    for measurement in measurements:
+        check_channels(measurement, building)
+    smoothed = [[_level(m, name) for name in building.levels()] for m in measurements]
+    longest = max(len(m.time) for m in measurements)
+    errors = [
+        _draws(longest, [run[i] for run in smoothed], measurements[0].step, draws, seed + i)
+        for i in range(building.size)
+    ]
+    return [
+        _response(m, building, levels, errors)
+        for m, levels in zip(measurements, smoothed, strict=True)
+    ]
+
+
+def _response(
+    m: Measurement, building: Building, levels: list[dict[str, Any]], errors: list[Array]
+) -> Response:
+    n = len(m.time)
+    ground = m["ground_acceleration"]
+    noise_ground = m.noise.get("ground_acceleration", 0.0)
+    a, noise_a, own = [], [], []
+    for name, level in zip(building.levels(), levels, strict=True):
+        channel = f"{name}_acceleration_absolute"
+        own.append(m.has(channel))
+        a.append(m[channel] if own[-1] else level["state"][:, 2] + ground)
+        noise_a.append(
+            m.noise.get(channel, 0.0) if own[-1] else float(np.hypot(level["std"][2], noise_ground))
+        )
+    drive = next((c for c in ("voltage", "current") if m.has(c)), None)
+    V, left = smooth_steps(m[drive], m.noise.get(drive, 0.0), m.step) if drive else (np.zeros(n), 0.0)
+    return Response(
+        m.name, m.step,
+        np.array([level["state"][:, 0] for level in levels]),
+        np.array([level["state"][:, 1] for level in levels]),
+        np.array(a), ground, m["force"] if m.has("force") else None, V, np.array(noise_a),
+        m.noise.get("force", 0.0), noise_ground, np.array(own),
+        np.array([level["std"] for level in levels]),
+        np.array([error[:, :n] for error in errors]), left, drive is not None,
+    )  # fmt: skip
+
+
+def _level(m: Measurement, name: str) -> dict[str, Any]:
+    """Return the smoothed motion of one level: state (n, 3), std (3,), jerk, noise, have."""
+    n, dt = len(m.time), m.step
+    y, r, have = np.zeros((n, 3)), np.zeros(3), np.zeros(3, dtype=np.bool_)
+    for i, what in enumerate(("displacement", "velocity")):
+        channel = f"{name}_{what}"
+        if m.has(channel):
+            y[:, i], have[i] = m[channel], True
+            r[i] = m.noise.get(channel, 0.0) ** 2
+    channel = f"{name}_acceleration_absolute"
+    if m.has(channel):
+        y[:, 2], have[2] = m[channel] - m["ground_acceleration"], True
+        r[2] = m.noise.get(channel, 0.0) ** 2 + m.noise.get("ground_acceleration", 0.0) ** 2
+    # A channel without any noise still is no better than its last digits.
+    r = np.maximum(r, (1e-7 * np.std(y, axis=0)) ** 2 + 1e-30)
+    added = jumps(y[:, 2], dt) if have[2] else np.zeros(n)
+    state, cov = np.zeros((n, 3)), np.zeros(3)
+    jerk = _likeliest(y, r, have, dt, added)
+    smooth_level(y, r, have, dt, jerk + added, True, state, cov)
+    std = np.sqrt(np.maximum(cov, 0.0))
+    return {"state": state, "std": std, "jerk": jerk, "r": r, "have": have}
+
+
+def jumps(a: Array, dt: float) -> Array:
+    """Return the jerk [m2/s5] that accounts for the jumps of an acceleration (n,) [m/s2]."""
+    change = np.abs(np.diff(a, prepend=a[0]))
+    usual = float(np.median(change)) / 0.6745
+    return np.where(change > JUMP * usual, change**2 / dt, 0.0)
+
+
+def _likeliest(
+    y: Array, r: Array, have: NDArray[np.bool_], dt: float, added: Array, most: int = 4000
+) -> float:
+    """Return the intensity of the white jerk that makes the strongest stretch likeliest."""
+    n = len(y)
+    if n > most:
+        power = np.convolve(np.abs(y[:, int(np.argmax(have))]), np.ones(most), mode="valid")
+        begin = int(np.argmax(power))
+        y, added = y[begin : begin + most], added[begin : begin + most]
+    spare, cov = np.zeros((1, 3)), np.zeros(3)
+    highest = int(np.flatnonzero(have)[-1])
+    third = np.diff(y[:, highest], n=3 - highest) / dt ** (3 - highest)
+    top = np.log10(np.var(third) * dt + 1e-30)
+
+    def cost(exponent: float) -> float:
+        jerk = 10.0**exponent + added
+        return float(smooth_level(y, r, have, dt, jerk, False, spare, cov))
+
+    grid = np.arange(top - 12.0, top + 2.1, 1.5)
+    best = grid[int(np.argmin([cost(exponent) for exponent in grid]))]
+    found = minimize_scalar(
+        cost, bounds=(best - 1.5, best + 1.5), method="bounded", options={"xatol": 0.1}
+    )
+    return float(10.0**found.x)
+
+
+def _draws(n: int, runs: list[dict[str, Any]], dt: float, draws: int, seed: int) -> Array:
+    """Return draws (d, n, 3) of the smoother's error at the median jerk and noise of the runs."""
+    generator = np.random.default_rng(seed)
+    jerk = float(np.median([run["jerk"] for run in runs]))
+    r = np.median([run["r"] for run in runs], axis=0)
+    have = runs[0]["have"]
+    lead = min(200, n)
+    total = n + 2 * lead
+    F = np.array([[1.0, dt, 0.5 * dt * dt], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+    Q = np.array(
+        [
+            [dt**4 / 20.0, dt**3 / 8.0, dt**2 / 6.0],
+            [dt**3 / 8.0, dt**2 / 3.0, dt / 2.0],
+            [dt**2 / 6.0, dt / 2.0, 1.0],
+        ]
+    ) * (jerk * dt)
+    root = np.linalg.cholesky(Q + np.diag([1e-30, 1e-30, 1e-30]) * max(jerk, 1.0))
+    out = np.zeros((draws, n, 3))
+    state, cov = np.zeros((total, 3)), np.zeros(3)
+    for d in range(draws):
+        path = random_walk(F, generator.standard_normal((total, 3)) @ root.T)
+        y = path + generator.standard_normal((total, 3)) * np.sqrt(r)
+        smooth_level(y, r, have, dt, np.full(total, jerk), True, state, cov)
+        out[d] = (path - state)[lead : lead + n]
+    return out
+
+
+def shear(response: Response, building: Building, level: int) -> tuple[Array, float]:
+    """Return what must be carried below a level, and its noise per sample.
+
+    The inertia, damping and (for matrices that are no chain) elastic forces of this level and all
+    above it, as M, C and K of the building have them, without the linear spring below the level
+    itself: -sum_j>=level (M a + C v + K x)_j + k x_rel, in N, positive against +x.
+
+    Returns
+    -------
+    force (n,) N; noise: standard deviation of its white part [N], from the accelerometers
+    """
+    M, C, K = (np.array(matrix) for matrix in (building.M, building.C, building.K))
+    rows_m, rows_c, rows_k = (matrix[level:].sum(axis=0) for matrix in (M, C, K))
+    # Sums over a chain leave rounding where the springs above cancel.
+    rows_k[np.abs(rows_k) < 1e-12 * np.abs(K).max()] = 0.0
+    below = response.x[level] - (response.x[level - 1] if level else 0.0)
+    total = -(rows_m @ response.a + rows_c @ response.v + rows_k @ response.x)
+    noise = float(np.sqrt(np.sum((rows_m * response.noise_a) ** 2)))
+    return total + building.stiffnesses[level] * below, noise
+
+
+def base_equilibrium(response: Response, building: Building) -> tuple[Array, float]:
+    """Return the force on the first level by its own equilibrium alone, and its noise.
+
+    As `shear` at level 0, from one accelerometer instead of all, but from the storey above it as
+    the building has it.
+    """
+    M, C, K = (np.array(matrix)[0] for matrix in (building.M, building.C, building.K))
+    total = -(M @ response.a + C @ response.v + K @ response.x)
+    white = np.sum((M * response.noise_a) ** 2)
+    smooth = np.sum((K * response.std[:, 0]) ** 2) + np.sum((C * response.std[:, 1]) ** 2)
+    own = building.stiffnesses[0] * response.x[0]
+    return total + own, float(np.sqrt(white + smooth))

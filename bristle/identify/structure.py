@@ -1,0 +1,362 @@
+"""A building's runs as problems that a model can be held against.
+
+The damper's: base motion in, force out, measured or reconstructed from equilibrium. The isolation
+layer's, where the damper's force is known: what else the base carries. Each storey's: its shear
+against its drift. In the last two the model is a line, k x + c v, and effects of the structure add
+to it; so they are judged by the same searches as a damper's effects in a damper's law.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compiled.response import Along
+from ..errors import RecordError
+from ..physics.building import Building
+from ..physics.effect import EFFECTS, Parameter
+from ..records.measurement import Measurement
+from .fit import Fit
+from .model import OTHER_LAWS, Model, Problem, Run
+from .response import Response, base_equilibrium, responses, shear
+
+Array = NDArray[np.float64]
+
+SLIDING = 3.0
+"""Where dry friction may act, slower samples than so many standard deviations are left out: the
+base may be held there, and the force is then whatever holds it."""
+
+BESIDE = 3
+"""Samples on either side of such a one that are left out with it."""
+
+_WIDE = (-1e12, 1e12)
+_STIFFNESS = Parameter(1000.0, "N/m", (0.0, 1e12), "stiffness")
+_DAMPING = Parameter(0.0, "N.s/m", _WIDE, "damping beyond the building's")
+_OFFSET = Parameter(0.0, "N", _WIDE, "constant force: an accelerometer's or load cell's zero")
+
+
+class LinearLayer:
+    """Linear isolation layer: F = k x + c v + added_mass a + offset."""
+
+    name: ClassVar[str] = "linear_layer"
+    parameters: ClassVar[dict[str, Parameter]] = {
+        "k": _STIFFNESS,
+        "c": _DAMPING,
+        "added_mass": Parameter(0.0, "kg", _WIDE, "mass of the base beyond the building's"),
+        "offset": _OFFSET,
+    }
+
+
+class LinearStorey:
+    """Linear storey: F = k drift + c drift_rate + offset."""
+
+    name: ClassVar[str] = "linear_storey"
+    parameters: ClassVar[dict[str, Parameter]] = {
+        "k": _STIFFNESS,
+        "c": _DAMPING,
+        "offset": _OFFSET,
+    }
+
+
+OTHER_LAWS.update({law.name: law for law in (LinearLayer, LinearStorey)})
+
+
+@dataclass(frozen=True)
+class StructureRun(Run):
+    """A run of a building as one of its problems sees it.
+
+    The arrays of `Run` hold the samples that count; `whole` is the run with all of them, for models
+    with memory, and `keep` says which ones count.
+    """
+
+    whole: Run | None = field(default=None, repr=False)
+    keep: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+
+class StructureProblem(Problem):
+    """Runs of a building held against a damper's law or a linear law, with effects of both sites.
+
+    Parameters
+    ----------
+    runs : list of StructureRun
+    storey : int
+        0 for the first level (the isolation layer, the damper), else the storey's number.
+    reconstructed : bool
+        Whether the damper's force is a result of equilibrium, not measured.
+    """
+
+    def __init__(
+        self, runs: list[StructureRun], storey: int = 0, reconstructed: bool = False
+    ) -> None:
+        super().__init__(list(runs))
+        self.storey = storey
+        self.reconstructed = reconstructed
+        self._along: dict[tuple[str, ...], Along] = {}
+
+    def along(self, effects: tuple[str, ...]) -> Along:
+        if effects not in self._along:
+            self._along[effects] = Along(list(effects), self.storey)
+        return self._along[effects]
+
+    def predict(self, model: Model, run: Run, draw: int | None = None) -> Array:
+        """Return the model's force [N] at the samples of a run that count."""
+        assert isinstance(run, StructureRun)
+        structure = tuple(e for e in model.effects if EFFECTS[e].site == "structure")
+        damper = tuple(e for e in model.effects if EFFECTS[e].site != "structure")
+        linear = model.law in OTHER_LAWS
+        memory = any(EFFECTS[e].states for e in model.effects)
+        assert run.whole is not None
+        seen = run.whole if memory or not linear else run
+        x, v, a = seen.x, seen.v, seen.a
+        if draw is not None:
+            e = seen.draws[draw]
+            x, v, a = x + e[:, 0], v + e[:, 1], a + e[:, 2]
+        if linear:
+            stiffness = model.value("k")
+            force = stiffness * x + model.value("c") * v + model.value("offset")
+            if model.law == LinearLayer.name:
+                force = force + model.value("added_mass") * a
+        else:
+            stiffness = 0.0
+            force = super().predict(replace(model, effects=damper), seen, draw)
+        if structure:
+            along = self.along(structure)
+            force = force + along.force(x, v, run.dt, stiffness, model.values)
+        return force if seen is run else force[run.keep]
+
+
+def structure_run(
+    name: str, dt: float, motion: tuple[Array, Array, Array, Array], force: Array, noise: float,
+    draws: Array, keep: NDArray[np.bool_] | None = None,
+) -> StructureRun:  # fmt: skip
+    """Return a run of the samples in `keep` (n,); the first ones are the smoother's and skipped."""
+    whole = Run(name, dt, *motion, force, noise, draws)
+    if keep is None:
+        index, skip = np.arange(len(force)), whole.skip
+    else:
+        index, skip = np.flatnonzero(keep & (np.arange(len(force)) >= whole.skip)), 0
+    x, v, a, V = (part[index] for part in motion)
+    return StructureRun(
+        name, dt, x, v, a, V, force[index], noise, draws[:, index], skip, whole=whole, keep=index
+    )
+
+
+def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
+    """Return the problem with every so many samples: enough to choose among starts."""
+    runs = []
+    for run in problem.runs:
+        assert isinstance(run, StructureRun)
+        part = slice(run.skip, None, stride)
+        runs.append(
+            replace(
+                run, x=run.x[part], v=run.v[part], a=run.a[part], V=run.V[part],
+                force=run.force[part], draws=run.draws[:, part], skip=0, keep=run.keep[part],
+            )
+        )  # fmt: skip
+    return StructureProblem(runs, problem.storey, problem.reconstructed)
+
+
+def storey_run(response: Response, building: Building, level: int) -> StructureRun:
+    """Return the shear below a level against the drift there.
+
+    Level 0 of a fixed base carries the damper as well, whose force must be known.
+    """
+    force, noise = shear(response, building, level)
+    lower = level - 1
+    x, v = response.x[level].copy(), response.v[level].copy()
+    error = _error(response, level)
+    if level:
+        x -= response.x[lower]
+        v -= response.v[lower]
+        error[:, :, :3] -= _error(response, lower)[:, :, :3]
+    elif response.force is not None:
+        force = force - response.force
+        noise = float(np.hypot(noise, response.noise_force))
+    a = response.a[level]
+    return structure_run(
+        response.name, response.dt, (x, v, a, response.V), force, noise, error
+    )
+
+
+def layer_run(response: Response, building: Building) -> StructureRun:
+    """Return what the isolation layer carries beside the damper, against the base motion.
+
+    Samples at which the base may be held are left out.
+    """
+    if response.force is None:
+        raise RecordError(
+            f"{response.name}: force was not measured; what the isolation layer carries beside the "
+            "damper cannot be told from the damper's force."
+        )
+    force, noise = shear(response, building, 0)
+    x, v, a = response.x[0], response.v[0], response.a[0]
+    return structure_run(
+        response.name, response.dt, (x, v, a, response.V), force - response.force,
+        float(np.hypot(noise, response.noise_force)), _error(response, 0), sliding(response),
+    )  # fmt: skip
+
+
+def sliding(response: Response) -> NDArray[np.bool_]:
+    """Return where the first level surely moves, and so do the samples beside, (n,).
+
+    Beside a stop or a start the velocity is smoothed over a bend, and less certain than elsewhere.
+    """
+    moves = np.abs(response.v[0]) > SLIDING * float(response.std[0, 1])
+    held = np.convolve(~moves, np.ones(2 * BESIDE + 1), mode="same") > 0.5
+    return ~held
+
+
+def damper_run(
+    response: Response, building: Building, law: str, linear_storeys: bool = True
+) -> StructureRun:
+    """Return the damper's motion and force, measured or from equilibrium.
+
+    Of the base's own equilibrium and the sum over all levels the one with less noise is taken; the
+    first needs the storey above to be linear (`linear_storeys`). For a Bingham law samples at which
+    the base may be held are left out.
+    """
+    motion = (response.x[0], response.v[0], response.a[0] - response.ground, response.V)
+    if response.force is not None:
+        force, noise = response.force, response.noise_force
+    else:
+        force, noise = reconstructed(response, building, linear_storeys)
+    keep = sliding(response) if law.startswith("bingham") else None
+    return structure_run(
+        response.name, response.dt, motion, force, noise, _error(response, 0), keep
+    )
+
+
+def reconstructed(
+    response: Response, building: Building, linear_storeys: bool = True
+) -> tuple[Array, float]:
+    """Return the damper's force (n,) [N] by equilibrium and its noise per sample [N].
+
+    The noise is that of the accelerometers and, for the base's own equilibrium, what the smoother
+    leaves uncertain of the displacements, both times the building's masses and stiffnesses.
+    """
+    force, noise = shear(response, building, 0)
+    if linear_storeys:
+        local, local_noise = base_equilibrium(response, building)
+        if local_noise < noise:
+            force, noise = local, local_noise
+    own = float(building.stiffnesses[0])
+    spread = own * float(response.std[0, 0])
+    return force - own * response.x[0], float(np.hypot(noise, spread))
+
+
+def _error(response: Response, level: int) -> Array:
+    """Return draws (d, n, 4) of the error of x, v, a and V of a level."""
+    count, n = response.draws.shape[1:3]
+    error = np.zeros((count, n, 4))
+    error[:, :, :3] = response.draws[level]
+    generator = np.random.default_rng(level + 100)
+    if response.accelerometer[level]:
+        white = float(np.hypot(response.noise_a[level], response.noise_ground))
+        error[:, :, 2] = white * generator.standard_normal((count, n))
+    error[:, :, 3] = response.V_left * generator.standard_normal((count, 1))
+    return error
+
+
+def structure_problems(
+    train: list[Measurement], holdout: list[Measurement], building: Building, law: str = "lugre"
+) -> dict[str, tuple[StructureProblem, StructureProblem]]:
+    """Return the problems of a building's runs, each for training and held-out runs.
+
+    Returns
+    -------
+    dict
+        "storey1", "storey2", ...; "layer", where the base is isolated and the damper's force was
+        measured in every run; "damper", where a voltage, a current or the force was measured.
+
+    Raises
+    ------
+    RecordError
+        If a channel is missing, or the building has other levels than were measured.
+    """
+    found = responses([*train, *holdout], building)
+    return problems_of(found[: len(train)], found[len(train) :], building, law)
+
+
+def problems_of(
+    train: list[Response], holdout: list[Response], building: Building, law: str = "lugre",
+    linear_storeys: bool = True,
+) -> dict[str, tuple[StructureProblem, StructureProblem]]:  # fmt: skip
+    """Return the problems of responses; see `structure_problems`."""
+    both = (train, holdout)
+    everything = [*train, *holdout]
+    measured = all(r.force is not None for r in everything)
+    damped = measured or any(r.driven for r in everything)
+    problems = {}
+    for level in range(building.size):
+        storey = level if building.isolated else level + 1
+        if storey == 0 or (level == 0 and damped and not measured):
+            continue
+        parts = [[storey_run(r, building, level) for r in part] for part in both]
+        problems[f"storey{storey}"] = tuple(StructureProblem(p, storey) for p in parts)
+    if building.isolated and (measured or not damped):
+        parts = [[layer_run(_unloaded(r), building) for r in part] for part in both]
+        problems["layer"] = tuple(StructureProblem(p) for p in parts)
+    if damped:
+        parts = [[damper_run(r, building, law, linear_storeys) for r in part] for part in both]
+        problems["damper"] = tuple(StructureProblem(p, 0, not measured) for p in parts)
+    return problems  # type: ignore[return-value]
+
+
+def _unloaded(response: Response) -> Response:
+    """Return a response without a damper as one whose damper's force is zero."""
+    if response.force is not None:
+        return response
+    return replace(response, force=np.zeros_like(response.ground))
+
+
+def fit_line(problem: StructureProblem, law: str) -> Fit:
+    """Return the linear law fitted to a problem, by weighted linear least squares in three passes.
+
+    The weights are those of Huber's loss at the expected noise.
+    """
+    names = list(OTHER_LAWS[law].parameters)
+    model = Model(law, (), dict.fromkeys(names, 0.0))
+    columns = [_columns(run, names) for run in problem.runs]
+    A = np.concatenate(columns)
+    force = np.concatenate([run.force for run in problem.runs])
+    sigma = np.concatenate([np.full(len(run.force), max(run.noise, 1e-300)) for run in problem.runs])
+    weight = np.ones(len(force))
+    scale = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
+    theta = np.zeros(len(names))
+    for _ in range(4):
+        w = np.sqrt(weight) / sigma
+        theta = np.linalg.lstsq(A / scale * w[:, None], force * w, rcond=1e-10)[0]
+        z = np.abs(force - A @ (theta / scale)) / sigma
+        spread = max(1.0, float(np.median(z)) / 0.6745)
+        weight = np.minimum(1.0, 2.0 * spread / np.maximum(z, 1e-300))
+    theta = theta / scale
+    model = replace(model, values=dict(zip(names, theta.tolist(), strict=True)))
+    z = (force - A @ theta) / sigma
+    cost = float(np.mean(np.where(np.abs(z) <= 2.0, 0.5 * z * z, 2.0 * np.abs(z) - 2.0)))
+    return Fit(model, _line_std(problem, model, columns), cost)
+
+
+def _line_std(problem: StructureProblem, model: Model, columns: list[Array]) -> dict[str, float]:
+    """Return standard deviations by the sandwich formula with the drawn, correlated noise."""
+    count = len(model.values)
+    bread, meat = np.zeros((count, count)), np.zeros((count, count))
+    scores: list[Array] = []
+    expected = problem.expectation(model)
+    for run, part, (_, sigma, spread) in zip(problem.runs, columns, expected, strict=True):
+        J = part / sigma[:, None]
+        bread += J.T @ J
+        meat += (J * (run.noise / sigma)[:, None] ** 2).T @ J
+        own = (spread / sigma) @ J
+        scores = [a + b for a, b in zip(scores, own, strict=True)] if scores else list(own)
+    found = np.array(scores)
+    inverse = np.linalg.pinv(bread)
+    covariance = inverse @ (meat + found.T @ found / max(len(found), 1)) @ inverse
+    return dict(zip(model.values, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+
+
+def _columns(run: Run, names: list[str]) -> Array:
+    one = {"k": run.x, "c": run.v, "added_mass": run.a, "offset": np.ones_like(run.x)}
+    return np.column_stack([one[name] for name in names])
