@@ -197,7 +197,7 @@ def _run_error(name: str, held: Sequence[Held]) -> RunError:
 
 
 def _interval(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
-    """Return the 95 % interval of z over all runs, by the scatter of the loss from block to block."""
+    """Return the 95 % interval of z over all runs, by the scatter of the loss over blocks."""
     loss = huber(np.concatenate(list(normalised)))
     blocks = finder.blocks
     counts = np.bincount(blocks.label)
