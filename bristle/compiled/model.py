@@ -96,6 +96,5 @@ def compiled_march() -> Callable[..., tuple[int, int, int]]:
 def _compiled(evaluate: Any, effect_forces: Any) -> Callable[..., tuple[int, int, int]]:
     """Compile the march with these woven functions: there are new ones after a new effect."""
     march.damper_evaluate = evaluate
-    march.effect_forces = effect_forces
     function: Callable[..., tuple[int, int, int]] = compiled(march.march, march.INLINE)
     return function
