@@ -23,11 +23,11 @@ SEARCH: dict[str, dict[str, tuple[float, ...]]] = {
     "flattening": {"v_f": (0.1, 1.0), "bend": (1.0, 2.0)},
     "saturation": {"V_s": (0.4, 1.0)},
     "coil_lag": {"tau": (0.5, 2.0)},
-    "temperature": {"E_0": (0.5, 4.0), "tau": (0.2,)},
+    "temperature": {"E_0": (2.0, 15.0), "tau": (0.2,)},
     "presliding": {"x_s": (0.1, 0.6)},
     "mount_compliance": {"k": (1.0,)},
-    "backlash": {"gap": (0.1, 0.5)},
-    "remanence": {},
+    "backlash": {"gap": (0.3, 3.0)},
+    "quadratic_damping": {"c_2": (0.3, 3.0)},
 }
 """Where a search begins, as factors on an effect's defaults scaled to the rig."""
 
