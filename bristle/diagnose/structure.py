@@ -48,7 +48,7 @@ CLEAN = 1.15
 SHARE = 0.7
 """Share of a site's excess that an effect must explain where its form leaves more than `CLEAN`."""
 
-NEARLY = 0.02
+NEARLY = 0.005
 """Rivals whose z lies that close together are not told apart."""
 
 OWN = 0.5
@@ -229,9 +229,7 @@ def damper_verdict(base: Fit, train: StructureProblem, held_out: StructureProble
     return _decided(before, train, held_out)
 
 
-def _decided(
-    before: Trial, train: StructureProblem, held_out: StructureProblem
-) -> DamperVerdict:
+def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem) -> DamperVerdict:
     def grown(first: Trial) -> list[Trial]:
         trials = try_all(first.model, train, held_out)
         if train.reconstructed:
@@ -415,6 +413,7 @@ def _search_cell(
     what: str, train: list[Response], holdout: list[Response], building: Building, law: str
 ) -> tuple[float, float, float, Finding]:
     """Return z on held-out runs, delay [s], gain and finding of the best delay or gain."""
+
     def problem(value: float, part: list[Response]) -> StructureProblem:
         delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
         return StructureProblem([layer_run(_corrected(r, delay, gain), building) for r in part])
@@ -483,7 +482,8 @@ def combine(
     untestable = ("base_friction",) if reconstructed and "base_friction" not in effects else ()
     return StructureDiagnosis(
         kind, effects[:3] if kind == "class" else effects,
-        words(kind, effects, sites, alike, coordinate), float(worst[3]), float(worst[4]), coordinate,
+        words(kind, effects, sites, alike, coordinate), float(worst[3]), float(worst[4]),
+        coordinate,
         max((f.detectable for f in findings.values()), default=float("nan")), untestable, sites,
         findings, damper, verdict, reconstructed, sensors, problems,
     )  # fmt: skip

@@ -37,8 +37,8 @@ class Response:
 
     `x`, `v`, `a` (levels, n): displacement, velocity [m, m/s] relative to the table, smoothed, and
     absolute acceleration [m/s2] as measured (or, for a level without an accelerometer, smoothed:
-    `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper, None
-    where it was not measured; `V` (n,) [V]. `noise_a` (levels,), `noise_force`, `noise_ground`
+    `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper,
+    None where it was not measured; `V` (n,) [V]. `noise_a` (levels,), `noise_force`, `noise_ground`
     standard deviations; `std` (levels, 3) what the smoother leaves uncertain of x, v and relative
     acceleration; `draws` (levels, d, n, 3) draws of that error; `V_left` the noise left on V.
     """
@@ -88,8 +88,8 @@ def check_channels(measurement: Measurement, building: Building) -> None:
     )
     if beyond:
         raise RecordError(
-            f"{measurement.name}: {', '.join(beyond)} measured, but {building.name!r} has the levels "
-            f"{', '.join(levels)}. Give the building.toml of the structure that was tested."
+            f"{measurement.name}: {', '.join(beyond)} measured, but {building.name!r} has the "
+            f"levels {', '.join(levels)}. Give the building.toml of the structure that was tested."
         )
     if len(measurement.time) < SHORTEST:
         raise RecordError(
@@ -143,7 +143,9 @@ def _response(
             m.noise.get(channel, 0.0) if own[-1] else float(np.hypot(level["std"][2], noise_ground))
         )
     drive = next((c for c in ("voltage", "current") if m.has(c)), None)
-    V, left = smooth_steps(m[drive], m.noise.get(drive, 0.0), m.step) if drive else (np.zeros(n), 0.0)
+    V, left = np.zeros(n), 0.0
+    if drive:
+        V, left = smooth_steps(m[drive], m.noise.get(drive, 0.0), m.step)
     return Response(
         m.name, m.step,
         np.array([level["state"][:, 0] for level in levels]),

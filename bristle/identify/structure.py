@@ -176,9 +176,7 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
         force = force - response.force
         noise = float(np.hypot(noise, response.noise_force))
     a = response.a[level]
-    return structure_run(
-        response.name, response.dt, (x, v, a, response.V), force, noise, error
-    )
+    return structure_run(response.name, response.dt, (x, v, a, response.V), force, noise, error)
 
 
 def layer_run(response: Response, building: Building) -> StructureRun:
@@ -322,7 +320,8 @@ def fit_line(problem: StructureProblem, law: str) -> Fit:
     columns = [_columns(run, names) for run in problem.runs]
     A = np.concatenate(columns)
     force = np.concatenate([run.force for run in problem.runs])
-    sigma = np.concatenate([np.full(len(run.force), max(run.noise, 1e-300)) for run in problem.runs])
+    noise = [max(run.noise, 1e-300) for run in problem.runs]
+    sigma = np.repeat(noise, [len(run.force) for run in problem.runs])
     weight = np.ones(len(force))
     scale = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
     theta = np.zeros(len(names))
