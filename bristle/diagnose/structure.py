@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from ..identify.fit import Fit, identify
+from ..identify.fit import Fit, fit, identify
 from ..identify.model import Model, Problem
 from ..identify.response import Response, responses
 from ..identify.structure import (
@@ -32,7 +32,7 @@ from ..identify.structure import (
 from ..physics.building import Building
 from ..physics.effect import EFFECTS, effects_of
 from ..records.measurement import Measurement
-from .candidates import Search, Trial, judge, refine, starts, try_all
+from .candidates import Trial, judge, refine, starts, try_all
 from .decision import Decision, decide
 from .evidence import paired
 from .sensors import SensorFault, sensor_faults
@@ -58,6 +58,9 @@ the next one's: two forms that are both wrong cannot decide otherwise."""
 SURE = 40.0
 """Gain of the log-likelihood that no chance brings: what happens in a few samples only, such as a
 stop that is met once, is seen in no resampling of blocks."""
+
+STOP = 0.4
+"""Share of the largest travel within which a stop would be met so often that it is a spring."""
 
 QUICK = 8
 """Sweeps of the first, short search from each start, on every fifth sample."""
@@ -265,12 +268,13 @@ def try_effect(
     """Refit a model with one more effect of the structure from several starts; judge the best."""
     few = thinned(train)
     light = few.expectation(base)
-    begun = []
-    for model in structure_starts(effect, base, train):
-        found, ended = Search(few, model, light, model.free()).run(QUICK)
-        begun.append((ended.cost, found))
-    best = min(begun, key=lambda pair: pair[0])[1]
-    best, _ = Search(train, best, train.expectation(base), best.free()).run(25)
+    begun = [
+        fit(few, model, expectation=light, max_evaluations=QUICK, with_std=False)
+        for model in structure_starts(effect, base, train)
+    ]
+    best = min(begun, key=lambda one: one.cost).model
+    expected = train.expectation(base)
+    best = fit(train, best, expectation=expected, max_evaluations=25, with_std=False).model
     return judge(best, train, held_out)
 
 
@@ -304,6 +308,9 @@ def structure_starts(effect: str, base: Model, train: Problem) -> list[Model]:
         chosen = {**own, **dict(zip(grid[effect], values, strict=True))}
         named = {f"{effect}.{name}": value for name, value in chosen.items()}
         out.append(replace(base, effects=(*base.effects, effect), values={**base.values, **named}))
+    if effect == "end_stop":
+        limits = {**base.limits, "end_stop.clearance": (STOP * reach, reach)}
+        out = [replace(model, limits=limits) for model in out]
     return out
 
 
@@ -461,7 +468,9 @@ def combine(
     if verdict is not None:
         made = verdict.decision
         parts.append(("damper", made.kind, made.effects, verdict.before.z, made.best.z))
-    named, rivals, alike = [], [], []
+    named: list[str] = []
+    rivals: list[str] = []
+    alike: list[str] = []
     sites: dict[str, str] = {}
     for site, kind, effects, _, _ in parts:
         twins = lookalikes(effects) if reconstructed and site == "damper" else []

@@ -246,7 +246,8 @@ def _sums(
         whole = (signals.shape[1] - _SKIP) // size
         if whole < 2:
             raise RecordError(
-                f"{run.name}: {signals.shape[1]} samples; intervals need {2 * size + _SKIP} or more."
+                f"{run.name}: {signals.shape[1]} samples; intervals need {2 * size + _SKIP} or "
+                "more."
             )
         end = _SKIP + whole * size
         s = signals[:, _SKIP:end].reshape(3 * n + 2, whole, size).transpose(1, 0, 2)
@@ -356,7 +357,7 @@ def _finish(
     std_omega = np.sqrt(np.maximum(np.einsum("ri,ij,rj->r", slope, cov, slope), 0.0))
     weighted = np.array(building.M) @ modes.shapes
     C = (weighted * (2.0 * np.maximum(zeta, 0.0) * modes.omega)) @ weighted.T
-    freeze = [tuple(tuple(float(v) for v in row) for row in matrix) for matrix in (C, )]
+    freeze = [tuple(tuple(float(v) for v in row) for row in matrix) for matrix in (C,)]
     K = tuple(tuple(float(v) for v in row) for row in stiffness_matrix(building, stiffness))
     found = building._replace(C=freeze[0], K=K, stiffnesses=tuple(float(k) for k in stiffness))
     return StructureFit(
@@ -369,13 +370,15 @@ def _left(runs: list[Response], found: Building, first: int, system: _System) ->
     """Return z by level: what equilibrium leaves over its noise, robustly, offsets apart."""
     C, K, M = (np.array(matrix) for matrix in (found.C, found.K, found.M))
     z = np.full(found.size, np.nan)
+    squares: list[list[Array]] = [[] for _ in z]
+    for run in runs:
+        level = M @ run.a + C @ run.v + K @ run.x
+        if run.force is not None:
+            level[0] += run.force
+        above = np.cumsum(level[::-1], axis=0)[::-1][:, _SKIP:]
+        for i in range(first, found.size):
+            rest = above[i] - np.median(above[i])
+            squares[i].append(np.minimum(np.abs(rest) / system.noise[i], 8.0) ** 2)
     for i in range(first, found.size):
-        squares = []
-        for run in runs:
-            rest = (M @ run.a + C @ run.v + K @ run.x)[i:].sum(axis=0)
-            if i == 0 and run.force is not None:
-                rest = rest + run.force
-            rest = rest[_SKIP:] - np.median(rest[_SKIP:])
-            squares.append(np.minimum(np.abs(rest) / system.noise[i], 8.0) ** 2)
-        z[i] = float(np.sqrt(np.mean(np.concatenate(squares))))
+        z[i] = float(np.sqrt(np.mean(np.concatenate(squares[i]))))
     return z
