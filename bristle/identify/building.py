@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from ..errors import RecordError
 from ..physics.building import Building
 from ..records.measurement import Measurement
 from .response import Response, responses
+from .simulated import simulated, stiffness_matrix
 
 Array = NDArray[np.float64]
 
@@ -64,13 +64,6 @@ class Modes(NamedTuple):
 
     omega: Array
     shapes: Array
-
-
-class Sums(NamedTuple):
-    """Cross products (blocks, 2 n + 1, 3 n + 2) of instruments with signals, and sample count."""
-
-    products: Array
-    count: int
 
 
 def identify_structure(
@@ -124,18 +117,6 @@ def _ratios(building: Building) -> Array:
     modes = _modes(building, np.array(building.stiffnesses))
     diagonal = np.einsum("ir,ij,jr->r", modes.shapes, np.array(building.C), modes.shapes)
     return np.asarray(diagonal / (2.0 * modes.omega))
-
-
-def stiffness_matrix(building: Building, stiffness: Array) -> Array:
-    """Return K (n, n) with other stiffnesses [N/m] below the levels."""
-    K = np.array(building.K)
-    for i, change in enumerate(stiffness - np.array(building.stiffnesses)):
-        K[i, i] += change
-        if i:
-            K[i - 1, i - 1] += change
-            K[i - 1, i] -= change
-            K[i, i - 1] -= change
-    return K
 
 
 def _modes(building: Building, stiffness: Array) -> Modes:
@@ -200,17 +181,17 @@ class _System:
         rows = self.regressors(i)
         return np.hstack([rows[:, : 2 * n], rows[:, 3 * n + 1 :]])
 
-    def solve(self, sums: Sums) -> tuple[Array, Array]:
+    def solve(self, sums: Array) -> tuple[Array, Array]:
         """Return the unknowns (p,) and their covariance, from blocks taken as independent."""
         p = 2 * self.rows + self.n
         A, b = np.zeros((p, p)), np.zeros(p)
-        per_block_A = np.zeros((len(sums.products), p, p))
-        per_block_b = np.zeros((len(sums.products), p))
+        per_block_A = np.zeros((len(sums), p, p))
+        per_block_b = np.zeros((len(sums), p))
         target = self.target()
         for i in range(self.first, self.n):
             W, R = self.instruments(i) / self.noise[i] ** 2, self.regressors(i)
-            per_block_A += W @ sums.products @ R.T
-            per_block_b += W @ sums.products @ target[i]
+            per_block_A += W @ sums @ R.T
+            per_block_b += W @ sums @ target[i]
         A, b = per_block_A.sum(axis=0), per_block_b.sum(axis=0)
         scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(A)), 1e-300))
         inverse = scale[:, None] * np.linalg.pinv(A * scale[:, None] * scale, rcond=1e-12) * scale
@@ -228,9 +209,9 @@ class _System:
 
 def _sums(
     runs: list[Response], building: Building, stiffness: Array, zeta: Array, first: int, plain: bool
-) -> Sums:
-    """Return cross products of instruments with signals, by block over all runs."""
-    parts, count = [], 0
+) -> Array:
+    """Return cross products (blocks, 2 n + 1, 3 n + 2) of instruments with signals, all runs."""
+    parts = []
     for run in runs:
         n = building.size
         drift = np.diff(run.x, axis=0, prepend=np.zeros((1, run.x.shape[1])))
@@ -240,7 +221,7 @@ def _sums(
         if plain:
             shown = np.vstack([drift, run.v, one])
         else:
-            x, v = _simulated(run, building, stiffness, zeta, first)
+            x, v = simulated(run, building, stiffness, zeta, first)
             shown = np.vstack([np.diff(x, axis=0, prepend=np.zeros((1, x.shape[1]))), v, one])
         size = max(10, round(BLOCK / run.dt))
         whole = (signals.shape[1] - _SKIP) // size
@@ -253,68 +234,7 @@ def _sums(
         s = signals[:, _SKIP:end].reshape(3 * n + 2, whole, size).transpose(1, 0, 2)
         w = shown[:, _SKIP:end].reshape(2 * n + 1, whole, size).transpose(1, 0, 2)
         parts.append(w @ s.transpose(0, 2, 1))
-        count += whole * size
-    return Sums(np.concatenate(parts), count)
-
-
-def _simulated(
-    run: Response, building: Building, stiffness: Array, zeta: Array, first: int
-) -> tuple[Array, Array]:
-    """Return the displacements and velocities (n, samples) that a building shows to a run.
-
-    Where the force on the first level is unknown (`first` 1), that level's measured motion drives
-    the rest.
-    """
-    M, K = np.array(building.M), stiffness_matrix(building, stiffness)
-    start_x, start_v = run.x[:, 0], run.v[:, 0]
-    if first == 0:
-        load = -np.outer(M.sum(axis=1), run.ground)
-        if run.force is not None:
-            load[0] -= run.force
-        base_x, base_v = np.zeros_like(run.ground), np.zeros_like(run.ground)
-        ratios = zeta
-    else:
-        base_x, base_v = run.x[0], run.v[0]
-        start_x, start_v = run.x[1:, 0] - base_x[0], run.v[1:, 0] - base_v[0]
-        load = -np.outer(M[1:].sum(axis=1), run.a[0])
-        M, K = M[1:, 1:], K[1:, 1:]
-        ratios = zeta[1:]
-    values, shapes = eigh(K, M)
-    omega = np.sqrt(np.maximum(values, 1e-12))
-    forces, x, v = shapes.T @ load, [], []
-    for r in range(len(omega)):
-        begin = (float(shapes[:, r] @ M @ start_x), float(shapes[:, r] @ M @ start_v))
-        # An instrument of a mode must die out, whatever its ratio looks like in between.
-        own = _oscillator(float(omega[r]), max(float(ratios[r]), 1e-3), forces[r], run.dt, begin)
-        x.append(own[0])
-        v.append(own[1])
-    moved_x, moved_v = shapes @ np.array(x) + base_x, shapes @ np.array(v) + base_v
-    if first:
-        moved_x, moved_v = np.vstack([base_x, moved_x]), np.vstack([base_v, moved_v])
-    return moved_x, moved_v
-
-
-def _oscillator(
-    omega: float, zeta: float, force: Array, dt: float, begin: tuple[float, float]
-) -> tuple[Array, Array]:
-    """Return position and velocity (n,) of p'' + 2 zeta omega p' + omega^2 p = force.
-
-    Exact for a force that is linear between samples.
-    """
-    A = np.array([[0.0, 1.0], [-(omega**2), -2.0 * zeta * omega]])
-    state = cont2discrete((A, np.array([[0.0], [1.0]]), np.eye(2), np.zeros((2, 1))), dt, "foh")
-    numerator, denominator = ss2tf(*state[:4])
-    damped = omega * np.sqrt(max(1.0 - zeta**2, 1e-12))
-    decay = zeta * omega
-    time = np.arange(len(force)) * dt
-    fade, phase = np.exp(-decay * time), damped * time
-    side = (begin[1] + decay * begin[0]) / damped
-    x = fade * (begin[0] * np.cos(phase) + side * np.sin(phase))
-    v = -decay * x + damped * fade * (side * np.cos(phase) - begin[0] * np.sin(phase))
-    return (
-        x + lfilter(numerator[0], denominator, force),
-        v + lfilter(numerator[1], denominator, force),
-    )
+    return np.concatenate(parts)
 
 
 def _finish(

@@ -6,13 +6,9 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
-from bristle.diagnose.structure import (
-    Finding,
-    diagnose_structure,
-    load_cell,
-    look_at,
-    lookalikes,
-)
+from bristle.diagnose.load_cell import load_cell
+from bristle.diagnose.sites import Finding, look_at
+from bristle.diagnose.structure import diagnose_structure, lookalikes
 from bristle.errors import RecordError
 from bristle.identify.response import responses
 from bristle.identify.structure import problems_of

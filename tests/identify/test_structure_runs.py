@@ -7,12 +7,12 @@ import pytest
 from shaken import building, friction, measured, shake
 
 from bristle.errors import RecordError
+from bristle.identify.line import fit_line
 from bristle.identify.model import Model
 from bristle.identify.response import base_equilibrium, jumps, respond, shear
 from bristle.identify.structure import (
     LinearLayer,
     damper_run,
-    fit_line,
     layer_run,
     reconstructed,
     sliding,
