@@ -28,6 +28,10 @@ Array = NDArray[np.float64]
 ROUNDS = 4
 """Rounds of instruments after the first, plain one."""
 
+LOOSER = 64.0
+"""Factor on the smoother's jerk: its corner at twice the frequency, for it would take a ten
+thousandth off the drifts at the highest mode, as much as their standard deviation."""
+
 BLOCK = 0.5
 """Length [s] of the blocks whose sums are taken as independent, longer than a smoother's memory."""
 
@@ -84,7 +88,7 @@ def identify_structure(
         If a channel is missing, the building has other levels than were measured, or a stiffness
         comes out negative.
     """
-    runs = responses(measurements, building, draws=0)
+    runs = responses(measurements, building, draws=0, looser=LOOSER)
     if damper is None:
         damper = any(run.driven or run.force is not None for run in runs)
     unknown = damper and not all(run.force is not None for run in runs)
