@@ -1,6 +1,8 @@
 """Measure every figure and print one table: `python -m benchmarks [NAME ...] [--json]`.
 
-A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them.
+A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them. `blind`
+named first has options of its own (`python -m benchmarks blind --help`): it takes hours, and the
+table here shows what its last run found.
 """
 
 from __future__ import annotations
@@ -18,6 +20,10 @@ from ._rows import Row
 
 def main() -> int:
     """Print the table; return 0 whatever is reached, for times depend on the machine."""
+    if sys.argv[1:2] == ["blind"] and len(sys.argv) > 2:
+        from .blind import main as blind
+
+        return blind(sys.argv[2:])
     names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")
@@ -38,7 +44,7 @@ def main() -> int:
 
 
 def show(rows: list[Row]) -> None:
-    """Print rows as a table; `ratio` is measured / goal, 1 or less is reached."""
+    """Print figures with a goal as a table, where `ratio` is measured / goal; then the others."""
     from rich.console import Console
     from rich.table import Table
 
@@ -47,13 +53,22 @@ def show(rows: list[Row]) -> None:
         table.add_column(column, overflow="fold")
     table.add_column("ratio", justify="right")
     table.add_column("")
+    lines = []
     for row in rows:
-        ratio = "" if row.ratio is None else f"{row.ratio:.3f}"
-        verdict = "" if row.ratio is None else "reached" if row.ratio <= 1 else "missed"
-        table.add_row(row.name, row.measured, row.goal, ratio, verdict)
+        if row.ratio is None:
+            lines.append(f"{row.name}: {row.measured}")
+        else:
+            verdict = "reached" if row.ratio <= 1 else "missed"
+            table.add_row(row.name, row.measured, row.goal, f"{row.ratio:.3f}", verdict)
         if row.note:
-            table.add_row(f"  {row.note}")
-    Console(highlight=False, markup=False).print(table)
+            lines.append(f"{row.name}: {row.note}")
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = 150  # a pipe or a file has no edge to fold at
+    if table.row_count:
+        console.print(table)
+    if lines:
+        console.print("", "Reported beside:", *lines, sep="\n")
 
 
 if __name__ == "__main__":

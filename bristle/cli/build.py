@@ -34,6 +34,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="controller file of `bristle design`, for a controller of its kind",
     )
+    parser.add_argument(
+        "--effect",
+        dest="effects",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="file with an effect of your own, for a damper or a Structure; may be repeated",
+    )
     parser.add_argument("--name", help="the model's name and the file's; else the component's")
     parser.add_argument(
         "--out",
@@ -56,6 +65,7 @@ def main(arguments: argparse.Namespace) -> int:
         building=arguments.building,
         record=arguments.record,
         controller=arguments.controller,
+        effects=arguments.effects,
     )
     target = arguments.out / f"{what.name}.fmu"
     fresh = built_guid(target) == what.guid()

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..study.new import Created
 
-HELP = "studies of measurements: new, first-look"
+HELP = "studies of measurements: new, first-look, auto"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,6 +22,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     look.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     look.add_argument("--json", action="store_true", help="print the findings as JSON")
     look.set_defaults(act=_first_look)
+    auto = commands.add_parser(
+        "auto", help="identify, diagnose, add, until nothing that the library knows is missing"
+    )
+    auto.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
+    auto.set_defaults(act=_auto)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -174,4 +180,33 @@ def _first_look(arguments: argparse.Namespace) -> int:
         print(f"\nPicture: {picture}")
         if not look.ok:
             print("Mend the above before a model is fitted.", file=sys.stderr)
+    return 0
+
+
+def _auto(arguments: argparse.Namespace) -> int:
+    from ..report.staircase import staircase
+    from ..study.learning import learn
+    from ..study.study import Study
+    from .diagnose import speaker, text
+
+    study = Study(arguments.folder)
+    quiet = arguments.json or not sys.stdout.isatty()
+    shown: list[int] = []
+
+    def show() -> None:
+        steps = study.steps()
+        if quiet:
+            return
+        print(f"\n{staircase(steps)}\n", flush=True)
+        shown.append(len(steps))
+
+    learned = learn(study, say=speaker(arguments.json), on_step=show)
+    if arguments.json:
+        import json
+
+        print(json.dumps(learned.as_dict(), indent=2, ensure_ascii=False))
+        return 0
+    if not shown:
+        print(f"{staircase(study.steps())}\n")
+    print(text(learned.verdict, arguments.folder))
     return 0

@@ -55,7 +55,7 @@ class Comparison:
     telling one of what is left after that, None where chance explains the rest; `spectrum` the
     residual's against the noise's; `regimes` classes of speed and voltage; `held` the runs
     themselves; `sentences` what an engineer would say; `seen` whether the runs were those of the
-    fit.
+    fit, None where nobody knows.
     """
 
     quantity: str
@@ -69,7 +69,7 @@ class Comparison:
     regimes: tuple[Regime, ...]
     held: tuple[Held, ...] = field(repr=False)
     sentences: tuple[str, ...] = ()
-    seen: bool = False
+    seen: bool | None = False
 
     @property
     def z(self) -> float:
@@ -92,7 +92,7 @@ class Comparison:
         return {
             "quantity": self.quantity,
             "unit": self.unit,
-            "held_out": not self.seen,
+            "held_out": None if self.seen is None else not self.seen,
             "sentences": list(self.sentences),
             "z": self.z,
             "z_interval": list(self.z_interval),
@@ -135,7 +135,7 @@ def compare(
 
 
 def compare_held(
-    held: Sequence[Held], *, seen: bool = False, seed: int = 0, flips: int = FLIPS
+    held: Sequence[Held], *, seen: bool | None = False, seed: int = 0, flips: int = FLIPS
 ) -> Comparison:
     """Compare one output, measured and predicted, whatever predicted it; see `compare`."""
     from .words import sentences
@@ -149,7 +149,8 @@ def compare_held(
     second = None
     if found and found[0].significant:
         left = finder.without(finder.normalised, found[0])
-        rest = finder.ranked(left, [found[0].coordinate])
+        raw = finder.without(finder.raw, found[0])
+        rest = finder.ranked(left, raw, [found[0].coordinate])
         second = rest[0] if rest and rest[0].significant else None
     comparison = Comparison(
         held[0].quantity, held[0].unit, runs, _run_error("all runs", held),
@@ -182,6 +183,7 @@ def _refuse(held: Sequence[Held]) -> None:
 
 
 def _run_error(name: str, held: Sequence[Held]) -> RunError:
+    """Return the error over some runs."""
     residual = np.concatenate([one.residual for one in held])
     sigma = np.concatenate([one.sigma[one.skip :] for one in held])
     own = np.concatenate([np.full(len(one.residual), one.noise) for one in held])
@@ -195,7 +197,7 @@ def _run_error(name: str, held: Sequence[Held]) -> RunError:
 
 
 def _interval(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
-    """Return the 95 % interval of z over all runs, by the scatter of the loss from block to block."""
+    """Return the 95 % interval of z over all runs, by the scatter of the loss over blocks."""
     loss = huber(np.concatenate(list(normalised)))
     blocks = finder.blocks
     counts = np.bincount(blocks.label)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -83,11 +84,12 @@ def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
     difference from sample to sample shows it once.
     """
     keep = float(np.exp(-dt / over))
-    lagged = np.empty_like(V)
+    lagged = np.empty(len(V), dtype=np.float64)
     lagged[0] = V[0]
     from scipy.signal import lfilter
 
-    lagged[1:], _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
+    rest, _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
+    lagged[1:] = np.asarray(rest, dtype=float)
     return np.asarray((V - lagged) / over, dtype=float)
 
 
@@ -128,6 +130,8 @@ def cut(values: Array, bins: int = BINS) -> Bins | None:
         filled += int(count)
         if alone:
             number, filled = number + 1, 0
+    if number and 0 < filled < 0.4 * share:  # a few samples at the end are no bin
+        group[group == number] = number - 1
     label = group[np.searchsorted(present, levels)]
     label = np.unique(label, return_inverse=True)[1].astype(np.int64)
     count = np.bincount(label)
@@ -135,7 +139,7 @@ def cut(values: Array, bins: int = BINS) -> Bins | None:
         return None
     order = np.argsort(label, kind="stable")
     edges = np.concatenate([[0], np.cumsum(count)])
-    parts = [values[order[begin:end]] for begin, end in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [values[order[begin:end]] for begin, end in itertools.pairwise(edges)]
     return Bins(
         label,
         np.array([part.mean() for part in parts]),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
+from ..identify.model import LOST
 from .coordinates import coordinates_of
 
 Array = NDArray[np.float64]
@@ -21,7 +22,8 @@ class Held:
     channel's own (`noise`) and that of the measured inputs carried through the model, of which
     `spread` (d, n) are draws. `coordinates` name to (n,). `numerical` (n,) is how far the
     prediction moves at half the step, None where that was not tried. The first `skip` samples do
-    not count: the model's states begin somewhere.
+    not count, for the model's states begin somewhere, nor do those where `known` (n,) is False:
+    they were not measured but filled in.
     """
 
     name: str
@@ -36,16 +38,18 @@ class Held:
     quantity: str = "force"
     unit: str = "N"
     skip: int = 25
+    known: NDArray[np.bool_] | None = None
 
     @property
     def time(self) -> Array:
         """Time (n,) [s] from the run's begin."""
-        return np.arange(len(self.measured)) * self.dt
+        return np.asarray(np.arange(len(self.measured)) * self.dt, dtype=float)
 
     @property
     def residual(self) -> Array:
-        """Measured less predicted, without the skipped samples, in the unit."""
-        return (self.measured - self.predicted)[self.skip :]
+        """Measured less predicted, without the skipped samples, in the unit; 0 where not known."""
+        error = self.measured - self.predicted
+        return (error if self.known is None else np.where(self.known, error, 0.0))[self.skip :]
 
     @property
     def normalised(self) -> Array:
@@ -78,11 +82,13 @@ def held_runs(problem: Problem, model: Model, draws: int = 12) -> list[Held]:
     ):
         predicted = problem.predict(model, run)
         finer = problem.predict(model, halved(run))[::2]
+        if run.measured is not None:
+            sigma = np.where(run.measured, sigma, sigma / LOST)  # `known` says it instead
         out.append(
             Held(
                 run.name, run.dt, run.force, predicted + bias, sigma, run.noise, spread,
                 coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force),
-                finer - predicted, skip=run.skip,
+                finer - predicted, skip=run.skip, known=run.measured,
             )
         )  # fmt: skip
     return out
@@ -94,16 +100,17 @@ def halved(run: Run) -> Run:
     return replace(
         run,
         dt=0.5 * run.dt,
-        x=_between(x, v, run.dt),
-        v=_between(v, a, run.dt),
-        a=_between(a, None, run.dt),
-        V=_between(run.V, None, run.dt),
-        force=_between(run.force, None, run.dt),
+        x=between(x, v, run.dt),
+        v=between(v, a, run.dt),
+        a=between(a, None, run.dt),
+        V=between(run.V, None, run.dt),
+        force=between(run.force, None, run.dt),
         draws=np.zeros((0, 2 * len(x) - 1, 4)),
+        measured=None,
     )
 
 
-def _between(y: Array, rate: Array | None, dt: float) -> Array:
+def between(y: Array, rate: Array | None, dt: float) -> Array:
     """Return samples (2 n - 1,) of which every second one is of y (n,)."""
     out = np.empty(2 * len(y) - 1)
     out[::2] = y

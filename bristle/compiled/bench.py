@@ -82,7 +82,7 @@ class Bench:
         """Return the force (n,) [N] for a motion x, v, a (n,) [m, m/s, m/s2] and V (n,) [V].
 
         `values` are the parameters by name in SI; missing ones take their defaults. The start
-        values of states end in `_0`; those that an effect starts with a signal take its first value.
+        values of states end in `_0`; those that start with a signal take its first value.
         """
         layout = damper.LAYOUT
         p = np.array(damper.pack(self.law, values))

@@ -31,7 +31,7 @@ def shown(effect: type[Effect], values: dict[str, float], signal: Array, dt: flo
     effect : Effect of the site "sensor"
     values : parameters of the effect by their own names ("gain"), in SI; missing ones default
     """
-    history, layout = _history(effect)
+    history, layout = _history(effect)  # type: ignore[arg-type]  # a class can be hashed
     p, z = np.zeros(max(1, layout.p_size)), np.zeros(max(1, layout.z_size))
     for name, known in effect.parameters.items():
         p[layout.parameters[f"{effect.name}.{name}"]] = values.get(name, known.value)

@@ -30,7 +30,9 @@ _CALLEE = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 _NUMBERS = (bool, int, float, str)
 
 
-def compiled(function: Callable[..., Any], inline: tuple[str, ...] = ()) -> Any:
+def compiled(
+    function: Callable[..., Any], inline: tuple[str, ...] = (), *, keep: bool = True
+) -> Any:
     """Return the function compiled by numba, together with all that it calls, cached on disk.
 
     Parameters
@@ -40,8 +42,10 @@ def compiled(function: Callable[..., Any], inline: tuple[str, ...] = ()) -> Any:
     inline : tuple of str
         Qualified names of callees that become part of their callers: best for short ones and for
         those with one caller, which would otherwise be translated by themselves and with it again.
+    keep : bool
+        Whether to keep the machine code on disk.
     """
-    folder = _folder(function)
+    folder = _folder(function) if keep else None
     before = numba.config.CACHE_DIR
     numba.config.CACHE_DIR = str(folder or "")
     try:

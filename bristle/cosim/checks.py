@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import BristleError
+from ..errors import BristleError, PhysicsError
 from .document import COMPONENT_KEYS, Document, flatten
 from .findings import Findings, number, unknown, written
 from .library import Library
@@ -202,6 +202,7 @@ def _check_component(
     part.step = _seconds(findings, settings, (*part.path, "step"), f"{where} step")
     folder = document.file.parent
     _choose_building(part, settings, folder, findings)
+    _choose_effects(part, settings, folder, findings)
     _choose_fmu(part, settings, folder, library, findings)
     for key in settings:
         if key in COMPONENT_KEYS:
@@ -238,6 +239,28 @@ def _choose_building(
         part.building = existing_file(value, folder, path, where, findings)
 
 
+def _choose_effects(
+    part: Part, settings: Mapping[str, Any], folder: Path, findings: Findings
+) -> None:
+    """Read `effects` of a component: files with effects of a user's own."""
+    if "effects" not in settings:
+        return
+    path, value = (*part.path, "effects"), settings["effects"]
+    where = f"[components.{part.name}] effects"
+    files = value if isinstance(value, list) else [value]
+    if not files or not all(isinstance(file, str) for file in files):
+        findings.error(
+            path, f'{where} is {written(value)}; "FILE.py", or a list of them, is right.'
+        )
+        return
+    fmu = str(settings.get("fmu", ""))
+    if fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu:
+        findings.error(path, f"{where}: an FMU carries its own; a built-in name takes them.")
+        return
+    found = [existing_file(file, folder, path, where, findings) for file in files]
+    part.effects = tuple(file for file in found if file is not None)
+
+
 def _choose_fmu(
     part: Part,
     settings: Mapping[str, Any],
@@ -263,7 +286,10 @@ def _choose_fmu(
         elif value not in library.names():
             findings.error(path, f"{where}: {unknown('built-in FMU', value, library.names())}")
         elif part.building or "building" not in settings:
-            part.description = library.describe(value, part.building)
+            own = (part.effects,) if part.effects else ()
+            part.description = library.describe(value, part.building, *own)
     except BristleError as error:
-        at = (*part.path, "building") if part.building else path
+        from_effects = part.effects and isinstance(error, PhysicsError) and not part.building
+        key = "effects" if from_effects else "building"
+        at = (*part.path, key) if part.building or from_effects else path
         findings.error(at, f"{where}: {error}")

@@ -16,7 +16,7 @@ from .lines import KeyPath, key_lines, repeated_keys
 MAX_BYTES = 1_000_000
 """A scenario is a page of text; a file larger than this [byte] is something else."""
 
-COMPONENT_KEYS = ("fmu", "building", "step", "parameters")
+COMPONENT_KEYS = ("fmu", "building", "step", "effects", "parameters")
 FILE_PARAMETERS = ("record", "file")
 """Parameters that may name a file, relative to the scenario's folder."""
 
@@ -176,7 +176,7 @@ def _plain(value: object, key: str) -> object:
     item = getattr(value, "item", None)
     if callable(item) and getattr(value, "size", 1) == 1:  # numbers of numpy
         value = item()
-    is_file_name = key in (*FILE_PARAMETERS, "fmu", "building")
+    is_file_name = key in (*FILE_PARAMETERS, "fmu", "building", "effects")
     if is_file_name and isinstance(value, str) and Path(value).suffix:
         here = Path(value).absolute()
         return str(here) if exists(here) else value

@@ -18,7 +18,7 @@ class Library:
     names
         () -> names of the built-in components.
     describe
-        (name, building file or None) -> Description of a built-in component.
+        (name, building file or None, files of effects) -> Description of a built-in component.
     describe_file
         (path) -> Description of an FMU file; raises FmuError.
     read_record
@@ -28,7 +28,7 @@ class Library:
     """
 
     names: Callable[[], Sequence[str]]
-    describe: Callable[[str, Path | None], Description]
+    describe: Callable[..., Description]
     describe_file: Callable[[Path], Description]
     read_record: Callable[[str, Path], object]
     driven_mass: Callable[[Path | None], float]

@@ -96,6 +96,10 @@ def _component(names: list[str]) -> dict[str, Any]:
                 "anyOf": [{"enum": names}, {"type": "string", "pattern": r"(\.[fF][mM][uU]|/|\\)"}],
             },
             "building": {"type": "string", "description": "data file of another building"},
+            "effects": {
+                "description": "files with effects of your own, for a built-in damper or Structure",
+                "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+            },
             "step": {**_TIME, "description": "the run's step divided by a whole number [s]"},
             "parameters": {"type": "object"},
         },

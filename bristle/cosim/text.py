@@ -49,6 +49,9 @@ def _component(component: Component, folder: Path) -> list[str]:
     lines = [f"fmu = {_value(fmu)}"]
     if component.building is not None:
         lines.append(f"building = {_value(component.building.absolute().as_posix())}")
+    if component.effects:
+        files = ", ".join(_value(file.absolute().as_posix()) for file in component.effects)
+        lines.append(f"effects = [{files}]")
     if component.step is not None:
         lines.append(f"step = {_value(component.step)}")
     if component.parameters:

@@ -147,12 +147,11 @@ def plan(
         baked["record"] = found
     if controller is not None:
         files[_design_file(component, kind, controller)] = controller
-    if starts:
-        baked["starts"] = _checked_starts(component, building, starts)
     effects = tuple(effects)
-    for file in effects:
-        if not file.is_file():
-            raise BuildError(f"{file}: there is no such file with an effect.")
+    if effects:
+        catalogue.describe(component, building, effects)  # refuses what is wrong with them
+    if starts:
+        baked["starts"] = _checked_starts(component, building, effects, starts)
     return Plan(chosen, path, baked, files, effects)
 
 
@@ -173,10 +172,10 @@ def _design_file(component: str, kind: type[Slave], controller: Path) -> str:
 
 
 def _checked_starts(
-    component: str, building: Path | None, starts: Mapping[str, Any]
+    component: str, building: Path | None, effects: tuple[Path, ...], starts: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return start values in the types of their variables; BuildError for what cannot be."""
-    known = catalogue.describe(component, building).variables
+    known = catalogue.describe(component, building, effects).variables
     kinds = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,), "String": (str,)}
     checked: dict[str, Any] = {}
     for key, value in starts.items():
@@ -346,15 +345,19 @@ def _pack(loose: Path, target: Path) -> None:
         raise
 
 
-def ensure(component: str, building: Path | None = None) -> Path:
+def ensure(component: str, building: Path | None = None, effects: Iterable[Path] = ()) -> Path:
     """Return a built-in component's FMU, built on first use and reused while its digest holds."""
-    if building is None:
+    effects = tuple(effects)
+    if building is None and not effects:
         return build(plan(component), fmus_folder())
-    named = hashlib.sha256(
-        json.dumps(catalogue.read_building_data(building), sort_keys=True).encode()
-    )
+    named = hashlib.sha256()
+    if building is not None:
+        data = catalogue.read_building_data(building)
+        named.update(json.dumps(data, sort_keys=True).encode())
+    for path in effects:
+        named.update(path.name.encode() + path.read_bytes())
     name = f"{component}_{named.hexdigest()[:8]}"
-    return build(plan(component, name=name, building=building), fmus_folder())
+    return build(plan(component, name=name, building=building, effects=effects), fmus_folder())
 
 
 def build_all(folder: Path, only: Iterable[str] = ()) -> list[Path]:

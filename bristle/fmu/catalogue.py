@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import sys
 import tomllib
+from collections.abc import Iterable
 from difflib import get_close_matches
 from functools import cache
 from pathlib import Path
@@ -15,7 +16,7 @@ from .. import units
 from ..errors import BuildError
 from ..resources import components_folder
 from .description import Description, Variable
-from .slave import Slave
+from .slave import EffectSlave, Slave
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -86,10 +87,20 @@ def _load(path: Path) -> ModuleType:
     return module
 
 
-def instantiate(name: str, building: Path | None = None, instance: str = "") -> Slave:
+def instantiate(
+    name: str,
+    building: Path | None = None,
+    instance: str = "",
+    effects: Iterable[Path] = (),
+) -> Slave:
     """Return a component as a Python object, as an FMU's binary would make it."""
+    from ..physics.user import load_effect
+
     baked: dict[str, Any] = {"building": read_building_data(building)} if building else {}
     kind = component_class(source(name))
+    own = [load_effect(path) for path in effects]
+    if own:
+        baked["own"] = [effect.name for effect in own]
     files: tuple[str, ...] = getattr(kind, "files", ())
     resources = str((_PACKAGE / files[0]).parent) if files else None
     return kind(baked=baked, instance_name=instance or name, resources=resources)
@@ -104,7 +115,7 @@ def read_building_data(path: Path) -> dict[str, Any]:
         return tomllib.load(file)
 
 
-def describe(name: str, building: Path | None = None) -> Description:
+def describe(name: str, building: Path | None = None, effects: Iterable[Path] = ()) -> Description:
     """Return the ports and parameters of a built-in component; no FMU is needed for it.
 
     Parameters
@@ -113,13 +124,18 @@ def describe(name: str, building: Path | None = None) -> Description:
         A name of `component_names()`.
     building : path, optional
         The building file of a Structure.
+    effects : iterable of path, optional
+        Files with effects of a user's own that the component carries too.
 
     Raises
     ------
     BuildError, PhysicsError
-        If there is no such component; if the building is wrong.
+        If there is no such component; if the building or an effect is wrong.
     """
-    slave = instantiate(name, building)
+    effects = tuple(effects)
+    slave = instantiate(name, building, effects=effects)
+    if effects and not isinstance(slave, EffectSlave):
+        raise BuildError(f"{name} takes no effects; a damper or a Structure does.")
     variables = {}
     for index, declared in slave.vars.items():
         key = declared.name

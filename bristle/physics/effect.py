@@ -89,6 +89,8 @@ class Effect:
         `{name: unit}` and `{name: Parameter}`; start values of states are zero.
     starts
         States that begin with the value of a signal where a measurement begins: {state: signal}.
+    bristles
+        Parameters that count for laws with bristles alone; with others a fit leaves them.
     contact
         Of a structure's effect: its `force` is dry friction, which carries what holds the base
         (`q.halt`), or the push of a stop. It is found together with the motion, whatever its
@@ -111,6 +113,7 @@ class Effect:
     states: ClassVar[dict[str, str]] = {}
     parameters: ClassVar[dict[str, Parameter]] = {}
     starts: ClassVar[dict[str, str]] = {}
+    bristles: ClassVar[tuple[str, ...]] = ()
     contact: ClassVar[bool] = False
     shows: ClassVar[str] = "force"
     own: ClassVar[bool] = False

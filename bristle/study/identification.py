@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..identify.fit import Fit, Model, Problem, identify
+from ..identify.fit import fit as fit_model
 from ..identify.prepare import prepare, saturated
 from ..identify.table import LawError, error_rms, error_table, force_rms
 from ..records.channels import DRIVE
@@ -28,6 +29,7 @@ Show = Callable[[int], None]
 STAGES = 4
 """How many stages `identify_study` reports to `show`."""
 
+_MISFIT = 1.15  # z above which an error is more than noise
 _SATURATED = 0.05  # share of samples at one and the same extreme of the force
 _LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
 
@@ -103,6 +105,8 @@ def identify_study(
     study: Study,
     *,
     law: str | None = None,
+    model: StudyModel | None = None,
+    begin: Mapping[str, float] | None = None,
     cutoff: float | None = None,
     starts: int = 4,
     table: bool = True,
@@ -114,6 +118,8 @@ def identify_study(
     Parameters
     ----------
     law : another law to take than the model's; its effects stay where they can join it
+    model : a model to take in place of the present one
+    begin : values in SI by name from which one more fit begins; the better one counts
     cutoff : Hz, of the low-pass for the table of errors; None takes the study's
     starts : how many starting points are tried
     table : whether to compare the laws as the paper does
@@ -133,9 +139,9 @@ def identify_study(
     identifier = IDENTIFIERS.get(study.settings.rig)
     if identifier is None:
         raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not identified yet.')
-    model = _of_law(study.model(), law)
+    model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    found = identifier(study, model, cutoff, starts, table, show or (lambda done: None))
+    found = identifier(study, model, cutoff, starts, table, show or (lambda done: None), begin)
     if not write:
         return found
     step = study.add_step(
@@ -146,15 +152,17 @@ def identify_study(
 
 
 def identify_bench(
-    study: Study, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show
-) -> Identified:
+    study: Study, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show,
+    begin: Mapping[str, float] | None = None,
+) -> Identified:  # fmt: skip
     """Identify a damper on a test bench: motion prescribed, force measured."""
     runs = study.runs()
-    return _identify(runs, model, cutoff, starts, table, show)
+    return _identify(runs, model, cutoff, starts, table, show, begin)
 
 
 IDENTIFIERS: dict[
-    str, Callable[[Study, StudyModel, float, int, bool, Show], Identified]
+    str,
+    Callable[[Study, StudyModel, float, int, bool, Show, Mapping[str, float] | None], Identified],
 ] = {"bench": identify_bench}
 """What identifies a study, by its rig."""
 
@@ -183,8 +191,8 @@ def identify_frames(
     RecordError, StudyError
         As `identify_study`.
     """
-    train = _measurements(frames, "frame")
-    held = _measurements(holdout, "held out") if holdout else []
+    train = measurements_of_frames(frames, "frame")
+    held = measurements_of_frames(holdout, "held out") if holdout else []
     if not train:
         raise StudyError("no frame is given; one run or more is right.")
     model = _of_law(new_model(law, effects) if law in LAW_NAMES else new_model(), law)
@@ -193,9 +201,10 @@ def identify_frames(
     return _identify(runs, model, cutoff, starts, table, lambda done: None)
 
 
-def _measurements(
+def measurements_of_frames(
     frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame], stem: str
 ) -> list[Measurement]:
+    """Return the measurements in frames whose columns are named by channel."""
     from ..records.channels import channel_unit, is_channel
     from ..records.measurement import ChannelSpec, measurements_of_frame
 
@@ -234,18 +243,22 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
 
 
 def _identify(
-    runs: Runs, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show
-) -> Identified:
-    notes = [*runs.notes, *_doubts(runs.all)]
+    runs: Runs, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show,
+    begin: Mapping[str, float] | None = None,
+) -> Identified:  # fmt: skip
     train = Problem([prepare(one, seed=31 * k) for k, one in enumerate(runs.train)])
     held = [prepare(one, seed=31 * k + 7) for k, one in enumerate(runs.holdout)]
     holdout = Problem(held) if held else None
+    notes = [*runs.notes, *_doubts(runs.all)]
     show(1)
     start = as_model(model)
     fit = identify(
         train, start.law, start.effects, starts, values=start.values, held=start.held,
         limits=start.limits,
     )  # fmt: skip
+    if begin is not None:
+        other = fit_model(train, replace(fit.model, values={**fit.model.values, **begin}))
+        fit = other if other.cost < fit.cost else fit
     show(2)
     found = _with_fit(model, fit)
     before = errors_of(train, holdout, start, cutoff)
@@ -255,11 +268,28 @@ def _identify(
     if table and sum(len(run.force) for run in train.runs) <= _LONGEST_TABLE:
         rows = error_table(train, holdout, cutoff, starts=starts)
     show(4)
-    if not any(one.has(*(c,)) for one in runs.all for c in DRIVE):
+    notes += _weighing(rows, model, after)
+    if not any(one.has(c) for one in runs.all for c in DRIVE):
         notes.append("Neither voltage nor current was measured: the parameters hold at its level.")
-    return Identified(
-        fit, found, rows, cutoff, before, after, tuple(notes), None, train, holdout
-    )
+    return Identified(fit, found, rows, cutoff, before, after, tuple(notes), None, train, holdout)
+
+
+def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float]) -> list[str]:
+    """Say what a model that errs by more than noise does to intervals and to the fit."""
+    if after["z_train"] <= _MISFIT:
+        return []
+    notes = [
+        "The error is more than noise: intervals are drawn from the error itself, and hold for "
+        "this model's best values, not for a damper's constants."
+    ]
+    same = [row for row in rows if row.law == model.law and not model.effects]
+    if same and same[0].train < 0.95 * after["rms_train"]:
+        notes.append(
+            f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
+            f"the force alone, as in the table, would leave {same[0].train:.4g} N in place of "
+            f"{after['rms_train']:.4g} N."
+        )
+    return notes
 
 
 def as_model(model: StudyModel) -> Model:
@@ -320,15 +350,17 @@ def _doubts(runs: list[Measurement]) -> list[str]:
             )
         if share > 0.0:
             notes.append(f"{run.name}: {share:.1%} of the force's samples stand at its extremes.")
-        estimated = [
-            c for c, fact in run.noise_facts.items()
-            if fact is not None and fact.colour in ("hidden", "rough", "blue")
-        ]  # fmt: skip
-        if estimated:
-            notes.append(
-                f"{run.name}: the noise of {', '.join(estimated)} cannot be told well from the "
-                "signal; give it in study.toml, for z and intervals rest on it."
-            )
+    doubtful: dict[str, int] = {}
+    for run in runs:
+        for channel, fact in run.noise_facts.items():
+            if fact is not None and fact.colour in ("hidden", "rough", "blue"):
+                doubtful[channel] = doubtful.get(channel, 0) + 1
+    if doubtful:
+        where = ", ".join(f"{c} ({n} of {len(runs)} runs)" for c, n in doubtful.items())
+        notes.append(
+            f"The noise cannot be told well from the signal: {where}. Give it in study.toml: z and "
+            "intervals rest on it."
+        )
     return notes
 
 

@@ -125,15 +125,18 @@ def motion(
     x = raw_motion(kind, t, rng, rig, **how)
     x = (x - x[0]) * _fade(t, how.get("rise", 0.6))
     x -= np.mean(x) * _fade(t, 2.0)
-    spline = make_interp_spline(t, x, k=5)
-    top = size * rig.speed / np.max(np.abs(spline.derivative()(t)))
+    top = size * rig.speed / np.max(np.abs(make_interp_spline(t, x, k=5).derivative()(t)))
     reach = size * 0.8 * rig.stroke / np.max(np.abs(x))
-    pieces = PPoly.from_spline(spline)
+    return through(x, t) * min(top, reach)
+
+
+def through(x: Array, t: Array) -> Array:
+    """Coefficients (6, n - 1) of the smooth motion through samples x (n,) m that begin at rest."""
+    pieces = PPoly.from_spline(make_interp_spline(t, x, k=5))
     # not-a-knot ends: the first and last pieces span several samples
     coefficients = np.empty((6, t.size - 1))
     for m in range(6):
         coefficients[m] = pieces(t[:-1], nu=m) / (1.0, 1.0, 2.0, 6.0, 24.0, 120.0)[m]
-    coefficients *= min(top, reach)
     coefficients[:3, 0] = 0.0  # the spline leaves rest to 1e-9; make it exact
     return _join(coefficients, t)
 
@@ -259,6 +262,25 @@ def bench_plan(rig: Rig, rng: np.random.Generator, duration: float = 12.0) -> li
             bench_experiment(rig, rng, str(kind), str(programme), "holdout", duration, size)
         )
     return runs
+
+
+def proposed(
+    rig: Rig, signals: tuple[Array, Array], role: str, about: dict[str, Any]
+) -> Experiment:
+    """A bench run that somebody proposes: x (n,) m and V (n,) V at RATE, the motion faded in.
+
+    Raises
+    ------
+    ValueError
+        If the motion leaves the stroke or the voltage its range.
+    """
+    x, volts = signals
+    t = np.arange(x.size) / RATE
+    moved = (x - x[0]) * _fade(t, 0.6)
+    if np.max(np.abs(moved)) > rig.stroke or volts.min() < -1e-9 or volts.max() > V_MAX + 1e-9:
+        raise ValueError("the proposed run leaves the stroke or the range of the voltage")
+    command = np.repeat(volts[:-1, None], FINE + 1, axis=1)
+    return Experiment(t, command, through(moved, t), np.zeros(1), role, about)
 
 
 def structure_experiment(

@@ -62,7 +62,8 @@ class Case:
     """Recorded runs and their truth.
 
     runs: dict of arrays (n,) in SI under their channel names, and `role`, `name`.
-    truth: what json can hold. specimen and the rest make further runs of the same rig.
+    truth: what json can hold. specimen and the rest make further runs of the same rig; plan holds
+    the experiments of the runs.
     """
 
     runs: list[Run]
@@ -71,6 +72,15 @@ class Case:
     fault: Fault | None = None
     spread: dict[str, float] = field(default_factory=dict)
     channels: tuple[str, ...] = BENCH
+    plan: list[ex.Experiment] = field(default_factory=list)
+
+    def clean(self, role: str) -> list[Run]:
+        """The recorded runs of a role once more, without noise and without a planted fault."""
+        plan = [run for run in self.plan if run.role == role]
+        return [
+            _pick(_shown(self.specimen, run), self.channels, role, f"{role}_{number}")
+            for number, run in enumerate(plan, 1)
+        ]
 
     def perform(self, run: ex.Experiment, seed: int, name: str = "extra_1") -> Run:
         """A further run of the same specimen, with the same instruments."""
@@ -313,6 +323,9 @@ def make_case(
             }
         )
     specimen = Specimen(bed, fields)
+    for one in found:  # the specimen may need more damping in series than was drawn
+        if "se_c" in one["parameters"]:
+            one["parameters"]["se_c"] = float(specimen.plant[0]["se_c"])
     clean = [_shown(specimen, run) for run in plan]
     fault, fault_share = None, 0.0
     if effect in FAULTS:
@@ -342,9 +355,8 @@ def make_case(
         "plan": [{"role": run.role, **run.about} for run in plan],
         **_shares(bed, clean, plan, fault, found),
     }
-    return Case(
-        runs, json.loads(json.dumps(truth, default=_plain)), specimen, fault, spread, channels
-    )
+    told = json.loads(json.dumps(truth, default=_plain))
+    return Case(runs, told, specimen, fault, spread, channels, plan)
 
 
 def _plain(value: Any) -> Any:

@@ -34,6 +34,8 @@ class Stribeck(Effect):
         "way": Parameter(0.0, "1", (0.0, 1.0), "0: of the force, 1: of the bristles' deflection"),
     }
 
+    bristles = ("way",)
+
     @staticmethod
     def yield_factor(q, z, p):
         excess = p.rise * exp(-((abs(q.v) / p.v_s) ** p.shape))

@@ -1,0 +1,1 @@
+"""The blind benchmark: cases of the independent generator, asked, scored and counted."""

@@ -1,0 +1,192 @@
+"""Which cases are made: stratified, so that any first part of the plan is balanced as well."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from tests.independent.effects import LIBRARY, OUTSIDE, compatible, forms
+from tests.independent.instruments import BENCH, FAULTS
+from tests.independent.rigs import LAWS, draw_rig
+
+from .forms import is_same
+
+STRENGTHS = (0.15, 0.40, 0.05)
+RIGS = ("bench_10N", "bench_2kN")
+BLOCK = (
+    *[("none", 0.01)] * 15, *[("effect", 0.01)] * 16, *[("outside", 0.01)] * 4,
+    *[("fault", 0.01)] * 3, *[("pair", 0.01)] * 2,
+    *[("none", 0.03)] * 2, *[("effect", 0.03)] * 4, ("outside", 0.03), ("fault", 0.03),
+)  # fmt: skip
+"""Kind and noise of 48 cases: 40 at 1 % noise, 15 of which hide nothing, and 8 at 3 %."""
+
+INVISIBLE = (
+    ("sensor_gain", "force"), ("sensor_gain", "voltage"),
+    ("sensor_bias", "voltage"), ("sensor_bias", "displacement"),
+)  # fmt: skip
+"""Faults that the parameters of the base laws absorb without a trace: no method can report them."""
+
+KINDS = ("none", "effect", "outside", "fault", "pair")
+
+
+@dataclass(frozen=True)
+class Task:
+    """One case to make: the arguments of the generator and what it is counted as."""
+
+    kind: str
+    effect: str
+    form: str
+    strength: float
+    noise: float
+    rig: str
+    law: str
+    seed: int
+
+    @property
+    def key(self) -> str:
+        """Return 16 hex digits that name the case."""
+        return hashlib.sha256(repr(sorted(asdict(self).items())).encode()).hexdigest()[:16]
+
+    @property
+    def same_form(self) -> bool:
+        """Return whether every hidden effect has a form that bristle has."""
+        pairs = zip(self.effect.split("+"), self.form.split("+"), strict=False)
+        return self.kind == "none" or all(is_same(*pair) for pair in pairs)
+
+    @staticmethod
+    def of(record: dict[str, Any]) -> Task:
+        """Return the task that a record was made for."""
+        return Task(**record)
+
+
+def make_plan(seed: int, cases: int, only: str = "") -> list[Task]:
+    """Return the first `cases` tasks of a seed's endless plan, those of one kind if wanted.
+
+    A longer plan begins with the shorter one.
+
+    Raises
+    ------
+    ValueError
+        If `only` is neither empty nor one of KINDS.
+    """
+    if only and only not in KINDS:
+        raise ValueError(f"kind {only!r}: there are {', '.join(KINDS)}")
+    tasks: list[Task] = []
+    for task in _endless(seed):
+        if not only or task.kind == only:
+            tasks.append(task)
+        if len(tasks) == cases:
+            break
+    return tasks
+
+
+def _endless(seed: int) -> Iterator[Task]:
+    rng = np.random.default_rng([seed, 20])
+    makers = {
+        "none": _none(seed), "effect": _single("effect", LIBRARY, seed),
+        "outside": _single("outside", OUTSIDE, seed), "fault": _faults(seed), "pair": _pairs(seed),
+    }  # fmt: skip
+    while True:
+        for place in rng.permutation(len(BLOCK)):
+            kind, noise = BLOCK[int(place)]
+            what = next(makers[kind])
+            yield Task(kind=kind, noise=noise, seed=int(rng.integers(2**31)), **what)
+
+
+def _none(seed: int) -> Iterator[dict[str, Any]]:
+    beds = [(rig, law) for rig in RIGS for law in LAWS]
+    for k in _shuffled(beds, np.random.default_rng([seed, 21])):
+        yield {"effect": "none", "form": "", "strength": 0.0, "rig": k[0], "law": k[1]}
+
+
+def _shuffled(things: list[Any], rng: np.random.Generator) -> Iterator[Any]:
+    """Yield all things in random order, again and again."""
+    while True:
+        for place in rng.permutation(len(things)):
+            yield things[int(place)]
+
+
+def _single(kind: str, names: tuple[str, ...], seed: int) -> Iterator[dict[str, Any]]:
+    """Yield one hidden effect after the other; strengths, rigs, laws and forms rotate in each."""
+    rng = np.random.default_rng([seed, 22, len(kind)])
+    able = [name for name in names if _able(name)]
+    each = {name: _variants(name, rng) for name in able}
+    for name in _shuffled(able, rng):
+        yield next(each[name])
+
+
+def _able(name: str) -> bool:
+    return any(forms(name, _bed(rig, law)) for rig in RIGS for law in LAWS)
+
+
+def _bed(rig: str, law: str) -> Any:
+    return draw_rig(rig, law, np.random.default_rng(0))
+
+
+def _variants(name: str, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+    """Yield all laws, rigs, strengths, same and other form of an effect; forms drawn in these."""
+    beds = [
+        (rig, law, group)
+        for rig in RIGS
+        for law in LAWS
+        for group in _groups([f.name for f in forms(name, _bed(rig, law))], name)
+    ]
+    order = _shuffled(beds, rng)
+    turn = int(rng.integers(len(STRENGTHS)))
+    while True:
+        for _ in beds:
+            rig, law, group = next(order)
+            strength = STRENGTHS[turn % len(STRENGTHS)]
+            turn += 1
+            form = group[int(rng.integers(len(group)))]
+            yield {"effect": name, "form": form, "strength": strength, "rig": rig, "law": law}
+        turn += 1  # so that a bed meets another strength in the next round
+
+
+def _groups(able: list[str], effect: str) -> list[list[str]]:
+    """Return the forms that bristle has and those that it lacks, empty groups left out."""
+    same = [name for name in able if is_same(effect, name)]
+    other = [name for name in able if not is_same(effect, name)]
+    return [group for group in (same, other) if group]
+
+
+def _faults(seed: int) -> Iterator[dict[str, Any]]:
+    rng = np.random.default_rng([seed, 23])
+    kinds = [
+        (fault, channel)
+        for fault in FAULTS
+        for channel in BENCH
+        if not (fault == "sensor_delay" and channel == "force")
+        and (fault, channel) not in INVISIBLE
+    ]
+    beds = _shuffled([(rig, law) for rig in RIGS for law in LAWS], rng)
+    for turn, (fault, channel) in enumerate(_shuffled(kinds, rng), 1):
+        rig, law = next(beds)
+        strength = STRENGTHS[turn % len(STRENGTHS)]
+        yield {"effect": fault, "form": channel, "strength": strength, "rig": rig, "law": law}
+
+
+def _pairs(seed: int) -> Iterator[dict[str, Any]]:
+    rng = np.random.default_rng([seed, 24])
+    beds = _shuffled([(rig, law) for rig in RIGS for law in LAWS], rng)
+    turn = 0
+    while True:
+        rig, law = next(beds)
+        able = [name for name in LIBRARY if forms(name, _bed(rig, law))]
+        names = tuple(str(name) for name in rng.choice(able, 2, replace=False))
+        if not compatible(names):
+            continue
+        chosen = []
+        for name in names:
+            own = forms(name, _bed(rig, law))
+            chosen.append(own[int(rng.integers(len(own)))].name)
+        turn += 1
+        strength = STRENGTHS[turn % 2]  # 15 and 40 %: 5 % of two would be less than that of one
+        yield {
+            "effect": "+".join(names), "form": "+".join(chosen), "strength": strength,
+            "rig": rig, "law": law,
+        }  # fmt: skip

@@ -1,0 +1,129 @@
+"""The package under test: asked as a user would, with the recorded channels and the law alone."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from bristle.diagnose import Diagnosis, diagnose
+from bristle.identify.fit import Model, Problem, huber
+from bristle.identify.prepare import prepare
+from bristle.physics.damper import LAWS
+from bristle.physics.effect import EFFECTS
+from bristle.records.measurement import ChannelSpec, Measurement, measurements_of_frame
+
+from .cases import ROOT, Recorded, digest_of
+from .forms import true_values
+
+UNITS = {
+    "displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "voltage": "V", "force": "N",
+    "ground_acceleration": "m/s2",
+}  # fmt: skip
+HUBER_AT_ONE = 0.494231
+"""Mean Huber loss (k = 2) of a standard normal variable."""
+
+KEPT = 8  # rows of the ranking that a record keeps
+
+
+def digest() -> str:
+    """Return the digest of all code that a verdict rests on."""
+    folders = ("diagnose", "identify", "compare", "compiled", "physics", "records")
+    package = ROOT / "bristle"
+    files = [p for f in folders if (package / f).is_dir() for p in (package / f).rglob("*.py")]
+    return digest_of(files)
+
+
+def measurements(runs: list[dict[str, Any]], channels: tuple[str, ...]) -> list[Measurement]:
+    """Return runs as measurements; the noise is not given, so it is estimated."""
+    specs = {"time": ChannelSpec("time", "s")}
+    specs |= {name: ChannelSpec(name, UNITS[name]) for name in channels}
+    out = []
+    for run in runs:
+        frame = pd.DataFrame({name: run[name] for name in ("time", *channels)})
+        out += measurements_of_frame(frame, run["name"], specs)
+    return out
+
+
+def diagnosed(train: list[Measurement], holdout: list[Measurement], law: str) -> Diagnosis:
+    """Return the diagnosis that a user gets who knows the law and nothing else."""
+    return diagnose(train, holdout, law=law)
+
+
+def ask(case: Recorded) -> tuple[dict[str, Any], Diagnosis]:
+    """Return what the diagnoser says of a case and how the true model does on it; the diagnosis."""
+    train = measurements(case.part("train"), case.channels)
+    holdout = measurements(case.part("holdout"), case.channels)
+    before = time.perf_counter()
+    found = diagnosed(train, holdout, case.task.law)
+    seconds = time.perf_counter() - before
+    z_true = z_of_truth(case, holdout)
+    return packed(found) | {"seconds": seconds, "z_true": z_true}, found
+
+
+def packed(found: Diagnosis) -> dict[str, Any]:
+    """Return what scoring needs of a diagnosis, as plain data."""
+    said = found.as_dict()
+    return {
+        "kind": said["kind"],
+        "effects": list(said["effects"]),
+        "ranking": said["ranking"][:KEPT],
+        "coordinate": said.get("coordinate", ""),
+        "organised": said.get("organised", [])[:3],
+        "sensors": said["sensors"],
+        "untestable": said["untestable"],
+        "detectable": said.get("detectable"),
+        "separate_by": said.get("separate_by", ""),
+        "words": said["words"],
+        "z_before": said.get("z_holdout_before"),
+        "z_after": said.get("z_holdout_after"),
+        "best": intervals(found),
+    }
+
+
+def intervals(found: Diagnosis) -> dict[str, list[float]]:
+    """Return value and standard deviation by parameter of the model that the verdict names."""
+    trial = found.after or found.before
+    if trial is None:
+        return {}
+    return {
+        name: [float(trial.model.value(name)), float(std)]
+        for name, std in found.std.items()
+        if np.isfinite(std)
+    }
+
+
+def true_model(task_law: str, truth: dict[str, Any]) -> Model | None:
+    """Return the hidden truth as a model; None for forms or effects that bristle lacks."""
+    values = {
+        name: value for name, value in truth["base"].items() if name in LAWS[task_law].parameters
+    }
+    names = []
+    for found in truth["effects"]:
+        own = true_values(found, truth["scales"]["force"])
+        if own is None or found["effect"] not in EFFECTS:
+            return None
+        if any(name.split(".")[1] not in EFFECTS[found["effect"]].parameters for name in own):
+            return None
+        names.append(found["effect"])
+        values |= own
+    return Model(task_law, tuple(names), values)
+
+
+def z_of(model: Model, problem: Problem) -> float:
+    """Return robust RMS(residual)/noise of a model on runs, 1 for the truth."""
+    losses = []
+    for run, (bias, sigma, _) in zip(problem.runs, problem.expectation(model), strict=True):
+        error = (run.force - problem.predict(model, run) - bias) / sigma
+        losses.append(huber(error[run.skip :]))
+    return float(np.sqrt(np.mean(np.concatenate(losses)) / HUBER_AT_ONE))
+
+
+def z_of_truth(case: Recorded, holdout: list[Measurement]) -> float | None:
+    """Return z of the true model with its true parameters on held-out runs; None if not ours."""
+    if case.truth["fault"] is not None:
+        return None
+    model = true_model(case.task.law, case.truth)
+    return None if model is None else z_of(model, Problem([prepare(m) for m in holdout]))

@@ -1,0 +1,100 @@
+"""One part of one case, in whatever process: asked, and packed for the record."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import asdict
+from typing import Any
+
+from .plan import Task
+
+PARTS = ("diagnosis", "peers")
+
+
+def digests() -> dict[str, str]:
+    """Return the digest of the code that each part's answers rest on, the generator's included."""
+    from . import cases, subject
+
+    made = cases.generator_digest()
+    own = cases.digest_of([cases.ROOT / "benchmarks" / "peers.py"])
+    under_test = subject.digest()
+    return {"diagnosis": f"{made}-{under_test}", "peers": f"{made}-{own}"}
+
+
+def do(part: str, task: Task, digest: str) -> dict[str, Any]:
+    """Return one finished line: the answer of `part` on a case, its truth, the time it took.
+
+    An error is an answer too; it is counted as a wrong one.
+    """
+    from . import cases
+
+    line: dict[str, Any] = {
+        "part": part, "key": task.key, "digest": digest, "task": asdict(task),
+    }  # fmt: skip
+    try:
+        case = cases.load(task)
+    except ValueError as error:  # the specimen's equations were not solved: no case
+        return line | {"truth": None, "error": f"no case: {error}"}
+    line["truth"] = slim(case.truth)
+    before = time.perf_counter()
+    try:
+        line["answer"] = _answer(part, case)
+    except Exception:  # whatever it is, it is the method's failure on this case
+        line["error"] = traceback.format_exc()
+    return line | {"seconds": time.perf_counter() - before}
+
+
+def _answer(part: str, case: Any) -> dict[str, Any]:
+    if part == "peers":
+        from benchmarks import peers
+
+        return peers.ask(case)
+    from . import inseparable, subject
+
+    answer, found = subject.ask(case)
+    return answer | inseparable.follow_up(case, answer, found.experiment)
+
+
+def slim(truth: dict[str, Any]) -> dict[str, Any]:
+    """Return the part of a truth that scoring needs."""
+    kept = (
+        "base", "scales", "effects", "fault", "share", "share_holdout", "share_low_passed",
+        "wanted",
+    )  # fmt: skip
+    return {name: truth[name] for name in kept}
+
+
+def local(jobs: list[tuple[str, Task, str]], workers: int) -> Iterator[dict[str, Any]]:
+    """Yield finished lines as they come, from processes of this machine."""
+    if workers <= 1:
+        yield from (do(*job) for job in jobs)
+        return
+    with ProcessPoolExecutor(workers) as pool:
+        futures: list[Future[dict[str, Any]]] = [pool.submit(do, *job) for job in jobs]
+        try:
+            for future in as_completed(futures):
+                yield future.result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def cluster(jobs: list[tuple[str, Task, str]], address: str) -> Iterator[dict[str, Any]]:
+    """Yield finished lines as they come from the workers of a Dask scheduler.
+
+    The workers need this checkout on their Python path.
+    """
+    from dask.distributed import Client
+    from dask.distributed import as_completed as completed
+
+    with Client(address) as client:
+        futures = [client.submit(do, *job, pure=False) for job in jobs]
+        for future in completed(futures):
+            yield future.result()
+
+
+def runner(workers: int, address: str) -> Callable[[Any], Iterator[dict[str, Any]]]:
+    """Return what runs jobs: this machine's processes, or a cluster where its address is given."""
+    return (lambda jobs: cluster(jobs, address)) if address else (lambda jobs: local(jobs, workers))

@@ -1,0 +1,141 @@
+"""Hidden effects found by the package and by its peers: `python benchmarks/blind.py --help`.
+
+Prints one table from cases that an independent generator makes from a fresh seed, with Wilson
+intervals. Every finished case is appended to a record in the cache folder at once; started again,
+the run continues there. Cases of an older version of the diagnoser are asked again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import secrets
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+if __package__ in (None, ""):  # `python benchmarks/blind.py` finds only this folder
+    sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from benchmarks._blind import plan, record, table, work
+from benchmarks._rows import Row
+
+CASES = 480
+
+
+def options() -> argparse.ArgumentParser:
+    """Return the command line."""
+    parser = argparse.ArgumentParser(prog="python benchmarks/blind.py", description=__doc__)
+    parser.add_argument("--cases", type=int, default=CASES, help=f"how many ({CASES}; 40 is quick)")
+    parser.add_argument("--seed", type=int, help="of the plan; else that of the last run")
+    parser.add_argument("--fresh", action="store_true", help="draw a seed that nobody has seen")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
+    parser.add_argument("--only", choices=plan.KINDS, default="", help="cases of one kind")
+    parser.add_argument("--part", choices=work.PARTS, action="append", help="default: both")
+    parser.add_argument("--cluster", default="", metavar="ADDRESS", help="Dask, tcp://host:port")
+    parser.add_argument("--times", action="store_true", help="also time fresh processes")
+    parser.add_argument("--report", action="store_true", help="count what is finished; run nothing")
+    parser.add_argument("--json", type=Path, help="write rows and conditions to a file")
+    parser.add_argument("--markdown", type=Path, help="write the table to a file")
+    return parser
+
+
+def seed_of(arguments: argparse.Namespace) -> int:
+    """Return the seed to run: given, or of the last record, or fresh from the system."""
+    if arguments.seed is not None:
+        return int(arguments.seed)
+    last = None if arguments.fresh else record.newest()
+    return secrets.randbelow(2**31) if last is None else last
+
+
+def main(given: Sequence[str] | None = None) -> int:
+    """Run what is not finished and print the table; 130 if interrupted, with all that is kept."""
+    arguments = options().parse_args(given)
+    seed = seed_of(arguments)
+    tasks = plan.make_plan(seed, arguments.cases, arguments.only)
+    path = record.path_of(seed)
+    print(f"seed {seed}, {len(tasks)} cases, record {path}", file=sys.stderr)
+    code = 0
+    if not arguments.report:
+        try:
+            advance(tasks, path, arguments)
+        except KeyboardInterrupt:
+            code = 130
+    times = _times(path, measure=arguments.times)
+    rows = table.figures(_lines(path, tasks, "diagnosis"), times)
+    rows += peer_figures(path, tasks)
+    table.show(rows)
+    conditions = {"seed": seed, "cases": len(tasks), "digests": work.digests()}
+    if arguments.json:
+        whole = {**conditions, "rows": table.as_json(rows)}
+        arguments.json.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
+    if arguments.markdown:
+        head = f"Seed {seed}, {len(tasks)} cases.\n\n"
+        arguments.markdown.write_text(head + table.markdown(rows), encoding="utf-8")
+    return code
+
+
+def advance(tasks: list[plan.Task], path: Path, arguments: argparse.Namespace) -> None:
+    """Do the parts of cases that are not in the record yet, and say how far it is."""
+    digests = {p: d for p, d in work.digests().items() if p in (arguments.part or work.PARTS)}
+    done = record.finished(path, digests)
+    jobs = [
+        (part, task, digest)
+        for task in tasks
+        for part, digest in digests.items()
+        if task.key not in done[part]
+    ]
+    begun = time.monotonic()
+    for number, line in enumerate(work.runner(arguments.workers, arguments.cluster)(jobs), 1):
+        record.append(path, line)
+        left = (time.monotonic() - begun) / number * (len(jobs) - number)
+        if sys.stderr.isatty():
+            print(f"\r{number}/{len(jobs)}, {left / 60:.0f} min left  ", end="", file=sys.stderr)
+
+
+def _lines(path: Path, tasks: list[plan.Task], part: str) -> list[dict[str, Any]]:
+    done = record.finished(path, work.digests())[part]
+    return [done[task.key] for task in tasks if task.key in done]
+
+
+def _times(path: Path, measure: bool) -> dict[str, float]:
+    """Return the times of fresh processes, kept in the record with the diagnoser's digest."""
+    digest = work.digests()["diagnosis"]
+    if measure:
+        from benchmarks._blind import clock
+
+        record.append(
+            path, {"part": "times", "key": "", "digest": digest, "times": clock.measure()}
+        )
+    kept = record.finished(path, {"times": digest})["times"]
+    return dict(kept[""]["times"]) if "" in kept else {}
+
+
+def peer_figures(path: Path, tasks: list[plan.Task]) -> list[table.Figure]:
+    """Return the same figures for the methods that users would otherwise try."""
+    from benchmarks import peers
+
+    return peers.figures(_lines(path, tasks, "peers"))
+
+
+def run() -> list[Row]:
+    """Return the rows of the last record for `python -m benchmarks`; it runs nothing, for hours."""
+    seed = record.newest()
+    if seed is None:
+        return [Row("hidden effects found", "not run yet: python benchmarks/blind.py")]
+    tasks = plan.make_plan(seed, CASES)
+    path = record.path_of(seed)
+    lines = _lines(path, tasks, "diagnosis")
+    rows = table.figures(lines, _times(path, measure=False))
+    return [
+        Row(row.name, f"{row.text()} ({row.counts})", row.goal, row.ratio)
+        for row in rows
+        if row.group == "main" and row.value is not None
+    ]
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,68 @@
+"""The file that `bristle effects new NAME` writes."""
+
+TEMPLATE = '''"""{title}: an effect of my own."""
+
+from math import tanh
+
+from bristle.physics.effect import Effect, Parameter
+
+
+class {cls}(Effect):
+    """{title}: the rod's seals rub against the motion, whatever the voltage.
+
+        F = f_s tanh(v / v_s)
+
+    Leaves out the pressure on the seals: doubt it when the error grows with the damper's force.
+    """
+
+    # The name in commands, scenarios and model.toml; that of this file too.
+    name = "{name}"
+
+    # "damper": between rod and fluid. "structure": base and storeys. "sensor": an instrument.
+    site = "damper"
+
+    # The damper laws that it can join.
+    laws = ("bingham", "lugre")
+
+    # The signals that the hooks below read from q. A damper offers x [m], v [m/s], a [m/s2] across
+    # the fluid, V [V], dt [s], energy [J] dissipated so far; a structure x, v of the base, and
+    # drift, drift_rate, stiffness, storey in `spring`.
+    needs = ("v",)
+
+    # What is promised, and tested by `bristle effects check`: no closed cycle gives energy; at rest
+    # and without history there is no force.
+    passive = True
+    zero_at_rest = True
+
+    # Where the formula is from, and what a residual looks like while the effect is missing.
+    source = "Andersson, Soderberg & Bjorklund (2007), Tribology International 40(4), 580-587"
+    expect = "a force with the sign of the velocity, the same at every voltage"
+
+    # Value, SI unit, bounds of what is physical, meaning. A fit begins at the value and stays
+    # within the bounds.
+    parameters = {{
+        "f_s": Parameter(0.2, "N", (0.0, 1e5), "friction of the seals"),
+        "v_s": Parameter(2e-3, "m/s", (1e-5, 1.0), "speed over which it builds up"),
+    }}
+
+    # Memory, if there is any, is a state: states = {{"heat": "J"}}, read as z.heat. It moves by
+    #     rate(q, z, p)     its derivative, as a tuple: (q.force * q.v - z.heat / p.tau,)
+    # or  advance(q, z, p)  its value after q.dt, as a tuple, where that is known exactly.
+
+    # Hooks are pure functions of q (signals), z (states) and p (parameters): math, arithmetic and
+    # if. Others than `force`: voltage, motion, yield_factor, viscous_factor, reach, yield_force,
+    # spring, factor, channel. `force` is positive where it resists motion along +x. A step such as
+    # the sign of v is written smoothly, for a fit must be able to follow it.
+
+    @staticmethod
+    def force(q, z, p):
+        return p.f_s * tanh(q.v / p.v_s)
+'''
+
+
+def template(name: str) -> str:
+    """Return the text of a file with an effect of this name, which works as it is."""
+    words = name.split("_")
+    title = " ".join(words).strip().capitalize()
+    cls = "".join(word[:1].upper() + word[1:] for word in words)
+    return TEMPLATE.format(name=name, title=title, cls=cls)

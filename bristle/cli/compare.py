@@ -1,0 +1,190 @@
+"""Hold a study's model against runs that it has not seen, or any FMU against a measurement."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..compare.comparison import Comparison
+    from ..compare.fmu import FmuComparison
+
+HELP = "where a model, or any FMU, fails against measurements: in words, then pictures"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle compare`."""
+    parser.epilog = (
+        "z is the error over the noise that a true model would show: 1 is as good as the data can "
+        "tell. With --fmu the FMU's code runs on this machine, with your rights."
+    )
+    parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument(
+        "--runs",
+        choices=("holdout", "train"),
+        default="holdout",
+        help="of the study: those held out, or those that the model was fitted to",
+    )
+    parser.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="an FMU, anybody's")
+    parser.add_argument("--data", type=Path, metavar="FILE", help="with --fmu: the measurement")
+    parser.add_argument(
+        "--set",
+        dest="values",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="with --fmu: a parameter's or input's value, in the FMU's unit",
+    )
+    parser.add_argument(
+        "--map",
+        dest="maps",
+        action="append",
+        default=[],
+        metavar="PORT=CHANNEL",
+        help="with --fmu: which channel an input is fed from or an output is held against",
+    )
+    parser.add_argument(
+        "--channel",
+        action="append",
+        default=[],
+        metavar="CHANNEL=COLUMN@UNIT",
+        help="with --fmu: where a channel is in the file, in place of the guess",
+    )
+    parser.add_argument(
+        "--timeout",
+        type=float,
+        default=300.0,
+        metavar="S",
+        help="with --fmu: limit of the run in s",
+    )
+    parser.add_argument("--out", type=Path, metavar="FILE", help="where the picture goes")
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Compare, print the sentences and tables, draw the picture."""
+    from ..study.errors import StudyError
+
+    if arguments.fmu is not None:
+        if arguments.folder is not None or arguments.data is None:
+            raise StudyError(
+                "--fmu goes with --data and without a study: bristle compare --fmu FILE.fmu "
+                "--data run.csv"
+            )
+        return _of_fmu(arguments)
+    fmu_only = [f"--{n}" for n in ("data", "values", "maps", "channel") if getattr(arguments, n)]
+    if arguments.folder is None or fmu_only:
+        wrong = "a study's folder, or --fmu and --data, are needed"
+        if fmu_only:
+            wrong = f"{fmu_only[0].replace('values', 'set').replace('maps', 'map')} needs --fmu"
+        raise StudyError(
+            f"{wrong}: bristle compare FOLDER, or bristle compare --fmu "
+            "FILE.fmu --data run.csv"
+        )
+    return _of_study(arguments)
+
+
+def _of_study(arguments: argparse.Namespace) -> int:
+    from ..report.comparison import draw_comparison
+    from ..report.style import png
+    from ..study.comparison import compare_study
+    from ..study.study import Study
+
+    study = Study(arguments.folder)
+    comparison = compare_study(study, role=arguments.runs)
+    page = draw_comparison(comparison)
+    if arguments.out is None:
+        picture = study.write_report("compare.png", png(page))
+    else:
+        picture = arguments.out
+        page.save(picture, dpi=160)
+    notes = study.runs().notes
+    if arguments.json:
+        _print_json(
+            {**comparison.as_dict(), "notes": list(notes), "picture": str(picture.absolute())}
+        )
+        return 0
+    _print(comparison)
+    for note in notes:
+        print(note)
+    print(f"\nPicture: {picture}")
+    return 0
+
+
+def _of_fmu(arguments: argparse.Namespace) -> int:
+    from ..compare.fmu import compare_fmu
+    from ..report.comparison import draw_comparison
+    from ..study.new import parse_channel
+
+    found: FmuComparison = compare_fmu(
+        arguments.fmu,
+        arguments.data,
+        values=_pairs(arguments.values, "--set"),
+        maps=_pairs(arguments.maps, "--map"),
+        channels=dict(parse_channel(text) for text in arguments.channel),
+        timeout=arguments.timeout,
+    )
+    picture = arguments.out or Path(f"{arguments.fmu.stem}_{arguments.data.stem}.png")
+    worst = max(found.outputs, key=lambda one: one.z)
+    draw_comparison(worst).save(picture, dpi=160)
+    if arguments.json:
+        _print_json({**found.as_dict(), "picture": str(picture.absolute())})
+        return 0
+    print("\n".join(found.mapping_lines()))
+    for one in found.outputs:
+        print(f"\n{one.quantity} [{one.unit}]")
+        _print(one)
+    print(f"\nPicture: {picture}")
+    return 0
+
+
+def _pairs(texts: list[str], option: str) -> dict[str, str]:
+    from ..study.errors import StudyError
+
+    found: dict[str, str] = {}
+    for text in texts:
+        name, equals, value = text.partition("=")
+        if not (name.strip() and equals and value.strip()):
+            raise StudyError(f'{option} "{text}": NAME=VALUE is right.')
+        if name.strip() in found:
+            raise StudyError(f"{option} {name.strip()} is given twice; once is right.")
+        found[name.strip()] = value.strip()
+    return found
+
+
+def _print_json(answer: dict[str, Any]) -> None:
+    import json
+
+    print(json.dumps(_finite(answer), indent=2, ensure_ascii=False))
+
+
+def _finite(value: Any) -> Any:
+    """Return a value as JSON has it: what is not finite is null."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and (value != value or value in (float("inf"), float("-inf"))):
+        return None
+    return value
+
+
+def _print(comparison: Comparison) -> None:
+    """Print the sentences, then the error per run, along coordinates and in bands."""
+    import textwrap
+
+    from ..report.tables import comparison_tables
+
+    for sentence in comparison.sentences:
+        print(textwrap.fill(sentence, 96) if sys.stdout.isatty() else sentence)
+    for title, header, rows in comparison_tables(comparison):
+        print(f"\n{title}")
+        widths = [max(len(row[i]) for row in [header, *rows]) for i in range(len(header))]
+        for row in [header, *rows]:
+            cells = [
+                row[0].ljust(widths[0]),
+                *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)),
+            ]
+            print("  " + "  ".join(cells).rstrip())

@@ -1,0 +1,93 @@
+"""What a study's model is missing, how sure that is, and what else it could be."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..diagnose import Diagnosis
+
+HELP = "what a study's model is missing, how sure, what else it could be"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle diagnose`."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument(
+        "--dry-run", action="store_true", help="show the verdict; leave verdict.json as it is"
+    )
+    parser.add_argument("--json", action="store_true", help="print verdict.json")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Diagnose, write verdict.json, print the verdict with its evidence."""
+    from ..study.learning import diagnose_study, verdict_of
+    from ..study.study import Study
+
+    study = Study(arguments.folder)
+    found = diagnose_study(study, write=not arguments.dry_run, say=speaker(arguments.json))
+    if arguments.json:
+        print(json.dumps(verdict_of(study, found), indent=2, ensure_ascii=False))
+    else:
+        print(text(found, arguments.folder))
+    return 0
+
+
+def speaker(quiet: bool):  # type: ignore[no-untyped-def]
+    """Return what tells the stages on a terminal, and nothing in a pipe."""
+    if quiet or not sys.stderr.isatty():
+        return lambda _text: None
+    return lambda text: print(f"\033[2K{text} ...", end="\r", file=sys.stderr, flush=True)
+
+
+TITLES = {
+    "none": "Nothing is missing.",
+    "effect": "Missing: {names}.",
+    "class": "Missing is one of: {names}.",
+    "unknown": "Something is missing that no effect of the library explains.",
+    "insufficient": "These data carry no verdict.",
+}
+
+
+def text(found: Diagnosis, folder: Path) -> str:
+    """Return the verdict as text."""
+    from ..physics.effect import EFFECTS
+
+    joined = (" and " if found.kind == "effect" else ", ").join(found.effects)
+    lines = [TITLES[found.kind].format(names=joined), "", found.words]
+    for name in found.effects:
+        lines += ["", f"  {EFFECTS[name].first_line()}"]
+    if found.sensors:
+        lines += ["", "Sensors:"]
+        lines += [f"  {one.channel:14} {one.fault:10} {one.value:.5g}" for one in found.sensors]
+    if found.trials and found.before is not None:
+        lines += ["", f"  {'model':34} {'z, training':>12} {'z, held out':>12}"]
+        lines.append(f"  {'as it is':34} {found.before.train:>12.3f} {found.before.z:>12.3f}")
+        for trial in found.trials[:5]:
+            note = "" if trial.refined else "  (short search: it gains too little)"
+            lines.append(
+                f"  {'with ' + trial.effects[-1]:34} {trial.train:>12.3f} {trial.z:>12.3f}{note}"
+            )
+        lines.append("  z: error over the noise that a true model would show; a true model has 1.")
+    if found.untestable:
+        lines += ["", f"Not testable with these runs: {', '.join(found.untestable)}."]
+    if found.experiment is not None:
+        lines += ["", f"To tell them apart: {found.experiment.words()}"]
+    return "\n".join([*lines, *_next(found, folder)])
+
+
+def _next(found: Diagnosis, folder: Path) -> list[str]:
+    if found.kind in ("effect", "class"):
+        names = " ".join(found.effects) if found.kind == "effect" else found.effects[0]
+        return ["", f"Next:  bristle add {folder} {names}"]
+    if found.kind == "unknown":
+        return [
+            "",
+            f"Next:  bristle compare {folder} , which shows where the residual is;  bristle "
+            "effects new NAME  begins an effect of your own.",
+        ]
+    return ["", f"Next:  bristle report {folder}"]

@@ -1,0 +1,57 @@
+"""Write a study's report: one HTML file that a colleague can open offline."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+HELP = "one HTML file of a study: verdict, history, loops, parameters, data"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle report`."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE", help="where it goes; else FOLDER/reports/report.html"
+    )
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Write the report; print where it is."""
+    from ..report.staircase import Staircase
+    from ..report.study_page import gather, render
+    from ..study.files import write_whole
+    from ..study.study import Study
+
+    study = Study(arguments.folder)
+    content = gather(study)
+    page = render(content)
+    if arguments.out is None:
+        file = study.write_report("report.html", page)
+    else:
+        file = arguments.out
+        write_whole(file, page)
+    if arguments.json:
+        import json
+
+        answer = {
+            "report": str(file.absolute()),
+            "z_holdout": content.now.z if content.now else None,
+            "verdict": (content.verdict or {}).get("kind"),
+            "trouble": content.trouble or None,
+        }
+        print(json.dumps(answer, indent=2, ensure_ascii=False))
+        return 0
+    stairs = Staircase(content.treads)
+    if sys.stdout.isatty():
+        from rich.console import Console
+
+        Console(highlight=False).print(stairs)
+    else:
+        print(stairs)
+    if content.trouble:
+        print(f"The model could not be compared: {content.trouble}")
+    print(f"\nReport: {file}")
+    return 0

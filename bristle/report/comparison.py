@@ -1,0 +1,95 @@
+"""The figure of a comparison: how wrong a prediction is, where, and where not."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..compare.words import name_of
+from .panels import (
+    draw_error,
+    draw_history,
+    draw_loop,
+    draw_place,
+    draw_regimes,
+    draw_spectrum,
+    worst_window,
+)
+from .style import Page, look
+
+if TYPE_CHECKING:
+    from ..compare.comparison import Comparison
+    from ..compare.where import Place
+
+_HISTORY, _PANELS = 3.1, 3.2
+"""Heights of the history with its error, and of a row of two panels [in]."""
+
+
+def draw_comparison(comparison: Comparison, title: str = "") -> Page:
+    """Return the figure of a comparison, drawn and not yet written.
+
+    Panels: the worst stretch of the worst run, measured and predicted, with the error under it; the
+    loops of that run; the error along the two most telling coordinates; its spectrum against that
+    of the noise; z in classes of speed and voltage.
+    """
+    held = comparison.worst
+    window = worst_window(held)
+    loops = [name for name in ("displacement", "velocity") if name in held.coordinates]
+    telling = telling_places(comparison)
+    first = telling[0] if comparison.second else None
+    rows = [bool(loops), bool(telling), True]
+    with look():
+        height = _HISTORY + _PANELS * sum(rows)
+        page = Page(9.6, height, title or headline(comparison), " ".join(comparison.sentences))
+        grid = page.grid(
+            2, 1, top=0.35, bottom=height - _HISTORY + 0.45, row_gap=0.4, height_ratios=[1.6, 1.0]
+        )
+        upper = page.figure.add_subplot(grid[0, 0])
+        draw_history(upper, held, window)
+        lower = page.figure.add_subplot(grid[1, 0], sharex=upper)
+        upper.tick_params(labelbottom=False)
+        draw_error(lower, held, window)
+        at = _HISTORY
+        if loops:
+            _row(page, at, [lambda axes, o=one: draw_loop(axes, held, o) for one in loops])
+            at += _PANELS
+        if telling:
+            draws = [lambda axes, p=one: draw_place(axes, comparison, p) for one in telling[:1]]
+            draws += [lambda a, p=one: draw_place(a, comparison, p, first) for one in telling[1:]]
+            _row(page, at, draws)
+            at += _PANELS
+        last = [lambda axes: draw_spectrum(axes, comparison)]
+        if comparison.regimes:
+            last.append(lambda axes: draw_regimes(axes, comparison))
+        _row(page, at, last)
+    return page
+
+
+def _row(page: Page, top: float, draws: list) -> None:  # type: ignore[type-arg]
+    inner = page.height - page.head - page.foot
+    grid = page.grid(
+        1, len(draws), top=top + 0.4, bottom=inner - top - _PANELS + 0.5, column_gap=1.1
+    )
+    for column, draw in enumerate(draws):
+        draw(page.figure.add_subplot(grid[0, column]))
+
+
+def telling_places(comparison: Comparison) -> list[Place]:
+    """Return the two coordinates to draw the error along: the first, and what is left's."""
+    if not comparison.places:
+        return []
+    first = comparison.places[0]
+    rest = [one for one in comparison.places[1:] if one.coordinate not in first.alike]
+    chosen = comparison.second or (rest[0] if rest else None)
+    return [first, chosen] if chosen else [first]
+
+
+def headline(comparison: Comparison) -> str:
+    """Return the finding in one line."""
+    what, z = comparison.quantity.replace("_", " "), comparison.z
+    if z <= 1.1:
+        return f"The model's {what} is right within its noise (z = {z:.2f})"
+    times = f"{z:.2g}" if z < 100.0 else f"{z:.0f}"
+    text = f"The model's {what} is wrong by {times} times what noise explains"
+    if comparison.first:
+        text += f"; the error turns with {name_of(comparison.first.coordinate)}"
+    return text

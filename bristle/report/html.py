@@ -1,0 +1,92 @@
+"""Pieces of an HTML page that needs nothing else: no network, no script, images inside."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+
+__all__ = ["CSS", "escape", "figure", "items", "page", "paragraphs", "section", "table", "tiles"]
+
+CSS = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+
+
+def page(title: str, body: Iterable[str], foot: str) -> str:
+    """Return a whole HTML document."""
+    return "\n".join(
+        [
+            "<!DOCTYPE html>",
+            '<html lang="en">',
+            "<head>",
+            '<meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="color-scheme" content="light">',
+            f"<title>{escape(title)}</title>",
+            f"<style>{CSS}</style>",
+            "</head>",
+            "<body>",
+            "<main>",
+            *body,
+            f"<footer>{foot}</footer>",
+            "</main>",
+            "</body>",
+            "</html>",
+            "",
+        ]
+    )
+
+
+def section(title: str, *parts: str) -> str:
+    """Return a section; parts are HTML, empty ones are left out."""
+    inner = "\n".join(part for part in parts if part)
+    return f"<section>\n<h2>{escape(title)}</h2>\n{inner}\n</section>"
+
+
+def paragraphs(*texts: str, kind: str = "") -> str:
+    """Return texts as paragraphs; they are plain text."""
+    attribute = f' class="{kind}"' if kind else ""
+    return "\n".join(f"<p{attribute}>{escape(text)}</p>" for text in texts if text)
+
+
+def items(texts: Iterable[str]) -> str:
+    """Return texts as a list; they are plain text."""
+    rows = [f"<li>{escape(text)}</li>" for text in texts]
+    return "<ul>\n" + "\n".join(rows) + "\n</ul>" if rows else ""
+
+
+def tiles(pairs: Iterable[tuple[str, str]]) -> str:
+    """Return numbers with what they are, side by side."""
+    rows = [f"<li><b>{escape(n)}</b><span>{escape(about)}</span></li>" for n, about in pairs]
+    return '<ul class="tiles">\n' + "\n".join(rows) + "\n</ul>"
+
+
+def table(
+    header: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    numbers: Iterable[int] = (),
+    strong: Iterable[int] = (),
+) -> str:
+    """Return a table; columns in `numbers` are set right, rows in `strong` bold."""
+    right, bold = set(numbers), set(strong)
+
+    def cell(kind: str, i: int, text: str) -> str:
+        mark = ' class="n"' if i in right else ""
+        return f"<{kind}{mark}>{escape(text)}</{kind}>"
+
+    lines = ['<div class="scroll">', "<table>", "<thead><tr>"]
+    lines.append("".join(cell("th", i, text) for i, text in enumerate(header)))
+    lines.append("</tr></thead>")
+    lines.append("<tbody>")
+    for k, row in enumerate(rows):
+        begin = '<tr class="strong">' if k in bold else "<tr>"
+        lines.append(begin + "".join(cell("td", i, text) for i, text in enumerate(row)) + "</tr>")
+    return "\n".join([*lines, "</tbody>", "</table>", "</div>"])
+
+
+def figure(png: bytes, alt: str, caption: str = "") -> str:
+    """Return a figure with the image inside."""
+    data = base64.b64encode(png).decode("ascii")
+    below = f"\n<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    image = f'<img src="data:image/png;base64,{data}" alt="{escape(alt)}">'
+    return f"<figure>\n{image}{below}\n</figure>"

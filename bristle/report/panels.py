@@ -1,0 +1,253 @@
+"""The panels that hold a prediction against a measurement, one function each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..compare.coordinates import SHOWN
+from ..compare.words import name_of
+from .style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..compare.comparison import Comparison
+    from ..compare.held import Held
+    from ..compare.where import Place
+
+Array = NDArray[np.float64]
+
+MEASURED, PREDICTED, ERROR = INK, BLUE, VERMILION
+_DOTS = 3000
+_WINDOW = 600  # samples of a history that are told apart on paper
+
+
+def worst_window(held: Held, samples: int = _WINDOW) -> slice:
+    """Return the stretch of a run where its normalised error is largest."""
+    count = len(held.measured)
+    if count <= samples:
+        return slice(0, count)
+    power = np.minimum(((held.measured - held.predicted) / held.sigma) ** 2, 1e4)
+    power[: held.skip] = 0.0
+    total = np.concatenate([[0.0], np.cumsum(power)])
+    begin = int(np.argmax(total[samples:] - total[:-samples]))
+    return slice(begin, begin + samples)
+
+
+def draw_history(axes: Axes, held: Held, window: slice) -> None:
+    """Draw measured over predicted output in a stretch of a run."""
+    time = held.time[window]
+    axes.plot(time, held.measured[window], color=MEASURED, lw=1.6, alpha=0.85)
+    axes.plot(time, held.predicted[window], color=PREDICTED, lw=1.3)
+    axes.axhline(0.0, color=PALE, lw=0.8, zorder=1)
+    axes.margins(x=0.0, y=0.08)
+    axes.set_title(f"{_named(held)} [{held.unit}], {held.name}: its worst stretch")
+    _legend(axes, ("measured", MEASURED), ("model", PREDICTED))
+
+
+def draw_error(axes: Axes, held: Held, window: slice) -> None:
+    """Draw the error in a stretch of a run over the band that noise explains."""
+    time, error = held.time[window], (held.measured - held.predicted)[window]
+    band = 2.0 * held.sigma[window]
+    axes.fill_between(time, -band, band, color="#dbe5ec", lw=0.0)
+    axes.plot(time, error, color=ERROR, lw=0.9)
+    axes.margins(x=0.0)
+    top = max(1.15 * float(np.quantile(np.abs(error), 0.995)), 1.5 * float(np.median(band)))
+    axes.set_ylim(-top, top)
+    axes.set_title(f"measured less model [{held.unit}]")
+    _legend(axes, ("twice the expected noise", "#9fb6c6"))
+    axes.set_xlabel("time [s]", loc="right", labelpad=0)
+
+
+def draw_loop(axes: Axes, held: Held, over: str, *, window: slice | None = None) -> None:
+    """Draw measured and predicted output over a coordinate."""
+    factor, unit = SHOWN.get(over, (1.0, ""))
+    part = window or slice(held.skip, None)
+    x = factor * held.coordinates[over][part]
+    zero_lines(axes)
+    axes.plot(x, held.measured[part], color=MEASURED, lw=1.3, alpha=0.75)
+    axes.plot(x, held.predicted[part], color=PREDICTED, lw=1.0)
+    axes.set_title(f"{_named(held)} [{held.unit}] over {name_of(over)}")
+    axes.set_xlabel(f"{_axis(over)} [{unit}]")
+    axes.margins(0.05)
+
+
+def draw_place(
+    axes: Axes, comparison: Comparison, place: Place, after: Place | None = None
+) -> None:
+    """Draw the error over a coordinate: samples, and the mean in bins with its interval.
+
+    `after` is a place whose means are taken off first.
+    """
+    factor, unit = SHOWN.get(place.coordinate, (1.0, ""))
+    x = np.concatenate([one.along()[place.coordinate] for one in comparison.held])
+    y = np.concatenate([one.residual for one in comparison.held])
+    sigma = np.concatenate([one.sigma[one.skip :] for one in comparison.held])
+    if after:
+        y = y - _means_along(comparison, after)
+    if place.turned:
+        y = y * _direction(comparison)
+    zero_lines(axes)
+    band = 2.0 * float(np.median(sigma))
+    axes.axhspan(-band, band, color="#dbe5ec", lw=0.0, zorder=0)
+    every = max(1, len(x) // _DOTS)
+    axes.plot(factor * x[::every], y[::every], ".", ms=1.6, color=PALE, alpha=0.7, zorder=1.5)
+    axes.errorbar(
+        factor * place.centre, place.mean, 2.0 * place.std, color=ERROR, lw=1.6, marker="o", ms=3.0,
+        elinewidth=0.9, zorder=3,
+    )  # fmt: skip
+    top = max(1.25 * float(np.max(np.abs(place.mean))), 1.6 * band)
+    axes.set_ylim(-top, top)
+    what = "more resistance than the model" if place.turned else "measured less model"
+    if after:
+        what = f"what is left: {what}"
+    axes.set_title(f"{what} [{comparison.unit}]")
+    axes.set_xlabel(_axis(place.coordinate) + (f" [{unit}]" if unit else ""))
+    if place.coordinate == "direction":
+        axes.set_xlim(-1.8, 1.8)
+        axes.set_xticks([-1.0, 1.0], ["moving back", "moving outwards"])
+    carried = percent(place.share, 0) if place.share >= 0.01 else "below 1 %"
+    of = "what is left" if after else "the error's power"
+    share = f"{carried} of {of}" if place.significant else "as by chance"
+    axes.text(0.98, 0.97, share, transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
+              color=ERROR if place.significant else GREY)  # fmt: skip
+
+
+def _direction(comparison: Comparison) -> Array:
+    return np.concatenate([one.along()["direction"] for one in comparison.held])
+
+
+def _means_along(comparison: Comparison, place: Place) -> Array:
+    """Return the error's mean (n,) that a place gives each sample."""
+    x = np.concatenate([one.along()[place.coordinate] for one in comparison.held])
+    bins = np.clip(np.searchsorted(place.low, x, side="right") - 1, 0, len(place.mean) - 1)
+    means = place.mean[bins]
+    return np.asarray(means * _direction(comparison) if place.turned else means)
+
+
+def draw_spectrum(axes: Axes, comparison: Comparison) -> None:
+    """Draw the power spectral densities of error, expected noise and measured output."""
+    found = comparison.spectrum
+    f = found.frequency[1:]
+    for values, colour, width in (
+        (found.measured, PALE, 1.0), (found.noise, BLUE, 1.3), (found.residual, ERROR, 1.3),
+    ):  # fmt: skip
+        axes.loglog(f, values[1:], color=colour, lw=width)
+    floor = float(np.min(found.noise[1:]))
+    axes.set_ylim(0.3 * floor, 3.0 * float(np.max(found.measured[1:])))
+    axes.set_xlim(f[0], f[-1])
+    axes.set_title(f"PSD [{comparison.unit}²/Hz]")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.set_minor_formatter(lambda value, _: "")
+    axes.set_xlabel("frequency [Hz]")
+    _legend(axes, ("measured", PALE), ("error", ERROR), ("expected noise", BLUE))
+
+
+def draw_regimes(axes: Axes, comparison: Comparison) -> None:
+    """Draw z in classes of speed and voltage, 1 being what noise explains."""
+    cells = [one for one in comparison.regimes if one.speed or one.voltage]
+    speeds = _ordered(one.speed for one in cells if one.speed)
+    volts = _ordered(one.voltage for one in cells if one.voltage)
+    pairs = {(one.speed, one.voltage): one.z for one in cells}
+    columns, rows = (volts or [""]), (speeds or [""])
+    values = np.array([[pairs.get((s, V), np.nan) for V in columns] for s in rows])
+    shown = np.log10(np.maximum(values, 1.0))
+    axes.imshow(shown, cmap="OrRd", vmin=0.0, vmax=1.0, aspect="auto", origin="lower")
+    for (i, j), z in np.ndenumerate(values):
+        if np.isfinite(z):
+            colour = "white" if z > 5.0 else INK
+            axes.text(j, i, short_z(z), ha="center", va="center",
+                      color=colour, fontsize=10)  # fmt: skip
+    axes.set_xticks(range(len(columns)), [_short(name) for name in columns], fontsize=8)
+    axes.set_yticks(range(len(rows)), [_short(name) for name in rows], fontsize=8)
+    axes.grid(visible=False)
+    axes.set_title("z: error over the noise that explains it")
+
+
+def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, Array] | None:
+    """Return the mean normalised error (b, b) over displacement and velocity, after their edges.
+
+    Edges (b + 1,) in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
+    """
+    along = [one.along() for one in comparison.held]
+    if not all("displacement" in one and "velocity" in one for one in along):
+        return None
+    x = np.concatenate([one["displacement"] for one in along])
+    v = np.concatenate([one["velocity"] for one in along])
+    r = np.concatenate([one.normalised for one in comparison.held])
+    r = np.clip(r, -30.0, 30.0)
+    edges = [_edges(y, bins) for y in (x, v)]
+    count = np.histogram2d(x, v, edges)[0]
+    total = np.histogram2d(x, v, edges, weights=r)[0]
+    with np.errstate(invalid="ignore"):
+        mean = np.where(count >= 8, total / np.maximum(count, 1), np.nan)
+    return edges[0], edges[1], mean
+
+
+def _edges(values: Array, bins: int) -> Array:
+    low, high = (float(q) for q in np.quantile(values, [0.004, 0.996]))
+    return np.linspace(low, high, bins + 1)
+
+
+def draw_map(axes: Axes, comparison: Comparison, limit: float) -> Any:
+    """Draw where over displacement and velocity the error is; return the image for a colour bar."""
+    found = residual_map(comparison)
+    if found is None:
+        axes.set_axis_off()
+        return None
+    x, v, mean = found
+    axes.set_facecolor("#dedede")  # no samples
+    image = axes.pcolormesh(1e3 * x, 1e3 * v, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit)
+    axes.set_xlabel("displacement [mm]")
+    axes.set_ylabel("velocity [mm/s]")
+    axes.grid(visible=False)
+    return image
+
+
+def _legend(axes: Axes, *names: tuple[str, str]) -> None:
+    """Write names into the title's line, from the right, each in its colour."""
+    text = "   ".join(name for name, _ in names)
+    if len(names) == 1:
+        axes.set_title(text, loc="right", fontsize=8.5, color=names[0][1])
+        return
+    handles = [axes.plot([], [], color=colour, lw=2.0)[0] for _, colour in names]
+    axes.legend(
+        handles, [name for name, _ in names], loc="lower right", bbox_to_anchor=(1.0, 1.0),
+        ncols=len(names), labelcolor="linecolor", fontsize=8, handlelength=0.9,
+        columnspacing=0.9, handletextpad=0.4, borderaxespad=0.15,
+    )  # fmt: skip
+
+
+def _axis(coordinate: str) -> str:
+    return name_of(coordinate).removeprefix("the ")
+
+
+def _named(held: Held) -> str:
+    name = held.quantity.replace("_", " ")
+    return name[:1].upper() + name[1:]
+
+
+def _ordered(names: Any) -> list[str]:
+    return list(dict.fromkeys(names))
+
+
+def _short(words: str) -> str:
+    """Return "low speed\n(below 12 mm/s)" of "at low speed (below 12 mm/s)"."""
+    return words.removeprefix("at ").replace(" (", "\n(")
+
+
+__all__ = [
+    "draw_error",
+    "draw_history",
+    "draw_loop",
+    "draw_map",
+    "draw_place",
+    "draw_regimes",
+    "draw_spectrum",
+    "residual_map",
+    "worst_window",
+]

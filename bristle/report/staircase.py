@@ -1,0 +1,117 @@
+"""The staircase of a study's history, for the terminal: the error of each model, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log10
+from typing import TYPE_CHECKING, Any
+
+from .style import short_z
+
+if TYPE_CHECKING:
+    from rich.text import Text
+
+    from ..study.history import Step
+
+WIDTH = 40
+"""Characters of the longest bar."""
+CLOSE = 1.1
+"""z up to which an error is drawn as being on the noise floor."""
+
+
+@dataclass(frozen=True)
+class Tread:
+    """One step of the staircase: what was done, and z and error [N] of the model after it."""
+
+    number: int
+    what: str
+    z: float | None
+    z_train: float | None
+    rms: float | None
+
+
+@dataclass(frozen=True)
+class Staircase:
+    """The treads of a history; `str` gives plain text, rich prints it in colour.
+
+    `floor` is the z that noise alone explains.
+    """
+
+    treads: tuple[Tread, ...]
+    floor: float = 1.0
+    unit: str = "N"
+
+    def __str__(self) -> str:
+        return "\n".join("".join(text for text, _ in line).rstrip() for line in self._lines("#"))
+
+    def __rich__(self) -> Text:
+        from rich.text import Text
+
+        lines = [Text.assemble(*parts) for parts in self._lines("█")]
+        return Text("\n").join(lines)
+
+    def _lines(self, mark: str) -> list[list[tuple[str, str]]]:
+        """Return the lines as pairs of text and style."""
+        if not self.treads:
+            return [[("The history is empty.", "")]]
+        names = [f"{one.number} {one.what}" for one in self.treads]
+        wide = min(max(len(name) for name in [*names, "  noise floor"]), 32)
+        known = [one.z for one in self.treads if one.z is not None]
+        top = max([*known, 2.0 * self.floor])
+        title = "error on held-out runs over what noise explains (z)"
+        lines = [[(f"{'':{wide}}  {title}", "dim")]]
+        for name, one in zip(names, self.treads, strict=True):
+            lines.append([(f"{name[:wide]:{wide}}  ", "bold"), *self._tread(one, top, mark)])
+        lines.append([(f"{'  noise floor':{wide}}  ", "dim"), (f"| {self.floor:.3g}", "green")])
+        return lines
+
+    def _tread(self, one: Tread, top: float, mark: str) -> list[tuple[str, str]]:
+        if one.z is None:
+            return [("not judged", "dim")]
+        done = one.z <= CLOSE * self.floor
+        share = log10(max(one.z / self.floor, 1.0)) / log10(top / self.floor)
+        bar = mark * max(1, round(WIDTH * share))
+        colour = "green" if done else "dark_orange"
+        about = [] if one.rms is None else [f"{one.rms:.3g} {self.unit} RMS"]
+        about += [] if one.z_train is None else [f"training z = {short_z(one.z_train)}"]
+        tail = f"   {', '.join(about)}" if about else ""
+        return [(bar, colour), (f" {short_z(one.z)}", f"bold {colour}"), (tail, "dim")]
+
+
+def staircase(steps: Sequence[Step], noise_floor: float = 1.0) -> Staircase:
+    """Return the staircase of a history, to print as it is or to show live.
+
+    Parameters
+    ----------
+    steps : list of Step
+        Their `after` holds "z_holdout", "z_train", "rms_holdout" [N]; a step without is "not
+        judged", unless the next one's `before` holds them.
+    noise_floor : float
+        z that noise alone explains.
+
+    Examples
+    --------
+    >>> from bristle.study import Step
+    >>> print(staircase([Step(0, "identify", "", {}, {"z_holdout": 4.0})]))
+                   error on held-out runs over what noise explains (z)
+    0 identify     ######################################## 4.00
+      noise floor  | 1
+    """
+    return Staircase(tuple(treads(steps)), noise_floor)
+
+
+def treads(steps: Sequence[Step]) -> list[Tread]:
+    """Return the treads of a history: what each step's `after` says, or the next one's `before`."""
+    out = []
+    for k, step in enumerate(steps):
+        errors: dict[str, Any] = {**step.after}
+        if not errors and k + 1 < len(steps):
+            errors = {**steps[k + 1].before}
+        numbers = [_number(errors.get(key)) for key in ("z_holdout", "z_train", "rms_holdout")]
+        out.append(Tread(step.number, step.what, *numbers))
+    return out
+
+
+def _number(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float) and value == value else None

@@ -1,0 +1,350 @@
+"""The report of a study: one HTML file that needs nothing else, with verdict, history and data."""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from .. import __version__
+from ..errors import BristleError
+from . import html
+from .comparison import headline
+from .staircase import Tread, treads
+from .study_tables import data_table, data_words, parameter_table, ranking_table, run_errors
+from .study_verdict import badge, noise_floor, rivals, separating, untestable, words
+from .style import percent, short_z
+
+if TYPE_CHECKING:
+    from ..compare.comparison import Comparison
+    from ..study.history import Step
+    from ..study.model import StudyModel
+    from ..study.study import Study
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a report tells: everything that was read and computed for it.
+
+    `now` is the present model on held-out runs, `before` the model before the last effect that was
+    added; None where there is none. `trouble` says why the model could not be compared.
+    """
+
+    study: Study
+    model: StudyModel
+    verdict: dict[str, Any] | None
+    steps: tuple[Step, ...]
+    treads: tuple[Tread, ...]
+    now: Comparison | None
+    before: Comparison | None
+    added: str
+    notes: tuple[str, ...]
+    trouble: str
+
+
+def study_report(study: Study) -> str:
+    """Return a study's report as one HTML document.
+
+    It is the same for the same study, whenever and wherever it is made.
+
+    Raises
+    ------
+    StudyError, RecordError
+        If the study or its files cannot be read.
+    """
+    return render(gather(study))
+
+
+def gather(study: Study) -> Content:
+    """Return what the report of a study tells; it compares the models before and after."""
+    from ..compare.comparison import compare_held
+    from ..study.comparison import holder
+    from ..study.model import read_model
+
+    model, steps = study.model(), tuple(study.steps())
+    runs = study.runs()
+    now = before = None
+    trouble, added = "", ""
+    found = treads(steps)
+    try:
+        hold = holder(study)
+        now = compare_held(hold(model))
+        for step in reversed(steps):
+            gone = set(read_model(study.history.model_file(step.number)).effects)
+            if step.number == 0 or not gone <= set(model.effects):
+                break
+            earlier = read_model(study.history.model_file(step.number - 1))
+            new = [name for name in model.effects if name not in earlier.effects]
+            if new:
+                before, added = compare_held(hold(earlier)), " and ".join(new)
+                break
+        found = [_judged(one, hold, study) for one in found]
+    except BristleError as error:
+        trouble = str(error)
+    return Content(
+        study, model, study.verdict(), steps, tuple(found), now, before, added, runs.notes, trouble
+    )
+
+
+def _judged(tread: Tread, hold: Any, study: Study) -> Tread:
+    """Return a tread with its z where the history does not tell it: an edit by hand."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from ..compare.scale import z_scale
+    from ..study.model import read_model
+
+    if tread.z is not None or tread.number == 0:
+        return tread  # the model that a study begins with is nobody's guess of this damper
+    held = hold(read_model(study.history.model_file(tread.number)))
+    return replace(tread, z=z_scale(np.concatenate([one.normalised for one in held])))
+
+
+def render(content: Content) -> str:
+    """Return the HTML document."""
+    study = content.study
+    settings = study.settings
+    rig = "test bench" if settings.rig == "bench" else "structure"
+    what = " + ".join([content.model.law, *content.model.effects])
+    body = [
+        f"<h1>{html.escape(settings.title)}</h1>",
+        html.paragraphs(f"A damper on a {rig}, held against its model: {what}.", kind="soft"),
+        f'<div class="notes">{html.escape(settings.notes)}</div>' if settings.notes.strip() else "",
+        _verdict(content),
+        _tiles(content),
+        _history(content),
+        _before_after(content),
+        _where(content),
+        _parameters(content),
+        _data(content),
+        _untold(content),
+        _reproduce(content),
+    ]
+    foot = (
+        f"bristle {html.escape(__version__)}. z is the error over the noise that a true model "
+        "would show, force and measured motion together, by a scale that a few large errors do not "
+        "carry: 1 is as good as these data can tell."
+    )
+    return html.page(settings.title, [part for part in body if part], foot)
+
+
+def _verdict(content: Content) -> str:
+    kind, tone = badge(content.verdict)
+    said = words(content.verdict, content.study.name)
+    inner = [
+        f'<div class="verdict" style="--tone: var(--{tone})">',
+        f'<div class="kind">{html.escape(kind)}</div>',
+        html.paragraphs(said[0], kind="say"),
+        html.paragraphs(*said[1:]),
+        "</div>",
+    ]
+    rows = ranking_table(content.verdict)
+    if rows:
+        header, cells, strong = rows
+        inner.append("<h3>The evidence</h3>")
+        inner.append(
+            html.paragraphs(
+                "Each effect was tried inside the model, everything refitted, and judged on runs "
+                "that no fit has seen.", kind="soft",
+            )
+        )  # fmt: skip
+        inner.append(html.table(header, cells, numbers=(1, 2), strong=strong))
+    inner.append(html.paragraphs(noise_floor(content.verdict), kind="soft"))
+    return "\n".join(part for part in inner if part)
+
+
+def _tiles(content: Content) -> str:
+    now = content.now
+    if now is None:
+        return ""
+    low, high = now.z_interval
+    pairs = [
+        (
+            f"z = {short_z(now.z)}",
+            f"error over noise on held-out runs; 95 %: {low:.2f} to {high:.2f}",
+        ),
+        (
+            f"{now.total.rms:.2g} {now.unit}",
+            f"RMS error, {percent(now.total.share)} of the {now.quantity}'s RMS",
+        ),
+    ]
+    first = next((one.z for one in content.treads if one.z is not None), None)
+    if first is not None and first > 1.02 * now.z:
+        pairs.append(
+            (f"{short_z(first)} → {short_z(now.z)}", "z of the first model, and of this one")
+        )
+    runs = content.study.settings.runs
+    held = sum(run.role == "holdout" for run in runs)
+    judged = f"{held} of them held out" if held else "its last part held out"
+    pairs.append((f"{len(runs)} run{'s' * (len(runs) > 1)}", judged))
+    return html.tiles(pairs)
+
+
+def _where(content: Content) -> str:
+    now = content.now
+    if now is None:
+        return html.section("Where the model stands", html.paragraphs(content.trouble))
+    from .study_pictures import error_page
+    from .style import png
+    from .tables import place_table
+
+    _, header, rows = place_table(now)
+    along = "the two coordinates that organise it most"
+    if now.second:
+        along = "the coordinate that organises it most, and what is left after that along the next"
+    caption = (
+        f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
+        "interval, the blue band twice the expected noise. Below: its spectrum against that of "
+        "the noise; z by speed and voltage."
+    )
+    title, say = headline(now), now.sentences
+    return html.section(
+        "Where the model stands now",
+        html.paragraphs(*say, kind="lead"),
+        html.figure(png(error_page(now)), title, caption),
+        html.table(*run_errors(now), numbers=range(1, 6)),
+        html.table(header, rows, numbers=range(1, 4)),
+        html.paragraphs(
+            "Chance is that of such a share under a true model with an error as correlated as this "
+            "one, all coordinates together.", kind="soft",
+        ),
+    )  # fmt: skip
+
+
+def _history(content: Content) -> str:
+    judged = [one for one in content.treads if one.z is not None]
+    header = ["step", "what", "z held-out", "z training", "error [N]", "why"]
+    rows = [
+        [
+            str(step.number), step.what, _or_dash(one.z), _or_dash(one.z_train),
+            "-" if one.rms is None else f"{one.rms:.3g}", step.why,
+        ]
+        for step, one in zip(content.steps, content.treads, strict=True)
+    ]  # fmt: skip
+    picture = ""
+    if judged:
+        from .study_pictures import staircase_page
+        from .style import png
+
+        fall = " → ".join(_or_dash(one.z) for one in judged)
+        cut = content.study.settings.cut_off
+        low = f", below {cut:g} Hz" if cut else ""
+        picture = html.figure(
+            png(staircase_page(judged)),
+            f"The staircase of the history: z on held-out runs {fall}",
+            "The error of each model of the history, on runs that no fit has seen (blue) and on "
+            "those that it was fitted to (grey), over what noise explains; forces are RMS "
+            f"errors{low}. A model at the green floor cannot be told from the truth by these data.",
+        )  # fmt: skip
+    return html.section("How the error fell", picture, html.table(header, rows, numbers=(2, 3, 4)))
+
+
+def _before_after(content: Content) -> str:
+    if content.now is None or content.now.unit != "N":
+        return ""
+    from .study_pictures import loops_page, maps_page
+    from .style import png
+
+    names = (f"without {content.added}", f"with {content.added}")
+    if content.before is None:
+        names = ("", "the model now")
+    z = f"z {short_z(content.before.z)} before, " if content.before else ""
+    title = f"Before and after {content.added}" if content.before else "The loops"
+    loops = html.figure(
+        png(loops_page(content.before, content.now, names)),
+        f"Force loops, measured and predicted; {z}{short_z(content.now.z)} now",
+        "Loops of the held-out run that was worst, measured (black) and predicted (blue).",
+    )
+    page = maps_page(content.before, content.now, names)
+    maps = ""
+    if page is not None:
+        maps = html.figure(
+            png(page),
+            "The error over displacement and velocity",
+            "Where the error is, over displacement and velocity, in units of the expected noise: "
+            "red where the measured force is above the model's, blue where it is below. A true "
+            "model leaves a pale map without a pattern.",
+        )
+    return html.section(title, loops, maps)
+
+
+def _parameters(content: Content) -> str:
+    header, rows, notes = parameter_table(content.model)
+    return html.section(
+        "Parameters", html.table(header, rows, numbers=(1, 2)),
+        html.paragraphs(*notes, kind="soft"),
+    )  # fmt: skip
+
+
+def _data(content: Content) -> str:
+    measured = content.study.runs().all
+    header, rows = data_table(content.study, measured)
+    return html.section(
+        "The data",
+        html.table(header, rows, numbers=range(2, 5)),
+        "<h3>Noise, and how it was found</h3>",
+        html.table(*data_words(measured), numbers=(1, 2)),
+        html.items(content.notes),
+    )
+
+
+def _untold(content: Content) -> str:
+    hidden = untestable(content.verdict)
+    parts = [
+        html.paragraphs(
+            "These effects could be there all the same: either the data do not excite them, or "
+            "refitting the model takes them up.", kind="soft",
+        ),
+        html.table(["effect", "what it does", "what it would look like"], hidden),
+    ] if hidden else []  # fmt: skip
+    told = rivals(content.verdict)
+    experiment = separating(content.verdict)
+    if experiment:
+        parts.append("<h3>The experiment that would tell</h3>")
+        parts.append(html.paragraphs(*told, experiment))
+    if not parts:
+        none = (
+            "No diagnosis has been made of this model, so nothing is known of what it could miss."
+        )
+        parts = [
+            html.paragraphs(none if content.verdict is None else "The diagnosis names nothing.")
+        ]
+    return html.section("What could not be tested", *parts)
+
+
+def _reproduce(content: Content) -> str:
+    import numpy
+    import scipy
+
+    study = content.study
+    name = study.name
+    commands = [f"bristle study first-look {name}", f"bristle identify {name}"]
+    for step in content.steps:
+        if step.what.startswith("add "):
+            commands.append(f"bristle {step.what.replace('add ', f'add {name} ', 1)}")
+    commands += [f"bristle compare {name}", f"bristle diagnose {name}", f"bristle report {name}"]
+    rows = [
+        [run.file, hashlib.sha256((study.folder / run.file).read_bytes()).hexdigest()[:16]]
+        for run in study.settings.runs
+    ]
+    versions = (
+        f"bristle {__version__}, Python {platform.python_version()}, numpy {numpy.__version__}, "
+        f"scipy {scipy.__version__}"
+    )
+    model = hashlib.sha256((study.folder / "model.toml").read_bytes()).hexdigest()[:16]
+    return html.section(
+        "How to reproduce",
+        html.paragraphs(
+            "The study's folder holds the data, the model and every step of its history. From the "
+            "folder above it:"
+        ),
+        "<pre>" + html.escape("\n".join(commands)) + "</pre>",
+        html.table(["file", "SHA-256, first 16 digits"], [*rows, ["model.toml", model]]),
+        html.paragraphs(f"Made with {versions}.", kind="soft"),
+    )
+
+
+def _or_dash(z: float | None) -> str:
+    return "-" if z is None else short_z(z)

@@ -1,0 +1,156 @@
+"""The tables of a study's report: parameters, data, noise, errors, evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import floor, isfinite, log10
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .style import MINUS, TIMES, percent
+from .tables import run_table
+
+if TYPE_CHECKING:
+    from ..compare.comparison import Comparison
+    from ..records.measurement import Measurement
+    from ..study.model import StudyModel, Value
+    from ..study.study import Study
+
+_RANKED = 8
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_COLOURS = {
+    "white": "estimated from the samples: white",
+    "low-passed": "estimated from the samples: white, low-passed above",
+    "blue": "estimated from the samples: it grows with frequency, so this is an upper limit",
+    "resting": "estimated where the channel is at rest",
+    "hidden": "estimated: it cannot be told well from the signal, so this is a lower limit",
+    "rough": "estimated: the signal itself is rough, so this is an upper limit",
+    "none": "none seen",
+}
+
+
+def parameter_table(model: StudyModel) -> tuple[list[str], list[list[str]], list[str]]:
+    """Return header, rows and notes of a model's parameters with their 95 % intervals."""
+    header = ["parameter", "value", "95 % interval", "unit", "origin", "what it is"]
+    rows, edges = [], []
+    for name, value in model.flat().items():
+        text, half = with_interval(value.value, value.std)
+        origin = value.origin if value.free else f"{value.origin}, held"
+        rows.append([name, text, half, "" if value.unit == "1" else value.unit, origin,
+                     model.declared(name).text])  # fmt: skip
+        if value.free and value.std is not None and _at_bound(value):
+            edges.append(name)
+    notes = [
+        "Intervals: 1.96 standard deviations, the noise of force and measured motion both counted."
+    ]
+    if edges:
+        notes.append(
+            f"{', '.join(edges)}: at the edge of what is allowed, so the interval says little."
+        )
+    silent = [
+        n for n, v in model.flat().items() if v.free and v.std is None and v.origin == "assumed"
+    ]
+    if silent:
+        notes.append(f"Not identified, or not told by these data: {', '.join(silent)}.")
+    return header, rows, notes
+
+
+def with_interval(value: float, std: float | None) -> tuple[str, str]:
+    """Return a value with the digits that its interval leaves, and the interval: "± 12"."""
+    if std is None or not isfinite(std) or std <= 0.0:
+        return f"{value:.5g}", "-"
+    half = 1.96 * std
+    size = max(abs(value), half)
+    power = 3 * floor(log10(size) / 3.0) if not 1e-3 <= size < 1e5 else 0
+    scaled, width = value / 10.0**power, half / 10.0**power
+    digits = 1 - floor(log10(width))
+    places = max(digits, 0)
+    tail = f" {TIMES} 10{str(power).translate(_RAISED)}" if power else ""
+    texts = (f"{round(one, digits):.{places}f}".replace("-", MINUS) for one in (scaled, width))
+    told, wide = texts
+    return f"{told}{tail}", f"± {wide}{tail}"
+
+
+def _at_bound(value: Value) -> bool:
+    room = 1e-6 * max(abs(value.high - value.low), 1e-300)
+    return value.value <= value.low + room or value.value >= value.high - room
+
+
+def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows: a line per run, or per piece where gaps have cut it."""
+    roles = {run.file.rpartition("/")[2]: run.role for run in study.settings.runs}
+    single = len(study.settings.runs) == 1
+    header = ["run", "role", "duration [s]", "rate [Hz]", "samples", "channels"]
+    rows = []
+    for run in measured:
+        file = run.source.replace("\\", "/").rpartition("/")[2]
+        role = ("held out" if "last" in run.name else "train") if single else roles.get(file, "")
+        rows.append(
+            [
+                run.name, "held out" if role == "holdout" else role, f"{run.duration:.4g}",
+                f"{run.sampling.rate:.5g}", str(len(run.time)), ", ".join(run.channels),
+            ]
+        )  # fmt: skip
+    return header, rows
+
+
+def data_words(measured: Sequence[Measurement]) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows: the noise of each channel over all runs, and how it was found."""
+    header = ["channel", "noise", "of its RMS", "how it was found"]
+    rows = []
+    for channel in dict.fromkeys(name for run in measured for name in run.channels):
+        having = [run for run in measured if channel in run.channels]
+        noise = float(np.median([run.noise.get(channel, 0.0) for run in having]))
+        size = float(np.median([np.std(run[channel]) for run in having]))
+        facts = [run.noise_facts.get(channel) for run in having]
+        found = dict.fromkeys(
+            "given" if f is None else _COLOURS.get(f.colour, f.colour) for f in facts
+        )
+        unit = having[0].units[channel]
+        of = percent(noise / size, 2) if size > 0.0 else "-"
+        rows.append([channel, in_lab_unit(noise, unit), of, "; ".join(found)])
+    return header, rows
+
+
+def run_errors(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
+    """Return header and rows of the error on each held-out run."""
+    _, header, rows = run_table(comparison)
+    return header, rows
+
+
+def ranking_table(
+    verdict: dict[str, Any] | None,
+) -> tuple[list[str], list[list[str]], list[int]] | None:
+    """Return header, rows and the rows of the effects that the verdict names; None without any."""
+    ranking = (verdict or {}).get("ranking") or []
+    named = set((verdict or {}).get("effects") or [])
+    rows: list[list[str]] = []
+    strong: list[int] = []
+    for entry in ranking[:_RANKED]:
+        effect = str(entry.get("effect", ""))
+        if effect in named:
+            strong.append(len(rows))
+        z = entry.get("z_holdout")
+        told = f"{z:.3f}" if isinstance(z, int | float) and z < 10.0 else number(z)
+        rows.append([effect, told, share(entry.get("gain"))])
+    return (["with this effect", "z held-out", "lower by"], rows, strong) if rows else None
+
+
+_LAB = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+
+
+def in_lab_unit(value: float, unit: str) -> str:
+    """Return a quantity in SI as an engineer reads it: lengths in mm."""
+    factor, shown = _LAB.get(unit, (1.0, unit))
+    return f"{factor * value:.3g} {shown}"
+
+
+def number(value: Any) -> str:
+    """Return a number of a JSON file as text, "-" where it is none."""
+    return f"{value:.3g}" if isinstance(value, int | float) else "-"
+
+
+def share(value: Any) -> str:
+    """Return a share of a JSON file as text in percent, "-" where it is none."""
+    return percent(value) if isinstance(value, int | float) else "-"

@@ -1,0 +1,69 @@
+"""The tables of a comparison, as text in cells: for the terminal and for the report."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..compare.words import name_of
+from .style import percent, short_z
+
+if TYPE_CHECKING:
+    from ..compare.comparison import Comparison, RunError
+    from ..compare.where import Place
+
+Table = tuple[str, list[str], list[list[str]]]
+
+_SHOWN = 6  # coordinates in a table
+
+
+def comparison_tables(comparison: Comparison) -> list[Table]:
+    """Return (title, header, rows) of the error per run, along coordinates, and in frequency."""
+    return [run_table(comparison), place_table(comparison), band_table(comparison)]
+
+
+def run_table(comparison: Comparison) -> Table:
+    """Return the error on each run and over all, with the numerical error beside it."""
+    unit = comparison.unit
+    header = ["run", "z", f"error [{unit}]", "of RMS", f"noise [{unit}]", "half step [z]"]
+    runs = [*comparison.runs]
+    rows = [_run(one) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
+    return (
+        "Error over the noise that a true model would show (z), and what half the step changes",
+        header,
+        rows,
+    )
+
+
+def _run(run: RunError) -> list[str]:
+    numerical = f"{run.numerical_z:.2g}" if run.numerical_z == run.numerical_z else "not tried"
+    return [
+        run.name, short_z(run.z), f"{run.rms:.3g}", percent(run.share), f"{run.noise:.3g}",
+        numerical,
+    ]  # fmt: skip
+
+
+def place_table(comparison: Comparison) -> Table:
+    """Return the coordinates by how much of the error's power each carries."""
+    header = ["coordinate", "of the error", "of what exceeds noise", "chance"]
+    rows = [_place(one) for one in comparison.places[:_SHOWN]]
+    return "Where the error lives: the part of its power that a coordinate carries", header, rows
+
+
+def _place(place: Place) -> list[str]:
+    name = name_of(place.coordinate) + (", with the direction of motion" if place.turned else "")
+    excess = percent(place.of_excess, 0) if place.of_excess == place.of_excess else "-"
+    chance = f"{place.p:.1g}" if place.p >= 0.001 else "< 0.001"
+    return [name, percent(place.share), excess, chance]
+
+
+def band_table(comparison: Comparison) -> Table:
+    """Return the error in octaves against the noise in each."""
+    header = ["band [Hz]", "z", f"error [{comparison.unit}]", "of what exceeds noise", "coherence"]
+    rows = [
+        [
+            f"{band.low:.3g} - {band.high:.3g}", short_z(band.z), f"{band.rms:.2g}",
+            percent(band.share, 0), f"{band.coherence:.2f}",
+        ]
+        for band in comparison.spectrum.bands
+    ]  # fmt: skip
+    return "In frequency; coherence of the error with the prediction", header, rows

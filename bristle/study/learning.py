@@ -1,0 +1,224 @@
+"""Learn what a study's model is missing: diagnose it, add an effect, or both until it is enough."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from ..diagnose import Diagnosis, diagnose
+from ..physics.effect import EFFECTS
+from .errors import StudyError
+from .history import Step
+from .identification import Identified, as_model, identify_study
+from .model import StudyModel
+from .study import Study, split_in_time
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Say = Callable[[str], None]
+
+MOST_EFFECTS = 4
+"""Effects that `learn` adds at the most: a model that asks for more is the wrong model."""
+
+
+def _silent(text: str) -> None:
+    """Say nothing."""
+
+
+def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> Diagnosis:
+    """Return what the present model of a study is missing; write verdict.json.
+
+    Parameters
+    ----------
+    say : called with a few words at each stage
+
+    Raises
+    ------
+    StudyError
+        If the model was not identified before, or the study cannot be written.
+    RecordError
+        If a file cannot be read, or a channel that is needed is missing.
+    """
+    model = study.model()
+    diagnoser = DIAGNOSERS.get(study.settings.rig)
+    if diagnoser is None:
+        raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not diagnosed yet.')
+    found = diagnoser(study, model, say)
+    if write:
+        study.write_verdict(verdict_of(study, found))
+    return found
+
+
+def _diagnose_bench(study: Study, model: StudyModel, say: Say) -> Diagnosis:
+    runs = study.runs()
+    start = as_model(model)
+    identified = any(value.origin == "identified" for value in model.flat().values())
+    return diagnose(
+        runs.train, runs.holdout, law=start.law, effects=start.effects,
+        values=start.values if identified else None, held=start.held, limits=start.limits,
+        progress=say,
+    )  # fmt: skip
+
+
+DIAGNOSERS: dict[str, Callable[[Study, StudyModel, Say], Diagnosis]] = {"bench": _diagnose_bench}
+"""What diagnoses a study, by its rig."""
+
+
+def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
+    """Return the content of verdict.json, with what weakens the split of the runs."""
+    verdict = found.as_dict()
+    notes = study.runs().notes
+    return {**verdict, "notes": list(notes)} if notes else verdict
+
+
+@dataclass(frozen=True)
+class Added:
+    """What adding an effect did: the identification with it, and the step in the history."""
+
+    effects: tuple[str, ...]
+    identified: Identified
+    step: Step
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        return {**self.identified.as_dict(), "added": list(self.effects), "step": self.step.number}
+
+
+def add_effects(
+    study: Study, names: Sequence[str], *, why: str = "", found: Diagnosis | None = None
+) -> Added:
+    """Add effects to a study's model, refit it, and write the step.
+
+    Parameters
+    ----------
+    why : the reason for the history; else the verdict at hand, or "by hand"
+    found : the diagnosis that named them: the fit then begins from its values
+
+    Raises
+    ------
+    StudyError
+        If an effect is not known, is there already, or cannot join the model.
+    """
+    model = study.model()
+    for name in names:
+        _refuse(model, name)
+        model = model.with_effect(name)
+    start: Mapping[str, float] | None = None
+    if found is not None and found.after is not None:
+        known = set(model.flat())
+        start = {k: v for k, v in found.after.model.values.items() if k in known}
+    identified = identify_study(study, model=model, begin=start, table=False, write=False)
+    verdict = study.verdict()
+    if not why:
+        agreed = verdict is not None and set(names) <= set(verdict.get("effects", []))
+        why = f"verdict: {verdict['kind']}" if agreed and verdict else "by hand"
+    step = study.add_step(
+        "add " + ", ".join(names), why, identified.model, identified.before, identified.after
+    )
+    return Added(tuple(names), replace(identified, step=step), step)
+
+
+def _refuse(model: StudyModel, name: str) -> None:
+    from ..cosim.findings import unknown
+
+    if name not in EFFECTS:
+        raise StudyError(unknown("effect", name, sorted(EFFECTS)))
+    effect = EFFECTS[name]
+    if name in model.effects:
+        raise StudyError(f"{name} is in the model already.")
+    if effect.site == "damper" and model.base_law not in effect.laws:
+        raise StudyError(
+            f"{name} cannot join the law {model.law}; it joins {', '.join(effect.laws)}."
+        )
+    for other in model.effects:
+        if other in effect.excludes or name in EFFECTS[other].excludes:
+            raise StudyError(f"{name} and {other} cannot be joined: undo the other one first.")
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What `learn` came to: the last diagnosis, and the steps that it made."""
+
+    verdict: Diagnosis
+    steps: tuple[Step, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        return {
+            "verdict": self.verdict.as_dict(),
+            "steps": [
+                {
+                    "number": step.number, "what": step.what, "why": step.why,
+                    "before": step.before, "after": step.after,
+                }
+                for step in self.steps
+            ],
+        }  # fmt: skip
+
+
+def learn(
+    study: Study, *, say: Say = _silent, on_step: Callable[[], None] | None = None
+) -> Learned:
+    """Identify, diagnose and add until the verdict is none, class, unknown or insufficient.
+
+    What was done is in the history already when this is interrupted: calling it again goes on.
+
+    Parameters
+    ----------
+    say : called with a few words at each stage
+    on_step : called after each new step of the history
+    """
+    steps: list[Step] = []
+
+    def stepped(step: Step | None) -> None:
+        if step is not None:
+            steps.append(step)
+            if on_step is not None:
+                on_step()
+
+    if not any(value.origin == "identified" for value in study.model().flat().values()):
+        say("identifying the model")
+        stepped(identify_study(study, table=False).step)
+    while True:
+        found = diagnose_study(study, say=say)
+        enough = len(study.model().effects) + len(found.effects) > MOST_EFFECTS
+        if found.kind != "effect" or enough:
+            return Learned(found, tuple(steps))
+        say("adding " + " and ".join(found.effects))
+        stepped(add_effects(study, found.effects, found=found).step)
+
+
+def diagnose_frames(
+    frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame],
+    law: str = "lugre",
+    *,
+    effects: tuple[str, ...] = (),
+    holdout: Mapping[str, pd.DataFrame] | list[pd.DataFrame] | None = None,
+) -> Diagnosis:
+    """Return what a damper's model misses, from pandas frames.
+
+    Parameters
+    ----------
+    frames, holdout : as `identify_frames` takes them; without `holdout` a single run is split in
+        time, and of several the last third is held out
+
+    Raises
+    ------
+    RecordError, StudyError
+        As `identify_frames`.
+    """
+    from .identification import measurements_of_frames
+
+    train = measurements_of_frames(frames, "frame")
+    held = measurements_of_frames(holdout, "held out") if holdout else []
+    if not train:
+        raise StudyError("no frame is given; one run or more is right.")
+    if not held and len(train) == 1:
+        runs = split_in_time(train)
+        train, held = runs.train, runs.holdout
+    elif not held:
+        count = max(1, len(train) // 3)
+        train, held = train[:-count], train[-count:]
+    return diagnose(train, held, law=law, effects=effects)
