@@ -20,7 +20,7 @@ from ..identify.structure import StructureProblem, problems_of
 from ..physics.building import Building
 from ..physics.effect import EFFECTS, effects_of
 from ..records.measurement import Measurement
-from .candidates import Trial, judge, refine, try_all
+from .candidates import Trial, judge, refine, try_all, try_members
 from .decision import Decision, decide
 from .load_cell import load_cell
 from .sensors import SensorFault, sensor_faults
@@ -173,8 +173,11 @@ def damper_verdict(base: Fit, train: StructureProblem, held_out: StructureProble
 
 
 def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem) -> DamperVerdict:
-    def grown(first: Trial) -> list[Trial]:
-        trials = try_all(first.model, train, held_out)
+    # A force that no load cell shows cannot be late.
+    instruments = () if train.reconstructed else ("delay",)
+
+    def grow(first: Trial) -> list[Trial]:
+        trials = try_all(first.model, train, held_out, instruments=instruments)
         if train.reconstructed:
             taken = first.model.effects
             trials += [
@@ -184,8 +187,12 @@ def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem)
             ]
         return sorted(trials, key=lambda trial: trial.z)
 
-    trials = grown(before)
-    return DamperVerdict(decide(before, trials, grown), before, tuple(trials))
+    def reduce(pair: Trial) -> list[Trial]:
+        return try_members(pair, before.model, train, held_out)
+
+    trials = grow(before)
+    decision = decide(before, trials, grow, reduce=reduce)
+    return DamperVerdict(decision, before, tuple(trials))
 
 
 def combine(

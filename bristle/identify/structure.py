@@ -8,6 +8,7 @@ to it; so they are judged by the same searches as a damper's effects in a damper
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -87,13 +88,15 @@ class StructureProblem(Problem):
         Whether the damper's force is a result of equilibrium, not measured.
     """
 
-    def __init__(
-        self, runs: list[StructureRun], storey: int = 0, reconstructed: bool = False
-    ) -> None:
+    def __init__(self, runs: Sequence[Run], storey: int = 0, reconstructed: bool = False) -> None:
         super().__init__(list(runs))
         self.storey = storey
         self.reconstructed = reconstructed
         self._along: dict[tuple[str, ...], Along] = {}
+
+    def of(self, runs: list[Run]) -> StructureProblem:
+        """Return the same problem for other runs."""
+        return StructureProblem(runs, self.storey, self.reconstructed)
 
     def along(self, effects: tuple[str, ...]) -> Along:
         if effects not in self._along:
@@ -106,9 +109,12 @@ class StructureProblem(Problem):
         structure = tuple(e for e in model.effects if EFFECTS[e].site == "structure")
         damper = tuple(e for e in model.effects if EFFECTS[e].site != "structure")
         linear = model.law in OTHER_LAWS
-        memory = any(EFFECTS[e].states for e in model.effects)
+        # A Bingham law is a function of the motion at each sample, a LuGre law of its history.
+        memory = model.law not in (*OTHER_LAWS, "bingham") or any(
+            EFFECTS[e].states or EFFECTS[e].site == "sensor" for e in model.effects
+        )
         assert run.whole is not None
-        seen = run.whole if memory or not linear else run
+        seen = run.whole if memory else run
         x, v, a = seen.x, seen.v, seen.a
         if draw is not None:
             e = seen.draws[draw]
