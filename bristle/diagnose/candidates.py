@@ -204,7 +204,7 @@ def lighter(
     joined = [EFFECTS[name] for name in effects]
     if any(effect.joint for effect in joined):
         few = slice(0, None, 2) if len(problem.runs) > 1 else slice(None)
-        return Problem(problem.runs[few]), expected[few]
+        return problem.of(problem.runs[few]), expected[few]
     if law != "bingham" or any(effect.states or effect.site == "sensor" for effect in joined):
         return problem, expected
     runs, thinned = [], []
@@ -219,7 +219,7 @@ def lighter(
             )
         )  # fmt: skip
         thinned.append((bias[every], sigma[every], draws[:, every]))
-    return Problem(runs), thinned
+    return problem.of(runs), thinned
 
 
 def refine(begun: Model, train: Problem, sweeps: int = 12) -> Model:
