@@ -31,6 +31,7 @@ STAGES = 4
 
 _MISFIT = 1.15  # z above which an error is more than noise
 _SATURATED = 0.05  # share of samples at one and the same extreme of the force
+_TABLE_STARTS = 3
 _LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
 
 
@@ -268,7 +269,7 @@ def _identify(
     show(3)
     rows: list[LawError] = []
     if table and sum(len(run.force) for run in train.runs) <= _LONGEST_TABLE:
-        rows = error_table(train, holdout, cutoff, starts=starts)
+        rows = error_table(train, holdout, cutoff, starts=min(starts, _TABLE_STARTS))
     show(4)
     notes += _weighing(rows, model, after)
     if not any(one.has(c) for one in runs.all for c in DRIVE):
