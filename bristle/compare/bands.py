@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .scale import z_scale
+from ..identify.search import z_scale
 
 if TYPE_CHECKING:
     from .held import Held

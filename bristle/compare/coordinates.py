@@ -64,7 +64,7 @@ def coordinates_of(
         found["voltage"] = V
         found["voltage_rate"] = recent_rate(V, dt)
     if v is not None and force is not None:
-        found["dissipated_energy"] = np.cumsum(np.abs(force * v)) * dt
+        found["dissipated_energy"] = np.asarray(np.cumsum(np.abs(force * v)) * dt, dtype=float)
     given = next((y for y in (x, v, a, V, force) if y is not None), np.zeros(0))
     found["time"] = np.arange(len(given), dtype=np.float64) * np.float64(dt)
     return found

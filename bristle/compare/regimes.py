@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .scale import z_scale
+from ..identify.search import z_scale
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identify.search import z_scale
 from .coordinates import BINS, FINE, SLOW, Bins, cut
-from .scale import rms, z_scale
+from .scale import rms
 
 Array = NDArray[np.float64]
 

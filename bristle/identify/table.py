@@ -7,6 +7,7 @@ several starting points; standard laws lack the exponential.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -76,15 +77,22 @@ def low_pass(y: Array, dt: float, cutoff: float = CUTOFF) -> Array:
     RecordError
         If the cut-off is negative or not a number.
     """
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
     if not cutoff >= 0.0:
         raise RecordError(f"cut-off {cutoff} Hz; 0 for none, or a positive number is right.")
     if cutoff == 0.0 or cutoff >= 0.5 / dt:
         return np.asarray(y, dtype=float)
-    sections = butter(ORDER, cutoff, fs=1.0 / dt, output="sos")
+    sections = _sections(float(cutoff), float(dt))
     pad = min(len(y) - 1, max(30, int(1.0 / (cutoff * dt))))
     return np.asarray(sosfiltfilt(sections, y, padlen=pad), dtype=float)
+
+
+@cache
+def _sections(cutoff: float, dt: float) -> Array:
+    from scipy.signal import butter
+
+    return np.asarray(butter(ORDER, cutoff, fs=1.0 / dt, output="sos"))
 
 
 def error_table(
@@ -163,6 +171,6 @@ def _fit_filtered(problem: Problem, model: Model, cutoff: float) -> tuple[Model,
         errors = filtered_errors(problem, scaled.at(theta), cutoff)
         return np.nan_to_num(np.concatenate(errors) / unit, nan=1e3, posinf=1e3, neginf=-1e3)
 
-    found = descend(residuals, scaled.start, scaled.low, scaled.high, 20, tolerance=1e-5)
+    found = descend(residuals, scaled.start, scaled.low, scaled.high, 12, tolerance=1e-4)
     best = scaled.at(found.theta)
     return replace(best, values=dict(best.values)), error_rms(problem, best, cutoff)

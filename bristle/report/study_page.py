@@ -93,7 +93,7 @@ def _judged(tread: Tread, hold: Any, study: Study) -> Tread:
 
     import numpy as np
 
-    from ..compare.scale import z_scale
+    from ..identify.search import z_scale
     from ..study.model import read_model
 
     if tread.z is not None or tread.number == 0:
