@@ -24,6 +24,8 @@ LAYERS = (
     {"results", "cosim"},
     {"compiled", "output"},
     {"identify"},
+    {"compare"},
+    {"diagnose"},
     {"study"},
     {"run"},
     {"report"},

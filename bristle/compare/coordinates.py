@@ -66,7 +66,7 @@ def coordinates_of(
     if v is not None and force is not None:
         found["dissipated_energy"] = np.asarray(np.cumsum(np.abs(force * v)) * dt, dtype=float)
     given = next((y for y in (x, v, a, V, force) if y is not None), np.zeros(0))
-    found["time"] = np.arange(len(given)) * dt
+    found["time"] = np.arange(len(given), dtype=np.float64) * np.float64(dt)
     return found
 
 
@@ -83,13 +83,11 @@ def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
     The change since its own first-order lag: a step shows for some `over` seconds, where a
     difference from sample to sample shows it once.
     """
-    keep = float(np.exp(-dt / over))
-    lagged = np.empty(len(V), dtype=np.float64)
-    lagged[0] = V[0]
     from scipy.signal import lfilter
 
+    keep = float(np.exp(-dt / over))
     rest, _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
-    lagged[1:] = np.asarray(rest, dtype=float)
+    lagged = np.concatenate([V[:1], np.asarray(rest, dtype=float)])
     return np.asarray((V - lagged) / over, dtype=float)
 
 

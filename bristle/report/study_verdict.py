@@ -35,6 +35,8 @@ def words(verdict: Verdict | None, name: str) -> list[str]:
             f"bristle diagnose {name} tells what it misses, and how sure that is.",
         ]
     out = [_first(verdict)]
+    if verdict.get("kind") in ("effect", "class"):
+        out += [f"{_about(str(one))}." for one in verdict.get("effects") or []]
     own = str(verdict.get("words") or "").strip()
     if own:
         out.append(own)
@@ -58,9 +60,7 @@ def words(verdict: Verdict | None, name: str) -> list[str]:
 def _first(verdict: Verdict) -> str:
     kind, effects = verdict.get("kind"), [str(one) for one in verdict.get("effects") or []]
     if kind == "effect":
-        return (
-            f"The model misses {_joined(effects, 'and')}: {'; '.join(_about(e) for e in effects)}."
-        )
+        return f"The model misses {_joined(effects, 'and')}."
     if kind == "class":
         which = (
             f"either {effects[0]} or {effects[1]}"
@@ -78,11 +78,10 @@ def _first(verdict: Verdict) -> str:
 
 
 def _about(effect: str) -> str:
-    """Return the first line of an effect's text, as it goes on in a sentence."""
+    """Return the first line of an effect's text, without its stop."""
     if effect not in EFFECTS:
-        return "an effect of the user's own"
-    text = (EFFECTS[effect].__doc__ or "").strip().splitlines()[0].rstrip(".")
-    return text[:1].lower() + text[1:]
+        return f"{effect} is an effect of the user's own"
+    return EFFECTS[effect].first_line().rstrip(".")
 
 
 def _joined(names: list[str], word: str) -> str:

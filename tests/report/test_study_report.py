@@ -176,7 +176,7 @@ def test_a_single_run_is_said_to_be_weaker(tmp_path):
         ({"kind": "effect", "effects": ["gas_spring"]}, "The model misses gas_spring"),
         ({"kind": "unknown", "coordinate": "displacement"}, "it is organised by displacement"),
         ({"kind": "insufficient", "words": "All runs are equal."}, "All runs are equal."),
-        ({"kind": "effect", "effects": ["mine"]}, "an effect of the user&#x27;s own"),
+        ({"kind": "effect", "effects": ["mine"]}, "mine is an effect of the user&#x27;s own"),
     ],
 )
 def test_every_kind_of_verdict_is_told(folder, verdict, words):
