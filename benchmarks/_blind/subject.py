@@ -107,6 +107,8 @@ def true_model(task_law: str, truth: dict[str, Any]) -> Model | None:
             return None
         if any(name.split(".")[1] not in EFFECTS[found["effect"]].parameters for name in own):
             return None
+        if EFFECTS[found["effect"]].site != "damper":
+            return None  # the truth of an instrument is asked of the diagnosis alone
         names.append(found["effect"])
         values |= own
     return Model(task_law, tuple(names), values)
