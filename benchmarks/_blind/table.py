@@ -328,6 +328,8 @@ def show(rows: list[Figure]) -> None:
     from rich.table import Table
 
     console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console = Console(highlight=False, markup=False, width=140)
     for group in dict.fromkeys(row.group for row in rows):
         table = Table(box=None, pad_edge=False, title=group, title_justify="left")
         for column in HEAD:
