@@ -112,6 +112,7 @@ def test_class_counts_only_if_the_separate_test_finds_it_inseparable():
     assert score.names_effect(line({**told, "resolved": {"asymmetry": 0.4}}))
     assert not score.names_effect(line({**told, "resolved": {"asymmetry": 30.0}}))
     assert not score.names_effect(line(told)), "without the test nothing is inseparable"
+    assert score.names_effect_or_class(line(told))
 
 
 def test_class_of_four_or_without_the_effect_is_wrong():
