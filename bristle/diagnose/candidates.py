@@ -20,7 +20,7 @@ Expected = list[tuple[Array, Array, Array]]
 
 SEARCH: dict[str, dict[str, tuple[float, ...]]] = {
     "stribeck": {"v_s": (0.3, 1.0, 3.0)},
-    "flattening": {"v_f": (0.5, 3.0)},
+    "flattening": {"v_f": (0.1, 1.0), "bend": (1.0, 2.0)},
     "saturation": {"V_s": (0.4, 1.0)},
     "coil_lag": {"tau": (0.5, 2.0)},
     "temperature": {"E_0": (0.5, 4.0), "tau": (0.2,)},
@@ -31,8 +31,20 @@ SEARCH: dict[str, dict[str, tuple[float, ...]]] = {
 }
 """Where a search begins, as factors on an effect's defaults scaled to the rig."""
 
-QUICK = 4
+QUICK = 8
 """Sweeps of the first, short search from each start."""
+
+LONG = 20
+"""Sweeps of the second search, from the best of the first ones."""
+
+KEPT = 2
+"""How many starts get a second search."""
+
+THIN = 6
+"""Of what has no memory every so many samples suffice for a search."""
+
+FALL = {"bingham": ("c_0", "c_v"), "lugre": ("sigma_2", "sigma_b")}
+"""The parts of the laws that fall with speed: a fit without an effect of speed inflates them."""
 
 PROMISING = 0.5
 """Share of the best gain on the training runs below which a candidate is not refined."""
@@ -140,50 +152,83 @@ def _raw(problem: Problem, model: Model, expected: Expected) -> Iterable[Array]:
 
 
 def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
-    """Return the models from which the search for an effect's parameters begins."""
+    """Return the models from which the search for an effect's parameters begins.
+
+    An effect of speed alone competes with the law's own fall with speed, which has taken up what it
+    could: so half of its starts have that part small and wide.
+    """
     values = {
         name: problem.scaled(base.law, f"{effect}.{name}") for name in EFFECTS[effect].parameters
     }
+    bases = [dict(base.values)]
+    if EFFECTS[effect].needs == ("v",) and not {*FALL[base.law], "v_n"} & set(base.held):
+        relaxed = {name: 0.3 * base.value(name) for name in FALL[base.law]}
+        bases.append({**base.values, **relaxed, "v_n": 2.0 * base.value("v_n")})
     factors = SEARCH.get(effect, {})
     out = []
-    for combination in product(*factors.values()):
-        own = dict(values)
-        for name, factor in zip(factors, combination, strict=True):
-            own[name] *= factor
-        named = {f"{effect}.{name}": value for name, value in own.items()}
-        out.append(replace(base, effects=(*base.effects, effect), values={**base.values, **named}))
+    for own in bases:
+        for combination in product(*factors.values()):
+            named = {f"{effect}.{name}": value for name, value in values.items()}
+            for name, factor in zip(factors, combination, strict=True):
+                named[f"{effect}.{name}"] *= factor
+            out.append(replace(base, effects=(*base.effects, effect), values={**own, **named}))
     return out
 
 
 @dataclass(frozen=True)
 class Begun:
-    """A candidate after its first, short search, with its mean loss on the training runs."""
+    """A candidate after its first search, with its mean loss on the training runs."""
 
     model: Model
     cost: float
 
 
 def begin(effect: str, base: Model, train: Problem, expected: Expected) -> Begun:
-    """Search shortly from every start of an effect, its own parameters first; return the best."""
+    """Search shortly from every start of an effect, and longer from the best; return the best.
+
+    All parameters move at once: with the law's held, an effect that the law has taken up vanishes.
+    """
+    problem, expected_there = lighter(train, expected, (*base.effects, effect), base.law)
     found = []
-    few = lighter(train, effect)
-    light = [expected[i] for i in few]
-    part = Problem([train.runs[i] for i in few])
     for model in starts(effect, base, train):
-        own = [name for name in model.free() if name.startswith(effect + ".")]
-        model, _ = Search(part, model, light, own).run(QUICK)
-        model, ended = Search(part, model, light, model.free()).run(QUICK)
+        model, ended = Search(problem, model, expected_there, model.free()).run(QUICK)
         found.append(Begun(model, ended.cost))
-    best = min(found, key=lambda one: one.cost)
-    if len(few) < len(train.runs):
-        return Begun(best.model, float(np.mean(loss(residuals(train, best.model, expected)))))
-    return best
+    found.sort(key=lambda one: one.cost)
+    longer = []
+    for one in found[:KEPT]:
+        model, ended = Search(problem, one.model, expected_there, one.model.free()).run(LONG)
+        longer.append(Begun(model, ended.cost))
+    best = min(longer, key=lambda one: one.cost).model
+    return Begun(best, float(np.mean(loss(residuals(train, best, expected)))))
 
 
-def lighter(problem: Problem, effect: str) -> list[int]:
-    """Return which runs a short search uses: a series element costs thirty times as much."""
-    count = len(problem.runs)
-    return list(range(count)) if not EFFECTS[effect].joint else list(range(0, count, 2))
+def lighter(
+    problem: Problem, expected: Expected, effects: Sequence[str], law: str
+) -> tuple[Problem, Expected]:
+    """Return less data for a search: a part of the samples without memory, of the runs with it.
+
+    Without states a law is a function of the motion at each sample. A series element costs thirty
+    times as much as another effect.
+    """
+    joined = [EFFECTS[name] for name in effects]
+    if any(effect.joint for effect in joined):
+        few = slice(0, None, 2) if len(problem.runs) > 1 else slice(None)
+        return Problem(problem.runs[few]), expected[few]
+    if law != "bingham" or any(effect.states or effect.site == "sensor" for effect in joined):
+        return problem, expected
+    runs, thinned = [], []
+    for run, (bias, sigma, draws) in zip(problem.runs, expected, strict=True):
+        every = slice(None, None, THIN)
+        runs.append(
+            replace(
+                run, dt=run.dt * THIN, x=run.x[every], v=run.v[every], a=run.a[every],
+                V=run.V[every], force=run.force[every], draws=run.draws[:, every],
+                skip=-(-run.skip // THIN),
+                measured=None if run.measured is None else run.measured[every],
+            )
+        )  # fmt: skip
+        thinned.append((bias[every], sigma[every], draws[:, every]))
+    return Problem(runs), thinned
 
 
 def refine(begun: Model, train: Problem, sweeps: int = 12) -> Model:
@@ -196,21 +241,32 @@ def refine(begun: Model, train: Problem, sweeps: int = 12) -> Model:
     return model
 
 
-def joinable(base: Model) -> list[str]:
-    """Return the effects that can join a model, the slow ones first."""
+def joinable(base: Model, instruments: Sequence[str] = ("delay",)) -> list[str]:
+    """Return the effects that can join a model on a test bench, the slow ones first.
+
+    `instruments` are the sensor effects that no redundancy of the channels has judged already.
+    """
     taken = set(base.effects)
     for name in base.effects:
         taken |= set(EFFECTS[name].excludes)
+    able = [
+        *effects_of("damper", base.law),
+        *(effect for effect in effects_of("sensor") if effect.name in instruments),
+    ]
     names = [
-        e.name
-        for e in effects_of("damper", base.law)
-        if e.name not in taken and not set(e.excludes) & set(base.effects)
+        effect.name
+        for effect in able
+        if effect.name not in taken and not set(effect.excludes) & set(base.effects)
     ]
     return sorted(names, key=lambda name: not EFFECTS[name].joint)
 
 
 def try_all(
-    base: Model, train: Problem, held_out: Problem, progress: Callable[[str], None] | None = None
+    base: Model,
+    train: Problem,
+    held_out: Problem,
+    progress: Callable[[str], None] | None = None,
+    instruments: Sequence[str] = ("delay",),
 ) -> list[Trial]:
     """Try every effect that can join the model, on all cores; best on the held-out runs first.
 
@@ -219,7 +275,7 @@ def try_all(
     """
     expected = train.expectation(base)
     before = float(np.mean(loss(residuals(train, base, expected))))
-    names = joinable(base)
+    names = joinable(base, instruments)
     with ThreadPoolExecutor(cpu_count()) as pool:
         begun = list(pool.map(lambda name: begin(name, base, train, expected), names))
         most = max(before - one.cost for one in begun)
@@ -232,3 +288,21 @@ def try_all(
 
         trials = list(pool.map(finish, zip(begun, worth, strict=True)))
     return sorted(trials, key=lambda trial: trial.z)
+
+
+def try_members(pair: Trial, base: Model, train: Problem, held_out: Problem) -> list[Trial]:
+    """Try each new effect of a model alone, its search begun from the values found together."""
+    out = []
+    for name in pair.effects:
+        if name in base.effects:
+            continue
+        others = [e for e in pair.effects if e not in base.effects and e != name]
+        kept = tuple(e for e in pair.effects if e not in others)
+        values = {
+            key: value
+            for key, value in pair.model.values.items()
+            if key.partition(".")[0] not in others
+        }
+        alone = refine(replace(pair.model, effects=kept, values=values), train, 2 * LONG)
+        out.append(judge(alone, train, held_out))
+    return out

@@ -72,6 +72,7 @@ def decide(
     trials: Sequence[Trial],
     grow: Callable[[Trial], list[Trial]],
     organised: bool = False,
+    reduce: Callable[[Trial], list[Trial]] | None = None,
 ) -> Decision:
     """Return the decision that the trials of single effects lead to.
 
@@ -82,6 +83,8 @@ def decide(
     grow : returns the trials of all effects added to a trial's model; called where no single one
         explains the residual
     organised : whether a coordinate organises the residual of `before` strongly
+    reduce : returns the trials of a pair's members alone, searched from the pair's values: a search
+        of their own may have ended in a lesser minimum
     """
     ranked = sorted(trials, key=lambda trial: trial.z)
     if not ranked or not missing(before, ranked[0]):
@@ -91,6 +94,13 @@ def decide(
     single = best.z <= ADEQUATE or explained >= SHARE
     if best.z > ADEQUATE:
         pair = _pair(before, ranked, grow, single)
+        if pair is not None and reduce is not None:
+            alone = min(reduce(pair.best), key=lambda trial: trial.z)
+            if alone.z < best.z:
+                rest = [trial for trial in ranked if trial.effects != alone.effects]
+                again = decide(before, [alone, *rest], lambda _first: [], organised)
+                if not _needed(alone, pair.best):
+                    return again
         if pair is not None:
             return pair
     if not single:
@@ -136,7 +146,7 @@ def _pair(
         return None
     pair = min(grown, key=lambda trial: trial.z)
     names = _new(pair, before)
-    if excess(pair) > PAIR_LEFT * excess(best) or not missing(best, pair):
+    if not _needed(best, pair):
         return None
     without = [alone[name] for name in names if name in alone]
     parts = [(excess(other) - excess(pair)) / excess(before) for other in without]
@@ -152,6 +162,11 @@ def _pair(
             f"z = {best.z:.2f}; {names[0]} and {names[1]} together leave {pair.z:.2f}.",
         ),
     )  # fmt: skip
+
+
+def _needed(single: Trial, pair: Trial) -> bool:
+    """Return whether a second effect takes a fair share of what the first one leaves."""
+    return excess(pair) <= PAIR_LEFT * excess(single) and missing(single, pair)
 
 
 def _effect_or_class(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from ..compare.where import Place, places
 from ..identify.fit import Model, Problem, identify
 from ..identify.prepare import prepare
 from ..records.measurement import Measurement
-from .candidates import Trial, judge, refine, try_all
+from .candidates import Trial, judge, refine, try_all, try_members
 from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
@@ -149,7 +149,10 @@ def diagnose(
         base = Model(law, tuple(effects), dict(values), tuple(held), dict(limits or {}))
         base = refine(base, problem)
     before = judge(base, problem, held_out)
-    return _judged(before, problem, held_out, faults, noise, say)
+    redundant = any(run.has("displacement", "velocity") for run in train)
+    instruments = ("delay",) if redundant else ("delay", "velocity_sensor")
+    found = _judged(before, problem, held_out, faults, noise, instruments, say)
+    return _with_instrument(found)
 
 
 def _judged(
@@ -158,18 +161,22 @@ def _judged(
     held_out: Problem,
     faults: list[SensorFault],
     noise: dict[str, float],
+    instruments: Sequence[str],
     say: Progress,
 ) -> Diagnosis:
     say("trying every effect inside the model")
-    trials = try_all(before.model, problem, held_out)
+    trials = try_all(before.model, problem, held_out, instruments=instruments)
 
     def grow(first: Trial) -> list[Trial]:
         say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
-        return try_all(first.model, problem, held_out)
+        return try_all(first.model, problem, held_out, instruments=instruments)
+
+    def reduce(pair: Trial) -> list[Trial]:
+        return try_members(pair, before.model, problem, held_out)
 
     rest = where(before, held_out)
     strong = bool(rest) and rest[0].significant and rest[0].share > STRONG
-    decision = decide(before, trials, grow, strong)
+    decision = decide(before, trials, grow, strong, reduce)
     expected = problem.expectation(before.model)
     visible = detectable(problem, expected)
     hidden = untestable(before.model, problem, expected, visible)
@@ -195,6 +202,15 @@ def _judged(
         tuple(faults), tuple(hidden), visible, coordinate, tuple(rest), experiment, noise,
         decision.explained,
     )  # fmt: skip
+
+
+def _with_instrument(found: Diagnosis) -> Diagnosis:
+    """Return the diagnosis with `velocity_sensor` named where the channels show its lag."""
+    if not any(fault.fault in ("lag", "high-pass") for fault in found.sensors):
+        return found
+    if found.kind not in ("none", "effect"):
+        return found
+    return replace(found, kind="effect", effects=("velocity_sensor", *found.effects))
 
 
 def where(trial: Trial, held_out: Problem) -> list[Place]:
