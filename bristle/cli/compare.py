@@ -53,7 +53,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --fmu: where a channel is in the file, in place of the guess",
     )
     parser.add_argument(
-        "--timeout", type=float, default=300.0, metavar="S", help="with --fmu: limit of the run in s"
+        "--timeout",
+        type=float,
+        default=300.0,
+        metavar="S",
+        help="with --fmu: limit of the run in s",
     )
     parser.add_argument("--out", type=Path, metavar="FILE", help="where the picture goes")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -72,10 +76,11 @@ def main(arguments: argparse.Namespace) -> int:
         return _of_fmu(arguments)
     fmu_only = [f"--{n}" for n in ("data", "values", "maps", "channel") if getattr(arguments, n)]
     if arguments.folder is None or fmu_only:
-        lacking = "a study's folder, or --fmu and --data, are needed"
-        what = f"{fmu_only[0].replace('values', 'set').replace('maps', 'map')} needs --fmu"
+        wrong = "a study's folder, or --fmu and --data, are needed"
+        if fmu_only:
+            wrong = f"{fmu_only[0].replace('values', 'set').replace('maps', 'map')} needs --fmu"
         raise StudyError(
-            f"{what if fmu_only else lacking}: bristle compare FOLDER, or bristle compare --fmu "
+            f"{wrong}: bristle compare FOLDER, or bristle compare --fmu "
             "FILE.fmu --data run.csv"
         )
     return _of_study(arguments)
@@ -97,7 +102,9 @@ def _of_study(arguments: argparse.Namespace) -> int:
         page.save(picture, dpi=160)
     notes = study.runs().notes
     if arguments.json:
-        _print_json({**comparison.as_dict(), "notes": list(notes), "picture": str(picture.absolute())})
+        _print_json(
+            {**comparison.as_dict(), "notes": list(notes), "picture": str(picture.absolute())}
+        )
         return 0
     _print(comparison)
     for note in notes:

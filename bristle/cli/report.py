@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 HELP = "one HTML file of a study: verdict, history, loops, parameters, data"
@@ -19,8 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Write the report; print where it is."""
-    from ..report.study_page import gather, render
     from ..report.staircase import Staircase
+    from ..report.study_page import gather, render
     from ..study.files import write_whole
     from ..study.study import Study
 
@@ -43,9 +44,13 @@ def main(arguments: argparse.Namespace) -> int:
         }
         print(json.dumps(answer, indent=2, ensure_ascii=False))
         return 0
-    from rich.console import Console
+    stairs = Staircase(content.treads)
+    if sys.stdout.isatty():
+        from rich.console import Console
 
-    Console(highlight=False).print(Staircase(content.treads))
+        Console(highlight=False).print(stairs)
+    else:
+        print(stairs)
     if content.trouble:
         print(f"The model could not be compared: {content.trouble}")
     print(f"\nReport: {file}")

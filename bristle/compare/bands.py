@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .scale import z_scale
+from ..identify.search import z_scale
 
 if TYPE_CHECKING:
     from .held import Held
@@ -59,9 +60,7 @@ def spectrum(held: Sequence[Held]) -> Spectrum:
     rate = 1.0 / held[0].dt
     lines = None
     limit = _SPIKE * max(1.0, z_scale(np.concatenate([one.normalised for one in held])))
-    errors = [
-        np.clip(one.normalised, -limit, limit) * one.sigma[one.skip :] for one in held
-    ]
+    errors = [np.clip(one.normalised, -limit, limit) * one.sigma[one.skip :] for one in held]
     total = sum(len(one.residual) for one in held)
     sums = np.zeros((4, size // 2 + 1))
     cross = np.zeros(size // 2 + 1, dtype=complex)
@@ -88,7 +87,7 @@ def spectrum(held: Sequence[Held]) -> Spectrum:
 def edges(rate: float, duration: float) -> Array:
     """Return the edges [Hz] of octaves from where runs hold some cycles to half the rate."""
     lowest = 2.0 ** np.ceil(np.log2(_CYCLES / duration))
-    inner = []
+    inner: list[float] = []
     f = lowest
     while f < 0.4 * rate and len(inner) < _MOST - 1:
         inner.append(f)
@@ -97,7 +96,12 @@ def edges(rate: float, duration: float) -> Array:
 
 
 def _bands(
-    held: Sequence[Held], errors: Sequence[Array], rate: float, lines: Array, coherence: Array, power: Array
+    held: Sequence[Held],
+    errors: Sequence[Array],
+    rate: float,
+    lines: Array,
+    coherence: Array,
+    power: Array,
 ) -> tuple[Band, ...]:
     """Return the bands, from one tapered periodogram per run: its lines are nearly independent."""
     from scipy.stats import chi2
@@ -121,7 +125,7 @@ def _bands(
     ratio = found / np.maximum(expected, 1e-300)
     p = chi2.sf(ratio * freedom, np.maximum(freedom, 1.0))
     out = []
-    for i, (low, high) in enumerate(zip(cuts[:-1], cuts[1:], strict=True)):
+    for i, (low, high) in enumerate(itertools.pairwise(cuts)):
         inside = (lines >= low) & (lines < high)
         weights = power[inside]
         shared = float(np.average(coherence[inside], weights=weights)) if weights.sum() else 0.0

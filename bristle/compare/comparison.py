@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
-from ..identify.fit import Fit, Model, Problem, huber
+from ..identify.fit import Fit, Model, Problem
+from ..identify.search import HUBER_AT_ONE, losses, z_scale
 from .bands import Spectrum, spectrum
 from .held import Held, held_runs
 from .regimes import Regime, regimes
-from .scale import HUBER_AT_ONE, rms, z_scale
+from .scale import rms
 from .where import FLIPS, Finder, Place
 
 Array = NDArray[np.float64]
@@ -197,8 +198,8 @@ def _run_error(name: str, held: Sequence[Held]) -> RunError:
 
 
 def _interval(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
-    """Return the 95 % interval of z over all runs, by the scatter of the loss from block to block."""
-    loss = huber(np.concatenate(list(normalised)))
+    """Return the 95 % interval of z over all runs, by the scatter of the loss over blocks."""
+    loss = losses(np.concatenate(list(normalised)))
     blocks = finder.blocks
     counts = np.bincount(blocks.label)
     means = np.bincount(blocks.label, weights=loss) / np.maximum(counts, 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,7 +64,7 @@ def coordinates_of(
         found["voltage"] = V
         found["voltage_rate"] = recent_rate(V, dt)
     if v is not None and force is not None:
-        found["dissipated_energy"] = np.cumsum(np.abs(force * v)) * dt
+        found["dissipated_energy"] = np.asarray(np.cumsum(np.abs(force * v)) * dt, dtype=float)
     given = next((y for y in (x, v, a, V, force) if y is not None), np.zeros(0))
     found["time"] = np.arange(len(given)) * dt
     return found
@@ -83,11 +84,12 @@ def recent_rate(V: Array, dt: float, over: float = RECENT) -> Array:
     difference from sample to sample shows it once.
     """
     keep = float(np.exp(-dt / over))
-    lagged = np.empty_like(V)
+    lagged = np.empty(len(V), dtype=np.float64)
     lagged[0] = V[0]
     from scipy.signal import lfilter
 
-    lagged[1:], _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
+    rest, _ = lfilter([1.0 - keep], [1.0, -keep], V[1:], zi=[keep * V[0]])
+    lagged[1:] = np.asarray(rest, dtype=float)
     return np.asarray((V - lagged) / over, dtype=float)
 
 
@@ -137,7 +139,7 @@ def cut(values: Array, bins: int = BINS) -> Bins | None:
         return None
     order = np.argsort(label, kind="stable")
     edges = np.concatenate([[0], np.cumsum(count)])
-    parts = [values[order[begin:end]] for begin, end in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [values[order[begin:end]] for begin, end in itertools.pairwise(edges)]
     return Bins(
         label,
         np.array([part.mean() for part in parts]),

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FmuError
+from ..errors import FmuError, RecordError
 from ..fmu.description import Description, Value, read_description
-from ..identify.prepare import smooth_steps
+from ..identify.drive import smooth_drive
 from ..identify.smooth import posterior_draws, smooth
 from ..records.channels import DRIVE, MOTION, PLAIN, channel_unit, is_channel
 from ..records.guess import guess_channels, specs
-from ..records.measurement import ChannelSpec, Measurement, measurements_of
+from ..records.measurement import ChannelSpec
 from ..records.noise import estimate_noise
 from ..records.sampling import evenly
 from ..records.table import Table, read_table
@@ -31,6 +31,8 @@ from .stepping import Job, step_through
 Array = NDArray[np.float64]
 
 DRAWS = 6
+HALVINGS = 2
+"""How often the measurement's step is halved for the prediction."""
 SILENT = 1e-3
 """Share of an output's RMS that stands in for its noise where the measurement has none."""
 _KINEMATIC = ("displacement", "velocity", "acceleration")
@@ -93,9 +95,11 @@ def compare_fmu(
 ) -> FmuComparison:
     """Hold an FMU, anybody's, against a measurement.
 
-    It is stepped in a process of its own at the measurement's step; inputs of t_k+1 are set before
-    the step from t_k. Displacement and velocity are joined into one smoothed motion first, for the
-    noise of inputs would be taken for errors of the FMU; what stays uncertain is carried through.
+    It is stepped in a process of its own at a quarter of the measurement's step, inputs between
+    samples interpolated; inputs of t_k+1 are set before the step from t_k. The numerical error is
+    what the last halving of the step has changed. Displacement and velocity are joined into one
+    smoothed motion first, for the noise of inputs would be taken for errors of the FMU; what stays
+    uncertain is carried through.
 
     Parameters
     ----------
@@ -117,7 +121,9 @@ def compare_fmu(
     path = Path(fmu)
     description = read_description(path)
     table = read_table(data)
-    structural = any(v.name.startswith(("ground_", "base_", "floor")) for v in description.variables.values())
+    structural = any(
+        v.name.startswith(("ground_", "base_", "floor")) for v in description.variables.values()
+    )
     pieces, notes = signals_of(table, channels or {}, "structure" if structural else "bench")
     given = _typed(description, values or {})
     ports = map_ports(description, pieces[0].units, maps or {}, given)
@@ -137,75 +143,99 @@ def signals_of(
     """Return the pieces of a table as an FMU is fed, and what was guessed and done.
 
     Columns that are no known channel are there under their own names, if they have a unit.
+
+    Raises
+    ------
+    RecordError
+        If there is no time, no column with a unit, or a given channel cannot be read.
     """
     guesses = guess_channels(table, rig)
-    chosen = {**specs(table, guesses), **channels}
     notes = [f"guessed: {one}" for one in guesses if one.channel not in channels and one.doubt]
-    taken = {table.find(one.column).text for one in chosen.values() if one.column}
-    measured = measurements_of(table, chosen)
-    others = _other_columns(table, taken, chosen)
-    if not others:
-        return [_signals(one, {}, {}, seed) for one in measured], notes
-    time = table.values[table.find(chosen["time"].column).text] if chosen["time"].column else None
-    if time is None or len(measured) > 1:
-        notes.append(f"not used, for the file has gaps or no times: {', '.join(others)}")
-        return [_signals(one, {}, {}, seed) for one in measured], notes
-    factor = conversion(chosen["time"].unit or "s", "s")[0]
-    values = {name: table.values[text] for name, (text, _) in others.items()}
-    even = evenly(time * factor, values, table.lines, table.source, table.place)
-    if len(even.pieces) != 1 or len(even.pieces[0][0]) != len(measured[0].time):
-        notes.append(f"not used, for values are missing: {', '.join(others)}")
-        return [_signals(measured[0], {}, {}, seed)], notes
-    extra = even.pieces[0][1]
-    return [_signals(measured[0], extra, {n: unit for n, (_, unit) in others.items()}, seed)], notes
-
-
-def _other_columns(
-    table: Table, taken: set[str], chosen: Mapping[str, ChannelSpec]
-) -> dict[str, tuple[str, str]]:
-    """Return columns that are no channel: name to (title, unit)."""
-    found = {}
+    chosen = {**specs(table, guesses), **channels}
+    time, columns = _time(table, chosen.pop("time", None)), {}
+    for name, spec in chosen.items():
+        column = table.find(spec.column)
+        unit = spec.unit or (column.unit.name if column.unit else "")
+        if not unit or column.text in table.words:
+            if name in channels:
+                raise RecordError(f'{table.source}: "{column.text}" has no numbers or no unit.')
+            continue
+        factor, offset = conversion(unit, channel_unit(name))
+        si = spec.sign * (factor * table.values[column.text] + offset)
+        columns[name] = si, channel_unit(name)
+    taken = {table.find(spec.column).text for spec in chosen.values()}
     for column in table.columns:
-        known = column.text in taken or column.text in table.words
-        if not known and column.unit is not None and column.name not in chosen:
-            found[column.name] = column.text, column.unit.name
-    return found
+        if column.text in taken or column.text in table.words or column.name in columns:
+            continue
+        if column.unit is not None and column.unit.name != "s":
+            columns[column.name] = table.values[column.text], column.unit.name
+        elif column.unit is None:
+            notes.append(f'not used: "{column.text}", which has no unit')
+    if not columns:
+        raise RecordError(f"{table.source}: no column besides the time has a unit that is known.")
+    values = {name: y for name, (y, _) in columns.items()}
+    even = evenly(time, values, table.lines, table.source, table.place)
+    units = {name: unit for name, (_, unit) in columns.items()}
+    stem = Path(table.source).stem
+    many = len(even.pieces) > 1
+    found = [
+        _signals(
+            f"{stem} ({k})" if many else stem, even.sampling.step, piece, units, channels, seed + k
+        )
+        for k, (_, piece, _) in enumerate(even.pieces, 1)
+    ]
+    return found, notes + even.notes
+
+
+def _time(table: Table, spec: ChannelSpec | None) -> Array:
+    """Return the time of a table [s]."""
+    if spec is not None and spec.step is not None:
+        return np.arange(table.rows, dtype=float) * spec.step
+    if spec is None:
+        raise RecordError(
+            f"{table.source}: no column is the time. --channel time=COLUMN@s names one."
+        )
+    column = table.find(spec.column)
+    factor, _ = conversion(spec.unit or (column.unit.name if column.unit else "s"), "s")
+    return np.asarray(factor * table.values[column.text], dtype=float)
 
 
 def _signals(
-    one: Measurement, extra: dict[str, Array], units: dict[str, str], seed: int
-) -> Signals:
-    n, dt = len(one.time), one.step
+    name: str, dt: float, raw: dict[str, Array], unit: dict[str, str],
+    channels: Mapping[str, ChannelSpec], seed: int,
+) -> Signals:  # fmt: skip
+    """Return one piece: its motion smoothed, its drive without noise, draws of what is left."""
+    n, unit = len(next(iter(raw.values()))), dict(unit)
     generator = np.random.default_rng(seed)
-    raw = {**one.channels, **extra}
-    unit = {**{name: channel_unit(name) for name in one.channels}, **units}
-    noise = dict(one.noise) | {name: estimate_noise(y).std for name, y in extra.items()}
-    values, errors, rates, derived = dict(raw), {}, {}, []
+    given = {k: s.noise for k, s in channels.items() if s.noise is not None}
+    noise = {k: given[k] if k in given else estimate_noise(y).std for k, y in raw.items()}
+    values, errors, derived = dict(raw), {}, []
+    rates: dict[str, str] = {}
     for prefix in ("", "base_"):
         x, v = raw.get(f"{prefix}displacement"), raw.get(f"{prefix}velocity")
         if x is None and v is None:
             continue
         sizes = (noise.get(f"{prefix}displacement", 0.0), noise.get(f"{prefix}velocity", 0.0))
         motion = smooth(x, v, dt, sizes)
-        drawn = posterior_draws(n, dt, sizes, motion.jerk, (x is not None, v is not None), DRAWS, seed)
+        have = (x is not None, v is not None)
+        drawn = posterior_draws(n, dt, sizes, motion.jerk, have, DRAWS, seed, motion)
         names = [f"{prefix}{kind}" for kind in _KINEMATIC]
-        for i, (name, y) in enumerate(zip(names, (motion.x, motion.v, motion.a), strict=True)):
-            if prefix and kind_of(name) == "acceleration":
+        for i, (one, y) in enumerate(zip(names, (motion.x, motion.v, motion.a), strict=True)):
+            if prefix and kind_of(one) == "acceleration":
                 continue  # of a structure it is the absolute one that is meant
-            if name not in raw:
-                derived.append(name)
-            values[name], errors[name] = y, drawn[:, :, i]
-            unit[name] = PLAIN[kind_of(name)]
-        rates |= dict(zip(names[:2], names[1:], strict=True))
-    for name in DRIVE:
-        if name in raw:
-            values[name], left = smooth_steps(raw[name], noise[name])
-            errors[name] = np.repeat(generator.standard_normal((DRAWS, 1)) * left, n, axis=1)
-    for name in values:
-        if name not in errors:
-            errors[name] = generator.standard_normal((DRAWS, n)) * noise.get(name, 0.0)
+            if one not in raw:
+                derived.append(one)
+            values[one], errors[one] = y, drawn[:, :, i]
+            unit[one] = PLAIN[kind_of(one)]
+        rates |= {names[0]: names[1], names[1]: names[2]}
+    for one in DRIVE:
+        if one in raw:
+            values[one], errors[one] = smooth_drive(raw[one], noise[one], dt, DRAWS, seed + 1)
+    for one in values:
+        if one not in errors:
+            errors[one] = generator.standard_normal((DRAWS, n)) * noise.get(one, 0.0)
     kept = {a: b for a, b in rates.items() if a in values and b in values}
-    return Signals(one.name, dt, values, unit, errors, raw, noise, kept, tuple(derived))
+    return Signals(name, dt, values, unit, errors, raw, noise, kept, tuple(derived))
 
 
 def kind_of(name: str) -> str:
@@ -216,7 +246,11 @@ def kind_of(name: str) -> str:
 def _job(
     path: Path, pieces: list[Signals], ports: PortMap, given: dict[str, Value]
 ) -> tuple[Job, list[dict[str, Array]]]:
-    """Return the passes per piece: as measured, at half the step, one per draw."""
+    """Return the passes per piece: at the finest step, at twice that, as measured, and the draws.
+
+    Held inputs cost accuracy in proportion to the step: at that of the measurement it would be
+    taken for an error of the FMU.
+    """
     passes: list[dict[str, Array]] = []
     steps: list[float] = []
 
@@ -229,12 +263,17 @@ def _job(
         steps.append(step)
 
     for piece in pieces:
-        add(piece.dt, piece.values)
-        finer = {
-            name: between(y, piece.values.get(piece.rates.get(name, "")), piece.dt)
-            for name, y in piece.values.items()
-        }
-        add(0.5 * piece.dt, finer)
+        finer = [piece.values]
+        for level in range(HALVINGS):
+            last, dt = finer[-1], piece.dt / 2**level
+            finer.append(
+                {
+                    name: between(y, last.get(piece.rates.get(name, "")), dt)
+                    for name, y in last.items()
+                }
+            )
+        for level in (HALVINGS, HALVINGS - 1, 0):
+            add(piece.dt / 2**level, finer[level])
         for d in range(DRAWS):
             add(piece.dt, {name: y + piece.errors[name][d] for name, y in piece.values.items()})
     names = tuple(port.name for port in ports.inputs)
@@ -246,7 +285,7 @@ def _held(
     pieces: list[Signals], ports: PortMap, found: list[dict[str, Array]], notes: list[str]
 ) -> dict[str, list[Held]]:
     """Return per output the pieces held against it."""
-    per = 2 + DRAWS
+    per = 3 + DRAWS
     held: dict[str, list[Held]] = {port.name: [] for port in ports.outputs}
     for k, piece in enumerate(pieces):
         mine = found[per * k : per * (k + 1)]
@@ -262,21 +301,22 @@ def _one(
     piece: Signals, name: str, signal: str, unit: str, rows: list[Array], ports: PortMap,
     notes: list[str],
 ) -> Held:  # fmt: skip
-    predicted, finer, draws = rows[0], rows[1][::2], np.array(rows[2:])
+    predicted, coarser = rows[0][:: 2**HALVINGS], rows[1][:: 2 ** (HALVINGS - 1)]
+    middle, draws = rows[2], np.array(rows[3:])
     measured = piece.raw[signal] if signal in piece.raw else piece.values[signal]
     noise = piece.noise.get(signal, 0.0)
     floor = SILENT * rms(measured - measured.mean())
     if noise < floor:
         noise = floor
         notes.append(
-            f"{signal} has no noise to speak of: errors are measured against {SILENT:.1%} of its RMS"
+            f"{signal} has no noise to speak of: errors are in units of {SILENT:.1%} of its RMS"
         )
-    spread = draws - predicted
+    spread = draws - middle
     bias = spread.mean(axis=0)
     sigma = np.sqrt(noise**2 + spread.var(axis=0, ddof=1))
     return Held(
         piece.name, piece.dt, measured, predicted + bias, sigma, noise, spread - bias,
-        _coordinates(piece, signal, ports), finer - predicted, name, unit,
+        _coordinates(piece, signal, ports), predicted - coarser, name, unit,
     )  # fmt: skip
 
 
@@ -286,7 +326,8 @@ def _coordinates(piece: Signals, signal: str, ports: PortMap) -> dict[str, Array
     prefix = "" if "velocity" in piece.values else "base_"
     force = piece.raw.get("force") if signal != "force" else piece.raw[signal]
     found = coordinates_of(
-        piece.dt, get(f"{prefix}displacement"), get(f"{prefix}velocity"), get(f"{prefix}acceleration"),
+        piece.dt, get(f"{prefix}displacement"), get(f"{prefix}velocity"),
+        get(f"{prefix}acceleration"),
         get("voltage", get("current")), force if force is not None else piece.raw.get(signal),
     )  # fmt: skip
     for port in ports.inputs:
@@ -313,7 +354,9 @@ def _typed(description: Description, values: Mapping[str, str]) -> dict[str, Val
             else:
                 out[name] = text
         except (ValueError, KeyError):
-            raise FmuError(f"--set {name}={text}: {name} is {kind} in {description.name}.") from None
+            raise FmuError(
+                f"--set {name}={text}: {name} is {kind} in {description.name}."
+            ) from None
     return out
 
 

@@ -43,7 +43,7 @@ class Held:
     @property
     def time(self) -> Array:
         """Time (n,) [s] from the run's begin."""
-        return np.arange(len(self.measured)) * self.dt
+        return np.asarray(np.arange(len(self.measured)) * self.dt, dtype=float)
 
     @property
     def residual(self) -> Array:

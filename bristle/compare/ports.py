@@ -34,7 +34,10 @@ class PortMap:
 
     def lines(self) -> list[str]:
         """Return the mapping in words, a line per port."""
-        out = [f"  {one.name} [{one.unit}] is fed from {one.signal}: {one.reason}" for one in self.inputs]
+        out = [
+            f"  {one.name} [{one.unit}] is fed from {one.signal}: {one.reason}"
+            for one in self.inputs
+        ]
         out += [
             f"  {one.name} [{one.unit}] is held against {one.signal}: {one.reason}"
             for one in self.outputs
@@ -112,7 +115,9 @@ def _match(
     if not by_unit or variable.unit in (None, "1"):
         return None
     same = [one for one in signals if _fits(variable.unit, signals[one])]
-    rivals = [v for v in ports.values() if v.name not in maps and _fits(variable.unit, v.unit or "")]
+    rivals = [
+        v for v in ports.values() if v.name not in maps and _fits(variable.unit, v.unit or "")
+    ]
     if len(same) == 1 and len(rivals) == 1:
         return _port(variable, same[0], "its unit alone, check it", signals)
     return None
@@ -151,12 +156,19 @@ def _fits(unit: str | None, other: str) -> bool:
 
 def _left(variable: Variable, signals: Mapping[str, str]) -> str:
     unit = f" [{variable.unit}]" if variable.unit else ""
-    stays = f"{variable.name}{unit} is fed from nothing and stays at its start value {variable.start}"
+    stays = (
+        f"{variable.name}{unit} is fed from nothing and stays at its start value {variable.start}"
+    )
     if variable.optional:
         return f"{stays} (it is optional)"
-    same = [name for name in signals if _fits(variable.unit, signals[name])] if variable.unit else []
-    there = f"measured in that unit: {', '.join(same)}" if same else "nothing of that unit was measured"
-    return f"{stays}; {there}. --map {variable.name}=CHANNEL feeds it, --set {variable.name}=VALUE sets it"
+    same = (
+        [name for name in signals if _fits(variable.unit, signals[name])] if variable.unit else []
+    )
+    there = (
+        f"measured in that unit: {', '.join(same)}" if same else "nothing of that unit was measured"
+    )
+    name = variable.name
+    return f"{stays}; {there}. --map {name}=CHANNEL feeds it, --set {name}=VALUE sets it"
 
 
 def _check_given(
@@ -177,7 +189,9 @@ def _check_given(
                 f"--map {name}={signal}: {name} is in {ports[name].unit}, {signal} in "
                 f"{signals[signal]}."
             )
-    settable = [v.name for v in description.variables.values() if v.causality in ("input", "parameter")]
+    settable = [
+        v.name for v in description.variables.values() if v.causality in ("input", "parameter")
+    ]
     wrong += [
         f"--set {name}: {unknown('parameter or input', name, settable)}"
         for name in values

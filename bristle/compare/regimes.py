@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .scale import z_scale
+from ..identify.search import z_scale
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -60,7 +60,7 @@ def regimes(
         if chosen.sum() >= _FEWEST:
             name = [kind[0] if kind else "" for kind in (s, V)]
             out.append(
-                Regime(" and ".join(words), *name, z_scale(r[chosen]), int(chosen.sum()))
+                Regime(" and ".join(words), name[0], name[1], z_scale(r[chosen]), int(chosen.sum()))
             )
     return out
 
@@ -85,7 +85,7 @@ def voltage_classes(V: Array | None) -> list[tuple[str, Mask]]:
     top = float(np.quantile(V, 0.98))
     off, middle = 0.05 * top, 0.5 * top
     return [
-        ("at 0 V", V <= off),
-        (f"at low voltage (below {middle:.2g} V)", (V > off) & (V < middle)),
-        (f"at high voltage (above {middle:.2g} V)", V >= middle),
+        ("at 0 V", off >= V),
+        (f"at low voltage (below {middle:.2g} V)", (off < V) & (middle > V)),
+        (f"at high voltage (above {middle:.2g} V)", middle <= V),
     ]

@@ -29,7 +29,10 @@ Array = NDArray[np.float64]
 Value = float | int | bool | str
 
 _PACKAGES = str(Path(__file__).resolve().parents[2])
-_BOOT = "import sys; sys.path.insert(0, sys.argv[1]); from bristle.compare.stepping import main; main(sys.argv[2])"
+_BOOT = (
+    "import sys; sys.path.insert(0, sys.argv[1]); "
+    "from bristle.compare.stepping import main; main(sys.argv[2])"
+)
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identify.search import z_scale
 from .coordinates import BINS, FINE, SLOW, Bins, cut
-from .scale import rms, z_scale
+from .scale import rms
 
 Array = NDArray[np.float64]
 
@@ -88,11 +89,14 @@ class Blocks:
     ----------
     residuals : list of (n,), one per run
     flips : how many random patterns of signs to draw
+    length : of a block [samples]; 0: by `block_length`
     """
 
-    def __init__(self, residuals: Sequence[Array], flips: int = FLIPS, seed: int = 0) -> None:
+    def __init__(
+        self, residuals: Sequence[Array], flips: int = FLIPS, seed: int = 0, length: int = 0
+    ) -> None:
         total = sum(len(r) for r in residuals)
-        self.length = block_length(residuals)
+        self.length = length or block_length(residuals)
         label, first = [], 0
         for r in residuals:
             count = max(1, round(len(r) / self.length))
@@ -107,7 +111,7 @@ class Blocks:
         """Return the sums (blocks, bins) of values (n,)."""
         index = self.label * bins.count + bins.label
         flat = np.bincount(index, weights=values, minlength=self.count * bins.count)
-        return flat.reshape(self.count, bins.count)
+        return np.asarray(flat.reshape(self.count, bins.count), dtype=float)
 
     def spread(self, values: Array, bins: Bins) -> Array:
         """Return the standard deviation (bins,) of the means of values in bins, over blocks."""
@@ -178,7 +182,6 @@ class Finder:
         flips: int = FLIPS,
         seed: int = 0,
     ) -> None:
-        self.blocks = Blocks(residuals, flips, seed)
         whole = np.concatenate(list(residuals))
         limit = CUT_OFF * max(1.0, z_scale(whole))
         self.normalised = np.clip(whole, -limit, limit)
@@ -186,12 +189,34 @@ class Finder:
         shared = [name for name in coordinates[0] if all(name in one for one in coordinates)]
         joined = {name: np.concatenate([one[name] for one in coordinates]) for name in shared}
         self.direction = joined.get("direction")
-        few = int(max(3, min(BINS, self.blocks.count // _PER_BIN)))
-        cuts = {
-            name: cut(y, few if name in SLOW else FINE.get(name, BINS))
-            for name, y in joined.items()
-        }
-        self.bins = {name: one for name, one in cuts.items() if one is not None}
+        self.bins: dict[str, Bins] = {}
+        self.blocks = Blocks(residuals, 0, seed)
+        for length in (self.blocks.length, 0):
+            few = int(max(3, min(BINS, self.blocks.count // _PER_BIN)))
+            cuts = {
+                name: cut(y, few if name in SLOW else FINE.get(name, BINS))
+                for name, y in joined.items()
+                if name in SLOW or name not in self.bins
+            }
+            self.bins |= {name: one for name, one in cuts.items() if one is not None}
+            if length:
+                shorter = self._length_beside(residuals)
+                self.blocks = Blocks(residuals, flips, seed, min(length, shorter))
+
+    def _length_beside(self, residuals: Sequence[Array]) -> int:
+        """Return the length of blocks for what is left after the most telling coordinate.
+
+        A pattern makes a residual look correlated for as long as the motion is: with blocks of that
+        length there would be too few to tell it from chance.
+        """
+        best, left = 0.0, self.normalised
+        for name, bins in self.bins.items():
+            for turned in self._ways(name):
+                rest = self._less_means(self.normalised, bins, turned)
+                gone = 1.0 - float(np.sum(rest**2)) / max(float(np.sum(self.normalised**2)), 1e-300)
+                if gone > best:
+                    best, left = gone, rest
+        return block_length(np.split(left, np.cumsum([len(r) for r in residuals])[:-1]))
 
     def ranked(
         self, normalised: Array, raw: Array | None = None, leave_out: Sequence[str] = ()
@@ -220,11 +245,13 @@ class Finder:
 
     def without(self, normalised: Array, place: Place) -> Array:
         """Return what is left of a residual (n,) after its means along a place are taken off."""
-        bins = self.bins[place.coordinate]
-        values = normalised * self._turn(place.turned)
+        return self._less_means(normalised, self.bins[place.coordinate], place.turned)
+
+    def _less_means(self, values: Array, bins: Bins, turned: bool) -> Array:
+        values = values * self._turn(turned)
         count = np.maximum(np.bincount(bins.label, minlength=bins.count), 1)
         mean = np.bincount(bins.label, weights=values, minlength=bins.count) / count
-        return np.asarray((values - mean[bins.label]) * self._turn(place.turned))
+        return np.asarray((values - mean[bins.label]) * self._turn(turned))
 
     def mean_along(self, place: Place, values: Array, chosen: Array) -> tuple[Array, Array]:
         """Return means and standard deviations (b,) of values (n,) along a place, of some samples.
@@ -266,7 +293,9 @@ class Finder:
         mine = float(_shares(sums.sum(axis=0)[None], counts, total, centred)[0])
         chance = _shares(self.blocks.signs @ sums, counts, total, centred)
         middle, width = float(chance.mean()), float(chance.std()) or 1e-12
-        share = max(0.0, (mine - middle) / max(1.0 - middle, 1e-9))
+        # What noise alone puts into the means: the scatter of blocks about them.
+        noise = float(counts @ self.blocks.spread(values, bins) ** 2) / total
+        share = max(0.0, (mine - noise) / max(1.0 - noise, 1e-9))
         power = rms(normalised) ** 2
         excess = share * power / (power - 1.0) if power > 1.1 else float("nan")
         raw = raw * self._turn(turned)

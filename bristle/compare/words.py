@@ -63,10 +63,7 @@ def _how_wrong(comparison: Comparison) -> str:
         size += ", much of it in short spikes"
     if total.z > CLOSE:
         times = f"{total.z:.3g}" if total.z < 100.0 else f"{total.z:.0f}"
-        return (
-            f"{where} the {what} by {size}, {times} times what its noise would "
-            f"explain{step}."
-        )
+        return f"{where} the {what} by {size}, {times} times what its noise would explain{step}."
     return f"{where} the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}."
 
 
@@ -75,10 +72,13 @@ def _where(comparison: Comparison, finder: Finder) -> str:
     if first is None or first.share < FAINT:
         if comparison.z <= CLOSE:
             return "What is left looks like noise along every coordinate."
-        return (
-            "No coordinate organises the error beyond chance"
-            + (f": {_loudest(comparison)}." if _loudest(comparison) else ".")
+        loud = _loudest(comparison)
+        most = (
+            "the error beyond chance"
+            if first is None
+            else f"more than {_percent(first.share)} of it"
         )
+        return f"No coordinate organises {most}{f'; {loud}' if loud else ''}."
     if comparison.z <= CLOSE:
         return (
             f"A pattern is left with {name_of(first.coordinate)}, {_percent(first.share)} of the "
@@ -98,7 +98,9 @@ def _where(comparison: Comparison, finder: Finder) -> str:
 
 def _where_right(comparison: Comparison) -> str:
     every = comparison.regimes
-    whole = f"between {min(r.z for r in every):.2f} and {max(r.z for r in every):.2f}" if every else ""
+    whole = (
+        f"between {min(r.z for r in every):.2f} and {max(r.z for r in every):.2f}" if every else ""
+    )
     right = [one for one in every if one.right]
     if every and len(right) == len(every):
         kinds = [kind for kind in ("speed", "voltage") if any(getattr(r, kind) for r in every)]
@@ -145,7 +147,7 @@ def _loudest(comparison: Comparison) -> str:
 
 
 def _pattern(place: Place, unit: str) -> str:
-    """Return how a residual goes along a coordinate, as in "beyond 8 mm it pushes back 0.4 N more"."""
+    """Return how a residual goes along a coordinate: "beyond 8 mm it pushes back 0.4 N more"."""
     hot = _hot(place)
     peak = float(np.max(np.abs(place.mean)))
     if not hot:
@@ -263,19 +265,22 @@ def _at_voltages(place: Place, comparison: Comparison, finder: Finder) -> str:
         return ""
     V = np.concatenate([one.along()["voltage"] for one in comparison.held])
     middle = 0.5 * float(np.quantile(V, 0.98))
-    sizes = [size_of(place, finder, chosen) for chosen in (V < middle, V >= middle)]
-    if not all(np.isfinite([*low] + [*high]).all() for low, high in [sizes]):
+    sizes = [size_of(place, finder, chosen) for chosen in (middle > V, middle <= V)]
+    if not all(np.isfinite([*low, *high]).all() for low, high in [sizes]):
         return ""
     (low, low_std), (high, high_std) = sizes
     doubt = 2.0 * float(np.hypot(low_std, high_std))
     if abs(high - low) <= max(_ALIKE * max(abs(low), abs(high)), doubt):
         return ", at every voltage alike" if doubt < 0.7 else ""
     peak = float(np.max(np.abs(place.mean)))
-    parts = f"{low * peak:.2g} {comparison.unit} below {middle:.2g} V, {high * peak:.2g} {comparison.unit} above"
+    unit = comparison.unit
+    parts = f"{low * peak:.2g} {unit} below {middle:.2g} V, {high * peak:.2g} {unit} above"
     return f", {'more' if high > low else 'less'} at high voltage ({parts})"
 
 
-def size_of(place: Place, finder: Finder, chosen: Sequence[bool] | NDArray[np.bool_]) -> tuple[float, float]:
+def size_of(
+    place: Place, finder: Finder, chosen: Sequence[bool] | NDArray[np.bool_]
+) -> tuple[float, float]:
     """Return the size of a pattern among some samples, 1 for that of all, and its uncertainty."""
     mean, std = finder.mean_along(place, finder.raw, np.asarray(chosen, dtype=float))
     good = np.isfinite(mean)
@@ -287,7 +292,7 @@ def size_of(place: Place, finder: Finder, chosen: Sequence[bool] | NDArray[np.bo
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
 def _begin(text: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from math import ceil
+from math import ceil, isfinite
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,14 @@ LONGEST_SUBSTEP = 2e-4
 """Longest substep [s]; half-sine peaks are then within 0.001 % of a tight integration."""
 
 Array = NDArray[Any]
+
+
+class StoppedError(RunError):
+    """A march that had to stop; `columns` holds the rows before."""
+
+    def __init__(self, text: str, columns: dict[str, Array]) -> None:
+        super().__init__(text)
+        self.columns = columns
 
 
 def simulate(scenario: Scenario) -> dict[str, Array]:
@@ -40,50 +48,53 @@ def simulate(scenario: Scenario) -> dict[str, Array]:
     ------
     ScenarioError
         Naming a component that cannot be compiled.
-    RunError
-        If a value stops being finite, or motion and forces do not agree; the text says when.
+    StoppedError
+        If a value stops being finite, or motion and forces do not agree; the text names the
+        component and the time, `columns` holds the rows before.
     """
     system = System(scenario)
     rows, substeps = scenario.steps, max(1, ceil(scenario.step / LONGEST_SUBSTEP - 1e-9))
     h = scenario.step / substeps
     table = np.zeros((rows + 1, len(system.outputs)))
     slots = np.array(list(system.outputs.values()), dtype=np.int64)
-    found = compiled_march()(
+    filled, unsettled, _ = compiled_march()(
         rows, substeps, h, *system.arrays(h), system.start_values(), slots, table
     )
-    _check(scenario, substeps, *found)
-    columns: dict[str, Array] = {"time": np.arange(rows + 1) * scenario.step}
+    what = ""
+    if unsettled >= 0:
+        name = system.names["damper"][unsettled]
+        what = f"{name} before t = {filled * scenario.step:.9g} s: force and motion do not agree"
+    elif not np.isfinite(table[filled - 1]).all():
+        filled -= 1
+        wrong = [n for n, v in zip(system.outputs, table[filled], strict=True) if not isfinite(v)]
+        component = wrong[0].partition(".")[0]
+        others = f" (as are {', '.join(wrong[1:4])})" if wrong[1:] else ""
+        when = f"at t = {filled * scenario.step:.9g} s"
+        what = f"{component} {when}: {wrong[0]} is not finite{others}"
+    columns = _columns(system, table[:filled], scenario.step)
+    if what:
+        raise StoppedError(
+            f"{what}.\n  A shorter step or parameters within their bounds would be right.", columns
+        )
+    return columns
+
+
+def _columns(system: System, table: Array, step: float) -> dict[str, Array]:
+    columns: dict[str, Array] = {"time": np.arange(len(table)) * step}
     for j, name in enumerate(system.outputs):
         integer = system.kinds[name] == "Integer"
         columns[name] = table[:, j].astype(np.int32) if integer else table[:, j]
     return columns
 
 
-def _check(
-    scenario: Scenario, substeps: int, wrong: int, unsettled: int, first: int, sweeps: int
-) -> None:
-    """Refuse what the march could not solve."""
-    if wrong >= 0:
-        raise RunError(
-            f"{scenario.file}: a value is not finite at {wrong * scenario.step:g} s. "
-            "A shorter step or parameters within their bounds would be right."
-        )
-    if unsettled > 0:
-        raise RunError(
-            f"{scenario.file}: motion and forces did not agree in {unsettled} of "
-            f"{scenario.steps * substeps} substeps, first before {first * scenario.step:g} s. "
-            "A shorter step or parameters within their bounds would be right."
-        )
-
-
-def compiled_march() -> Callable[..., tuple[int, int, int, int]]:
+def compiled_march() -> Callable[..., tuple[int, int, int]]:
     """Return the compiled time march; the first call on a machine takes seconds."""
     return _compiled(damper.evaluate, structure.effect_forces)
 
 
 @cache
-def _compiled(evaluate: Any, effect_forces: Any) -> Callable[..., tuple[int, int, int, int]]:
+def _compiled(evaluate: Any, effect_forces: Any) -> Callable[..., tuple[int, int, int]]:
     """Compile the march with these woven functions: there are new ones after a new effect."""
     march.damper_evaluate = evaluate
-    function: Callable[..., tuple[int, int, int, int]] = compiled(march.march, march.INLINE)
+    function: Callable[..., tuple[int, int, int]] = compiled(march.march, march.INLINE)
     return function

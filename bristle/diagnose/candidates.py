@@ -12,22 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, parameter
-from ..identify.search import Descent, descend, jacobian, loss
+from ..identify.search import Descent, descend, jacobian, loss, losses, z_of, z_scale
 from ..physics.effect import EFFECTS, effects_of
 
 Array = NDArray[np.float64]
 Expected = list[tuple[Array, Array, Array]]
 
 SEARCH: dict[str, dict[str, tuple[float, ...]]] = {
-    "stribeck": {"v_s": (0.3, 1.0, 3.0)},
+    "stribeck": {"v_s": (0.5, 2.0)},
     "flattening": {"v_f": (0.1, 1.0), "bend": (1.0, 2.0)},
     "saturation": {"V_s": (0.4, 1.0)},
     "coil_lag": {"tau": (0.5, 2.0)},
-    "temperature": {"E_0": (0.5, 4.0), "tau": (0.2,)},
+    "temperature": {"E_0": (2.0, 15.0), "tau": (0.2,)},
     "presliding": {"x_s": (0.1, 0.6)},
     "mount_compliance": {"k": (1.0,)},
-    "backlash": {"gap": (0.3, 1.0)},
-    "remanence": {},
+    "backlash": {"gap": (0.3, 3.0)},
+    "quadratic_damping": {"c_2": (0.3, 3.0)},
 }
 """Where a search begins, as factors on an effect's defaults scaled to the rig."""
 
@@ -71,15 +71,6 @@ class Trial:
     def effects(self) -> tuple[str, ...]:
         """The effects of the model."""
         return self.model.effects
-
-
-HUBER_AT_ONE = 0.494231
-"""Mean Huber loss (k = 2) of a standard normal variable."""
-
-
-def z_of(mean_loss: float) -> float:
-    """Return RMS(residual)/noise from a mean robust loss: 1 for Gaussian noise of that size."""
-    return float(np.sqrt(max(mean_loss, 0.0) / HUBER_AT_ONE))
 
 
 class Search:
@@ -139,10 +130,10 @@ def judge(model: Model, train: Problem, held_out: Problem, refined: bool = True)
     z = residuals(held_out, model, expected)
     own = residuals(train, model, train.expectation(model))
     raw = np.concatenate(list(_raw(held_out, model, expected)))
-    losses = loss(z)
+    lost = losses(z)
     return Trial(
-        model, z_of(float(np.mean(loss(own)))), z_of(float(np.mean(losses))),
-        float(np.sqrt(np.mean(raw**2))), losses, z, refined,
+        model, z_scale(own), z_of(float(np.mean(lost))),
+        float(np.sqrt(np.mean(raw**2))), lost, z, refined,
     )  # fmt: skip
 
 
@@ -213,7 +204,7 @@ def lighter(
     joined = [EFFECTS[name] for name in effects]
     if any(effect.joint for effect in joined):
         few = slice(0, None, 2) if len(problem.runs) > 1 else slice(None)
-        return Problem(problem.runs[few]), expected[few]
+        return problem.of(problem.runs[few]), expected[few]
     if law != "bingham" or any(effect.states or effect.site == "sensor" for effect in joined):
         return problem, expected
     runs, thinned = [], []
@@ -228,7 +219,7 @@ def lighter(
             )
         )  # fmt: skip
         thinned.append((bias[every], sigma[every], draws[:, every]))
-    return Problem(runs), thinned
+    return problem.of(runs), thinned
 
 
 def refine(begun: Model, train: Problem, sweeps: int = 12) -> Model:

@@ -14,7 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .model import (
-    DRIVEN, FIXED, OTHER_LAWS, Model, Problem, Run, law_parameters, parameter, sizes, steady,
+    DRIVEN,
+    FIXED,
+    OTHER_LAWS,
+    Model,
+    Problem,
+    Run,
+    law_parameters,
+    parameter,
+    sizes,
+    steady,
     without,
 )  # fmt: skip
 from .search import descend
@@ -30,6 +39,9 @@ Expected = list[tuple[Array, Array, Array]]
 
 _ALIKE = 1e-3  # relative difference of costs below which two starts have come to the same end
 _WEAK = 1e-6  # a singular value of the scaled Jacobian below this share of the largest is none
+_MISFIT = 1.15  # z above which a residual is more than noise
+_HUBER_AT_ONE = 0.494231  # mean Huber loss (k = 2) of a standard normal variable
+_BLOCK = 250  # samples, longer than a residual's correlation
 _FINAL_DRAWS = 24  # draws of the motion for bias and intervals of what is reported
 
 
@@ -133,7 +145,8 @@ def _intervals(scaled: Scaled, theta: Array) -> tuple[dict[str, float], tuple[st
 
     Covariance A^-1 B A^-1 of an M-estimator (Huber 1981, Robust Statistics, ch. 7): A = J'J over
     the samples within the quadratic part of the loss, B the covariance of J' psi under the drawn
-    noise, white for the force's own.
+    noise, white for the force's own. Where the residual is more than noise, B is taken from the
+    residual itself, in blocks, so that a wrong model's intervals widen with its error.
     """
     r = scaled.residuals(theta)
     J = scaled.jacobian(theta, r)
@@ -157,11 +170,23 @@ def _intervals(scaled: Scaled, theta: Array) -> tuple[dict[str, float], tuple[st
         scores = np.array([J.T @ np.clip(e, -2.0, 2.0) for e in drawn])
         scores -= scores.mean(axis=0)
         B = B + scores.T @ scores / (count - 1)
+    if float(np.mean(huber(r))) > _MISFIT**2 * _HUBER_AT_ONE:
+        B = _scores_of_blocks(J, r)
     covariance = inverse @ B @ inverse
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / safe * scaled.scale
     return dict(zip(scaled.names, std.tolist(), strict=True)), _lost(
         scaled, theta * scaled.scale, std, norms, vectors[:, weak]
     )
+
+
+def _scores_of_blocks(J: Array, r: Array) -> Array:
+    """Return the covariance (p, p) of J' psi, from blocks of samples taken as independent."""
+    scores = J * np.clip(r, -2.0, 2.0)[:, None]
+    edges = np.arange(0, len(r), min(_BLOCK, max(1, len(r) // 20)))
+    sums = np.add.reduceat(scores, edges, axis=0)
+    sums -= sums.mean(axis=0)
+    B: Array = sums.T @ sums
+    return B
 
 
 def _lost(

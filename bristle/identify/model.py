@@ -24,6 +24,8 @@ FIXED = ("exponent", "mass", "which")
 DRIVEN = {"bingham": ("f_v", "c_v"), "lugre": ("sigma_0", "sigma_b")}
 """Parameters that act through the voltage alone."""
 
+_AROUND = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
+
 _STEADY = 1e-2  # of its level: what a voltage varies by without telling anything
 
 LOST = 1e4
@@ -117,6 +119,10 @@ class Problem:
         self._benches: dict[tuple[str, tuple[str, ...]], Bench] = {}
         self._sizes: dict[str, float] = {}
 
+    def of(self, runs: list[Run]) -> Problem:
+        """Return a problem of the same kind for other runs, such as a part of these."""
+        return Problem(runs)
+
     def size(self, unit: str) -> float:
         """Return the typical size on this rig of a parameter of some unit, in SI."""
         if not self._sizes:
@@ -164,7 +170,10 @@ class Problem:
         if not len(spread):
             spread = np.zeros((1, len(middle)))
         bias = spread.mean(axis=0)
-        noise = np.sqrt(run.noise**2 + np.mean((spread - bias) ** 2, axis=0))
+        # A jump that no draw put at this sample may still be here if one put it at the next.
+        variance = np.mean((spread - bias) ** 2, axis=0)
+        around = np.convolve(variance, _AROUND, "same")
+        noise = np.sqrt(run.noise**2 + np.maximum(variance, around))
         if run.measured is not None:
             noise = np.where(run.measured, noise, LOST * noise)
         return bias, noise, spread - bias

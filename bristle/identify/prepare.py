@@ -43,9 +43,7 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     have = (x is not None, v is not None)
     motion = smooth(x, v, dt, noise)
     error = np.zeros((draws, n, 4))
-    error[:, :, :3] = posterior_draws(
-        n, dt, noise, motion.jerk, have, draws, seed, motion
-    )
+    error[:, :, :3] = posterior_draws(n, dt, noise, motion.jerk, have, draws, seed, motion)
     drive = next((c for c in ("voltage", "current") if measurement.has(c)), None)
     V = np.zeros(n)
     if drive:

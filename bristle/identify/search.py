@@ -17,6 +17,16 @@ Array = NDArray[np.float64]
 HUBER = 2.0
 """Normalised residual beyond which the loss grows linearly."""
 
+HUBER_AT_ONE = 0.494231
+"""Mean Huber loss (k = 2) of a standard normal variable."""
+
+CUT = 6.0
+"""Normalised residuals count up to this, times their median scale where that is above 1.
+
+A sign law's force near v = 0 has two values: where all draws of the motion show the one and the
+truth is the other, the noise expected is a hundred times too small.
+"""
+
 _NUDGE = 1e-5
 
 
@@ -38,6 +48,26 @@ def loss(z: Array) -> Array:
     """Return Huber's loss of normalised residuals: quadratic up to `HUBER`, linear beyond."""
     size = np.abs(z)
     return np.where(size <= HUBER, 0.5 * size * size, HUBER * size - 0.5 * HUBER * HUBER)
+
+
+def losses(z: Array) -> Array:
+    """Return the robust loss of each normalised residual (n,), spikes cut at `CUT`."""
+    limit = CUT * max(1.0, float(np.median(np.abs(z))) / 0.6745) if len(z) else CUT
+    return loss(np.clip(z, -limit, limit))
+
+
+def z_of(mean_loss: float) -> float:
+    """Return RMS(residual)/noise from a mean robust loss: 1 for Gaussian noise of that size."""
+    return float(np.sqrt(max(mean_loss, 0.0) / HUBER_AT_ONE))
+
+
+def z_scale(z: Array) -> float:
+    """Return RMS(residual)/noise of residuals (n,) over their expected noise, robustly.
+
+    Huber's loss with k = 2 (Huber 1964, Ann. Math. Statist. 35, 73-101): the errors of a sign law
+    near v = 0 are not Gaussian, and a plain RMS reads 2 for the truth.
+    """
+    return z_of(float(np.mean(losses(z)))) if len(z) else float("nan")
 
 
 def descend(

@@ -6,7 +6,10 @@ several starting points; standard laws lack the exponential.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cache
+from os import cpu_count
 from typing import Any
 
 import numpy as np
@@ -76,15 +79,22 @@ def low_pass(y: Array, dt: float, cutoff: float = CUTOFF) -> Array:
     RecordError
         If the cut-off is negative or not a number.
     """
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
     if not cutoff >= 0.0:
         raise RecordError(f"cut-off {cutoff} Hz; 0 for none, or a positive number is right.")
     if cutoff == 0.0 or cutoff >= 0.5 / dt:
         return np.asarray(y, dtype=float)
-    sections = butter(ORDER, cutoff, fs=1.0 / dt, output="sos")
+    sections = _sections(float(cutoff), float(dt))
     pad = min(len(y) - 1, max(30, int(1.0 / (cutoff * dt))))
     return np.asarray(sosfiltfilt(sections, y, padlen=pad), dtype=float)
+
+
+@cache
+def _sections(cutoff: float, dt: float) -> Array:
+    from scipy.signal import butter
+
+    return np.asarray(butter(ORDER, cutoff, fs=1.0 / dt, output="sos"))
 
 
 def error_table(
@@ -102,7 +112,9 @@ def error_table(
     train, holdout : the runs that laws are fitted to, and those they are judged on, if any
     cutoff : Hz, of the low-pass on measured and predicted force; 0 for none
     """
-    return [_law_error(train, holdout, cutoff, law, starts) for law in laws]
+    train.bench(Model("bingham"))  # compiled once, before threads ask for it
+    with ThreadPoolExecutor(cpu_count()) as pool:
+        return list(pool.map(lambda law: _law_error(train, holdout, cutoff, law, starts), laws))
 
 
 def _law_error(
@@ -163,6 +175,6 @@ def _fit_filtered(problem: Problem, model: Model, cutoff: float) -> tuple[Model,
         errors = filtered_errors(problem, scaled.at(theta), cutoff)
         return np.nan_to_num(np.concatenate(errors) / unit, nan=1e3, posinf=1e3, neginf=-1e3)
 
-    found = descend(residuals, scaled.start, scaled.low, scaled.high, 20, tolerance=1e-5)
+    found = descend(residuals, scaled.start, scaled.low, scaled.high, 12, tolerance=1e-4)
     best = scaled.at(found.theta)
     return replace(best, values=dict(best.values)), error_rms(problem, best, cutoff)

@@ -105,13 +105,13 @@ def add_force(n: int, held: Row, ramp: Row, level: int, f0: float, f1: float, x1
 def accelerations(n: int, M_inverse: Row, C: Row, K: Row, x: Row, forces: Row, out: Row) -> None:
     """Fill `out` (n,) with the absolute accelerations q'' + a_g [m/s2] under `forces` (n,) [N]."""
     for i in range(n):
-        total = 0.0
-        for j in range(n):
-            load = forces[j]
-            for k in range(n):
-                load += K[j * n + k] * x[k] + C[j * n + k] * x[n + k]
-            total -= M_inverse[i * n + j] * load
-        out[i] = total
+        out[i] = 0.0
+    for j in range(n):
+        load = forces[j]
+        for k in range(n):
+            load += K[j * n + k] * x[k] + C[j * n + k] * x[n + k]
+        for i in range(n):
+            out[i] -= M_inverse[i * n + j] * load
 
 
 def holding_force(n: int, C: Row, K: Row, mass: float, x: Row, a_g: float, others: float) -> float:
@@ -255,16 +255,19 @@ def balance_contact(
 ) -> float:  # fmt: skip
     """Add to x1 the contacts' force on the first level that goes with it; return that force [N].
 
-    It is that of the middle of the step, or, where a contact sticks, what brings the level to rest
-    at its end (Moreau's time stepping). The more force, the less motion into the contact: so the
-    balance has one solution, found by regula falsi (Illinois) at any stiffness.
+    It is that of the middle of the step; where a contact closes, that of its end (the middle's
+    would create energy); where one sticks, what brings the level to rest (Moreau's time stepping).
+    The more force, the less motion into the contact: so the balance has one solution, found by
+    regula falsi (Illinois) at any stiffness.
     """
+    closed = contact_force(n, isolated, stiffnesses, x0, h, energy, 0.0, z0, p, on) != 0.0
+    part = 0.5 if closed else 1.0
     gain = held[n * (n + 1)]
     tried, low, at_low, high, at_high, last = guess, 0.0, 0.0, 0.0, 0.0, 0
     add_force(n, held, ramp, 0, tried, tried, x1)
     for _ in range(MOST_TRIALS):
         for i in range(2 * n):
-            middle[i] = 0.5 * (x0[i] + x1[i])
+            middle[i] = x0[i] + part * (x1[i] - x0[i])
         halt = tried - x1[n] / gain
         advance_effects(n, middle, h, energy, halt, tried, z0, p, on, z1)
         found = contact_force(n, isolated, stiffnesses, middle, h, energy, halt, z1, p, on)
@@ -343,6 +346,7 @@ class StructureModel:
         self.z = [values.get(name + "_0", 0.0) for name in LAYOUT.states]
         self._step: dict[float, tuple[int, StepMatrices]] = {}
         self._unloaded = [0.0] * self.m.n
+        self._gives = self.m.M_inverse[:: self.m.n]  # acceleration per force on the first level
         self.settle()
 
     def step(self, dt: float, a0: float, a1: float, force: float) -> None:
@@ -390,14 +394,13 @@ class StructureModel:
 
         The ground's acceleration [m/s2] counts where a contact sticks: the level then has it too.
         """
-        m = self.m
-        n, inertia = m.n, m.M_inverse
         if self.touches:
-            halt = self._hold - m.mass * a_g - force + m.mass * self.x[n] / EFFECT_STEP
+            m = self.m
+            halt = self._hold - m.mass * a_g - force + m.mass * self.x[m.n] / EFFECT_STEP
             force += contact_force(
-                n, m.isolated, m.stiffnesses, self.x, inf, 0.0, halt, self.z, self.p, self.on
+                m.n, m.isolated, m.stiffnesses, self.x, inf, 0.0, halt, self.z, self.p, self.on
             )
-        return [self._unloaded[i] - inertia[i * n] * force for i in range(n)]
+        return [free - give * force for free, give in zip(self._unloaded, self._gives)]
 
     def holding_force(self, a_g: float, others: float) -> float:
         """Return the damper force [N] at which the first level stays at its velocity."""

@@ -28,8 +28,8 @@ def draw_comparison(comparison: Comparison, title: str = "") -> Page:
     """Return the figure of a comparison, drawn and not yet written.
 
     Panels: the worst stretch of the worst run, measured and predicted, with the error under it; the
-    loops of that run; the error along the two most telling coordinates; its spectrum against that of
-    the noise; z in classes of speed and voltage.
+    loops of that run; the error along the two most telling coordinates; its spectrum against that
+    of the noise; z in classes of speed and voltage.
     """
     held = comparison.worst
     window = worst_window(held)
@@ -66,8 +66,9 @@ def draw_comparison(comparison: Comparison, title: str = "") -> Page:
 
 def _row(page: Page, top: float, draws: list) -> None:  # type: ignore[type-arg]
     inner = page.height - page.head - page.foot
-    grid = page.grid(1, len(draws), top=top + 0.4, bottom=inner - top - _PANELS + 0.5,
-                     column_gap=1.1)
+    grid = page.grid(
+        1, len(draws), top=top + 0.4, bottom=inner - top - _PANELS + 0.5, column_gap=1.1
+    )
     for column, draw in enumerate(draws):
         draw(page.figure.add_subplot(grid[0, column]))
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..compare.coordinates import SHOWN
 from ..compare.words import name_of
-from .style import BLUE, GREY, INK, PALE, VERMILION, label, zero_lines
+from .style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -71,7 +71,7 @@ def draw_loop(axes: Axes, held: Held, over: str, *, window: slice | None = None)
     axes.plot(x, held.measured[part], color=MEASURED, lw=1.3, alpha=0.75)
     axes.plot(x, held.predicted[part], color=PREDICTED, lw=1.0)
     axes.set_title(f"{_named(held)} [{held.unit}] over {name_of(over)}")
-    axes.set_xlabel(f"{name_of(over)} [{unit}]")
+    axes.set_xlabel(f"{_axis(over)} [{unit}]")
     axes.margins(0.05)
 
 
@@ -105,11 +105,11 @@ def draw_place(
     if after:
         what = f"what is left: {what}"
     axes.set_title(f"{what} [{comparison.unit}]")
-    axes.set_xlabel(name_of(place.coordinate) + (f" [{unit}]" if unit else ""))
+    axes.set_xlabel(_axis(place.coordinate) + (f" [{unit}]" if unit else ""))
     if place.coordinate == "direction":
         axes.set_xlim(-1.8, 1.8)
         axes.set_xticks([-1.0, 1.0], ["moving back", "moving outwards"])
-    carried = f"{place.share:.0%}" if place.share >= 0.01 else "below 1 %"
+    carried = percent(place.share, 0) if place.share >= 0.01 else "below 1 %"
     of = "what is left" if after else "the error's power"
     share = f"{carried} of {of}" if place.significant else "as by chance"
     axes.text(0.98, 0.97, share, transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
@@ -160,7 +160,7 @@ def draw_regimes(axes: Axes, comparison: Comparison) -> None:
     for (i, j), z in np.ndenumerate(values):
         if np.isfinite(z):
             colour = "white" if z > 5.0 else INK
-            axes.text(j, i, f"{z:.3g}" if z < 100 else f"{z:.0f}", ha="center", va="center",
+            axes.text(j, i, short_z(z), ha="center", va="center",
                       color=colour, fontsize=10)  # fmt: skip
     axes.set_xticks(range(len(columns)), [_short(name) for name in columns], fontsize=8)
     axes.set_yticks(range(len(rows)), [_short(name) for name in rows], fontsize=8)
@@ -169,9 +169,9 @@ def draw_regimes(axes: Axes, comparison: Comparison) -> None:
 
 
 def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, Array] | None:
-    """Return mean normalised error over displacement and velocity: edges (b + 1,), (b + 1,), (b, b).
+    """Return the mean normalised error (b, b) over displacement and velocity, after their edges.
 
-    Edges in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
+    Edges (b + 1,) in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
     """
     along = [one.along() for one in comparison.held]
     if not all("displacement" in one and "velocity" in one for one in along):
@@ -180,12 +180,17 @@ def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, 
     v = np.concatenate([one["velocity"] for one in along])
     r = np.concatenate([one.normalised for one in comparison.held])
     r = np.clip(r, -30.0, 30.0)
-    edges = [np.linspace(*np.quantile(y, [0.004, 0.996]), bins + 1) for y in (x, v)]
+    edges = [_edges(y, bins) for y in (x, v)]
     count = np.histogram2d(x, v, edges)[0]
     total = np.histogram2d(x, v, edges, weights=r)[0]
     with np.errstate(invalid="ignore"):
         mean = np.where(count >= 8, total / np.maximum(count, 1), np.nan)
     return edges[0], edges[1], mean
+
+
+def _edges(values: Array, bins: int) -> Array:
+    low, high = (float(q) for q in np.quantile(values, [0.004, 0.996]))
+    return np.linspace(low, high, bins + 1)
 
 
 def draw_map(axes: Axes, comparison: Comparison, limit: float) -> Any:
@@ -195,7 +200,7 @@ def draw_map(axes: Axes, comparison: Comparison, limit: float) -> Any:
         axes.set_axis_off()
         return None
     x, v, mean = found
-    axes.set_facecolor("#f4f4f4")
+    axes.set_facecolor("#dedede")  # no samples
     image = axes.pcolormesh(1e3 * x, 1e3 * v, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit)
     axes.set_xlabel("displacement [mm]")
     axes.set_ylabel("velocity [mm/s]")
@@ -212,9 +217,13 @@ def _legend(axes: Axes, *names: tuple[str, str]) -> None:
     handles = [axes.plot([], [], color=colour, lw=2.0)[0] for _, colour in names]
     axes.legend(
         handles, [name for name, _ in names], loc="lower right", bbox_to_anchor=(1.0, 1.0),
-        ncols=len(names), labelcolor="linecolor", fontsize=8.5, handlelength=1.1,
-        columnspacing=1.1, borderaxespad=0.15,
+        ncols=len(names), labelcolor="linecolor", fontsize=8, handlelength=0.9,
+        columnspacing=0.9, handletextpad=0.4, borderaxespad=0.15,
     )  # fmt: skip
+
+
+def _axis(coordinate: str) -> str:
+    return name_of(coordinate).removeprefix("the ")
 
 
 def _named(held: Held) -> str:

@@ -68,7 +68,7 @@ class PaperFigure:
 
 def paper_figures() -> dict[str, PaperFigure]:
     """Return the figures by name, in the order of the paper."""
-    from . import loops, optimum, stiction
+    from . import identification, loops, optimum, stiction
 
     found = (
         PaperFigure(
@@ -91,6 +91,13 @@ def paper_figures() -> dict[str, PaperFigure]:
             "peaks in the acceleration of the base where its velocity crosses zero",
             stiction.RUNS,
             stiction.draw,
+        ),
+        PaperFigure(
+            "identification",
+            "Figs 6-8",
+            "laws with and without the exponential, fitted to the identification experiment",
+            identification.RUNS,
+            identification.draw,
         ),
         PaperFigure(
             "passive-optimum",

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from math import log10
 from typing import TYPE_CHECKING, Any
 
+from .style import short_z
+
 if TYPE_CHECKING:
     from rich.text import Text
 
@@ -72,9 +74,9 @@ class Staircase:
         bar = mark * max(1, round(WIDTH * share))
         colour = "green" if done else "dark_orange"
         about = [] if one.rms is None else [f"{one.rms:.3g} {self.unit} RMS"]
-        about += [] if one.z_train is None else [f"on training runs z = {_short(one.z_train)}"]
+        about += [] if one.z_train is None else [f"training z = {short_z(one.z_train)}"]
         tail = f"   {', '.join(about)}" if about else ""
-        return [(bar, colour), (f" {_short(one.z)}", f"bold {colour}"), (tail, "dim")]
+        return [(bar, colour), (f" {short_z(one.z)}", f"bold {colour}"), (tail, "dim")]
 
 
 def staircase(steps: Sequence[Step], noise_floor: float = 1.0) -> Staircase:
@@ -83,8 +85,8 @@ def staircase(steps: Sequence[Step], noise_floor: float = 1.0) -> Staircase:
     Parameters
     ----------
     steps : list of Step
-        Their `after` holds "z_holdout", "z_train", "rms_holdout" [N]; a step without is "not judged",
-        unless the next one's `before` holds them.
+        Their `after` holds "z_holdout", "z_train", "rms_holdout" [N]; a step without is "not
+        judged", unless the next one's `before` holds them.
     noise_floor : float
         z that noise alone explains.
 
@@ -93,7 +95,7 @@ def staircase(steps: Sequence[Step], noise_floor: float = 1.0) -> Staircase:
     >>> from bristle.study import Step
     >>> print(staircase([Step(0, "identify", "", {}, {"z_holdout": 4.0})]))
                    error on held-out runs over what noise explains (z)
-    0 identify     ######################################## 4
+    0 identify     ######################################## 4.00
       noise floor  | 1
     """
     return Staircase(tuple(treads(steps)), noise_floor)
@@ -113,7 +115,3 @@ def treads(steps: Sequence[Step]) -> list[Tread]:
 
 def _number(value: Any) -> float | None:
     return float(value) if isinstance(value, int | float) and value == value else None
-
-
-def _short(z: float) -> str:
-    return f"{z:.3g}" if z < 100.0 else f"{z:.0f}"

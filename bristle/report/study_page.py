@@ -14,6 +14,7 @@ from .comparison import headline
 from .staircase import Tread, treads
 from .study_tables import data_table, data_words, parameter_table, ranking_table, run_errors
 from .study_verdict import badge, noise_floor, rivals, separating, untestable, words
+from .style import percent, short_z
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
@@ -92,7 +93,7 @@ def _judged(tread: Tread, hold: Any, study: Study) -> Tread:
 
     import numpy as np
 
-    from ..compare.scale import z_scale
+    from ..identify.search import z_scale
     from ..study.model import read_model
 
     if tread.z is not None or tread.number == 0:
@@ -113,18 +114,18 @@ def render(content: Content) -> str:
         f'<div class="notes">{html.escape(settings.notes)}</div>' if settings.notes.strip() else "",
         _verdict(content),
         _tiles(content),
-        _where(content),
         _history(content),
         _before_after(content),
+        _where(content),
         _parameters(content),
         _data(content),
         _untold(content),
         _reproduce(content),
     ]
     foot = (
-        f"bristle {html.escape(__version__)}. z is the error over the noise that a true model would "
-        "show, force and measured motion together, by a scale that a few large errors do not carry: "
-        "1 is as good as these data can tell."
+        f"bristle {html.escape(__version__)}. z is the error over the noise that a true model "
+        "would show, force and measured motion together, by a scale that a few large errors do not "
+        "carry: 1 is as good as these data can tell."
     )
     return html.page(settings.title, [part for part in body if part], foot)
 
@@ -160,12 +161,20 @@ def _tiles(content: Content) -> str:
         return ""
     low, high = now.z_interval
     pairs = [
-        (f"z = {_short(now.z)}", f"error over noise on held-out runs; 95 %: {low:.2f} to {high:.2f}"),
-        (f"{now.total.rms:.2g} {now.unit}", f"RMS error, {now.total.share:.1%} of the {now.quantity}'s RMS"),
+        (
+            f"z = {short_z(now.z)}",
+            f"error over noise on held-out runs; 95 %: {low:.2f} to {high:.2f}",
+        ),
+        (
+            f"{now.total.rms:.2g} {now.unit}",
+            f"RMS error, {percent(now.total.share)} of the {now.quantity}'s RMS",
+        ),
     ]
     first = next((one.z for one in content.treads if one.z is not None), None)
     if first is not None and first > 1.02 * now.z:
-        pairs.append((f"{_short(first)} → {_short(now.z)}", "z of the first model, and of this one"))
+        pairs.append(
+            (f"{short_z(first)} → {short_z(now.z)}", "z of the first model, and of this one")
+        )
     runs = content.study.settings.runs
     held = sum(run.role == "holdout" for run in runs)
     judged = f"{held} of them held out" if held else "its last part held out"
@@ -182,11 +191,13 @@ def _where(content: Content) -> str:
     from .tables import place_table
 
     _, header, rows = place_table(now)
+    along = "the two coordinates that organise it most"
+    if now.second:
+        along = "the coordinate that organises it most, and what is left after that along the next"
     caption = (
-        "Above: the error along the coordinate that organises it most, and what is left after that "
-        "along the next; dots are samples, the line the mean with its 95 % interval, the blue band "
-        "twice the expected noise. Below: its spectrum against that of the noise; z by speed and "
-        "voltage."
+        f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
+        "interval, the blue band twice the expected noise. Below: its spectrum against that of "
+        "the noise; z by speed and voltage."
     )
     title, say = headline(now), now.sentences
     return html.section(
@@ -223,13 +234,11 @@ def _history(content: Content) -> str:
         picture = html.figure(
             png(staircase_page(judged)),
             f"The staircase of the history: z on held-out runs {fall}",
-            "The error of each model of the history, on runs that no fit has seen (blue) and on those "
-            f"that it was fitted to (grey), over what noise explains; forces are RMS errors{low}. A "
-            "model at the green floor cannot be told from the truth by these data.",
+            "The error of each model of the history, on runs that no fit has seen (blue) and on "
+            "those that it was fitted to (grey), over what noise explains; forces are RMS "
+            f"errors{low}. A model at the green floor cannot be told from the truth by these data.",
         )  # fmt: skip
-    return html.section(
-        "How the error fell", picture, html.table(header, rows, numbers=(2, 3, 4))
-    )
+    return html.section("How the error fell", picture, html.table(header, rows, numbers=(2, 3, 4)))
 
 
 def _before_after(content: Content) -> str:
@@ -241,11 +250,11 @@ def _before_after(content: Content) -> str:
     names = (f"without {content.added}", f"with {content.added}")
     if content.before is None:
         names = ("", "the model now")
-    z = f"z {_short(content.before.z)} before, " if content.before else ""
+    z = f"z {short_z(content.before.z)} before, " if content.before else ""
     title = f"Before and after {content.added}" if content.before else "The loops"
     loops = html.figure(
         png(loops_page(content.before, content.now, names)),
-        f"Force loops, measured and predicted; {z}{_short(content.now.z)} now",
+        f"Force loops, measured and predicted; {z}{short_z(content.now.z)} now",
         "Loops of the held-out run that was worst, measured (black) and predicted (blue).",
     )
     page = maps_page(content.before, content.now, names)
@@ -254,9 +263,9 @@ def _before_after(content: Content) -> str:
         maps = html.figure(
             png(page),
             "The error over displacement and velocity",
-            "Where the error is, over displacement and velocity, in units of the expected noise: red "
-            "where the measured force is above the model's, blue where it is below. A true model "
-            "leaves a pale map without a pattern.",
+            "Where the error is, over displacement and velocity, in units of the expected noise: "
+            "red where the measured force is above the model's, blue where it is below. A true "
+            "model leaves a pale map without a pattern.",
         )
     return html.section(title, loops, maps)
 
@@ -296,8 +305,12 @@ def _untold(content: Content) -> str:
         parts.append("<h3>The experiment that would tell</h3>")
         parts.append(html.paragraphs(*told, experiment))
     if not parts:
-        none = "No diagnosis has been made of this model, so nothing is known of what it could miss."
-        parts = [html.paragraphs(none if content.verdict is None else "The diagnosis names nothing.")]
+        none = (
+            "No diagnosis has been made of this model, so nothing is known of what it could miss."
+        )
+        parts = [
+            html.paragraphs(none if content.verdict is None else "The diagnosis names nothing.")
+        ]
     return html.section("What could not be tested", *parts)
 
 
@@ -333,9 +346,5 @@ def _reproduce(content: Content) -> str:
     )
 
 
-def _short(z: float) -> str:
-    return f"{z:.3g}" if z < 100.0 else f"{z:.0f}"
-
-
 def _or_dash(z: float | None) -> str:
-    return "-" if z is None else _short(z)
+    return "-" if z is None else short_z(z)

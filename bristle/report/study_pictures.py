@@ -1,16 +1,16 @@
-"""The pictures of a study's report: the staircase, loops and maps before and after, the error now."""
+"""The pictures of a study's report: staircase, loops and maps before and after, the error now."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .comparison import telling_places
 from .panels import draw_loop, draw_map, draw_place, draw_regimes, draw_spectrum, residual_map
-from .style import BLUE, GREEN, GREY, INK, PALE, VERMILION, Page, label, look
+from .style import BLUE, GREEN, GREY, INK, MINUS, PALE, VERMILION, Page, label, look, short_z
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,8 +25,8 @@ def staircase_page(treads: Sequence[Tread], unit: str = "N") -> Page:
     """Return the staircase: z of each model on training and held-out runs over the noise floor."""
     judged = [one for one in treads if one.z is not None]
     with look():
-        page = Page(_WIDTH, 3.7, "")
-        grid = page.grid(1, 1, top=0.25, bottom=0.75, left=0.6, right=1.0)
+        page = Page(_WIDTH, 3.5, "")
+        grid = page.grid(1, 1, top=0.25, bottom=0.5, left=0.6, right=1.0)
         axes = page.figure.add_subplot(grid[0, 0])
         top = max([one.z or 1.0 for one in judged] + [one.z_train or 1.0 for one in judged] + [2.0])
         axes.set_yscale("log")
@@ -45,16 +45,26 @@ def staircase_page(treads: Sequence[Tread], unit: str = "N") -> Page:
         axes.yaxis.set_minor_formatter(lambda value, _: "")
         axes.grid(visible=False, axis="x")
         axes.set_title("z: error over what noise explains")
-        right = len(judged) - 0.5
-        label(axes, "noise floor", right, 1.0, GREEN, xytext=(6, 0), va="center")
-        if judged[-1].z is not None:
-            apart = judged[-1].z > 1.35
-            label(axes, "held-out", right, judged[-1].z, BLUE, xytext=(6, 0 if apart else 14), va="center")
-        train = judged[-1].z_train
-        if train is not None:
-            near = abs(np.log(train / (judged[-1].z or 1.0))) < 0.2 or train < 1.35
-            label(axes, "training", right, train, GREY, xytext=(6, -14 if near else 0), va="center")
+        last = judged[-1]
+        ends = [
+            ("noise floor", 1.0, GREEN),
+            ("held-out", last.z, BLUE),
+            ("training", last.z_train, GREY),
+        ]
+        _name_ends(axes, [(name, y, c) for name, y, c in ends if y is not None], len(judged) - 0.5)
     return page
+
+
+def _name_ends(axes: Axes, ends: list[tuple[str, float, str]], x: float) -> None:
+    """Write the names of lines at their right ends, pushed apart where they are close."""
+    low, high = np.log(axes.get_ylim())
+    height = axes.get_position().height * axes.figure.get_figheight() * 72.0  # type: ignore[union-attr]
+    before = -np.inf
+    for name, y, colour in sorted(ends, key=lambda end: (end[1], end[0] == "held-out")):
+        at = (np.log(y) - low) / (high - low) * height
+        up = max(at, before + 12.0)
+        before = up
+        label(axes, name, x, y, colour, xytext=(6, up - at), va="center")
 
 
 def _stairs(axes: Axes, heights: Sequence[float | None], colour: str, width: float) -> None:
@@ -70,14 +80,14 @@ def _stairs(axes: Axes, heights: Sequence[float | None], colour: str, width: flo
 def _tread(axes: Axes, i: int, one: Tread, before: float | None, unit: str) -> None:
     """Write z and error over a tread, and at its riser by how much the error fell."""
     assert one.z is not None
-    z = f"{one.z:.3g}" if one.z < 100.0 else f"{one.z:.0f}"
+    z = short_z(one.z)
     rms = "" if one.rms is None else f"  {one.rms:.2g} {unit}"
     label(axes, f"z = {z}{rms}", i, one.z, INK, xytext=(0, 7), ha="center", va="bottom")
     if before is None or before <= 0.0:
         return
     change = one.z / before - 1.0
     # In units of the noise: what there was above it, and what is left of that.
-    text = f"{change:+.0%}".replace("-", "−")
+    text = f"{100.0 * change:+.0f} %".replace("-", MINUS)
     colour = GREEN if change < 0.0 else VERMILION
     axes.annotate(
         text, (i - 0.5, float(np.sqrt(one.z * before))), xytext=(5, 0), textcoords="offset points",
@@ -104,7 +114,7 @@ def loops_page(before: Comparison | None, now: Comparison, names: tuple[str, str
                 if column == 0:
                     axes.set_title(f"{name}: force [{held.unit}] over displacement")
                 else:
-                    axes.set_title(f"over velocity; z = {z:.3g} on {held.name}")
+                    axes.set_title(f"over velocity; z = {short_z(z)} on {held.name}")
         return page
 
 
@@ -120,18 +130,18 @@ def maps_page(before: Comparison | None, now: Comparison, names: tuple[str, str]
     with look():
         page = Page(_WIDTH, 3.5, "")
         grid = page.grid(1, 2, top=0.35, bottom=0.5, right=1.0, column_gap=0.75)
-        image = None
+        image: Any = None
         for column, (one, name) in enumerate(zip(both, labels, strict=True)):
             axes = page.figure.add_subplot(grid[0, column])
             image = draw_map(axes, one, limit)
-            axes.set_title(f"{name}: z = {one.z:.3g}")
+            axes.set_title(f"{name}: z = {short_z(one.z)}")
         height = page.height
         room = page.figure.add_axes(
             ((_WIDTH - 0.72) / _WIDTH, 0.75 / height, 0.14 / _WIDTH, (height - 1.5) / height)
         )
         bar = page.figure.colorbar(image, cax=room)
         bar.set_label("mean error over noise", fontsize=8.5)
-        bar.outline.set_visible(False)  # type: ignore[operator]
+        bar.outline.set_visible(False)
     return page
 
 

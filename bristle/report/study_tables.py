@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .style import MINUS, TIMES, percent
 from .tables import run_table
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from ..study.study import Study
 
 _RANKED = 8
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _COLOURS = {
     "white": "estimated from the samples: white",
     "low-passed": "estimated from the samples: white, low-passed above",
@@ -39,7 +41,9 @@ def parameter_table(model: StudyModel) -> tuple[list[str], list[list[str]], list
                      model.declared(name).text])  # fmt: skip
         if value.free and value.std is not None and _at_bound(value):
             edges.append(name)
-    notes = ["Intervals: 1.96 standard deviations, the noise of force and measured motion both counted."]
+    notes = [
+        "Intervals: 1.96 standard deviations, the noise of force and measured motion both counted."
+    ]
     if edges:
         notes.append(
             f"{', '.join(edges)}: at the edge of what is allowed, so the interval says little."
@@ -57,12 +61,15 @@ def with_interval(value: float, std: float | None) -> tuple[str, str]:
     if std is None or not isfinite(std) or std <= 0.0:
         return f"{value:.5g}", "-"
     half = 1.96 * std
-    digits = 1 - floor(log10(half))
-    if -4 < digits < 8 and abs(value) < 1e7:
-        places = max(digits, 0)
-        rounded = round(half, digits)
-        return f"{value:.{places}f}", f"± {rounded:.{places}f}"
-    return f"{value:.4g}", f"± {half:.2g}"
+    size = max(abs(value), half)
+    power = 3 * floor(log10(size) / 3.0) if not 1e-3 <= size < 1e5 else 0
+    scaled, width = value / 10.0**power, half / 10.0**power
+    digits = 1 - floor(log10(width))
+    places = max(digits, 0)
+    tail = f" {TIMES} 10{str(power).translate(_RAISED)}" if power else ""
+    texts = (f"{round(one, digits):.{places}f}".replace("-", MINUS) for one in (scaled, width))
+    told, wide = texts
+    return f"{told}{tail}", f"± {wide}{tail}"
 
 
 def _at_bound(value: Value) -> bool:
@@ -97,10 +104,12 @@ def data_words(measured: Sequence[Measurement]) -> tuple[list[str], list[list[st
         noise = float(np.median([run.noise.get(channel, 0.0) for run in having]))
         size = float(np.median([np.std(run[channel]) for run in having]))
         facts = [run.noise_facts.get(channel) for run in having]
-        found = dict.fromkeys("given" if f is None else _COLOURS.get(f.colour, f.colour) for f in facts)
+        found = dict.fromkeys(
+            "given" if f is None else _COLOURS.get(f.colour, f.colour) for f in facts
+        )
         unit = having[0].units[channel]
-        share = f"{noise / size:.2%}" if size > 0.0 else "-"
-        rows.append([channel, f"{noise:.3g} {unit}", share, "; ".join(found)])
+        of = percent(noise / size, 2) if size > 0.0 else "-"
+        rows.append([channel, in_lab_unit(noise, unit), of, "; ".join(found)])
     return header, rows
 
 
@@ -116,13 +125,25 @@ def ranking_table(
     """Return header, rows and the rows of the effects that the verdict names; None without any."""
     ranking = (verdict or {}).get("ranking") or []
     named = set((verdict or {}).get("effects") or [])
-    rows, strong = [], []
+    rows: list[list[str]] = []
+    strong: list[int] = []
     for entry in ranking[:_RANKED]:
         effect = str(entry.get("effect", ""))
         if effect in named:
             strong.append(len(rows))
-        rows.append([effect, number(entry.get("z_holdout")), share(entry.get("gain"))])
+        z = entry.get("z_holdout")
+        told = f"{z:.3f}" if isinstance(z, int | float) and z < 10.0 else number(z)
+        rows.append([effect, told, share(entry.get("gain"))])
     return (["with this effect", "z held-out", "lower by"], rows, strong) if rows else None
+
+
+_LAB = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+
+
+def in_lab_unit(value: float, unit: str) -> str:
+    """Return a quantity in SI as an engineer reads it: lengths in mm."""
+    factor, shown = _LAB.get(unit, (1.0, unit))
+    return f"{factor * value:.3g} {shown}"
 
 
 def number(value: Any) -> str:
@@ -132,4 +153,4 @@ def number(value: Any) -> str:
 
 def share(value: Any) -> str:
     """Return a share of a JSON file as text in percent, "-" where it is none."""
-    return f"{value:.1%}" if isinstance(value, int | float) else "-"
+    return percent(value) if isinstance(value, int | float) else "-"

@@ -7,12 +7,13 @@ from typing import Any
 
 from ..compare.words import name_of
 from ..physics.effect import EFFECTS
-from .study_tables import number, share
+from ..records.channels import PLAIN
+from .study_tables import in_lab_unit, number, share
 
 Verdict = Mapping[str, Any]
 
 _BADGES = {
-    "none": ("Nothing is missing", "green"),
+    "none": ("Nothing found missing", "green"),
     "effect": ("Missing physics found", "blue"),
     "class": ("One of a few is missing", "purple"),
     "unknown": ("Something unknown is missing", "red"),
@@ -45,7 +46,11 @@ def words(verdict: Verdict | None, name: str) -> list[str]:
             continue
         out.append(
             str(fault.get("words") or "")
-            or f"Sensor: {fault.get('fault')} of {fault.get('channel')}, {number(fault.get('value'))}."
+            or "Sensor: {fault} of {channel}, {value}.".format(
+                fault=fault.get("fault"),
+                channel=fault.get("channel"),
+                value=number(fault.get("value")),
+            )
         )
     return list(dict.fromkeys(out))
 
@@ -53,9 +58,16 @@ def words(verdict: Verdict | None, name: str) -> list[str]:
 def _first(verdict: Verdict) -> str:
     kind, effects = verdict.get("kind"), [str(one) for one in verdict.get("effects") or []]
     if kind == "effect":
-        return f"The model misses {_joined(effects, 'and')}: {'; '.join(_about(e) for e in effects)}."
+        return (
+            f"The model misses {_joined(effects, 'and')}: {'; '.join(_about(e) for e in effects)}."
+        )
     if kind == "class":
-        return f"The model misses one of {_joined(effects, 'or')}; these data cannot say which."
+        which = (
+            f"either {effects[0]} or {effects[1]}"
+            if len(effects) == 2
+            else (f"one of {_joined(effects, 'and')}")
+        )
+        return f"The model misses {which}; these data cannot say which."
     if kind == "unknown":
         along = str(verdict.get("coordinate") or "")
         tail = f"; it is organised by {name_of(along)}" if along else ""
@@ -84,15 +96,16 @@ def noise_floor(verdict: Verdict | None) -> str:
     floor = (verdict or {}).get("noise_floor")
     if not isinstance(floor, Mapping) or not floor:
         return ""
-    units = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "force": "N",
-             "voltage": "V", "current": "A"}  # fmt: skip
-    parts = [f"{name} {number(value)} {units.get(name, '')}".strip() for name, value in floor.items()
-             if isinstance(value, int | float)]  # fmt: skip
+    parts = [
+        f"{name} {in_lab_unit(value, PLAIN.get(name, ''))}".strip()
+        for name, value in floor.items()
+        if isinstance(value, int | float)
+    ]
     return f"Noise that the verdict rests on: {', '.join(parts)}." if parts else ""
 
 
 def untestable(verdict: Verdict | None) -> list[list[str]]:
-    """Return rows of the effects that could not be tested: name, what it does, what it would show."""
+    """Return rows of the effects that could not be tested: name, what it does and would show."""
     rows = []
     for name in (verdict or {}).get("untestable") or []:
         effect = EFFECTS.get(str(name))
@@ -112,5 +125,9 @@ def separating(verdict: Verdict | None) -> str:
     """Return the experiment that would separate rivals, "" where none is named."""
     found = (verdict or {}).get("separate_by")
     if isinstance(found, Mapping):
-        return str(found.get("words") or found.get("text") or ", ".join(f"{k}: {v}" for k, v in found.items()))
+        return str(
+            found.get("words")
+            or found.get("text")
+            or ", ".join(f"{k}: {v}" for k, v in found.items())
+        )
     return str(found or "")

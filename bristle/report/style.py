@@ -23,6 +23,8 @@ BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 INK, GREY, PALE = "#222222", "#666666", "#b8b8b8"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 
+MINUS, TIMES = "\u2212", "\u00d7"
+
 MARGIN = 0.16
 """Space between text and the edge of a figure [in]."""
 
@@ -191,6 +193,16 @@ def _broken(text: str, width: float, per_inch: float) -> str:
         textwrap.fill(line, max(20, int((width - 2 * MARGIN) * per_inch)))
         for line in text.splitlines()
     )
+
+
+def percent(share: float, digits: int = 1) -> str:
+    """Return a share as text: "8.6 %"."""
+    return f"{100.0 * share:.{digits}f} %"
+
+
+def short_z(z: float) -> str:
+    """Return z as text, with the digits that tell it from 1."""
+    return f"{z:.2f}" if z < 10.0 else f"{z:.3g}" if z < 100.0 else f"{z:.0f}"
 
 
 def zero_lines(axes: Axes) -> None:

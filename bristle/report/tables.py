@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..compare.words import name_of
+from .style import percent, short_z
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison, RunError
@@ -26,14 +27,18 @@ def run_table(comparison: Comparison) -> Table:
     header = ["run", "z", f"error [{unit}]", "of RMS", f"noise [{unit}]", "half step [z]"]
     runs = [*comparison.runs]
     rows = [_run(one) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
-    return "Error over the noise that a true model would show (z), and what half the step changes", header, rows
+    return (
+        "Error over the noise that a true model would show (z), and what half the step changes",
+        header,
+        rows,
+    )
 
 
 def _run(run: RunError) -> list[str]:
     numerical = f"{run.numerical_z:.2g}" if run.numerical_z == run.numerical_z else "not tried"
     return [
-        run.name, f"{run.z:.3g}" if run.z < 100 else f"{run.z:.0f}", f"{run.rms:.3g}",
-        f"{100.0 * run.share:.2g} %", f"{run.noise:.3g}", numerical,
+        run.name, short_z(run.z), f"{run.rms:.3g}", percent(run.share), f"{run.noise:.3g}",
+        numerical,
     ]  # fmt: skip
 
 
@@ -46,9 +51,9 @@ def place_table(comparison: Comparison) -> Table:
 
 def _place(place: Place) -> list[str]:
     name = name_of(place.coordinate) + (", with the direction of motion" if place.turned else "")
-    excess = f"{place.of_excess:.0%}" if place.of_excess == place.of_excess else "-"
+    excess = percent(place.of_excess, 0) if place.of_excess == place.of_excess else "-"
     chance = f"{place.p:.1g}" if place.p >= 0.001 else "< 0.001"
-    return [name, f"{place.share:.1%}", excess, chance]
+    return [name, percent(place.share), excess, chance]
 
 
 def band_table(comparison: Comparison) -> Table:
@@ -56,8 +61,8 @@ def band_table(comparison: Comparison) -> Table:
     header = ["band [Hz]", "z", f"error [{comparison.unit}]", "of what exceeds noise", "coherence"]
     rows = [
         [
-            f"{band.low:.3g} - {band.high:.3g}", f"{band.z:.3g}", f"{band.rms:.2g}",
-            f"{band.share:.0%}", f"{band.coherence:.2f}",
+            f"{band.low:.3g} - {band.high:.3g}", short_z(band.z), f"{band.rms:.2g}",
+            percent(band.share, 0), f"{band.coherence:.2f}",
         ]
         for band in comparison.spectrum.bands
     ]  # fmt: skip

@@ -29,7 +29,9 @@ Show = Callable[[int], None]
 STAGES = 4
 """How many stages `identify_study` reports to `show`."""
 
+_MISFIT = 1.15  # z above which an error is more than noise
 _SATURATED = 0.05  # share of samples at one and the same extreme of the force
+_TABLE_STARTS = 3
 _LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
 
 
@@ -138,9 +140,11 @@ def identify_study(
     identifier = IDENTIFIERS.get(study.settings.rig)
     if identifier is None:
         raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not identified yet.')
+    left_out = tuple(f"Left out: {why}" for why in study.usable_effects())
     model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     found = identifier(study, model, cutoff, starts, table, show or (lambda done: None), begin)
+    found = replace(found, notes=(*found.notes, *left_out))
     if not write:
         return found
     step = study.add_step(
@@ -245,10 +249,10 @@ def _identify(
     runs: Runs, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show,
     begin: Mapping[str, float] | None = None,
 ) -> Identified:  # fmt: skip
-    notes = [*runs.notes, *_doubts(runs.all)]
     train = Problem([prepare(one, seed=31 * k) for k, one in enumerate(runs.train)])
     held = [prepare(one, seed=31 * k + 7) for k, one in enumerate(runs.holdout)]
     holdout = Problem(held) if held else None
+    notes = [*runs.notes, *_doubts(runs.all)]
     show(1)
     start = as_model(model)
     fit = identify(
@@ -265,11 +269,30 @@ def _identify(
     show(3)
     rows: list[LawError] = []
     if table and sum(len(run.force) for run in train.runs) <= _LONGEST_TABLE:
-        rows = error_table(train, holdout, cutoff, starts=starts)
+        rows = error_table(train, holdout, cutoff, starts=min(starts, _TABLE_STARTS))
     show(4)
-    if not any(one.has(*(c,)) for one in runs.all for c in DRIVE):
+    notes += _weighing(rows, model, after)
+    if not any(one.has(c) for one in runs.all for c in DRIVE):
         notes.append("Neither voltage nor current was measured: the parameters hold at its level.")
     return Identified(fit, found, rows, cutoff, before, after, tuple(notes), None, train, holdout)
+
+
+def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float]) -> list[str]:
+    """Say what a model that errs by more than noise does to intervals and to the fit."""
+    if after["z_train"] <= _MISFIT:
+        return []
+    notes = [
+        "The error is more than noise: intervals are drawn from the error itself, and hold for "
+        "this model's best values, not for a damper's constants."
+    ]
+    same = [row for row in rows if row.law == model.law and not model.effects]
+    if same and same[0].train < 0.95 * after["rms_train"]:
+        notes.append(
+            f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
+            f"the force alone, as in the table, would leave {same[0].train:.4g} N in place of "
+            f"{after['rms_train']:.4g} N."
+        )
+    return notes
 
 
 def as_model(model: StudyModel) -> Model:
@@ -330,15 +353,17 @@ def _doubts(runs: list[Measurement]) -> list[str]:
             )
         if share > 0.0:
             notes.append(f"{run.name}: {share:.1%} of the force's samples stand at its extremes.")
-        estimated = [
-            c for c, fact in run.noise_facts.items()
-            if fact is not None and fact.colour in ("hidden", "rough", "blue")
-        ]  # fmt: skip
-        if estimated:
-            notes.append(
-                f"{run.name}: the noise of {', '.join(estimated)} cannot be told well from the "
-                "signal; give it in study.toml, for z and intervals rest on it."
-            )
+    doubtful: dict[str, int] = {}
+    for run in runs:
+        for channel, fact in run.noise_facts.items():
+            if fact is not None and fact.colour in ("hidden", "rough", "blue"):
+                doubtful[channel] = doubtful.get(channel, 0) + 1
+    if doubtful:
+        where = ", ".join(f"{c} ({n} of {len(runs)} runs)" for c, n in doubtful.items())
+        notes.append(
+            f"The noise cannot be told well from the signal: {where}. Give it in study.toml: z and "
+            "intervals rest on it."
+        )
     return notes
 
 

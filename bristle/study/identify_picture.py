@@ -53,16 +53,14 @@ def _row(
     every = max(1, len(measured) // _SHOWN)
     axes = (1e3 * run.v, "velocity [mm/s]"), (1e3 * run.x, "displacement [mm]")
     for panel, (along, label) in zip(panels, axes, strict=False):
-        panel.plot(along[::every], measured[::every], color=_MEASURED, linewidth=0.7)
+        panel.plot(along[::every], measured[::every], color=_MEASURED, linewidth=1.6)
         panel.plot(along[::every], predicted[::every], color=_PREDICTED, linewidth=0.6)
         panel.set_xlabel(label)
     panels[0].set_ylabel(f"force [{unit}]")
     panels[0].set_title(f"{run.name} ({role})", fontsize=8, loc="left")
     time = np.arange(len(measured)) * run.dt
     part = slice(0, min(len(time), int(3.0 / run.dt) + 1))
-    panels[2].plot(time[part], measured[part], color=_MEASURED, label="measured", linewidth=1.0)
-    panels[2].plot(
-        time[part], predicted[part], color=_PREDICTED, label="predicted", linewidth=0.8
-    )
+    panels[2].plot(time[part], measured[part], color=_MEASURED, label="measured", linewidth=2.0)
+    panels[2].plot(time[part], predicted[part], color=_PREDICTED, label="predicted", linewidth=0.8)
     panels[2].set_xlabel("time [s]")
     panels[2].legend(frameon=False, fontsize=8, loc="upper right")

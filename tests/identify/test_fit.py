@@ -7,8 +7,8 @@ import pytest
 
 from bristle.compiled.bench import Bench
 from bristle.errors import RecordError
-from bristle.identify.fit import Model, Problem, Run, identify
 from bristle.identify.drive import smooth_steps
+from bristle.identify.fit import Model, Problem, Run, identify
 from bristle.identify.prepare import prepare
 from bristle.identify.smooth import posterior_draws, smooth
 from bristle.physics.damper import LAWS

@@ -1,0 +1,221 @@
+"""A model held against runs: z, bands, regimes, sentences that match the numbers, refusals."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from held_made import DT, held_runs_with, motion
+
+from bristle.compare import compare, compare_held
+from bristle.compare.held import halved, held_runs
+from bristle.compiled.bench import Bench
+from bristle.errors import RecordError
+from bristle.identify.fit import Model, Problem, Run
+from bristle.identify.smooth import posterior_draws, smooth
+
+VALUES = {"f_c": 1.2, "f_v": 0.7, "c_0": 20.0, "c_v": 6.0, "v_n": 0.1}
+
+
+def bench(law="lugre", values=None, n=4000, count=3, noise=0.01, skip=25):
+    """Return runs of a damper whose model is known, all channels noisy, motion smoothed."""
+    runs = []
+    for k in range(count):
+        random = np.random.default_rng(50 + k)
+        x, v, a, V = motion(n, 7 * k + 1)
+        force = Bench(law, []).force(x, v, a, V, DT, values or {})
+        sizes = noise * np.std(x), noise * np.std(v), noise * np.std(force)
+        noisy = [
+            y + s * random.standard_normal(n) for y, s in zip((x, v, force), sizes, strict=True)
+        ]
+        found = smooth(noisy[0], noisy[1], DT, sizes[:2])
+        draws = np.zeros((12, n, 4))
+        draws[:, :, :3] = posterior_draws(n, DT, sizes[:2], found.jerk, (True, True), 12, k)
+        runs.append(
+            Run(f"run_{k}", DT, found.x, found.v, found.a, V, noisy[2], sizes[2], draws, skip)
+        )
+    return Problem(runs)
+
+
+@pytest.mark.parametrize("size", [1.0, 2.5])
+@pytest.mark.parametrize("phi", [0.0, 0.9])
+def test_z_is_the_size_of_the_error_over_the_noise(size, phi):
+    found = compare_held(held_runs_with(size=size, phi=phi, n=6000))
+    low, high = found.z_interval
+    # Huber's scale reads a Gaussian error as its RMS only up to about k = 2.
+    expected = 1.0 if size == 1.0 else pytest.approx(2.1, abs=0.25)
+    assert found.z == (pytest.approx(1.0, abs=0.08) if size == 1.0 else expected)
+    assert low < found.z < high
+    assert found.total.rms == pytest.approx(0.05 * size, rel=0.1)
+    assert found.first is None
+
+
+def test_the_truth_is_right_within_its_noise_and_a_wrong_model_is_not():
+    problem = bench()
+    truth = compare(problem, Model("lugre"))
+    assert 0.9 < truth.z < 1.1
+    wrong = compare(problem, Model("lugre", (), {"sigma_2": 200.0}))
+    assert wrong.z > 1.5 * truth.z
+    assert {"speed", "velocity"} & {wrong.first.coordinate, *wrong.first.alike}
+    assert wrong.total.rms > truth.total.rms
+
+
+def test_the_numerical_error_falls_with_the_step():
+    run = bench(count=1, noise=1e-6).runs[0]
+    finer = halved(run)
+    coarse = held_runs(Problem([run]), Model("lugre"))[0]
+    fine = held_runs(
+        Problem([replace(finer, draws=np.zeros((1, len(finer.x), 4)))]), Model("lugre")
+    )[0]
+    moving = slice(100, None)
+    assert np.std(coarse.numerical[moving]) > 0.0
+    assert np.std(fine.numerical[moving]) < 0.6 * np.std(coarse.numerical[moving])
+
+
+def test_halving_the_step_of_a_cubic_motion_is_exact():
+    t = np.arange(50) * 0.1
+    x, v, a = t**3 - t, 3.0 * t**2 - 1.0, 6.0 * t
+    run = Run("r", 0.1, x, v, a, t, x, 1.0, np.zeros((0, 50, 4)))
+    s = np.arange(99) * 0.05
+    assert halved(run).x == pytest.approx(s**3 - s, abs=1e-12)
+    assert halved(run).v == pytest.approx(3.0 * s**2 - 1.0, abs=1e-12)
+    assert pytest.approx(s, abs=1e-12) == halved(run).V
+
+
+def test_samples_that_were_filled_in_do_not_count():
+    problem = bench(count=1)
+    run = problem.runs[0]
+    force = run.force.copy()
+    force[1000:1004] += 50.0
+    known = np.ones(len(force), dtype=bool)
+    known[1000:1004] = False
+    spoilt = Problem([replace(run, force=force)])
+    marked = Problem([replace(run, force=force, measured=known)])
+    assert compare(spoilt, Model("lugre")).total.rms > 1.0
+    clean = compare(problem, Model("lugre"))
+    assert compare(marked, Model("lugre")).total.rms == pytest.approx(clean.total.rms, rel=0.02)
+
+
+def test_white_noise_is_at_its_floor_in_every_band():
+    found = compare_held(held_runs_with(n=6000))
+    assert all(band.z == pytest.approx(1.0, abs=0.35) for band in found.spectrum.bands)
+    assert sum(band.p < 0.01 for band in found.spectrum.bands) <= 1
+    assert found.spectrum.noise[5:] == pytest.approx(2.0 * 0.05**2 * DT, rel=1e-9)
+    power = np.trapezoid(found.spectrum.residual, found.spectrum.frequency)
+    assert power == pytest.approx(0.05**2, rel=0.1)
+
+
+def test_a_tone_is_in_its_band():
+    def tone(along):
+        return 0.1 * np.sin(2.0 * np.pi * 3.0 * along["time"])
+
+    found = compare_held(held_runs_with(tone, n=6000))
+    loudest = max(found.spectrum.bands, key=lambda band: band.share)
+    assert loudest.low <= 3.0 < loudest.high
+    assert loudest.share > 0.9
+    assert loudest.p < 1e-6
+    assert "3" in f"{loudest.low:g}" or loudest.low < 3.0 < loudest.high
+
+
+def numbers(text):
+    return [float(word) for word in re.findall(r"(?<![\w.])\d+\.?\d*(?:e-?\d+)?", text)]
+
+
+def test_sentences_say_the_numbers_of_a_spring_that_is_missing():
+    held = held_runs_with(lambda c: 40.0 * c["displacement"])
+    found = compare_held(held)
+    how, where, right = found.sentences
+    assert how.startswith("On runs it has not seen the model misses the force by")
+    rms, share, z = numbers(how)[:3]
+    assert rms == pytest.approx(found.total.rms, rel=0.05)
+    assert share == pytest.approx(100.0 * found.total.share, rel=0.05)
+    assert z == pytest.approx(found.z, rel=0.005)
+    assert "turns with displacement" in where
+    assert "pushes back up to" in where
+    assert "more than the model" in where
+    assert "to either side" in where
+    edge, amount = numbers(where)[:2]
+    top = max(abs(found.first.mean))
+    assert amount == pytest.approx(top, rel=0.15)
+    # Beyond the edge the mean error is at least half of the largest.
+    beyond = np.abs(found.first.centre) > 1e-3 * edge
+    assert np.abs(found.first.mean[beyond]).min() > 0.4 * top
+    assert "at every voltage alike" in where
+    assert "Nowhere is it right within its noise" in right or "it is right within" in right
+
+
+def test_a_softer_spring_pushes_back_less():
+    where = compare_held(held_runs_with(lambda c: -40.0 * c["displacement"])).sentences[1]
+    assert re.search(r"pushes back up to [\d.]+ N less than the model", where)
+
+
+def test_an_error_that_grows_with_voltage_is_said_to():
+    held = held_runs_with(lambda c: 15.0 * c["displacement"] * c["voltage"])
+    where = compare_held(held).sentences[1]
+    assert "more at high voltage" in where
+
+
+def test_more_resistance_at_high_speed():
+    held = held_runs_with(lambda c: 300.0 * c["velocity"] * np.abs(c["velocity"]))
+    where = compare_held(held).sentences[1]
+    assert re.search(r"above [\d.]+ mm/s the damper resists up to [\d.]+ N more", where)
+
+
+def test_where_it_is_right_is_said():
+    held = held_runs_with(lambda c: np.where(c["speed"] > 0.05, 0.3 * c["direction"], 0.0), n=6000)
+    found = compare_held(held)
+    right = [one for one in found.regimes if one.right]
+    assert right
+    assert found.sentences[2].startswith("At low speed")
+    assert "right within its noise" in found.sentences[2]
+    assert numbers(found.sentences[2])[-1] < 1.1 or "and so it is" in found.sentences[2]
+
+
+def test_nothing_is_said_of_noise():
+    found = compare_held(held_runs_with(n=6000))
+    assert "which its noise explains" in found.sentences[0]
+    assert found.sentences[1] == "What is left looks like noise along every coordinate."
+    assert found.sentences[2].startswith("It is right within its noise at every speed and voltage")
+
+
+def test_the_runs_of_the_fit_are_called_so():
+    held = held_runs_with()
+    assert compare_held(held, seen=True).sentences[0].startswith("On the runs that it was fitted")
+    assert compare_held(held, seen=None).sentences[0].startswith("In this measurement")
+
+
+def test_the_comparison_is_json_and_the_same_again():
+    held = held_runs_with(lambda c: 40.0 * c["displacement"])
+    first, again = (json.dumps(compare_held(held).as_dict()) for _ in range(2))
+    assert first == again
+    answer = json.loads(first)
+    assert answer["places"][0]["coordinate"] == "displacement"
+    assert answer["places"][0]["significant"] is True
+    assert {"z", "z_interval", "runs", "bands", "regimes", "sentences"} <= set(answer)
+
+
+def test_without_any_run_there_is_nothing_to_compare():
+    with pytest.raises(RecordError, match="no run"):
+        compare_held([])
+
+
+def test_a_prediction_that_is_not_finite_is_refused_with_its_time():
+    one = held_runs_with(count=1)[0]
+    predicted = one.predicted.copy()
+    predicted[500] = np.nan
+    with pytest.raises(RecordError, match=r"run_0: the predicted force is nan at 1 s"):
+        compare_held([replace(one, predicted=predicted)])
+
+
+def test_a_channel_without_noise_is_refused():
+    one = held_runs_with(count=1)[0]
+    with pytest.raises(RecordError, match=r"noise of the force is zero"):
+        compare_held([replace(one, sigma=np.zeros_like(one.sigma))])
+
+
+def test_a_short_run_is_refused():
+    with pytest.raises(RecordError, match="100 samples"):
+        compare_held(held_runs_with(count=1, n=100))

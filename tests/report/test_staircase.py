@@ -1,0 +1,43 @@
+"""The staircase of a history, for the terminal."""
+
+from __future__ import annotations
+
+from io import StringIO
+
+from rich.console import Console
+
+from bristle.report.staircase import staircase
+from bristle.study import Step
+
+STEPS = [
+    Step(0, "begin with lugre", "made"),
+    Step(1, "identify lugre", "", {}, {"z_train": 6.3, "z_holdout": 6.6, "rms_holdout": 0.88}),
+    Step(2, "edited by hand", ""),
+    Step(3, "add gas_spring", "", {"z_holdout": 3.0}, {"z_holdout": 1.02, "rms_holdout": 0.2}),
+]
+
+
+def test_bars_fall_with_the_error_on_a_scale_of_ratios():
+    lines = str(staircase(STEPS)).splitlines()
+    bars = [line.count("#") for line in lines]
+    assert "not judged" in lines[1]
+    assert bars[2] == 40
+    assert bars[3] == round(40 * 0.582)  # log 3 / log 6.6, from what the next step began with
+    assert bars[4] == 1
+    assert "0.88 N RMS, training z = 6.30" in lines[2]
+    assert lines[-1].endswith("| 1")
+
+
+def test_plain_text_holds_nothing_but_ascii():
+    assert str(staircase(STEPS)).isascii()
+
+
+def test_on_a_terminal_it_is_coloured():
+    out = StringIO()
+    Console(file=out, force_terminal=True, width=120).print(staircase(STEPS))
+    assert "\u2588" in out.getvalue()
+    assert "\x1b[" in out.getvalue()
+
+
+def test_an_empty_history_says_so():
+    assert str(staircase([])) == "The history is empty."

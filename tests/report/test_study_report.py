@@ -1,0 +1,231 @@
+"""The report of a study: one HTML file that is whole, says what the study holds, and stays put."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "study"))
+from made import write_runs
+
+from bristle.cli import main
+from bristle.report.study_page import gather, render, study_report
+from bristle.report.study_tables import with_interval
+from bristle.study import Study, create_study
+
+VALUES = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 0.01, "v_n": 5.0, "exponent": 0.0}
+VOID = {"meta", "img", "br", "hr", "link", "input"}
+VERDICT = {
+    "schema": 1,
+    "kind": "class",
+    "effects": ["stribeck", "flattening"],
+    "ranking": [
+        {"effect": "stribeck", "z_holdout": 1.041, "gain": 0.21},
+        {"effect": "presliding", "z_holdout": 1.3, "gain": 0.004},
+    ],
+    "z_holdout_before": 1.31,
+    "noise_floor": {"displacement": 4.2e-5, "force": 0.05},
+    "untestable": ["temperature"],
+    "detectable": 0.02,
+    "coordinate": "",
+    "sensors": [{"channel": "velocity", "fault": "gain", "value": 1.05}],
+    "separate_by": "A sine of 12 mm at 3 Hz & 6 V tells the two apart.",
+    "words": "",
+}
+
+
+class Checker(HTMLParser):
+    """Raises where tags are not closed in order; keeps what the page refers to."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.links: list[str] = []
+        self.seen: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        self.seen.append(tag)
+        self.links += [value for name, value in attrs if name in ("src", "href", "srcset")]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open, f"</{tag}> closes nothing"
+        assert self.open.pop() == tag, f"</{tag}> out of order"
+
+
+def checked(page: str) -> Checker:
+    checker = Checker()
+    checker.feed(page)
+    checker.close()
+    assert not checker.open
+    return checker
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """Return a study with three steps, the last of which adds an effect."""
+    root = tmp_path_factory.mktemp("report")
+    files = write_runs(root / "lab", 4, seconds=6.0)
+    study = create_study(root / "rig", files, law="bingham", title='Rig "2" <b>& more</b>').study
+    toml = root / "rig" / "study.toml"
+    text = toml.read_text().replace('notes = ""', 'notes = "Oil from March <i>.\\nSecond line."')
+    toml.write_text(text)
+    study = Study(study.folder)
+    model = study.model().with_values(VALUES, {"f_c": 0.01, "c_0": 0.2})
+    study.add_step(
+        "identify bingham", "fit to 3 training runs", model, {"z_holdout": 90.0},
+        {"z_train": 4.1, "z_holdout": 4.3, "rms_holdout": 0.4},
+    )  # fmt: skip
+    more = model.with_effect("gas_spring").with_values({"gas_spring.k": 1.0}, {"gas_spring.k": 0.5})
+    study.add_step(
+        "add gas_spring", "verdict: effect", more, {"z_holdout": 4.3},
+        {"z_train": 1.5, "z_holdout": 1.6, "rms_holdout": 0.2},
+    )  # fmt: skip
+    study.write_verdict(VERDICT)
+    return study.folder
+
+
+@pytest.fixture(scope="module")
+def page(folder) -> str:
+    return study_report(Study(folder))
+
+
+def text_of(page: str) -> str:
+    body = re.sub(r"<style>.*?</style>", "", page, flags=re.DOTALL)
+    return re.sub(r"\s+", " ", re.sub(r"<[^>]+>", " ", body))
+
+
+def test_the_page_is_well_formed_and_needs_nothing_else(page):
+    checker = checked(page)
+    assert page.startswith("<!DOCTYPE html>")
+    assert "http" not in page
+    assert "//" not in re.sub(r"data:image/png;base64,[A-Za-z0-9+/=]+", "", page)
+    assert "script" not in checker.seen
+    assert checker.links
+    assert all(link.startswith("data:image/png;base64,") for link in checker.links)
+    assert "@import" not in page
+    assert "url(" not in page
+    images = re.findall(r"<img [^>]+>", page)
+    assert len(images) == 4
+    assert all(re.search(r'alt="[^"]{10,}"', image) for image in images)
+
+
+def test_what_the_lab_wrote_is_text_and_no_markup(page):
+    assert "Rig &quot;2&quot; &lt;b&gt;&amp; more&lt;/b&gt;" in page
+    assert "Oil from March &lt;i&gt;.\nSecond line." in page
+
+
+def test_the_page_says_what_the_study_holds(page, folder):
+    text = text_of(page)
+    assert "The model misses either stribeck or flattening; these data cannot say which." in text
+    assert "A sine of 12 mm at 3 Hz &amp; 6 V tells the two apart." in text
+    assert "Sensor: gain of velocity, 1.05." in text
+    assert "displacement 0.042 mm" in text
+    for name in Study(folder).model().flat():
+        assert f" {name} " in text
+    assert "1.300 ± 0.020 N identified" in text
+    for run in Study(folder).settings.runs:
+        assert run.file in text
+    assert "the force declines through a run" in text  # what temperature would look like
+    assert "bristle add rig gas_spring" in text
+    for z in ("4.30", "1.60", "1.041"):
+        assert z in text
+
+
+def test_the_sentences_are_those_of_the_comparison(page, folder):
+    content = gather(Study(folder))
+    assert content.added == "gas_spring"
+    assert content.before is not None
+    text = text_of(page)
+    for sentence in content.now.sentences:
+        assert sentence.replace("'", "&#x27;").replace(">", "&gt;") in text
+
+
+def test_the_same_study_gives_the_same_bytes(page, folder):
+    assert study_report(Study(folder)) == page
+
+
+def test_a_new_study_has_a_report_too(tmp_path):
+    files = write_runs(tmp_path / "lab", 3, seconds=4.0)
+    study = create_study(tmp_path / "fresh", files, law="bingham").study
+    page = study_report(study)
+    checked(page)
+    text = text_of(page)
+    assert "No diagnosis has been made of the present model." in text
+    assert "bristle diagnose fresh" in text
+    assert "begin with bingham" in text
+
+
+def test_a_single_run_is_said_to_be_weaker(tmp_path):
+    files = write_runs(tmp_path / "lab", 1, seconds=8.0)
+    page = study_report(create_study(tmp_path / "one", files, law="bingham").study)
+    checked(page)
+    assert "weaker than a run of its own" in text_of(page)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "words"),
+    [
+        ({"kind": "none", "detectable": 0.031}, "3.1 % of the force would have been seen"),
+        ({"kind": "effect", "effects": ["gas_spring"]}, "The model misses gas_spring"),
+        ({"kind": "unknown", "coordinate": "displacement"}, "it is organised by displacement"),
+        ({"kind": "insufficient", "words": "All runs are equal."}, "All runs are equal."),
+        ({"kind": "effect", "effects": ["mine"]}, "an effect of the user&#x27;s own"),
+    ],
+)
+def test_every_kind_of_verdict_is_told(folder, verdict, words):
+    from dataclasses import replace
+
+    content = replace(gather(Study(folder)), verdict=verdict, now=None, before=None)
+    page = render(content)
+    checked(page)
+    assert words in text_of(page)
+
+
+def test_the_command_writes_the_file_and_says_where(folder, tmp_path, capsys):
+    assert main(["report", str(folder)]) == 0
+    said = capsys.readouterr().out
+    assert str(folder / "reports" / "report.html") in said
+    assert "noise floor" in said
+    other = tmp_path / "elsewhere.html"
+    assert main(["report", str(folder), "--out", str(other), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["report"] == str(other)
+    assert answer["verdict"] == "class"
+    assert answer["z_holdout"] > 0.0
+    assert other.read_text() == (folder / "reports" / "report.html").read_text()
+
+
+def test_a_folder_that_is_no_study_is_refused(tmp_path, capsys):
+    assert main(["report", str(tmp_path / "nothing")]) == 2
+    assert "no study" in capsys.readouterr().err
+
+
+def test_the_comparison_of_a_study_by_the_command(folder, capsys):
+    assert main(["compare", str(folder), "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["held_out"] is True
+    assert Path(answer["picture"]).read_bytes().startswith(b"\x89PNG")
+    assert main(["compare", str(folder), "--runs", "train"]) == 0
+    assert "On the runs that it was fitted to" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "told"),
+    [
+        (12.3456, 0.5, ("12.35", "± 0.98")),
+        (0.018412, 1.6e-5, ("0.018412", "± 0.000031")),
+        (1319.0, 52.0, ("1320", "± 100")),
+        (340755.0, 1633.0, ("340.8 \u00d7 10³", "± 3.2 \u00d7 10³")),
+        (-13.2, 12.8, ("\u221213", "± 25")),
+        (1.0, None, ("1", "-")),
+    ],
+)
+def test_values_have_the_digits_that_their_intervals_leave(value, std, told):
+    assert with_interval(value, std) == told
