@@ -24,6 +24,7 @@ from benchmarks._blind import plan, record, table, work
 from benchmarks._rows import Row
 
 CASES = 480
+MARK = "<!-- measured -->"
 
 
 def options() -> argparse.ArgumentParser:
@@ -39,7 +40,7 @@ def options() -> argparse.ArgumentParser:
     parser.add_argument("--times", action="store_true", help="also time fresh processes")
     parser.add_argument("--report", action="store_true", help="count what is finished; run nothing")
     parser.add_argument("--json", type=Path, help="write rows and conditions to a file")
-    parser.add_argument("--markdown", type=Path, help="write the table to a file")
+    parser.add_argument("--markdown", type=Path, help="write the table to a file, behind its mark")
     return parser
 
 
@@ -73,9 +74,15 @@ def main(given: Sequence[str] | None = None) -> int:
         whole = {**conditions, "rows": table.as_json(rows)}
         arguments.json.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
     if arguments.markdown:
-        head = f"Seed {seed}, {len(tasks)} cases.\n\n"
-        arguments.markdown.write_text(head + table.markdown(rows), encoding="utf-8")
+        _into_page(arguments.markdown, f"Seed {seed}, {len(tasks)} cases.", table.markdown(rows))
     return code
+
+
+def _into_page(page: Path, conditions: str, text: str) -> None:
+    """Write a table into a page, behind its mark where it has one."""
+    head = page.read_text(encoding="utf-8") if page.exists() else ""
+    head = head[: head.index(MARK)] + MARK + "\n\n" if MARK in head else ""
+    page.write_text(f"{head}{conditions}\n\n{text}", encoding="utf-8")
 
 
 def advance(tasks: list[plan.Task], path: Path, arguments: argparse.Namespace) -> None:

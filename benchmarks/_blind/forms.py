@@ -14,8 +14,38 @@ Values = dict[str, float]
 
 
 def _blasius(f: Fields) -> Values:
-    # The generator scales b so that both exponents give equal forces at quad_w.
-    return {"c_2": f["quad_b"] * f["quad_w"] ** (2.0 - f["quad_p"]), "shape": f["quad_p"]}
+    # Both write the power law about a speed of reference, the generator about the rig's top speed.
+    return {"c_2": f["quad_b"] * (f["quad_w"] / 0.1) ** (2.0 - f["quad_p"]), "shape": f["quad_p"]}
+
+
+def _stribeck(shape: float, way: float) -> Callable[[Fields], Values]:
+    return lambda f: {"rise": f["st_s"], "v_s": f["st_w"], "shape": shape, "way": way}
+
+
+def _flattening(shape: float) -> Callable[[Fields], Values]:
+    return lambda f: {"v_f": 1.0 / f["flat_a"], "shape": shape, "bend": 1.0}
+
+
+def _carreau(f: Fields) -> Values:
+    shape = 2.0 / f["flat_n"]
+    return {"v_f": shape**0.5 / f["flat_a"], "shape": shape, "bend": 2.0}
+
+
+def _gas(f: Fields) -> Values:
+    k_3 = f["gas_k"] / f["gas_a"] ** 2 if f["gas_kind"] == 3 else 0.0
+    return {"k": f["gas_k"], "preload": f.get("gas_f", 0.0), "k_2": 0.0, "k_3": k_3}
+
+
+def _mount(f: Fields) -> Values:
+    hard = (1e-3 / f["se_u"]) ** 2 if f["series_kind"] == 2 else 0.0
+    return {"k": f["se_k"], "c": f["se_c"], "hard": hard}
+
+
+def _coil(f: Fields) -> Values:
+    up, down = f["coil_up"], f["coil_down"]
+    if f["coil_kind"] == 3:
+        return {"tau": up, "fall": 1.0, "eddy": down / up}
+    return {"tau": (up * down) ** 0.5, "fall": down / up, "eddy": 0.0}
 
 
 def _rigid(f: Fields) -> Values:
@@ -25,38 +55,51 @@ def _rigid(f: Fields) -> Values:
 
 
 SAME: dict[tuple[str, str], Callable[[Fields], Values]] = {
-    ("stribeck", "gaussian"): lambda f: {"rise": f["st_s"], "v_s": f["st_w"], "shape": 2.0},
-    ("stribeck", "exponential"): lambda f: {"rise": f["st_s"], "v_s": f["st_w"], "shape": 1.0},
-    ("flattening", "rational"): lambda f: {"v_f": 1.0 / f["flat_a"], "shape": 1.0},
-    ("flattening", "exponential"): lambda f: {"v_f": 1.0 / f["flat_a"], "shape": 0.0},
+    ("stribeck", "gaussian"): _stribeck(2.0, 0.0),
+    ("stribeck", "exponential"): _stribeck(1.0, 0.0),
+    ("stribeck", "gaussian_state"): _stribeck(2.0, 1.0),
+    ("stribeck", "exponential_state"): _stribeck(1.0, 1.0),
+    ("flattening", "rational"): _flattening(1.0),
+    ("flattening", "exponential"): _flattening(0.0),
+    ("flattening", "carreau"): _carreau,
     ("quadratic_damping", "square"): lambda f: {"c_2": f["quad_b"], "shape": 2.0},
     ("quadratic_damping", "blasius"): _blasius,
-    ("asymmetry", "step"): lambda f: {"ratio": f["asym_s"], "v_s": 1e-6},
+    ("asymmetry", "step"): lambda f: {"ratio": f["asym_s"], "v_s": 1e-6, "side": 0.0},
     ("presliding", "dahl"): lambda f: {"x_s": f["pre_len"], "shape": 1.0},
     ("temperature", "arrhenius"): lambda f: {
-        "E_0": f["hot_cap"], "tau": f["hot_tau"], "part": 0.5,
+        "E_0": f["hot_cap"], "tau": f["hot_tau"], "part": 0.5, "housing": 0.0,
     },
-    ("gas_spring", "linear"): lambda f: {"k": f["gas_k"], "preload": 0.0, "k_2": 0.0, "k_3": 0.0},
-    ("gas_spring", "preloaded"): lambda f: {
-        "k": f["gas_k"], "preload": f["gas_f"], "k_2": 0.0, "k_3": 0.0,
-    },
-    ("gas_spring", "progressive"): lambda f: {
-        "k": f["gas_k"], "preload": 0.0, "k_2": 0.0, "k_3": f["gas_k"] / f["gas_a"] ** 2,
-    },
-    ("fluid_inertia", "mass"): lambda f: {"m_f": f["mass"]},
-    ("mount_compliance", "kelvin_voigt"): lambda f: {"k": f["se_k"], "c": f["se_c"]},
+    ("gas_spring", "linear"): _gas,
+    ("gas_spring", "preloaded"): _gas,
+    ("gas_spring", "progressive"): _gas,
+    ("fluid_inertia", "mass"): lambda f: {"m_f": f["mass"], "m_h": 0.0},
+    ("fluid_inertia", "with_history"): lambda f: {"m_f": f["mass"], "m_h": f["basset"] / 20**0.5},
+    ("mount_compliance", "kelvin_voigt"): _mount,
+    ("mount_compliance", "hardening"): _mount,
     ("backlash", "rigid"): _rigid,
-    ("coil_lag", "first_order"): lambda f: {"tau": f["coil_up"]},
-    ("remanence", "play"): lambda f: {"width": f["rem_r"]},
+    ("coil_lag", "first_order"): _coil,
+    ("coil_lag", "rise_and_fall"): _coil,
+    ("coil_lag", "eddy"): _coil,
+    ("remanence", "play"): lambda f: {"width": f["rem_r"], "spread": 0.0},
     ("saturation", "froehlich"): lambda f: {"V_s": f["sat_v"], "shape": 1.0},
-    ("delay", "transport"): lambda f: {"tau": f["late"]},
-    ("velocity_sensor", "lag"): lambda f: {"tau": f["time"]},
+    ("delay", "transport"): lambda f: {"time": f["late"], "filtered": 0.0},
+    ("velocity_sensor", "lag"): lambda f: {
+        "gain": 1.0, "tau": f["time"], "shape": 0.0, "corner": 0.0,
+    },
+    ("velocity_sensor", "geophone"): lambda f: {
+        "gain": 1.0, "tau": 0.0, "shape": 0.0, "corner": f["corner"],
+    },
+    ("velocity_sensor", "second_order"): lambda f: {
+        "gain": 1.0, "tau": 2.0 * f["damping"] / f["corner"], "shape": 0.25 / f["damping"] ** 2,
+        "corner": 0.0,
+    },
 }  # fmt: skip
 """The generator's (effect, form) that bristle has, and what its parameters are there."""
 
 LIMITS = (
     "asymmetry.v_s", "gas_spring.preload", "gas_spring.k_2", "gas_spring.k_3", "backlash.k",
-    "backlash.c", "backlash.mass",
+    "backlash.c", "backlash.mass", "delay.filtered", "velocity_sensor.shape",
+    "stribeck.way", "asymmetry.side", "temperature.housing", "coil_lag.eddy", "remanence.spread",
 )  # fmt: skip
 """True values at zero or at a limit: an interval about them says nothing of coverage."""
 

@@ -127,6 +127,11 @@ def names_effect(line: Line) -> bool:
     return in_class(line) and inseparable(line)
 
 
+def names_effect_or_class(line: Line) -> bool:
+    """Return what `names_effect` does with the separate test left out: the name is among three."""
+    return names_effect(line) or in_class(line)
+
+
 def in_class(line: Line) -> bool:
     """Return whether the verdict is a class of at most three with the hidden effect."""
     said, (true,) = answer(line), hidden(line)

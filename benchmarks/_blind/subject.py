@@ -9,8 +9,9 @@ import numpy as np
 import pandas as pd
 
 from bristle.diagnose import Diagnosis, diagnose
-from bristle.identify.fit import Model, Problem, huber
+from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
+from bristle.identify.search import z_scale
 from bristle.physics.damper import LAWS
 from bristle.physics.effect import EFFECTS
 from bristle.records.measurement import ChannelSpec, Measurement, measurements_of_frame
@@ -22,9 +23,6 @@ UNITS = {
     "displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "voltage": "V", "force": "N",
     "ground_acceleration": "m/s2",
 }  # fmt: skip
-HUBER_AT_ONE = 0.494231
-"""Mean Huber loss (k = 2) of a standard normal variable."""
-
 KEPT = 8  # rows of the ranking that a record keeps
 
 
@@ -107,6 +105,8 @@ def true_model(task_law: str, truth: dict[str, Any]) -> Model | None:
             return None
         if any(name.split(".")[1] not in EFFECTS[found["effect"]].parameters for name in own):
             return None
+        if EFFECTS[found["effect"]].site != "damper":
+            return None  # the truth of an instrument is asked of the diagnosis alone
         names.append(found["effect"])
         values |= own
     return Model(task_law, tuple(names), values)
@@ -114,11 +114,11 @@ def true_model(task_law: str, truth: dict[str, Any]) -> Model | None:
 
 def z_of(model: Model, problem: Problem) -> float:
     """Return robust RMS(residual)/noise of a model on runs, 1 for the truth."""
-    losses = []
+    left = []
     for run, (bias, sigma, _) in zip(problem.runs, problem.expectation(model), strict=True):
         error = (run.force - problem.predict(model, run) - bias) / sigma
-        losses.append(huber(error[run.skip :]))
-    return float(np.sqrt(np.mean(np.concatenate(losses)) / HUBER_AT_ONE))
+        left.append(error[run.skip :])
+    return float(z_scale(np.concatenate(left)))
 
 
 def z_of_truth(case: Recorded, holdout: list[Measurement]) -> float | None:

@@ -277,6 +277,14 @@ def part_rows(lines: list[Line]) -> list[Figure]:
     for name in sorted({line["task"]["effect"] for line in of_kind(lines, "fault", 0.01)}):
         group = [line for line in of_kind(lines, "fault", 0.01) if line["task"]["effect"] == name]
         rows.append(share(f"reported, {name}", count(group, score.reports_fault), group="parts"))
+    strong = binned(single, "15 %", "40 %")
+    rows.append(
+        share(
+            "15 and 40 %, right or in any class of at most three",
+            count(strong, score.names_effect_or_class),
+            group="parts",
+        )
+    )
     classes = [line for line in counted if score.answer(line)["kind"] == "class"]
     rows.append(
         share(
@@ -328,6 +336,8 @@ def show(rows: list[Figure]) -> None:
     from rich.table import Table
 
     console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console = Console(highlight=False, markup=False, width=140)
     for group in dict.fromkeys(row.group for row in rows):
         table = Table(box=None, pad_edge=False, title=group, title_justify="left")
         for column in HEAD:
