@@ -20,7 +20,7 @@ HUBER = 2.0
 HUBER_AT_ONE = 0.494231
 """Mean Huber loss (k = 2) of a standard normal variable."""
 
-CUT = 6.0
+CUT = 25.0
 """Normalised residuals count up to this, times their median scale where that is above 1.
 
 A sign law's force near v = 0 has two values: where all draws of the motion show the one and the
