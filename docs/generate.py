@@ -76,7 +76,7 @@ def effect_page(name: str) -> str:
     """Return the page of an effect: formula, parameters, what its absence looks like, source."""
     effect = EFFECTS[name]
     told = tell(effect)
-    site = "a damper" if effect.site == "damper" else f"the {effect.site}"
+    site = {"damper": "a damper", "sensor": "a sensor"}.get(effect.site, f"the {effect.site}")
     laws = f" Joins the laws {' and '.join(told['laws'])}." if told["laws"] else ""
     parts = [f"# {name}", told["about"], _formula(told["text"])]
     if shown := picture_of(name):
@@ -88,37 +88,54 @@ def effect_page(name: str) -> str:
         [f"`{name}.{key}`", f"{p['value']:g}", _unit(p["unit"]), _span(*p["bounds"]), p["text"]]
         for key, p in told["parameters"].items()
     ])]  # fmt: skip
-    if told["states"]:
+    if len(told["states"]) > 8:
+        parts.append(f"State: {len(told['states'])} values, a ring among them.")
+    elif told["states"]:
         states = ", ".join(f"`{name}.{key}` [{unit}]" for key, unit in told["states"].items())
         parts.append(f"State: {states}.")
     parts += ["## When it is missing", f"{told['expect'][0].upper()}{told['expect'][1:]}."]
     parts += ["## Source", f"{told['source']}."]
+    parts += _use_of(name, effect.site, told)
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _use_of(name: str, site: str, told: dict[str, Any]) -> list[str]:
+    """Return how an effect is switched on; a sensor's is part of a study's model alone."""
     first = next(iter(told["parameters"]))
     value = told["parameters"][first]["value"]
-    component = effect.site
-    parts += ["## Switch it on", "In a scenario:", textwrap.indent(
-        f'[components.{component}]\nparameters = {{ "{name}.on" = true, '
-        f'"{name}.{first}" = {value} }}', "    ",
-    )]  # fmt: skip
-    parts.append(
+    if site == "sensor":
+        return [
+            "## Use it",
+            "In a study, beside the damper's own effects: `bristle add STUDY "
+            f"{name}`. It acts on the {EFFECTS[name].shows} channel of the measurement; no "
+            "exported damper carries it.",
+        ]
+    text = f'[components.{site}]\nparameters = {{ "{name}.on" = true, "{name}.{first}" = {value} }}'
+    return [
+        "## Switch it on",
+        "In a scenario:",
+        textwrap.indent(text, "    "),
         "or on the command line: "
-        f"`bristle run el_centro_lugre_passive --set {component}.{name}.on=true`."
-    )
-    return "\n\n".join(part for part in parts if part) + "\n"
+        f"`bristle run el_centro_lugre_passive --set {site}.{name}.on=true`.",
+    ]
 
 
 def _properties(told: dict[str, Any]) -> str:
     words = [
         "It never gives energy to the motion."
         if told["passive"]
-        else "It can give energy to the motion.",
-        "At rest and without history it exerts no force."
-        if told["zero_at_rest"]
-        else "It exerts a force at rest too.",
+        else "It can give energy to the motion."
+        if told["site"] != "sensor"
+        else "It changes what is shown, not the motion.",
+        "It exerts a force at rest too."
+        if not told["zero_at_rest"]
+        else "At rest and without history it exerts no force."
+        if told["site"] != "sensor"
+        else "",
     ]
     if told["excludes"]:
         words.append(f"Not together with {', '.join(told['excludes'])}.")
-    return " ".join(words)
+    return " ".join(word for word in words if word)
 
 
 def _component_index() -> str:

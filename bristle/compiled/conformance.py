@@ -82,16 +82,17 @@ def _rests(effect: type[Effect]) -> Check:
 
 def _cycle(
     law: str, effects: list[str], values: dict[str, float], amplitude: float, frequency: float,
-    V: Callable[[float], float],
+    V: Callable[[float], float] | float,
 ) -> tuple[list[float], list[float], list[float]]:  # fmt: skip
     """Return times, velocities and forces of three cycles."""
     model = DamperModel(law, values, effects)
+    voltage = V if callable(V) else lambda _t: V
     w, before = 2.0 * pi * frequency, 2.0 * pi * frequency * amplitude
     times, speeds, forces = [], [], []
     for k in range(1, round(3.0 / frequency / STEP) + 1):
         t = k * STEP
         x, v = amplitude * sin(w * t), amplitude * w * cos(w * t)
-        forces.append(model.step(x, v, (v - before) / STEP, V(t), STEP, 0.0, 0.0, False))
+        forces.append(model.step(x, v, (v - before) / STEP, voltage(t), STEP, 0.0, 0.0, False))
         times.append(t)
         speeds.append(v)
         before = v
@@ -114,7 +115,7 @@ def _matters(effect: type[Effect]) -> Check:
 def _bounds(effect: type[Effect]) -> Check:
     for law in effect.laws:
         for values in _corners(effect):
-            forces = _cycle(law, [effect.name], values, 0.01, 3.0, lambda _t: 8.0)[2]
+            forces = _cycle(law, [effect.name], values, 0.01, 3.0, 8.0)[2]
             if not all(isfinite(force) for force in forces):
                 return Check("it can be simulated at every bound", False, f"{law}, {values}")
     return Check("it can be simulated at every bound", True)
@@ -127,7 +128,7 @@ def _energy(effect: type[Effect]) -> Check:
     for law in effect.laws:
         for amplitude, frequency, V in ((0.001, 5.0, 6.0), (0.015, 5.0, 0.0), (0.015, 1.0, 6.0)):
             for values in _corners(effect):
-                held = _cycle(law, [effect.name], values, amplitude, frequency, lambda _t, V=V: V)
+                held = _cycle(law, [effect.name], values, amplitude, frequency, V)
                 last = round(1.0 / frequency / STEP)
                 v, force = np.array(held[1][-last:]), np.array(held[2][-last:])
                 work = float(STEP * np.sum(v * force))

@@ -23,11 +23,11 @@ SEARCH: dict[str, dict[str, tuple[float, ...]]] = {
     "flattening": {"v_f": (0.1, 1.0), "bend": (1.0, 2.0)},
     "saturation": {"V_s": (0.4, 1.0)},
     "coil_lag": {"tau": (0.5, 2.0)},
-    "temperature": {"E_0": (0.5, 4.0), "tau": (0.2,)},
+    "temperature": {"E_0": (2.0, 15.0), "tau": (0.2,)},
     "presliding": {"x_s": (0.1, 0.6)},
     "mount_compliance": {"k": (1.0,)},
-    "backlash": {"gap": (0.1, 0.5)},
-    "remanence": {},
+    "backlash": {"gap": (0.3, 1.0, 4.0)},
+    "quadratic_damping": {"c_2": (0.3, 3.0)},
 }
 """Where a search begins, as factors on an effect's defaults scaled to the rig."""
 
@@ -142,6 +142,16 @@ def _raw(problem: Problem, model: Model, expected: Expected) -> Iterable[Array]:
         yield (run.force - problem.predict(model, run) - bias)[run.skip :]
 
 
+def _stiff_contact(own: dict[str, float], problem: Problem) -> None:
+    """Tie a contact's stiffness to its gap: closed, it gives by a small part of it."""
+    own["backlash.k"] = 50.0 * problem.size("N") / own["backlash.gap"]
+    own["backlash.c"] = float(np.sqrt(own["backlash.k"] * own["backlash.mass"]))
+
+
+TIES: dict[str, Callable[[dict[str, float], Problem], None]] = {"backlash": _stiff_contact}
+"""Start values that follow from others."""
+
+
 def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
     """Return the models from which the search for an effect's parameters begins.
 
@@ -162,6 +172,8 @@ def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
             named = {f"{effect}.{name}": value for name, value in values.items()}
             for name, factor in zip(factors, combination, strict=True):
                 named[f"{effect}.{name}"] *= factor
+            if effect in TIES:
+                TIES[effect](named, problem)
             out.append(replace(base, effects=(*base.effects, effect), values={**own, **named}))
     return out
 
@@ -174,20 +186,22 @@ class Begun:
     cost: float
 
 
-def begin(effect: str, base: Model, train: Problem, expected: Expected) -> Begun:
+def begin(effect: str, base: Model, train: Problem, expected: Expected, deep: bool = True) -> Begun:
     """Search shortly from every start of an effect, and longer from the best; return the best.
 
     All parameters move at once: with the law's held, an effect that the law has taken up vanishes.
     """
     problem, expected_there = lighter(train, expected, (*base.effects, effect), base.law)
     found = []
-    for model in starts(effect, base, train):
+    for model in starts(effect, base, train)[: None if deep else 2]:
         model, ended = Search(problem, model, expected_there, model.free()).run(QUICK)
         found.append(Begun(model, ended.cost))
     found.sort(key=lambda one: one.cost)
     longer = []
-    for one in found[:KEPT]:
-        model, ended = Search(problem, one.model, expected_there, one.model.free()).run(LONG)
+    for one in found[: KEPT if deep else 0] or found[:1]:
+        model, ended = Search(problem, one.model, expected_there, one.model.free()).run(
+            LONG if deep else QUICK
+        )
         longer.append(Begun(model, ended.cost))
     best = min(longer, key=lambda one: one.cost).model
     return Begun(best, float(np.mean(loss(residuals(train, best, expected)))))
@@ -204,7 +218,7 @@ def lighter(
     joined = [EFFECTS[name] for name in effects]
     if any(effect.joint for effect in joined):
         few = slice(0, None, 2) if len(problem.runs) > 1 else slice(None)
-        return Problem(problem.runs[few]), expected[few]
+        return problem.of(problem.runs[few]), expected[few]
     if law != "bingham" or any(effect.states or effect.site == "sensor" for effect in joined):
         return problem, expected
     runs, thinned = [], []
@@ -219,7 +233,7 @@ def lighter(
             )
         )  # fmt: skip
         thinned.append((bias[every], sigma[every], draws[:, every]))
-    return Problem(runs), thinned
+    return problem.of(runs), thinned
 
 
 def refine(begun: Model, train: Problem, sweeps: int = 12) -> Model:
@@ -258,17 +272,18 @@ def try_all(
     held_out: Problem,
     progress: Callable[[str], None] | None = None,
     instruments: Sequence[str] = ("delay",),
+    deep: bool = True,
 ) -> list[Trial]:
     """Try every effect that can join the model, on all cores; best on the held-out runs first.
 
     Every effect is searched shortly from several starts; those that gain a fair share of what the
-    best one gains on the training runs are refined.
+    best one gains on the training runs are refined. Not `deep`: fewer starts, for a second effect.
     """
     expected = train.expectation(base)
     before = float(np.mean(loss(residuals(train, base, expected))))
     names = joinable(base, instruments)
     with ThreadPoolExecutor(cpu_count()) as pool:
-        begun = list(pool.map(lambda name: begin(name, base, train, expected), names))
+        begun = list(pool.map(lambda name: begin(name, base, train, expected, deep), names))
         most = max(before - one.cost for one in begun)
         worth = [before - one.cost >= PROMISING * most for one in begun]
 

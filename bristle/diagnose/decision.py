@@ -32,9 +32,9 @@ PAIR_LEFT = 0.5
 PAIR_PART = 0.05
 """Smallest part of the first excess that the lesser effect of a pair must account for."""
 
-RIVAL = 2.0
+RIVAL = 1.25
 """Where the best model is not adequate, others rival it up to this many times its excess: a misfit
-of form as large as the best one's own cannot decide between them."""
+of form cannot decide between what is nearly as wrong."""
 
 CLOSE = 0.004
 """Share of z within which two adequate models are equal whatever the statistics say."""
@@ -92,7 +92,7 @@ def decide(
     best = ranked[0]
     explained = 1.0 - excess(best) / excess(before)
     single = best.z <= ADEQUATE or explained >= SHARE
-    if best.z > ADEQUATE:
+    if best.z > ADEQUATE and explained < 1.0 - PAIR_PART:
         pair = _pair(before, ranked, grow, single)
         if pair is not None and reduce is not None:
             alone = min(reduce(pair.best), key=lambda trial: trial.z)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compare.coordinates import coordinates_of
 from ..compare.where import Place, places
-from ..identify.fit import Model, Problem, identify
+from ..identify.fit import Model, Problem, fit, identify
 from ..identify.prepare import prepare
 from ..records.measurement import Measurement
 from .candidates import Trial, judge, refine, try_all, try_members
@@ -169,7 +169,7 @@ def _judged(
 
     def grow(first: Trial) -> list[Trial]:
         say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
-        return try_all(first.model, problem, held_out, instruments=instruments)
+        return try_all(first.model, problem, held_out, instruments=instruments, deep=False)
 
     def reduce(pair: Trial) -> list[Trial]:
         return try_members(pair, before.model, problem, held_out)
@@ -194,13 +194,16 @@ def _judged(
     words += [fault.words for fault in faults]
     if kind == "none":
         words.append(f"An effect that leaves {visible:.2%} of the force would have been seen.")
+    say("intervals")
+    fitted = fit(problem, decision.best.model, max_evaluations=4)
+    told = {name: s for name, s in fitted.std.items() if name not in fitted.unidentified}
     coordinate = rest[0].coordinate if kind == "unknown" and rest else ""
     if coordinate:
         words.append(f"What is unexplained is organised by {coordinate.replace('_', ' ')}.")
     return Diagnosis(
         kind, decision.effects, " ".join(words), before, decision.best, tuple(trials),
         tuple(faults), tuple(hidden), visible, coordinate, tuple(rest), experiment, noise,
-        decision.explained,
+        decision.explained, told,
     )  # fmt: skip
 
 

@@ -119,6 +119,10 @@ class Problem:
         self._benches: dict[tuple[str, tuple[str, ...]], Bench] = {}
         self._sizes: dict[str, float] = {}
 
+    def of(self, runs: list[Run]) -> Problem:
+        """Return a problem of the same kind for other runs, such as a part of these."""
+        return Problem(runs)
+
     def size(self, unit: str) -> float:
         """Return the typical size on this rig of a parameter of some unit, in SI."""
         if not self._sizes:

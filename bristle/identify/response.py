@@ -37,8 +37,8 @@ class Response:
 
     `x`, `v`, `a` (levels, n): displacement, velocity [m, m/s] relative to the table, smoothed, and
     absolute acceleration [m/s2] as measured (or, for a level without an accelerometer, smoothed:
-    `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper, None
-    where it was not measured; `V` (n,) [V]. `noise_a` (levels,), `noise_force`, `noise_ground`
+    `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper,
+    None where it was not measured; `V` (n,) [V]. `noise_a` (levels,), `noise_force`, `noise_ground`
     standard deviations; `std` (levels, 3) what the smoother leaves uncertain of x, v and relative
     acceleration; `draws` (levels, d, n, 3) draws of that error; `V_left` the noise left on V.
     """
@@ -88,8 +88,8 @@ def check_channels(measurement: Measurement, building: Building) -> None:
     )
     if beyond:
         raise RecordError(
-            f"{measurement.name}: {', '.join(beyond)} measured, but {building.name!r} has the levels "
-            f"{', '.join(levels)}. Give the building.toml of the structure that was tested."
+            f"{measurement.name}: {', '.join(beyond)} measured, but {building.name!r} has the "
+            f"levels {', '.join(levels)}. Give the building.toml of the structure that was tested."
         )
     if len(measurement.time) < SHORTEST:
         raise RecordError(
@@ -103,11 +103,17 @@ def respond(measurement: Measurement, building: Building, draws: int = 12) -> Re
 
 
 def responses(
-    measurements: list[Measurement], building: Building, draws: int = 12, seed: int = 0
+    measurements: list[Measurement],
+    building: Building,
+    draws: int = 12,
+    seed: int = 0,
+    looser: float = 1.0,
 ) -> list[Response]:
     """Return the measurements of one rig as responses.
 
-    The smoother's jerk is each run's own; the draws of its error are made once per level.
+    The smoother's jerk is each run's own, times `looser`: likeliest is not without bias, and a
+    looser smoother trades a little noise for much of that. The draws of its error are made once per
+    level.
 
     Raises
     ------
@@ -116,7 +122,7 @@ def responses(
     """
     for measurement in measurements:
         check_channels(measurement, building)
-    smoothed = [[_level(m, name) for name in building.levels()] for m in measurements]
+    smoothed = [[_level(m, name, looser) for name in building.levels()] for m in measurements]
     longest = max(len(m.time) for m in measurements)
     errors = [
         _draws(longest, [run[i] for run in smoothed], measurements[0].step, draws, seed + i)
@@ -143,7 +149,9 @@ def _response(
             m.noise.get(channel, 0.0) if own[-1] else float(np.hypot(level["std"][2], noise_ground))
         )
     drive = next((c for c in ("voltage", "current") if m.has(c)), None)
-    V, left = smooth_steps(m[drive], m.noise.get(drive, 0.0), m.step) if drive else (np.zeros(n), 0.0)
+    V, left = np.zeros(n), 0.0
+    if drive:
+        V, left = smooth_steps(m[drive], m.noise.get(drive, 0.0), m.step)
     return Response(
         m.name, m.step,
         np.array([level["state"][:, 0] for level in levels]),
@@ -155,7 +163,7 @@ def _response(
     )  # fmt: skip
 
 
-def _level(m: Measurement, name: str) -> dict[str, Any]:
+def _level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
     """Return the smoothed motion of one level: state (n, 3), std (3,), jerk, noise, have."""
     n, dt = len(m.time), m.step
     y, r, have = np.zeros((n, 3)), np.zeros(3), np.zeros(3, dtype=np.bool_)
@@ -172,7 +180,7 @@ def _level(m: Measurement, name: str) -> dict[str, Any]:
     r = np.maximum(r, (1e-7 * np.std(y, axis=0)) ** 2 + 1e-30)
     added = jumps(y[:, 2], dt) if have[2] else np.zeros(n)
     state, cov = np.zeros((n, 3)), np.zeros(3)
-    jerk = _likeliest(y, r, have, dt, added)
+    jerk = looser * _likeliest(y, r, have, dt, added)
     smooth_level(y, r, have, dt, jerk + added, True, state, cov)
     std = np.sqrt(np.maximum(cov, 0.0))
     return {"state": state, "std": std, "jerk": jerk, "r": r, "have": have}

@@ -8,6 +8,7 @@ to it; so they are judged by the same searches as a damper's effects in a damper
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
@@ -19,7 +20,6 @@ from ..errors import RecordError
 from ..physics.building import Building
 from ..physics.effect import EFFECTS, Parameter
 from ..records.measurement import Measurement
-from .fit import Fit
 from .model import OTHER_LAWS, Model, Problem, Run
 from .response import Response, base_equilibrium, responses, shear
 
@@ -88,13 +88,15 @@ class StructureProblem(Problem):
         Whether the damper's force is a result of equilibrium, not measured.
     """
 
-    def __init__(
-        self, runs: list[StructureRun], storey: int = 0, reconstructed: bool = False
-    ) -> None:
+    def __init__(self, runs: Sequence[Run], storey: int = 0, reconstructed: bool = False) -> None:
         super().__init__(list(runs))
         self.storey = storey
         self.reconstructed = reconstructed
         self._along: dict[tuple[str, ...], Along] = {}
+
+    def of(self, runs: list[Run]) -> StructureProblem:
+        """Return the same problem for other runs."""
+        return StructureProblem(runs, self.storey, self.reconstructed)
 
     def along(self, effects: tuple[str, ...]) -> Along:
         if effects not in self._along:
@@ -107,9 +109,12 @@ class StructureProblem(Problem):
         structure = tuple(e for e in model.effects if EFFECTS[e].site == "structure")
         damper = tuple(e for e in model.effects if EFFECTS[e].site != "structure")
         linear = model.law in OTHER_LAWS
-        memory = any(EFFECTS[e].states for e in model.effects)
+        # A Bingham law is a function of the motion at each sample, a LuGre law of its history.
+        memory = model.law not in (*OTHER_LAWS, "bingham") or any(
+            EFFECTS[e].states or EFFECTS[e].site == "sensor" for e in model.effects
+        )
         assert run.whole is not None
-        seen = run.whole if memory or not linear else run
+        seen = run.whole if memory else run
         x, v, a = seen.x, seen.v, seen.a
         if draw is not None:
             e = seen.draws[draw]
@@ -176,9 +181,7 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
         force = force - response.force
         noise = float(np.hypot(noise, response.noise_force))
     a = response.a[level]
-    return structure_run(
-        response.name, response.dt, (x, v, a, response.V), force, noise, error
-    )
+    return structure_run(response.name, response.dt, (x, v, a, response.V), force, noise, error)
 
 
 def layer_run(response: Response, building: Building) -> StructureRun:
@@ -310,53 +313,3 @@ def _unloaded(response: Response) -> Response:
     if response.force is not None:
         return response
     return replace(response, force=np.zeros_like(response.ground))
-
-
-def fit_line(problem: StructureProblem, law: str) -> Fit:
-    """Return the linear law fitted to a problem, by weighted linear least squares in three passes.
-
-    The weights are those of Huber's loss at the expected noise.
-    """
-    names = list(OTHER_LAWS[law].parameters)
-    model = Model(law, (), dict.fromkeys(names, 0.0))
-    columns = [_columns(run, names) for run in problem.runs]
-    A = np.concatenate(columns)
-    force = np.concatenate([run.force for run in problem.runs])
-    sigma = np.concatenate([np.full(len(run.force), max(run.noise, 1e-300)) for run in problem.runs])
-    weight = np.ones(len(force))
-    scale = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
-    theta = np.zeros(len(names))
-    for _ in range(4):
-        w = np.sqrt(weight) / sigma
-        theta = np.linalg.lstsq(A / scale * w[:, None], force * w, rcond=1e-10)[0]
-        z = np.abs(force - A @ (theta / scale)) / sigma
-        spread = max(1.0, float(np.median(z)) / 0.6745)
-        weight = np.minimum(1.0, 2.0 * spread / np.maximum(z, 1e-300))
-    theta = theta / scale
-    model = replace(model, values=dict(zip(names, theta.tolist(), strict=True)))
-    z = (force - A @ theta) / sigma
-    cost = float(np.mean(np.where(np.abs(z) <= 2.0, 0.5 * z * z, 2.0 * np.abs(z) - 2.0)))
-    return Fit(model, _line_std(problem, model, columns), cost)
-
-
-def _line_std(problem: StructureProblem, model: Model, columns: list[Array]) -> dict[str, float]:
-    """Return standard deviations by the sandwich formula with the drawn, correlated noise."""
-    count = len(model.values)
-    bread, meat = np.zeros((count, count)), np.zeros((count, count))
-    scores: list[Array] = []
-    expected = problem.expectation(model)
-    for run, part, (_, sigma, spread) in zip(problem.runs, columns, expected, strict=True):
-        J = part / sigma[:, None]
-        bread += J.T @ J
-        meat += (J * (run.noise / sigma)[:, None] ** 2).T @ J
-        own = (spread / sigma) @ J
-        scores = [a + b for a, b in zip(scores, own, strict=True)] if scores else list(own)
-    found = np.array(scores)
-    inverse = np.linalg.pinv(bread)
-    covariance = inverse @ (meat + found.T @ found / max(len(found), 1)) @ inverse
-    return dict(zip(model.values, np.sqrt(np.diag(covariance)).tolist(), strict=True))
-
-
-def _columns(run: Run, names: list[str]) -> Array:
-    one = {"k": run.x, "c": run.v, "added_mass": run.a, "offset": np.ones_like(run.x)}
-    return np.column_stack([one[name] for name in names])

@@ -6,8 +6,10 @@ several starting points; standard laws lack the exponential.
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
+from os import cpu_count
 from typing import Any
 
 import numpy as np
@@ -110,7 +112,9 @@ def error_table(
     train, holdout : the runs that laws are fitted to, and those they are judged on, if any
     cutoff : Hz, of the low-pass on measured and predicted force; 0 for none
     """
-    return [_law_error(train, holdout, cutoff, law, starts) for law in laws]
+    train.bench(Model("bingham"))  # compiled once, before threads ask for it
+    with ThreadPoolExecutor(cpu_count()) as pool:
+        return list(pool.map(lambda law: _law_error(train, holdout, cutoff, law, starts), laws))
 
 
 def _law_error(

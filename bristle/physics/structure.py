@@ -255,16 +255,19 @@ def balance_contact(
 ) -> float:  # fmt: skip
     """Add to x1 the contacts' force on the first level that goes with it; return that force [N].
 
-    It is that of the middle of the step, or, where a contact sticks, what brings the level to rest
-    at its end (Moreau's time stepping). The more force, the less motion into the contact: so the
-    balance has one solution, found by regula falsi (Illinois) at any stiffness.
+    It is that of the middle of the step; where a contact closes, that of its end (the middle's
+    would create energy); where one sticks, what brings the level to rest (Moreau's time stepping).
+    The more force, the less motion into the contact: so the balance has one solution, found by
+    regula falsi (Illinois) at any stiffness.
     """
+    closed = contact_force(n, isolated, stiffnesses, x0, h, energy, 0.0, z0, p, on) != 0.0
+    part = 0.5 if closed else 1.0
     gain = held[n * (n + 1)]
     tried, low, at_low, high, at_high, last = guess, 0.0, 0.0, 0.0, 0.0, 0
     add_force(n, held, ramp, 0, tried, tried, x1)
     for _ in range(MOST_TRIALS):
         for i in range(2 * n):
-            middle[i] = 0.5 * (x0[i] + x1[i])
+            middle[i] = x0[i] + part * (x1[i] - x0[i])
         halt = tried - x1[n] / gain
         advance_effects(n, middle, h, energy, halt, tried, z0, p, on, z1)
         found = contact_force(n, isolated, stiffnesses, middle, h, energy, halt, z1, p, on)

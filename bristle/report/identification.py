@@ -57,8 +57,8 @@ def draw(runs: Runs) -> Drawing:
 
     cases = [_case(runs, name) for name in BRISTLES]
     table = pd.concat([_errors(case) for case in cases], ignore_index=True)
-    page = Page(10.0, 8.6, _title(cases), _subtitle(cases), RECONSTRUCTED)
-    grid = page.grid(3, 2, row_gap=0.85, column_gap=1.35, left=1.2, height_ratios=(1.2, 1.0, 0.8))
+    page = Page(11.4, 8.6, _title(cases), _subtitle(cases), RECONSTRUCTED)
+    grid = page.grid(3, 2, row_gap=0.85, column_gap=1.5, left=1.4, height_ratios=(1.2, 1.0, 0.8))
     loops = []
     for column, case in enumerate(cases):
         loops.append(_loop(page, grid, column, case))

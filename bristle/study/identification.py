@@ -31,6 +31,7 @@ STAGES = 4
 
 _MISFIT = 1.15  # z above which an error is more than noise
 _SATURATED = 0.05  # share of samples at one and the same extreme of the force
+_TABLE_STARTS = 3
 _LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
 
 
@@ -139,9 +140,11 @@ def identify_study(
     identifier = IDENTIFIERS.get(study.settings.rig)
     if identifier is None:
         raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not identified yet.')
+    left_out = tuple(f"Left out: {why}" for why in study.usable_effects())
     model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     found = identifier(study, model, cutoff, starts, table, show or (lambda done: None), begin)
+    found = replace(found, notes=(*found.notes, *left_out))
     if not write:
         return found
     step = study.add_step(
@@ -266,7 +269,7 @@ def _identify(
     show(3)
     rows: list[LawError] = []
     if table and sum(len(run.force) for run in train.runs) <= _LONGEST_TABLE:
-        rows = error_table(train, holdout, cutoff, starts=starts)
+        rows = error_table(train, holdout, cutoff, starts=min(starts, _TABLE_STARTS))
     show(4)
     notes += _weighing(rows, model, after)
     if not any(one.has(c) for one in runs.all for c in DRIVE):

@@ -41,6 +41,8 @@ def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> D
     RecordError
         If a file cannot be read, or a channel that is needed is missing.
     """
+    for why in study.usable_effects():
+        say(f"left out: {why}")
     model = study.model()
     diagnoser = DIAGNOSERS.get(study.settings.rig)
     if diagnoser is None:

@@ -25,6 +25,7 @@ from ..cosim.lines import KeyPath
 from ..errors import UnitError
 from ..physics.damper import LAWS
 from ..physics.effect import EFFECTS, Parameter
+from ..physics.user import why_left_out
 from ..units import convert
 from .files import Toml, write_whole
 
@@ -249,7 +250,8 @@ def _defaults(law: str, effect: str = "") -> dict[str, Value]:
 def _effect(toml: Toml, name: str, table: Any, law: str) -> dict[str, Value] | None:
     keys = ("effects", name)
     if name not in EFFECTS:
-        toml.error(keys, unknown("effect", name, sorted(EFFECTS)))
+        why = why_left_out(toml.path.parent / "effects" / f"{name}.py")
+        toml.error(keys, why or unknown("effect", name, sorted(EFFECTS)))
         return None
     if not isinstance(table, dict):
         toml.error(keys, f"is {written(table)}; a table is right.")

@@ -11,6 +11,7 @@ from typing import Any
 
 from filelock import FileLock, Timeout
 
+from ..physics.user import Loaded, load_effects
 from ..records.measurement import Measurement, read_measurements
 from .errors import StudyError
 from .files import read_json, write_json, write_whole
@@ -68,8 +69,12 @@ class Study:
         self.history = History(self.folder)
         self._lock = FileLock(self.folder / ".lock")
         self._complete_what_was_begun()
+        self.own_effects = load_effects(self.effects_folder)
         self.settings: Settings = read_settings(self.folder / "study.toml")
         self._seen = self._state()
+
+    own_effects: list[Loaded]
+    """The files of effects/, each with its effect or why it is left out."""
 
     @classmethod
     def open(cls, folder: Path | str) -> Study:
@@ -92,6 +97,17 @@ class Study:
     def effects_folder(self) -> Path:
         """Where the user's own effects are."""
         return self.folder / "effects"
+
+    def usable_effects(self) -> list[str]:
+        """Register the user's own effects that can be compiled; return why others are left out.
+
+        Call it before a fit or a diagnosis: an effect that cannot be compiled would take all others
+        along.
+        """
+        from ..compiled.own import usable
+
+        self.own_effects = usable(load_effects(self.effects_folder))
+        return [one.error for one in self.own_effects if one.error]
 
     @property
     def reports_folder(self) -> Path:

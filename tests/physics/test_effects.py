@@ -10,10 +10,13 @@ import pytest
 from rigs import LAWS, NO_LAW, Bench, force_at, sine
 from scipy.integrate import solve_ivp
 
+from bristle.compiled.channel import shown
 from bristle.errors import PhysicsError
 from bristle.physics import damper
+from bristle.physics.building import paper_building
 from bristle.physics.damper import DamperModel, advances, moving_states
-from bristle.physics.effect import EFFECTS, Effect, Parameter, effects_of
+from bristle.physics.effect import EFFECTS, Effect, Parameter, Q, effects_of
+from bristle.physics.structure import StructureModel
 
 both_laws = pytest.mark.parametrize("law", LAWS)
 
@@ -244,6 +247,382 @@ def test_two_series_elements_are_refused() -> None:
     finally:
         EFFECTS.pop("twin", None)
         damper.reweave()
+
+
+# -- Stribeck in the bristles
+
+
+def test_stribeck_in_the_bristles_is_the_same_in_steady_sliding() -> None:
+    for way in (0.0, 0.4, 1.0):
+        bench = Bench("lugre", on("stribeck", rise=0.5, v_s=0.02, way=way), ["stribeck"])
+        v, dt, x = 0.012, 0.002, 0.0
+        bench.last = (0.0, v, 4.0)
+        for _ in range(4000):  # some twenty times the travel in which the bristles slip
+            x += v * dt
+            force = bench.move(x, v, 4.0, dt)
+        excess = 0.5 * exp(-((v / 0.02) ** 2))
+        sliding = (1.3 + 0.83 * 4.0) * (1.0 + excess) + 180.0 * v * exp(-v / 0.02)
+        assert force == pytest.approx(sliding, rel=1e-9)
+
+
+def test_stribeck_in_the_bristles_builds_up_over_their_travel() -> None:
+    at_once = Bench("lugre", on("stribeck", rise=0.5, v_s=0.02, way=0.0), ["stribeck"])
+    over_travel = Bench("lugre", on("stribeck", rise=0.5, v_s=0.02, way=1.0), ["stribeck"])
+    plain = Bench("lugre")
+    forces = []
+    for bench in (at_once, over_travel, plain):
+        bench.last = (0.0, 1e-4, 4.0)
+        forces.append(bench.move(1e-6, 1e-4, 4.0, 0.01))
+    bristles = [force - 180.0 * 1e-4 * exp(-1e-4 / 0.02) for force in forces]
+    assert bristles[0] == pytest.approx(1.5 * bristles[2], rel=0.01)  # stiffer from the start
+    assert bristles[1] == pytest.approx(bristles[2], rel=0.01)  # as stiff, with a later slip
+
+
+# -- flattening
+
+
+@pytest.mark.parametrize(
+    ("shape", "bend", "factor"),
+    [
+        (0.0, 1.0, lambda u: exp(-u)),
+        (1.0, 1.0, lambda u: 1.0 / (1.0 + u)),
+        (2.0 / 0.7, 2.0, lambda u: (1.0 + u * u / 0.35) ** -0.35),  # Carreau, n = 0.7
+    ],
+)
+@both_laws
+def test_flattening_has_the_forms_of_the_literature(
+    law: str, shape: float, bend: float, factor: Any
+) -> None:
+    values = on("flattening", v_f=0.1, shape=shape, bend=bend)
+    for v in (-0.3, -0.02, 0.0, 0.05, 0.2):
+        motion = {"v": v, "V": 4.0, "z": 0.001}
+        found = force_at(law, **motion, values=values, effects=["flattening"])
+        assert found == pytest.approx(force_at(law, **motion) * factor(abs(v) / 0.1), rel=1e-12)
+
+
+# -- quadratic damping
+
+
+@pytest.mark.parametrize("shape", [1.75, 2.0, 3.0])
+def test_quadratic_damping_is_a_power_of_the_speed(shape: float) -> None:
+    values = on("quadratic_damping", c_2=250.0, shape=shape)
+    for v in (-0.3, -0.1, 0.0, 0.05):
+        motion = {"v": v, "V": 2.0}
+        added = force_at("bingham", **motion, values=values, effects=["quadratic_damping"])
+        added -= force_at("bingham", **motion)
+        assert added == pytest.approx(np.sign(v) * 2.5 * (abs(v) / 0.1) ** shape, abs=1e-12)
+
+
+# -- asymmetry
+
+
+@pytest.mark.parametrize(
+    ("side", "out", "back"), [(0.0, 1.4, 0.6), (1.0, 1.4, 1.0), (-1.0, 1.0, 0.6)]
+)
+def test_asymmetry_changes_both_directions_or_one(side: float, out: float, back: float) -> None:
+    values = on("asymmetry", ratio=0.4, v_s=1e-6, side=side)
+    for v, factor in ((0.1, out), (-0.1, back)):
+        found = force_at("bingham", v=v, V=4.0, values=values, effects=["asymmetry"])
+        assert found == pytest.approx(factor * force_at("bingham", v=v, V=4.0), rel=1e-9)
+
+
+# -- saturation
+
+
+def test_saturation_is_froehlichs_curve_and_has_a_ceiling() -> None:
+    froehlich = on("saturation", V_s=4.0, shape=1.0)
+    for V in (0.0, 2.0, 8.0):
+        found = force_at("bingham", v=0.1, V=V, values=froehlich, effects=["saturation"])
+        assert found == pytest.approx(force_at("bingham", v=0.1, V=V / (1.0 + V / 4.0)), rel=1e-12)
+    for shape in (1.0, 2.0, 6.0):
+        values = on("saturation", V_s=4.0, shape=shape)
+        most = force_at("bingham", v=0.1, V=1e6, values=values, effects=["saturation"])
+        assert most == pytest.approx(force_at("bingham", v=0.1, V=4.0), rel=1e-4)
+
+
+def test_saturation_comes_within_1_percent_of_tanh() -> None:
+    saturation = EFFECTS["saturation"]
+    p = saturation.Values(V_s=1.022, shape=2.5)
+    for V in np.linspace(0.0, 4.0, 81):
+        found = saturation.voltage(Q(*(V for _ in Q._fields)), (), p)
+        assert found == pytest.approx(np.tanh(V), abs=0.0101)
+
+
+# -- presliding
+
+
+def test_presliding_is_dahls_curve() -> None:
+    values = {**on("presliding", x_s=5e-4, shape=1.0), "c_0": 0.0, "c_v": 0.0}
+    bench = Bench("bingham", values, ["presliding"])
+    limit, x, v, dt = 1.3 + 0.83 * 4.0, 0.0, 0.01, 0.002
+    bench.last = (0.0, v, 4.0)
+    for _ in range(100):
+        x += v * dt
+        assert bench.move(x, v, 4.0, dt) == pytest.approx(limit * (1 - exp(-x / 5e-4)), rel=1e-9)
+    turned, before = 0.0, bench.state("presliding.direction")
+    bench.last = (x, -v, 4.0)
+    for _ in range(100):
+        turned += v * dt
+        force = bench.move(x - turned, -v, 4.0, dt)
+        assert force == pytest.approx(
+            limit * ((1.0 + before) * exp(-turned / 5e-4) - 1.0), abs=1e-9
+        )
+
+
+def test_presliding_of_shape_0_is_an_elastic_plastic_spring() -> None:
+    values = {**on("presliding", x_s=1e-3, shape=0.0), "c_0": 0.0, "c_v": 0.0}
+    bench = Bench("bingham", values, ["presliding"])
+    bench.last = (0.0, 0.01, 0.0)
+    for k in range(1, 101):
+        force = bench.move(k * 2e-5, 0.01, 0.0, 0.002)
+        assert force == pytest.approx(1.3 * min(k * 2e-5 / 1e-3, 1.0), rel=1e-9)
+
+
+# -- fluid inertia
+
+
+@both_laws
+def test_fluid_inertia_is_a_mass(law: str) -> None:
+    model = DamperModel(law, on("fluid_inertia", m_f=0.4), ["fluid_inertia"])
+    bare = DamperModel(law)
+    held = (0.001, 0.05), (2.0, 0.002, 0.0, 0.0, False)
+    force = model.force(*held[0], 3.0, *held[1]) - bare.force(*held[0], 3.0, *held[1])
+    assert force == pytest.approx(1.2, rel=1e-12)
+
+
+@pytest.mark.parametrize("frequency", [1.0, 3.0, 6.0])
+def test_the_fluids_memory_is_half_way_between_mass_and_damping(frequency: float) -> None:
+    # A kernel 1/sqrt(pi t) turns a into a / sqrt(i omega): sqrt(i omega) v, 45 degrees ahead of v.
+    omega = 2.0 * pi * frequency
+    values = {**on("fluid_inertia", m_f=0.0, m_h=1.0), **NO_LAW["bingham"]}
+    model, dt, rows = DamperModel("bingham", values, ["fluid_inertia"]), 5e-4, []
+    for k in range(1, round(8.0 / frequency / dt)):
+        t = k * dt
+        v, a = sin(omega * t), omega * np.cos(omega * t)
+        rows.append((t, model.step(0.0, v, a, 0.0, dt, 0.0, 0.0, False)))
+    t, force = np.array(rows[-round(4.0 / frequency / dt) :]).T
+    pair = np.column_stack([np.sin(omega * t), np.cos(omega * t)])
+    (in_phase, ahead), *_ = np.linalg.lstsq(pair, force, rcond=None)
+    size = (20.0 * omega) ** 0.5
+    assert np.hypot(in_phase, ahead) == pytest.approx(size, rel=0.12)
+    assert np.degrees(np.arctan2(ahead, in_phase)) == pytest.approx(45.0, abs=6.0)
+
+
+# -- temperature
+
+
+def test_heat_thins_the_fluid_and_leaves_with_its_time_constant() -> None:
+    bench = Bench("bingham", on("temperature", E_0=5.0, tau=2.0, part=0.5), ["temperature"])
+    bench.last = (0.0, 0.1, 4.0)
+    bench.model.z[damper.LAYOUT.states["temperature.heat"]] = 5.0
+    still = Bench("bingham", on("temperature", E_0=5.0, tau=2.0, part=0.5), ["temperature"])
+    at_e = bench.model.force(0.0, 0.1, 0.0, 4.0, 0.002, 0.0, 0.0, False)
+    yielding, viscous = 1.3 + 0.83 * 4.0, 180.0 * 0.1 * exp(-5.0)
+    assert at_e == pytest.approx(yielding * exp(-0.5) + viscous * exp(-1.0), rel=1e-12)
+    still.model.z[damper.LAYOUT.states["temperature.heat"]] = 5.0
+    still.last = (0.0, 0.0, 0.0)
+    for _ in range(1000):
+        still.move(0.0, 0.0, 0.0, 0.002)
+    assert still.state("temperature.heat") == pytest.approx(5.0 * exp(-1.0), rel=1e-9)
+
+
+@pytest.mark.parametrize(("curve", "left"), [(-1.0, 0.6), (0.0, exp(-0.4)), (1.0, 1.0 / 1.4)])
+def test_heat_thins_linearly_exponentially_or_less_and_less(curve: float, left: float) -> None:
+    values = on("temperature", E_0=10.0, curve=curve, heat_0=4.0)
+    found = force_at("bingham", v=0.1, V=4.0, values=values, effects=["temperature"])
+    assert found == pytest.approx(left * force_at("bingham", v=0.1, V=4.0), rel=1e-9)
+
+
+# -- backlash
+
+
+def test_backlash_carries_nothing_over_the_width_of_its_gap() -> None:
+    gap, dt = 1e-3, 5e-4
+    bench = Bench("bingham", on("backlash", gap=gap), ["backlash"])
+    times = dt * np.arange(round(2.0 / dt))
+    forces = bench.play(sine(0.01, 1.0), 4.0, times)
+    x = 0.01 * np.sin(2.0 * pi * times)
+    after = (times > 0.25) & (times < 0.75)
+    free = after & (np.abs(forces) < 1e-9)
+    assert np.ptp(x[free]) == pytest.approx(2.0 * gap, rel=0.1)
+    slides = (times > 0.6) & (times < 0.7)
+    assert np.abs(forces[slides]).min() > 4.0
+
+
+# -- coil lag with two times and eddy currents
+
+
+def test_coil_lag_rises_and_falls_with_times_of_its_own() -> None:
+    for target, start, tau in ((8.0, 0.0, 0.02 / 2.0), (0.0, 8.0, 0.02 * 2.0)):
+        bench = Bench("bingham", on("coil_lag", tau=0.02, fall=4.0, voltage_0=start), ["coil_lag"])
+        bench.last = (0.0, 0.0, target)
+        bench.move(0.0, 0.0, target, 0.01)
+        left = (bench.state("coil_lag.voltage") - target) / (start - target)
+        assert left == pytest.approx(exp(-0.01 / tau), rel=1e-9)
+
+
+def test_eddy_currents_are_a_second_lag() -> None:
+    values = on("coil_lag", tau=0.03, eddy=0.5)
+    bench = Bench("bingham", values, ["coil_lag"])
+    bench.last = (0.0, 0.0, 5.0)
+    for k in range(1, 40):
+        bench.move(0.0, 0.0, 5.0, 0.002)
+        t = 0.002 * k
+        exact = 5.0 * (1.0 - 2.0 * exp(-t / 0.03) + exp(-t / 0.015))
+        assert bench.state("coil_lag.field") == pytest.approx(exact, rel=1e-9)
+
+
+# -- mount that hardens
+
+
+def test_a_hard_bush_carries_its_force_over_less_travel() -> None:
+    values = on("mount_compliance", k=5e3, hard=2.0)
+    bench = Bench("bingham", values, ["mount_compliance"])
+    v, dt, x = 0.05, 0.002, 0.0
+    for k in range(500):
+        speed = v * min(1.0, k / 50)
+        x += speed * dt
+        force = bench.move(x, speed, 4.0, dt)
+    s = bench.state("mount_compliance.compression")
+    assert force == pytest.approx(force_at("bingham", v=v, V=4.0), rel=1e-6)
+    assert force == pytest.approx(5e3 * s * (1.0 + 2.0 * (s / 1e-3) ** 2), rel=1e-6)
+
+
+# -- the structure's
+
+
+def ringing(
+    values: dict[str, float], effects: list[str], seconds: float = 1.5
+) -> tuple[np.ndarray, np.ndarray, StructureModel]:
+    """Return times and states (n, 6) of the paper's building under a sine of the ground."""
+    model = StructureModel(paper_building(), values, effects)
+    times = 0.002 * np.arange(round(seconds / 0.002) + 1)
+    states = [list(model.x)]
+    for t in times[:-1]:
+        model.step(0.002, *(4.0 * sin(13.0 * s) for s in (t, t + 0.002)), 0.0)
+        states.append(list(model.x))
+    return times, np.array(states), model
+
+
+def exact(times: np.ndarray, force: Any) -> np.ndarray:
+    """Return the same by a tight integration with `force`(x, v) on the base."""
+    M, C, K = (np.array(matrix) for matrix in paper_building()[1:4])
+
+    def rate(t: float, y: np.ndarray) -> np.ndarray:
+        load = C @ y[3:] + K @ y[:3] + np.array([force(y[0], y[3]), 0.0, 0.0])
+        return np.concatenate([y[3:], -np.linalg.solve(M, load) - 4.0 * sin(13.0 * t)])
+
+    span = (0.0, float(times[-1]))
+    options = {"rtol": 1e-9, "atol": 1e-12, "max_step": 5e-4}
+    return solve_ivp(rate, span, np.zeros(6), "RK45", times, **options).y.T
+
+
+def test_a_duffing_spring_is_integrated_closely() -> None:
+    values = on("duffing", k_3=2e6, shape=5.0)
+    times, found, _ = ringing(values, ["duffing"])
+    wanted = exact(times, lambda x, v: 2e6 * 1e-4 * (abs(x) / 0.01) ** 4 * x)
+    assert np.abs(found - wanted).max() < 1e-3 * np.abs(wanted).max()
+
+
+def test_a_softening_spring_never_pushes_outwards() -> None:
+    duffing, k = EFFECTS["duffing"], 1057.0
+    p = duffing.Values(k_3=-1e8, shape=3.0)
+    q = Q(*(0.0 for _ in Q._fields))._replace(stiffness=k)
+    forces = [k * x + duffing.force(q._replace(x=x), (), p) for x in np.linspace(0.0, 0.05, 51)]
+    assert min(forces) >= 0.0
+    small = duffing.force(q._replace(x=1e-4), (), p)
+    assert small == pytest.approx(-1e8 * 1e-12, rel=1e-2)
+
+
+def test_an_end_stop_is_integrated_closely_and_loses_energy() -> None:
+    values = on("end_stop", clearance=0.004, k=3e4, c=20.0)
+
+    def stop(x: float, v: float) -> float:
+        side = np.sign(x)
+        return side * max(3e4 * (abs(x) - 0.004) + 20.0 * side * v, 0.0) if abs(x) > 0.004 else 0.0
+
+    times, found, _ = ringing(values, ["end_stop"])
+    wanted = exact(times, stop)
+    assert np.abs(found - wanted).max() < 0.01 * np.abs(wanted).max()
+
+
+@pytest.mark.parametrize("k", [1e5, 1e7, 1e9])
+def test_a_stiff_stop_holds(k: float) -> None:
+    _, found, _ = ringing(on("end_stop", clearance=0.003, k=k), ["end_stop"])
+    assert np.abs(found[:, 0]).max() < 0.003 + 3.0 * (0.5 * 4.4 / k) ** 0.5 + 1e-3
+
+
+def test_base_friction_sticks_and_says_so_in_the_accelerations() -> None:
+    model = StructureModel(paper_building(), on("base_friction", limit=3.0), ["base_friction"])
+    for k in range(500):  # 0.3 m/s2 on 4.4 kg: less than the limit, once the storeys are quiet
+        a_g = 0.3 * sin(13.0 * 0.002 * k)
+        model.step(0.002, a_g, a_g, 0.0)
+        assert abs(model.x[0]) < 1e-8
+        assert model.absolute_accelerations(0.0, a_g)[0] == pytest.approx(a_g, abs=1e-9)
+
+
+def test_base_friction_slides_with_its_force() -> None:
+    _, found, model = ringing(on("base_friction", limit=0.8), ["base_friction"])
+    assert np.abs(found[:, 0]).max() > 1e-3
+    x, v = np.array(model.x[:3]), np.array(model.x[3:])
+    assert abs(v[0]) > 0.01
+    M, C, K = (np.array(matrix) for matrix in paper_building()[1:4])
+    added = -M @ model.absolute_accelerations(0.0, 0.0) - K @ x - C @ v
+    assert added[0] == pytest.approx(0.8 * np.sign(v[0]), rel=1e-9)
+
+
+def test_base_friction_with_an_elastic_travel_follows_it() -> None:
+    values = on("base_friction", limit=2.0, x_s=1e-3)
+    times, found, _ = ringing(values, ["base_friction"], seconds=1.0)
+    stiffer = 2.0 / 1e-3  # about rest
+    first = found[1:4, 0] / ringing({}, [], seconds=1.0)[1][1:4, 0]
+    assert (first < 1.0).all()
+    assert (first > 1.0 - stiffer * times[1:4] ** 2).all()
+
+
+# -- instruments
+
+
+def test_a_delay_shows_the_force_late() -> None:
+    t = 0.002 * np.arange(1000)
+    force = 5.0 * np.sin(2.0 * pi * 2.0 * t)
+    for time in (0.0, 0.003, 0.0171, 0.1):
+        late = shown(EFFECTS["delay"], {"time": time, "filtered": 0.0}, force, 0.002)
+        expected = np.interp(t - time, t, force)
+        np.testing.assert_allclose(late, expected, atol=1e-9)
+
+
+def test_a_filter_delays_by_the_same_time_in_the_mean() -> None:
+    t = 0.002 * np.arange(1000)
+    ramp = 3.0 * t
+    for part in (0.3, 1.0):
+        late = shown(EFFECTS["delay"], {"time": 0.03, "filtered": part}, ramp, 0.002)
+        # A filter of held samples is late by up to half a sample more.
+        assert (ramp[500] - late[500]) / 3.0 == pytest.approx(0.03, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    ("values", "response"),
+    [
+        ({"tau": 0.02, "gain": 1.1, "shape": 0.0, "corner": 0.0}, lambda s: 1.1 / (1.0 + 0.02 * s)),
+        (
+            {"tau": 0.03, "shape": 0.8, "corner": 0.0},
+            lambda s: 1.0 / (1.0 + 0.03 * s + 0.8 * (0.03 * s) ** 2),
+        ),
+        ({"tau": 0.0, "corner": 15.0}, lambda s: s / (s + 15.0)),
+    ],
+)
+@pytest.mark.parametrize("frequency", [1.0, 4.0])
+def test_a_velocity_sensor_has_its_response(
+    values: dict[str, float], response: Any, frequency: float
+) -> None:
+    dt, omega = 5e-4, 2.0 * pi * frequency
+    t = dt * np.arange(round(6.0 / dt))
+    seen = shown(EFFECTS["velocity_sensor"], values, np.sin(omega * t), dt)
+    last = t > 3.0
+    pair = np.column_stack([np.sin(omega * t[last]), np.cos(omega * t[last])])
+    (real, imaginary), *_ = np.linalg.lstsq(pair, seen[last], rcond=None)
+    assert complex(real, imaginary) == pytest.approx(response(1j * omega), abs=0.02)
 
 
 # -- several together

@@ -35,14 +35,14 @@ class CoilLag(Effect):
 
     @staticmethod
     def voltage(q, z, p):
-        return z.voltage if p.eddy < 1e-6 else z.field
+        return z.voltage if p.eddy <= 0.0 else z.field
 
     @staticmethod
     def advance(q, z, p):
         gap = z.voltage - q.V
         tau = p.tau * p.fall**0.5 if gap > 0.0 else p.tau / p.fall**0.5
         coil = exp(-q.dt / tau)
-        if p.eddy < 1e-6:
+        if p.eddy <= 0.0:
             return q.V + gap * coil, q.V + gap * coil
         late = exp(-q.dt / (p.eddy * tau))
         share = gap / (1.0 - p.eddy)

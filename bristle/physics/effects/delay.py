@@ -32,7 +32,7 @@ class Delay(Effect):
     starts = dict.fromkeys(states, "value")
     parameters = {
         "time": Parameter(0.005, "s", (0.0, 0.2), "how late the force is shown"),
-        "filtered": Parameter(0.0, "1", (0.0, 1.0), "share of the time that a filter takes"),
+        "filtered": Parameter(0.5, "1", (0.0, 1.0), "share of the time that a filter takes"),
     }
 
     @staticmethod

@@ -36,6 +36,6 @@ class Flattening(Effect):
     @staticmethod
     def factor(q, z, p):
         speed = (abs(q.v) / p.v_f) ** p.bend
-        if p.shape < 1e-6:
+        if p.shape < 1e-9:
             return exp(-speed)
         return (1.0 + p.shape * speed) ** (-1.0 / p.shape)

@@ -30,8 +30,8 @@ class VelocitySensor(Effect):
     parameters = {
         "gain": Parameter(1.0, "1", (0.2, 5.0), "shown by true velocity"),
         "tau": Parameter(0.005, "s", (0.0, 0.2), "time constant of the low-pass"),
-        "shape": Parameter(0.0, "1", (0.0, 2.0), "0 first order, 0.25 and more second order"),
-        "corner": Parameter(0.0, "1/s", (0.0, 100.0), "corner of the high-pass; 0: none"),
+        "shape": Parameter(0.25, "1", (0.0, 2.0), "0 first order, 0.25 and more second order"),
+        "corner": Parameter(1.0, "1/s", (0.0, 100.0), "corner of the high-pass; 0: none"),
     }
 
     @staticmethod

@@ -1,0 +1,82 @@
+"""A load cell that is late or wrongly scaled, told from missing physics by equilibrium."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ..identify.line import fit_line
+from ..identify.response import Response
+from ..identify.structure import LinearLayer, StructureProblem, layer_run
+from ..physics.building import Building
+from .candidates import judge
+from .sites import CLEAN, GAIN, SHARE, Finding, detectable
+
+
+def load_cell(
+    layer: Finding, train: list[Response], holdout: list[Response], building: Building, law: str
+) -> tuple[Finding, tuple[list[Response], list[Response]]] | None:
+    """Return the finding that the load cell is late or wrongly scaled, with the forces set right.
+
+    Equilibrium knows when and how large the force is. None where no delay and no gain explains
+    the layer better than its own effects do.
+    """
+    best: tuple[float, float, float, Finding] | None = None
+    for what in ("delay", "gain"):
+        found = _search_cell(what, train, holdout, building, law)
+        if best is None or found[0] < best[0]:
+            best = found
+    assert best is not None
+    z_1, delay, gain, finding = best
+    own = min((trial.z for trial in layer.trials), default=np.inf)
+    share = 1.0 - max(z_1**2 - 1.0, 0.01) / max(layer.z_before**2 - 1.0, 0.01)
+    if z_1 >= own or 1.0 - z_1 / layer.z_before < GAIN or (z_1 > CLEAN and share < SHARE):
+        return None
+    name = "delay" if delay else "force_gain"
+    right = tuple([_corrected(r, delay, gain) for r in part] for part in (train, holdout))
+    told = replace(
+        finding, site="force", kind="effect", effects=(name,), z_before=layer.z_before, share=share,
+        coordinate=f"{delay:.3g} s" if delay else f"{gain:.4g}",
+    )  # fmt: skip
+    return told, right  # type: ignore[return-value]
+
+
+def _search_cell(
+    what: str, train: list[Response], holdout: list[Response], building: Building, law: str
+) -> tuple[float, float, float, Finding]:
+    """Return z on held-out runs, delay [s], gain and finding of the best delay or gain."""
+
+    def problem(value: float, part: list[Response]) -> StructureProblem:
+        delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
+        return StructureProblem([layer_run(_corrected(r, delay, gain), building) for r in part])
+
+    def cost(value: float) -> float:
+        return fit_line(problem(value, train), LinearLayer.name).cost
+
+    if what == "delay":
+        dt = train[0].dt
+        grid = dt * np.array([0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
+    else:
+        grid = np.array([0.6, 0.8, 0.9, 1.1, 1.25, 1.6])
+    costs = [cost(value) for value in grid]
+    k = int(np.argmin(costs))
+    low, high = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
+    value = float(
+        minimize_scalar(cost, bounds=(low, high), method="bounded", options={"maxiter": 14}).x
+    )
+    own, other = problem(value, train), problem(value, holdout)
+    base = fit_line(own, LinearLayer.name)
+    after = judge(base.model, own, other)
+    finding = Finding("force", "none", (), 0.0, after.z, 0.0, detectable(other), "", base.model)
+    delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
+    return after.z, delay, gain, finding
+
+
+def _corrected(response: Response, delay: float, gain: float) -> Response:
+    """Return a response whose force is what a cell of that delay [s] and gain has measured."""
+    assert response.force is not None
+    time = np.arange(len(response.force)) * response.dt
+    force = np.interp(time + delay, time, response.force) if delay else response.force
+    return replace(response, force=force / gain, noise_force=response.noise_force / gain)

@@ -1,0 +1,65 @@
+"""The linear law of a layer or storey fitted to its runs, in closed form."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .fit import Fit
+from .model import OTHER_LAWS, Model, Run
+from .structure import StructureProblem
+
+Array = NDArray[np.float64]
+
+
+def fit_line(problem: StructureProblem, law: str) -> Fit:
+    """Return the linear law fitted to a problem, by weighted linear least squares in three passes.
+
+    The weights are those of Huber's loss at the expected noise.
+    """
+    names = list(OTHER_LAWS[law].parameters)
+    model = Model(law, (), dict.fromkeys(names, 0.0))
+    columns = [_columns(run, names) for run in problem.runs]
+    A = np.concatenate(columns)
+    force = np.concatenate([run.force for run in problem.runs])
+    noise = [max(run.noise, 1e-300) for run in problem.runs]
+    sigma = np.repeat(noise, [len(run.force) for run in problem.runs])
+    weight = np.ones(len(force))
+    scale = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
+    theta = np.zeros(len(names))
+    for _ in range(4):
+        w = np.sqrt(weight) / sigma
+        theta = np.linalg.lstsq(A / scale * w[:, None], force * w, rcond=1e-10)[0]
+        z = np.abs(force - A @ (theta / scale)) / sigma
+        spread = max(1.0, float(np.median(z)) / 0.6745)
+        weight = np.minimum(1.0, 2.0 * spread / np.maximum(z, 1e-300))
+    theta = theta / scale
+    model = replace(model, values=dict(zip(names, theta.tolist(), strict=True)))
+    z = (force - A @ theta) / sigma
+    cost = float(np.mean(np.where(np.abs(z) <= 2.0, 0.5 * z * z, 2.0 * np.abs(z) - 2.0)))
+    return Fit(model, _line_std(problem, model, columns), cost)
+
+
+def _line_std(problem: StructureProblem, model: Model, columns: list[Array]) -> dict[str, float]:
+    """Return standard deviations by the sandwich formula with the drawn, correlated noise."""
+    count = len(model.values)
+    bread, meat = np.zeros((count, count)), np.zeros((count, count))
+    scores: list[Array] = []
+    expected = problem.expectation(model)
+    for run, part, (_, sigma, spread) in zip(problem.runs, columns, expected, strict=True):
+        J = part / sigma[:, None]
+        bread += J.T @ J
+        meat += (J * (run.noise / sigma)[:, None] ** 2).T @ J
+        own = (spread / sigma) @ J
+        scores = [a + b for a, b in zip(scores, own, strict=True)] if scores else list(own)
+    found = np.array(scores)
+    inverse = np.linalg.pinv(bread)
+    covariance = inverse @ (meat + found.T @ found / max(len(found), 1)) @ inverse
+    return dict(zip(model.values, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+
+
+def _columns(run: Run, names: list[str]) -> Array:
+    one = {"k": run.x, "c": run.v, "added_mass": run.a, "offset": np.ones_like(run.x)}
+    return np.column_stack([one[name] for name in names])

@@ -1,0 +1,158 @@
+"""A building's hidden effects are named at their site, and what looks alike is named with them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shaken import building, friction, measured, shake
+
+from bristle.diagnose.load_cell import load_cell
+from bristle.diagnose.sites import Finding, look_at
+from bristle.diagnose.structure import diagnose_structure, lookalikes
+from bristle.errors import RecordError
+from bristle.identify.response import responses
+from bristle.identify.structure import problems_of
+
+
+def duffing(x, v):
+    return [1.5e7 * x[0] ** 3, 0.0, 0.0]
+
+
+def rub(x, v):
+    return [0.6 * np.tanh(v[0] / 1e-4), 0.0, 0.0]
+
+
+def stop(x, v):
+    return [6e3 * np.sign(x[0]) * max(abs(x[0]) - 0.003, 0.0), 0.0, 0.0]
+
+
+def soften(x, v):
+    drift = np.diff(x, prepend=0.0)
+    # What the linear spring has too much; from a tanh, not from the library's own form.
+    loss = 1400.0 * (0.003 * np.tanh(drift / 0.003) - drift)
+    loss[0] = 0.0
+    return [loss[0] - loss[1], loss[1] - loss[2], loss[2]]
+
+
+HIDDEN = {"duffing": duffing, "base_friction": rub, "end_stop": stop, "storey_softening": soften}
+
+
+def runs_of(hidden, seed=20, damper=friction, count=3):
+    b = building(2, True, 6)
+    return b, [measured(shake(b, seed + i, damper, hidden), i) for i in range(count)]
+
+
+def findings(hidden):
+    b, runs = runs_of(hidden)
+    found = responses(runs, b)
+    problems = problems_of(found[:2], found[2:], b)
+    return {s: look_at(s, *problems[s]) for s in ("layer", "storey1", "storey2")}, found, b
+
+
+@pytest.mark.parametrize("effect", HIDDEN)
+def test_the_hidden_effect_is_named_at_its_site(effect):
+    found, _, _ = findings(HIDDEN[effect])
+    sites = ("storey1", "storey2") if effect == "storey_softening" else ("layer",)
+    for site, finding in found.items():
+        expected = (effect,) if site in sites else ()
+        assert finding.effects == expected, (site, finding)
+        if site in sites:
+            assert finding.kind == "effect"
+            assert finding.share > 0.9
+            assert finding.z_after < 0.8 * finding.z_before
+        else:
+            assert finding.kind == "none"
+            assert finding.z_before == pytest.approx(1.0, abs=0.06)
+
+
+def test_nothing_is_found_where_nothing_is_hidden():
+    found, _, _ = findings(None)
+    assert [f.kind for f in found.values()] == ["none"] * 3
+    assert all(0.0 < f.detectable < 0.05 for f in found.values())
+
+
+def test_a_force_of_no_effect_is_unknown_and_its_coordinate_named():
+    def ripple(x, v):
+        return [0.4 * np.sin(2.0 * np.pi * x[0] / 0.002), 0.0, 0.0]
+
+    found, _, _ = findings(ripple)
+    assert found["layer"].kind == "unknown"
+    assert found["layer"].coordinate == "displacement"
+
+
+@pytest.mark.parametrize(("what", "value"), [("delay", 0.008), ("force_gain", 1.15)])
+def test_a_load_cell_that_is_late_or_wrong_is_told_from_physics(what, value):
+    b = building(2, True, 6)
+    runs = []
+    for i in range(3):
+        clean = shake(b, 30 + i, friction)
+        if what == "delay":
+            late = round(value / 0.002)
+            clean["force"] = np.concatenate([np.zeros(late), clean["force"][:-late]])
+        else:
+            clean["force"] = clean["force"] * value
+        runs.append(measured(clean, i))
+    found = responses(runs, b)
+    problems = problems_of(found[:2], found[2:], b)
+    layer = look_at("layer", *problems["layer"])
+    told = load_cell(layer, found[:2], found[2:], b, "lugre")
+    assert told is not None
+    finding, (train, _) = told
+    assert finding.effects == (what,)
+    assert float(finding.coordinate.split()[0]) == pytest.approx(value, rel=0.03)
+    assert finding.z_after == pytest.approx(1.0, abs=0.1)
+    scale = 1.0 if what == "delay" else value
+    assert np.std(train[0].force) == pytest.approx(np.std(found[0].force) / scale, rel=0.02)
+
+
+def test_a_real_effect_is_not_blamed_on_the_load_cell():
+    found, all_runs, b = findings(duffing)
+    assert load_cell(found["layer"], all_runs[:2], all_runs[2:], b, "lugre") is None
+
+
+def test_bare_building_diagnosed_from_start_to_end():
+    b, runs = runs_of(duffing, damper=None)
+    said = []
+    found = diagnose_structure(runs[:2], runs[2:], b, say=said.append)
+    assert (found.kind, found.effects) == ("effect", ("duffing",))
+    assert found.sites == {"duffing": "layer"}
+    assert not found.reconstructed
+    assert "duffing (layer)" in found.words
+    assert said[0].startswith("smoothing")
+    answer = found.as_dict()
+    assert answer["ranking"][0]["effect"] == "duffing"
+    assert answer["z_holdout_after"] == pytest.approx(1.0, abs=0.1)
+    assert answer["z_holdout_before"] > 1.5
+
+
+def test_what_a_reconstructed_force_cannot_tell_is_named():
+    assert lookalikes(("gas_spring",)) == ["duffing"]
+    assert lookalikes(("duffing", "gas_spring")) == []
+    assert lookalikes(("fluid_inertia",)) == ["base_mass"]
+    assert lookalikes(("base_friction",)) == ["f_c"]
+    assert lookalikes(("stribeck",)) == []
+
+
+def test_findings_of_sites_become_one_verdict():
+    from bristle.diagnose.structure import combine
+
+    def at(site, kind, *effects):
+        return Finding(site, kind, effects, 3.0, 1.0, 1.0, 0.01, coordinate="velocity")
+
+    both = {"layer": at("layer", "effect", "duffing"), "storey1": at("storey1", "none")}
+    assert combine(both, None, None, {}).effects == ("duffing",)
+    both["storey1"] = at("storey1", "effect", "storey_softening")
+    found = combine(both, None, None, {})
+    assert (found.kind, found.effects) == ("effect", ("duffing", "storey_softening"))
+    both["storey1"] = at("storey1", "unknown")
+    found = combine(both, None, None, {})
+    assert (found.kind, found.coordinate) == ("unknown", "velocity")
+    assert "Besides, duffing is missing (layer)." in found.words
+
+
+def test_missing_channels_are_named():
+    b, runs = runs_of(None, count=1)
+    clean = shake(b, 20, friction, samples=1000)
+    bad = measured(clean, 0, without=("ground_acceleration", "base_displacement", "base_velocity"))
+    with pytest.raises(RecordError, match="ground_acceleration, base_displacement missing"):
+        diagnose_structure([bad], runs, b)

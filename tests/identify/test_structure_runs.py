@@ -1,0 +1,151 @@
+"""A building's response as problems: equilibrium holds, its noise is as stated."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shaken import building, friction, measured, shake
+
+from bristle.errors import RecordError
+from bristle.identify.line import fit_line
+from bristle.identify.model import Model
+from bristle.identify.response import base_equilibrium, jumps, respond, shear
+from bristle.identify.structure import (
+    LinearLayer,
+    damper_run,
+    layer_run,
+    reconstructed,
+    sliding,
+    storey_run,
+    structure_problems,
+    thinned,
+)
+
+
+@pytest.fixture(scope="module")
+def truth():
+    """Return a building, the clean channels of a run and its response, with the force."""
+    b = building(2, True, 1)
+    clean = shake(b, 11, friction, samples=8000)
+    return b, clean, respond(measured(clean, 11), b)
+
+
+def test_smoothed_motion_errs_as_much_as_it_says(truth):
+    b, clean, response = truth
+    for i, level in enumerate(b.levels()):
+        for j, (what, found) in enumerate((("displacement", response.x), ("velocity", response.v))):
+            error = found[i] - clean[f"{level}_{what}"]
+            # White jerk leaves room for jumps; a motion without them is known better than that.
+            assert 0.5 * response.std[i, j] < np.std(error) < 1.2 * response.std[i, j]
+            # The redundancy of three instruments: several times better than the one alone.
+            assert np.std(error) < 0.7 * 0.01 * np.std(clean[f"{level}_{what}"])
+            assert np.std(response.draws[i, :, :, j]) == pytest.approx(response.std[i, j], rel=0.2)
+
+
+def test_a_jump_of_the_acceleration_is_no_noise():
+    smooth = np.sin(np.arange(400) * 0.01)
+    assert not np.any(jumps(smooth + np.random.default_rng(0).normal(size=400), 0.002))
+    stepped = 1e-3 * np.random.default_rng(1).normal(size=400) + (np.arange(400) >= 200)
+    assert np.flatnonzero(jumps(stepped, 0.002)).tolist() == [200]
+
+
+def test_both_equilibria_give_the_force_and_their_noise(truth):
+    b, clean, response = truth
+    carried = clean["force"] + b.stiffnesses[0] * clean["base_displacement"]
+    for found, noise in (shear(response, b, 0), base_equilibrium(response, b)):
+        assert np.std((found - carried)[25:]) == pytest.approx(noise, rel=0.1)
+        assert abs(np.mean((found - carried)[25:])) < 0.05 * noise
+    force, noise = reconstructed(response, b)
+    assert np.std((force - clean["force"])[25:]) == pytest.approx(noise, rel=0.1)
+    assert noise <= min(shear(response, b, 0)[1], base_equilibrium(response, b)[1]) * 1.05
+
+
+def test_shear_of_a_storey_is_its_spring(truth):
+    b, clean, response = truth
+    spring = b.stiffnesses[1] * (clean["floor1_displacement"] - clean["base_displacement"])
+    found, noise = shear(response, b, 1)
+    assert np.std((found - spring)[25:]) == pytest.approx(noise, rel=0.1)
+
+
+def test_lines_fitted_to_layer_and_storeys_are_the_springs(truth):
+    b, _, response = truth
+    runs = {"layer": layer_run(response, b), "storey1": storey_run(response, b, 1)}
+    problems = structure_problems([measured(shake(b, 12, friction), 12)], [], b)
+    assert set(problems) == {"layer", "storey1", "storey2", "damper"}
+    for i, site in enumerate(("layer", "storey1", "storey2")):
+        line = fit_line(problems[site][0], "linear_layer" if i == 0 else "linear_storey")
+        assert abs(line.model.values["k"] - b.stiffnesses[i]) < 4.0 * line.std["k"]
+        assert abs(line.model.values["c"]) < 4.0 * line.std["c"]
+    assert runs["layer"].noise > runs["storey1"].noise  # all masses and the load cell
+
+
+def test_where_the_base_may_be_held_is_left_out(truth):
+    b, _, response = truth
+    moves = sliding(response)
+    assert 0.5 < moves.mean() < 1.0
+    assert np.min(np.abs(response.v[0][moves])) > 3.0 * response.std[0, 1]
+    run = layer_run(response, b)
+    assert len(run.force) == np.sum(moves[25:])
+    assert len(run.whole.force) == len(moves)
+    assert len(damper_run(response, b, "lugre").force) == len(moves)
+    assert len(damper_run(response, b, "bingham").force) == len(run.force)
+
+
+def test_effects_of_the_structure_are_predicted_from_their_source(truth):
+    b, _, _ = truth
+    problems = structure_problems([measured(shake(b, 12, friction), 12)], [], b)
+    problem, _ = problems["layer"]
+    run = problem.runs[0]
+    values = {"k": 900.0, "c": 0.0, "added_mass": 0.0, "offset": 0.1}
+    plain = problem.predict(Model(LinearLayer.name, (), values), run)
+    assert plain == pytest.approx(900.0 * run.x + 0.1)
+    own = {"end_stop.clearance": 0.003, "end_stop.k": 2e3, "end_stop.c": 0.0}
+    stopped = problem.predict(Model(LinearLayer.name, ("end_stop",), {**values, **own}), run)
+    beyond = np.maximum(np.abs(run.x) - 0.003, 0.0)
+    assert stopped - plain == pytest.approx(2e3 * beyond * np.sign(run.x), abs=1e-9)
+    own = {"base_friction.limit": 0.7, "base_friction.x_s": 0.0}
+    rubbed = problem.predict(Model(LinearLayer.name, ("base_friction",), {**values, **own}), run)
+    assert rubbed - plain == pytest.approx(0.7 * np.sign(run.v), abs=1e-9)
+    storey, _ = problems["storey2"]
+    run = storey.runs[0]
+    line = {"k": 1000.0, "c": 0.0, "offset": 0.0}
+    own = {"storey_softening.d_half": 0.002, "storey_softening.shape": 2.0}
+    soft = storey.predict(Model("linear_storey", ("storey_softening",), {**line, **own}), run)
+    assert soft == pytest.approx(1000.0 * run.x / (1.0 + (run.x / 0.002) ** 2), abs=1e-9)
+
+
+def test_an_effect_with_memory_sees_the_samples_that_are_left_out(truth):
+    b, _, _ = truth
+    problem, _ = structure_problems([measured(shake(b, 12, friction), 12)], [], b)["layer"]
+    run = problem.runs[0]
+    values = {"k": 0.0, "base_friction.limit": 1.0, "base_friction.x_s": 2e-3}
+    found = problem.predict(Model(LinearLayer.name, ("base_friction",), values), run)
+    share, expected = 0.0, [0.0]
+    for v in run.whole.v[1:]:
+        side = np.sign(v)
+        share = side + (share - side) * np.exp(-abs(v) * run.dt / 2e-3)
+        expected.append(share)
+    assert found == pytest.approx(np.array(expected)[run.keep], abs=1e-9)
+    few = thinned(problem)
+    again = few.predict(Model(LinearLayer.name, ("base_friction",), values), few.runs[0])
+    assert again == pytest.approx(found[::5])
+
+
+def test_without_a_force_the_layer_is_the_dampers_and_said_so(truth):
+    b, clean, _ = truth
+    clean = {**clean, "voltage": np.full_like(clean["time"], 2.0)}
+    run = measured(clean, 3, without=("force",))
+    problems = structure_problems([run], [run], b)
+    assert set(problems) == {"storey1", "storey2", "damper"}
+    assert problems["damper"][0].reconstructed
+    with pytest.raises(RecordError, match="force was not measured"):
+        layer_run(respond(run, b), b)
+
+
+def test_without_a_damper_the_layer_stands_alone():
+    b = building(1, True, 2)
+    run = measured(shake(b, 2, samples=3000), 2)
+    assert set(structure_problems([run], [], b)) == {"storey1", "layer"}
+    b = building(2, False, 2)
+    run = measured(shake(b, 2, samples=3000), 2)
+    assert set(structure_problems([run], [], b)) == {"storey1", "storey2"}

@@ -1,0 +1,189 @@
+"""Effects of a user's own: they join the library, or are refused with file, line and reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bristle.cli import main
+from bristle.cli._effect_template import template
+from bristle.compiled.own import refused, usable
+from bristle.errors import PhysicsError
+from bristle.fmu import catalogue
+from bristle.physics import damper, user
+from bristle.physics.damper import DamperModel
+from bristle.physics.effect import EFFECTS
+
+
+@pytest.fixture(autouse=True)
+def library(tmp_path: Path) -> Iterator[None]:
+    """Leave the library as it was."""
+    before = set(EFFECTS)
+    yield
+    for file in tmp_path.rglob("*.py"):
+        file.unlink()
+    for folder in [tmp_path, *tmp_path.rglob("*/")]:
+        user.load_effects(folder)
+    assert set(EFFECTS) == before
+
+
+def written(folder: Path, name: str = "seal", **changes: str) -> Path:
+    """Write the template's effect, some of its text replaced (old to new)."""
+    text = template(name)
+    for old, new in changes.items():
+        assert old in text, old
+        text = text.replace(old, new)
+    file = folder / f"{name}.py"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+def test_an_effect_joins_the_library_and_the_law(tmp_path: Path) -> None:
+    written(tmp_path)
+    (loaded,) = user.load_effects(tmp_path)
+    assert loaded.error == ""
+    assert EFFECTS["seal"] is loaded.effect
+    assert user.own_effects() == {"seal": (tmp_path / "seal.py").resolve()}
+    plain = DamperModel("lugre").force(0.0, 0.1, 0.0, 4.0, 0.002, 0.0, 0.0, False)
+    model = DamperModel("lugre", {"seal.f_s": 1.5}, ["seal"])
+    force = model.force(0.0, 0.1, 0.0, 4.0, 0.002, 0.0, 0.0, False)
+    assert force - plain == pytest.approx(1.5, rel=1e-9)
+
+
+def test_an_edited_file_replaces_its_effect_and_a_gone_one_takes_it_away(tmp_path: Path) -> None:
+    file = written(tmp_path)
+    first = user.load_effects(tmp_path)[0].effect
+    assert user.load_effects(tmp_path)[0].effect is first
+    written(tmp_path, **{"Parameter(0.2,": "Parameter(0.7,"})
+    second = user.load_effects(tmp_path)[0].effect
+    assert second is not first
+    assert second is not None
+    assert second.parameters["f_s"].value == 0.7
+    file.unlink()
+    assert user.load_effects(tmp_path) == []
+    assert "seal" not in EFFECTS
+    assert "seal.f_s" not in damper.LAYOUT.parameters
+
+
+def test_of_two_folders_the_one_read_last_stays(tmp_path: Path) -> None:
+    for name, value in (("one", "0.3"), ("two", "0.4")):
+        (tmp_path / name).mkdir()
+        written(tmp_path / name, **{"Parameter(0.2,": f"Parameter({value},"})
+        user.load_effects(tmp_path / name)
+        assert EFFECTS["seal"].parameters["f_s"].value == float(value)
+
+
+def test_stock_components_do_not_know_it_unless_they_are_told(tmp_path: Path) -> None:
+    file = written(tmp_path)
+    user.load_effects(tmp_path)
+    assert "seal.on" not in catalogue.describe("LuGreDamper").variables
+    told = catalogue.describe("LuGreDamper", None, [file]).variables
+    assert told["seal.f_s"].unit == "N"
+
+
+FORCE = "return p.f_s * tanh(q.v / p.v_s)"
+BAD = [
+    ({FORCE: "return p.f_s / q.v"}, "raises ZeroDivisionError", FORCE),
+    ({FORCE: "return p.f_s * tanh(q.v / p.v_s) * float('nan')"}, "returns nan", "def force"),
+    ({FORCE: "return 'strong'"}, "a number is right", "def force"),
+    ({FORCE: "return p.f_s if q.v > 0.0 else -p.v_s"}, "jumps by 0.2", "def force"),
+    ({FORCE: "return round(p.f_s, 1) * tanh(q.v / p.v_s)"}, "jumps by 0.1 with p.f_s", "def force"),
+    ({FORCE: "return tanh(q.v / p.v_s)"}, "p.f_s moves nothing", "@staticmethod"),
+    ({"from math import tanh": "from time import time as tanh"}, "time is imported", "from math"),
+    ({"from math import tanh": "import random"}, "random is imported", "from math"),
+    ({FORCE: "return open('x')"}, "open is not defined", FORCE),
+    ({FORCE: "return p.f_s *"}, "this is no Python", FORCE),
+    ({FORCE: "while True: pass"}, "a loop may not end", FORCE),
+    ({FORCE: "p.f_s = 1.0"}, "changes nothing", FORCE),
+    ({FORCE: "return [1.0][0]"}, "a hook knows numbers and tuples", FORCE),
+    ({FORCE: "return q.v.__class__(1)"}, "__class__ has no place", FORCE),
+    ({FORCE: "return p.f_s * q.x"}, 'add "x" to needs', FORCE),
+    ({FORCE: "return p.f_s * q.colour"}, "q has no colour", FORCE),
+    ({'name = "seal"': 'name = "stribeck"'}, "the name is taken by", "class Seal"),
+    ({'name = "seal"': 'name = "other"'}, 'name = "seal" is right', "class Seal"),
+    ({'site = "damper"': 'site = "roof"'}, "site 'roof'", "class Seal"),
+    ({'"N"': '"Nm2"'}, "Nm2", "class Seal"),
+    ({'"f_s"': '"on"', "p.f_s": "p.on"}, "cannot be named", "class Seal"),
+    ({"class Seal(Effect)": "class Seal"}, "0 effects", ""),
+]
+
+
+@pytest.mark.parametrize(("changes", "says", "at"), BAD, ids=[says for _, says, _ in BAD])
+def test_a_bad_effect_is_left_out_with_file_line_and_reason(
+    changes: dict[str, str], says: str, at: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = written(tmp_path, **changes)
+    before = set(EFFECTS)
+    (loaded,) = user.load_effects(tmp_path)
+    assert loaded.effect is None
+    assert says in loaded.error
+    assert loaded.error.count("\n") == 0
+    line = next(
+        (k for k, row in enumerate(template("seal").splitlines(), 1) if at and at in row), 0
+    )
+    assert loaded.error.startswith(f"{file}, line {line}:" if line else f"{file}")
+    assert set(EFFECTS) == before
+    assert user.why_left_out(file) == loaded.error
+    assert main(["effects", "check", str(file)]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_a_bad_effect_leaves_the_good_ones_in(tmp_path: Path) -> None:
+    written(tmp_path)
+    written(tmp_path, "leaking", **{FORCE: "return p.f_s / q.v"})
+    (tmp_path / "no_text.py").write_bytes(b"\xff\xfe\x00")
+    loaded = {one.name: one for one in user.load_effects(tmp_path)}
+    assert loaded["seal"].effect is EFFECTS["seal"]
+    assert "cannot be read" in loaded["no_text"].error
+    assert "leaking" not in EFFECTS
+
+
+def test_what_numba_refuses_is_left_out_too(tmp_path: Path) -> None:
+    written(tmp_path, **{FORCE: "return float(str(p.f_s)) * tanh(q.v / p.v_s)"})
+    loaded = user.load_effects(tmp_path)
+    assert loaded[0].effect is not None  # Python runs it
+    (checked,) = usable(loaded)
+    assert checked.effect is None
+    assert "force cannot be compiled" in checked.error
+    assert "seal" not in EFFECTS
+
+
+def test_the_template_conforms(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["effects", "new", "lip_seal"]) == 0
+    assert main(["effects", "new", "lip_seal"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert main(["effects", "check", "lip_seal.py"]) == 0
+    said = capsys.readouterr().out
+    assert "lip_seal conforms" in said
+    assert "FAIL" not in said
+    assert refused(EFFECTS["lip_seal"]) is None
+
+
+@pytest.mark.parametrize(
+    ("changes", "falls_short"),
+    [
+        ({FORCE: "return -p.f_s * tanh(q.v / p.v_s)"}, "a closed cycle gives no energy"),
+        ({FORCE: "return p.f_s * (1.0 + tanh(q.v / p.v_s))"}, "no force at rest"),
+        ({"Leaves out": "Lacks"}, "it says what it is"),
+        ({"Parameter(0.2,": "Parameter(1e-6,"}, "changes the force by more than 1 %"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_promise_that_does_not_hold_is_found(
+    changes: dict[str, str], falls_short: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["effects", "check", str(written(tmp_path, **changes))]) == 2
+    rows = [row for row in capsys.readouterr().out.splitlines() if row.startswith("FAIL")]
+    assert len(rows) == 1
+    assert falls_short in rows[0]
+
+
+def test_one_file_is_loaded_by_name_or_refused(tmp_path: Path) -> None:
+    assert user.load_effect(written(tmp_path)).name == "seal"
+    with pytest.raises(PhysicsError, match="there is no such file"):
+        user.load_effect(tmp_path / "gone.py")
