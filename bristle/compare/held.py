@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import LOST
+from ..identify.structure import StructureRun
 from .coordinates import coordinates_of
 
 Array = NDArray[np.float64]
@@ -97,8 +99,12 @@ def held_runs(problem: Problem, model: Model, draws: int = 12) -> list[Held]:
 def halved(run: Run) -> Run:
     """Return a run with a sample between any two: motion by Hermite's cubic, voltage by a line."""
     x, v, a = run.x, run.v, run.a
+    whole: dict[str, Any] = {}
+    if isinstance(run, StructureRun) and run.whole is not None:
+        whole = {"whole": halved(run.whole), "keep": np.arange(2 * len(x) - 1)}
     return replace(
         run,
+        **whole,
         dt=0.5 * run.dt,
         x=between(x, v, run.dt),
         v=between(v, a, run.dt),

@@ -167,7 +167,7 @@ def _tiles(content: Content) -> str:
         ),
         (
             f"{now.total.rms:.2g} {now.unit}",
-            f"RMS error, {percent(now.total.share)} of the {now.quantity}'s RMS",
+            f"RMS error at all frequencies, {percent(now.total.share)} of the {now.quantity}'s RMS",
         ),
     ]
     first = next((one.z for one in content.treads if one.z is not None), None)

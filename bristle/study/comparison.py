@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from ..compare.comparison import Comparison, compare_held
 from ..compare.held import Held, held_runs
 from ..identify.fit import Problem
 from ..identify.prepare import prepare
+from ..identify.response import responses
+from ..identify.structure import StructureProblem, damper_run, sliding
+from ..physics.building import paper_building, read_building
 from ..physics.effect import EFFECTS
 from .errors import StudyError
 from .identification import as_model
@@ -50,7 +54,37 @@ def hold_bench(study: Study, role: str) -> Holder:
     return hold
 
 
-HOLDERS: dict[str, Callable[[Study, str], Holder]] = {"bench": hold_bench}
+def hold_structure(study: Study, role: str) -> Holder:
+    """Return what holds dampers against a building's runs: base motion in, force out.
+
+    A force that was not measured is reconstructed from equilibrium, and carries its noise.
+    """
+    file = study.model().building
+    building = read_building(study.folder / file) if file else paper_building()
+    runs = study.runs()
+    found = responses(runs.all, building)
+    chosen = found[: len(runs.train)] if role == "train" else found[len(runs.train) :]
+    reconstructed = any(one.force is None for one in found)
+    whole = [damper_run(one, building, "lugre") for one in chosen]
+    moving = [replace(run, measured=sliding(one)) for run, one in zip(whole, chosen, strict=True)]
+
+    def hold(model: StudyModel) -> list[Held]:
+        # A base that dry friction holds tells nothing of the force of a law that jumps at v = 0.
+        part = moving if model.base_law == "bingham" else whole
+        held = held_runs(StructureProblem(part, 0, reconstructed), as_model(model))
+        return (
+            [replace(one, quantity="reconstructed force") for one in held]
+            if (reconstructed)
+            else held
+        )
+
+    return hold
+
+
+HOLDERS: dict[str, Callable[[Study, str], Holder]] = {
+    "bench": hold_bench,
+    "structure": hold_structure,
+}
 """What holds models against measured runs, by the rig."""
 
 
