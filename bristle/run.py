@@ -249,7 +249,7 @@ class _Job:
 
         paths, descriptions = {}, {}
         for component in self.scenario.components:
-            path = component.path or ensure(component.fmu, component.building)
+            path = component.path or ensure(component.fmu, component.building, component.controller)
             # A missing binary is explained when the FMU is loaded, with the way out.
             description = read_description(path, any_platform=True)
             paths[component.name], descriptions[component.name] = path, description

@@ -237,7 +237,9 @@ def kind_of(component: Component, scenario: Scenario) -> str:
 
 def configured(component: Component, scenario: Scenario) -> Slave:
     """Return the component's Python object with the scenario's values, its model built."""
-    slave = catalogue.instantiate(component.fmu, component.building, component.name)
+    slave = catalogue.instantiate(
+        component.fmu, component.building, component.name, component.controller
+    )
     for name, value in component.parameters.items():
         if name == "record":
             value = ground_motion_file(str(value), scenario.file.parent)
