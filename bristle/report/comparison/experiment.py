@@ -176,8 +176,8 @@ def measured(frame: pd.DataFrame, motion: Motion, intensity: float, law: str) ->
     """Return the row of a run.
 
     Keys are "motion", "intensity [g]", "law"; of each quantity "peak ...", "rms ..." over the
-    record and "paper window rms ..." over the paper's window; "peak command" before limits, in the command's
-    unit; "between", the share of samples at which the voltage lies between 0 and 8 V.
+    record and "paper window rms ..." over the paper's window; "peak command" before limits, in
+    the command's unit; "between", the share of samples at which the voltage lies between 0 and 8 V.
     """
     row: dict[str, Any] = {"motion": motion.name, "intensity [g]": intensity, "law": law}
     time = frame.index.to_numpy()
