@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -132,7 +132,7 @@ def cases(found: Iterable[Motion]) -> list[tuple[Motion, float, str]]:
 
 
 def compare(
-    found: list[Motion], left_out: str, controllers: dict[str, Path], runs: Runs
+    found: list[Motion], left_out: str, controllers: Callable[[], dict[str, Path]], runs: Runs
 ) -> Comparison:
     """Run every case and measure it.
 
@@ -140,15 +140,17 @@ def compare(
     ----------
     found, left_out
         As `motions` gives them.
-    controllers : dict
-        Controller files of "hinf" and "lpv".
+    controllers : callable
+        () -> controller files of "hinf" and "lpv"; asked when the first is needed, after all runs
+        without one.
     runs : Runs
     """
     import pandas as pd
 
     rows, frames = [], {}
     for motion, intensity, law in cases(found):
-        frame = runs(*scenario(motion, intensity, law, controllers))
+        files = controllers() if law in _DESIGNS else {}
+        frame = runs(*scenario(motion, intensity, law, files))
         rows.append(measured(frame, motion, intensity, law))
         frames[motion.name, intensity, law] = frame
     return Comparison(found, left_out, pd.DataFrame(rows), frames)
