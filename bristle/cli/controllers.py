@@ -1,4 +1,4 @@
-"""Run the paper's comparison of controllers: Tables IV and V, its figures, and a ledger of claims."""
+"""Run the paper's comparison of controllers: Tables IV and V, figures, a ledger of its claims."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ CONTROLLERS = (CLIPPED, HINF, LPV)
 OTHERS = (BINGHAM, LPV_0)
 """Further laws, which single statements are about."""
 
-EL_CENTRO, SYLMAR, NEWHALL = "El Centro", "Northridge, Sylmar", "Northridge, Newhall"
+EL_CENTRO, SYLMAR, NEWHALL = "El Centro", "Northridge (Sylmar)", "Northridge (Newhall)"
 
 QUANTITIES = {
     "base drift": ("structure.base_displacement", "mm", 1e3),

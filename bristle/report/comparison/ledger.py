@@ -148,7 +148,7 @@ def grouped(cases: list[Key]) -> dict[str, list[Key]]:
 
 def _places(cases: list[Key]) -> str:
     return "; ".join(
-        f"{motion} {' and '.join(f'{intensity:g}' for _, intensity in sorted(group))} g"
+        f"{motion} {', '.join(f'{intensity:g}' for _, intensity in sorted(group))} g"
         for motion, group in grouped(cases).items()
     )
 

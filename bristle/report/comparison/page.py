@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections import Counter
 from html import escape
 from pathlib import Path
@@ -124,8 +125,8 @@ def _head(report: Report, count: Counter[str]) -> str:
 (2012), {count[REPRODUCED]} are reproduced, {count[NOT]} are not, and {count[UNDECIDABLE]} cannot be
 decided from what the text tells.</p>
 <div class="bar" role="img" aria-label="verdicts">{bar}</div>
-<nav><a href="#ledger">Ledger</a>{tables}<a href="#figures">Figures</a><a href="#designs">Designs</a>
-</nav>
+<nav><a href="#ledger">Ledger</a>{tables}<a href="#figures">Figures</a>
+<a href="#designs">Designs</a></nav>
 </header>
 """
 
@@ -146,9 +147,9 @@ base and table, and {len(LAWS)} laws for its voltage: {escape(laws)}. Controller
 structure, damper and controller are solved as one system. "LPV" has the anti-windup rate
 λ = 200 1/s.</p>
 <p class="note"><b>What is not the paper's own.</b> Its tables and matrices are lost to this
-project: damper parameters, weights of the designs, and the factor {KAPPA:g} on the nominal peak of every
-ground motion are reconstructed so that its text holds as far as it can. Orders and shapes can be
-compared; values cannot.</p>
+project: damper parameters, weights of the designs, and the factor {KAPPA:g} on the nominal peak of
+every ground motion are reconstructed so that its text holds as far as it can. Orders and shapes can
+be compared; values cannot.</p>
 <table><thead><tr><th>Ground motion</th><th>Nominal peaks</th><th>RMS over the record of</th>
 <th>The paper runs</th></tr></thead><tbody>{rows}</tbody></table>
 {note}
@@ -159,17 +160,17 @@ compared; values cannot.</p>
 def _ledger(judged: list[tuple[Statement, Verdict]]) -> str:
     rows = "".join(
         f"<tr><td>{s.number}</td>"
-        f'<td class="what">{escape(s.text)}<small>Section {escape(s.section)}</small></td>'
+        f'<td class="what">{_said(s.text)}<small>Section {escape(s.section)}</small></td>'
         f'<td><span class="badge {_CLASSES[v.verdict]}">{v.verdict}</span></td>'
-        f"<td>{escape(v.measured)}{_small(v.why)}<small><b>Decided by:</b> {escape(s.rule)}."
+        f"<td>{_said(v.measured)}{_small(v.why)}<small><b>Decided by:</b> {_said(s.rule, False)}."
         "</small></td></tr>\n"
         for s, v in judged
     )
     return f"""<section>
 <h2 id="ledger">The ledger</h2>
-<p>Each statement of the text, in other words, with the number found here. Verdicts are computed from
-the tables below; "peak y" is the peak absolute acceleration of floor 2. Lists run from the weakest
-to the strongest intensity.</p>
+<p>Each statement of the text, in other words, with the number found here. Verdicts are computed
+from the tables below; "peak y" is the peak absolute acceleration of floor 2. Lists run from the
+weakest to the strongest intensity.</p>
 <div class="scroll"><table class="ledger"><thead><tr><th></th><th>Statement</th><th>Verdict</th>
 <th>Found</th></tr></thead><tbody>
 {rows}</tbody></table></div>
@@ -178,7 +179,15 @@ to the strongest intensity.</p>
 
 
 def _small(text: str) -> str:
-    return f"<small>{escape(text)}</small>" if text else ""
+    return f"<small>{_said(text)}</small>" if text else ""
+
+
+def _said(text: str, sentence: bool = True) -> str:
+    """Return a text as HTML: numbers stay with their units, a sentence begins with a capital."""
+    if sentence:
+        text = text[:1].upper() + text[1:]
+    kept = re.sub(r"(?<=\d) (?=[%VNgs]\b|%|m/s|N/m|1/m|cm|Hz)", "\u00a0", text)
+    return escape(kept.replace("H-infinity", "H\u2011infinity"))
 
 
 def _table(title: str, name: str, table: pd.DataFrame) -> str:
@@ -217,8 +226,9 @@ def _table(title: str, name: str, table: pd.DataFrame) -> str:
 def _cell(own: pd.DataFrame, law: str, column: str, form: str, kind: str) -> str:
     value = float(own.loc[law, column])
     absent = law == "no damper" and ("force" in column or "voltage" in column)
-    text = "–" if absent else form.format(value)
-    lowest = law in CONTROLLERS and value == min(float(own.loc[c, column]) for c in CONTROLLERS)
+    text = "-" if absent else form.format(value)
+    others = [form.format(float(own.loc[c, column])) for c in CONTROLLERS if c != law]
+    lowest = law in CONTROLLERS and float(text) < min(map(float, others))
     name = "first" if kind == "peak" else "rms"
     return f'<td class="{name}">{f"<b>{text}</b>" if lowest else text}</td>'
 
@@ -257,9 +267,10 @@ def _designs(report: Report) -> str:
         )
     return f"""<section>
 <h2 id="designs">The designs</h2>
-<p>Made for this report, verified after the solver, and written beside it: <code>hinf.json</code> serves the
-clipped-optimal law and the inverses, <code>lpv.json</code> the LPV law.</p>
-<div class="scroll"><table class="numbers"><thead><tr><th>Design</th><th>γ</th>
+<p>Made for this report, verified after the solver, and written beside it:
+<code>hinf.json</code> serves the clipped-optimal law and the inverses, <code>lpv.json</code> the
+LPV law.</p>
+<div class="scroll"><table class="numbers"><thead><tr><th>Design</th><th>gamma</th>
 <th>closed-loop norm, computed anew</th><th>largest real part of its poles [1/s]</th>
 <th>largest pole of the sampled loop</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>
 </section>
@@ -273,8 +284,8 @@ def _foot(report: Report) -> str:
 <p>bristle {__version__}; <code>{command}</code>; {len(report.comparison.table)} runs of the
 comparison and those behind Figs 5 and 9 in {report.seconds:.0f} s, designs included. Every number
 stands in the CSV files beside this page.</p>
-<p>F. A. Shirazi, J. Mohammadpour, K. M. Grigoriadis, G. Song: Identification and Control of an MR Damper
-With Stiction Effect and its Application in Structural Vibration Mitigation. IEEE Transactions on
-Control Systems Technology 20(5), 2012.</p>
+<p>F. A. Shirazi, J. Mohammadpour, K. M. Grigoriadis, G. Song: Identification and Control of an MR
+Damper With Stiction Effect and its Application in Structural Vibration Mitigation. IEEE
+Transactions on Control Systems Technology 20(5), 2012.</p>
 </footer>
 """

@@ -159,9 +159,8 @@ def northridge(c: Comparison) -> Page | None:
     motion = c.strong[0]
     if motion == EL_CENTRO:
         return None
-    station = motion.split(", ")[1]
     laws = (FOUR, *CONTROLLERS)
-    what = f"Under Northridge ({station}) the peak acceleration of floor 2"
+    what = f"Under {motion} the peak acceleration of floor 2"
     return histories(c, motion, _Y, what, "m/s²", 1.0, laws, "16")
 
 
