@@ -5,15 +5,19 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
 
 from bristle.cli import main
+from bristle.cli.controllers import _answer, _print
 from bristle.errors import RecordError
-from bristle.report.comparison import experiment
+from bristle.report.comparison import experiment, make
 from bristle.report.comparison.experiment import (
     CLIPPED,
     EL_CENTRO,
@@ -31,6 +35,7 @@ from bristle.report.comparison.experiment import (
     scenario,
 )
 from bristle.report.comparison.identification import NOISE, errors, gain
+from bristle.report.comparison.make import Report
 from bristle.report.paper import Runs
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "ground_motion"
@@ -193,12 +198,16 @@ def test_lugre_fits_a_lugre_damper_to_the_noise_and_bingham_does_not() -> None:
 
 
 @pytest.fixture(scope="session")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
+    """Return a whole comparison, and its files."""
+    newhall = AT_NEWHALL if AT_NEWHALL.exists() else None
+    return make.make(tmp_path_factory.mktemp("controllers"), newhall)
+
+
+@pytest.fixture(scope="session")
+def written(report: Report) -> Path:
     """Return the folder of a whole comparison."""
-    folder = tmp_path_factory.mktemp("controllers")
-    arguments = ["--newhall", str(AT_NEWHALL)] if AT_NEWHALL.exists() else []
-    assert main(["controllers", "--out", str(folder), *arguments]) == 0
-    return folder
+    return report.folder
 
 
 def test_everything_is_written(written: Path) -> None:
@@ -237,21 +246,39 @@ def test_tables_hold_every_case_and_law(written: Path) -> None:
         assert len(pd.read_csv(written / "table5.csv", comment="#")) in (12, 24)
 
 
-def test_json_answers_with_tables_and_ledger(
-    written: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:  # fmt: skip
-    from bristle.cli.controllers import _answer
-    from bristle.report.comparison import make
+def test_the_answer_as_json_holds_tables_and_ledger(report: Report) -> None:
+    answer = json.loads(json.dumps(_answer(report), allow_nan=False))
+    assert [row["number"] for row in answer["ledger"]] == list(range(1, 22))
+    assert len(answer["tables"]["table4"]) == 4 * 6
+    assert all(Path(path).is_file() for path in answer["files"])
+
+
+def test_what_is_printed_holds_tables_and_verdicts(
+    report: Report, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _print(report)
+    said = capsys.readouterr().out
+    assert "Table IV: El Centro; peak/RMS" in said
+    assert len(re.findall(r"^ *\d+  (?:not )?(?:reproduced|undecidable)", said, re.M)) == 21
+    assert max(map(len, said.splitlines())) < 400
+
+
+def test_without_northridge_the_rest_is_done_and_the_gap_is_said(
+    report: Report, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    @contextmanager
+    def designed(folder: Path) -> Iterator[Any]:
+        yield lambda: {kind: report.folder / f"{kind}.json" for kind in ("hinf", "lpv")}
 
     only = Motion(EL_CENTRO, "el_centro_1940_ns", (0.2, 0.6), 5.0, 5.0)
     monkeypatch.setattr(make, "motions", lambda newhall: ([only], "the others"))
-    report = make.make(tmp_path)
-    answer = json.loads(json.dumps(_answer(report), allow_nan=False))
-    assert [row["number"] for row in answer["ledger"]] == list(range(1, 22))
-    assert answer["left_out"] == "the others"
-    assert list(answer["tables"]) == ["table4"]
-    assert all(Path(path).is_file() for path in answer["files"])
+    monkeypatch.setattr(make, "designing", designed)
+    monkeypatch.setattr(make.identification, "errors", lambda runs: report.numbers.fits)
+    less = make.make(tmp_path)
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "Left out. the others" in page
     assert "Table V" not in page
+    assert list(less.tables) == ["table4"]
+    verdicts = {statement.number: verdict for statement, verdict in less.ledger}
+    assert verdicts[12].verdict == verdicts[20].verdict == "undecidable"
+    assert not (tmp_path / "fig16-accelerations-northridge.png").exists()

@@ -193,6 +193,7 @@ TURNS = [
     (11, fact("first_mode", 20.0), NOT),
     (12, put(Y, 9.6, LPV, SYLMAR, 0.7), NOT),
     (12, put("peak command", 13.0, LPV_400, SYLMAR, 0.7), NOT),
+    (12, without_northridge, UNDECIDABLE),
     (13, put(Y, 9.5, LPV), NOT),
     (14, put(Y, 10.5, HINF), NOT),
     (15, put(Y, 99.0, LPV, EL_CENTRO, 0.2), NOT),

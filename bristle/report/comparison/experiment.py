@@ -124,7 +124,7 @@ def cases(found: Iterable[Motion]) -> list[tuple[Motion, float, str]]:
     for motion in found:
         for intensity in motion.intensities:
             laws = [*LAWS, *OTHERS]
-            if motion.name != EL_CENTRO and intensity == max(motion.intensities):
+            if intensity == max(motion.intensities):
                 laws.append(LPV_400)
             listed += [(motion, intensity, law) for law in laws]
     # Runs of one kind together: compiled code is loaded once for each.
