@@ -24,6 +24,7 @@ from bristle.report.comparison.experiment import (
     SYLMAR,
     ZERO,
 )
+from bristle.report.comparison.identification import STIFFNESS
 from bristle.report.comparison.ledger import (
     NOT,
     REPRODUCED,
@@ -70,7 +71,7 @@ def made_up() -> dict[str, Any]:
     fits = pd.DataFrame(
         [
             {"specimen": specimen, "law": law, "error [N]": error, "share": error / 2.0}
-            for specimen in ("a_0 = 500 1/m", "a_0 = 2000 1/m")
+            for specimen in STIFFNESS
             for law, error in errors.items()
         ]
     )

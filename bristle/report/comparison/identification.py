@@ -26,7 +26,7 @@ STEP = 0.002
 CUT_OFF = 18.0  # Hz
 NOISE = 0.03
 """Standard deviation of the noise as a share of the force's RMS."""
-STIFFNESS = {"a_0 = 500 1/m": 1.0, "a_0 = 2000 1/m": 4.0}
+STIFFNESS = {"bristle a_0 = 500 1/m": 1.0, "bristle a_0 = 2000 1/m": 4.0}
 """Specimens: the reconstructed bristle, and one so many times stiffer; same steady sliding."""
 RUNS = len(STIFFNESS)
 LAWS = ("Bingham", "Bingham, standard", "LuGre", "LuGre, standard")

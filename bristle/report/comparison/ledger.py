@@ -384,7 +384,7 @@ def lpv_against_hinf(n: Numbers) -> Verdict:
         return n.lower(case, LPV, HINF, PEAK_Y)
 
     return _by_record(
-        n, lambda case: low(case) > 0.0, f"percent below H-infinity, peak y: {_listed(n, low)}"
+        n, lambda case: low(case) > 0.0, f"Percent below H-infinity, peak y: {_listed(n, low)}"
     )
 
 

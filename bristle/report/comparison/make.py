@@ -23,6 +23,7 @@ from .. import optimum, stiction
 from ..paper import Drawing, Runs, prepare
 from ..style import Page, look
 from . import identification
+from . import page as page_of
 from .experiment import Comparison, cases, compare, motions, published_table
 from .facts import facts
 from .ledger import Numbers, Statement, Verdict, ledger
@@ -31,7 +32,6 @@ from .pictures import FIGURES
 if TYPE_CHECKING:
     import pandas as pd
 
-DPI = 160
 KINDS = ("hinf", "lpv")
 REPORT = "report.html"
 _PACKAGE = Path(__file__).resolve().parents[2]
@@ -102,9 +102,7 @@ def make(folder: Path, newhall: Path | None = None, progress: bool = False) -> R
         comparison, numbers, judged, tables, figures, folder, [folder / REPORT, *files],
         time.perf_counter() - began,
     )  # fmt: skip
-    from .page import page
-
-    _write(folder / REPORT, page(report))
+    _write(folder / REPORT, page_of.page(report))
     return report
 
 
@@ -147,7 +145,7 @@ def _draw(comparison: Comparison, peaks: Drawing, best: Drawing, folder: Path) -
     drawn = {}
     for name, (number, page) in pages.items():
         if page is not None:
-            page.save(folder / f"{name}.png", dpi=DPI)
+            page.save(folder / f"{name}.png", dpi=page_of.DOTS)
             drawn[name] = number
     return drawn
 

@@ -35,6 +35,9 @@ _SHOWN = (
     ("damper force", "N", "{:.2f}", "{:.2f}"),
     ("voltage", "V", "{:.1f}", "{:.2f}"),
 )
+DOTS = 160
+"""Dots per inch of the images."""
+
 _CLASSES = {REPRODUCED: "yes", NOT: "no", UNDECIDABLE: "open"}
 _TITLES = {"table4": "Table IV: El Centro", "table5": "Table V: Northridge"}
 
@@ -235,7 +238,8 @@ def _cell(own: pd.DataFrame, law: str, column: str, form: str, kind: str) -> str
 
 def _figures(report: Report) -> str:
     figures = "".join(
-        f'<figure><img alt="{escape(number or "Summary")}" src="{_embedded(report, name)}">'
+        f'<figure><img alt="{escape(number or "Summary")}" style="max-width:{_width(report, name)}px" '
+        f'src="{_embedded(report, name)}">'
         f"<figcaption><b>{escape(number or 'Summary')}.</b> {escape(CAPTIONS[name])}</figcaption>"
         "</figure>\n"
         for name, number in sorted(report.figures.items(), key=lambda item: item[0] != "summary")
@@ -246,6 +250,12 @@ def _figures(report: Report) -> str:
 arrangement is this project's.</p>
 {figures}</section>
 """
+
+
+def _width(report: Report, name: str) -> int:
+    """Return the width of an image on the page [px]: letters have one size in all of them."""
+    pixels = int.from_bytes(Path(report.folder, f"{name}.png").read_bytes()[16:20], "big")
+    return round(pixels / DOTS * 104)
 
 
 def _embedded(report: Report, name: str) -> str:

@@ -262,7 +262,7 @@ def _mark(axes: Axes, values: pd.Series[Any], unit: str) -> None:
     axes.plot(at, value, "o", color=VERMILION, markersize=4, zorder=4)
     low, high = axes.get_xlim()
     left = at > low + 0.6 * (high - low)
-    label(axes, f"{abs(value):.3g} {unit}", at, value, VERMILION, fontsize=8,
+    label(axes, f"{abs(value):#.3g} {unit}", at, value, VERMILION, fontsize=8,
           xytext=(-5 if left else 5, 0), ha="right" if left else "left", va="center")  # fmt: skip
 
 
