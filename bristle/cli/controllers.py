@@ -92,8 +92,9 @@ def _print_table(title: str, table: pd.DataFrame) -> None:
     """Print a table, peak/RMS of each quantity."""
     print(f"{title}; peak/RMS, over the record as published")
     head = "".join(f"{name:>29}" for name, _ in _COLUMNS)
-    for (motion, g), group in table.groupby(["motion", "intensity [g]"], sort=False):
-        print(f"{f'{motion} {float(g):g} g':23}{head}")
+    groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
+    for (motion, g), group in groups:
+        print(f"{f'{motion} {g:g} g':23}{head}")
         for _, row in group.iterrows():
             cells = "".join(
                 f"{form.format(row[f'peak {name}'], row[f'rms {name}']):>29}"

@@ -270,7 +270,7 @@ def test_without_northridge_the_rest_is_done_and_the_gap_is_said(
     def designed(folder: Path) -> Iterator[Any]:
         yield lambda: {kind: report.folder / f"{kind}.json" for kind in ("hinf", "lpv")}
 
-    only = Motion(EL_CENTRO, "el_centro_1940_ns", (0.2, 0.6), 5.0, 5.0)
+    only = Motion(EL_CENTRO, "el_centro_1940_ns", (0.2, 0.6), 31.18, 35.0)
     monkeypatch.setattr(make, "motions", lambda newhall: ([only], "the others"))
     monkeypatch.setattr(make, "designing", designed)
     monkeypatch.setattr(make.identification, "errors", lambda runs: report.numbers.fits)

@@ -42,7 +42,7 @@ QUANTITIES = {
 }
 """What is tabled: the column of a run, the unit it is shown in, the factor to that unit."""
 
-_PLANTS = {
+_PLANTS: dict[str, tuple[str, dict[str, object]]] = {
     NONE: ("no_damper", {}),
     ZERO: ("el_centro_0p6g_constant_voltage", {"voltage.level": 0.0}),
     FOUR: ("el_centro_0p6g_constant_voltage", {"voltage.level": 4.0}),
@@ -198,7 +198,7 @@ def measured(frame: pd.DataFrame, motion: Motion, intensity: float, law: str) ->
 
 def _values(frame: pd.DataFrame, column: str, quantity: str) -> np.ndarray[Any, Any]:
     if quantity == "voltage":
-        column = next((name for name in frame if str(name).endswith(".voltage")), "")
+        column = next((str(name) for name in frame if str(name).endswith(".voltage")), "")
     if column not in frame:  # no damper: no force, no voltage
         return np.zeros(len(frame))
     values: np.ndarray[Any, Any] = frame[column].to_numpy()

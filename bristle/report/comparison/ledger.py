@@ -77,7 +77,7 @@ class Numbers:
 
     def value(self, case: Key, law: str, quantity: str) -> float:
         """Return one number of the table."""
-        index: pd.DataFrame = self.__dict__["_index"]
+        index: Any = self.__dict__["_index"]
         return float(index.loc[(*case, law), quantity])
 
     def lower(self, case: Key, law: str, other: str, quantity: str) -> float:
@@ -210,7 +210,7 @@ def jump(n: Numbers) -> Verdict:
 
 
 def stiction(n: Numbers) -> Verdict:
-    lugre = n.peaks[n.peaks["law"] == "LuGre"].groupby("voltage [V]")
+    lugre: Any = n.peaks[n.peaks["law"] == "LuGre"].groupby("voltage [V]")
     over = {
         float(V): (float(part["height [m/s2]"].median()), float(part["crest [m/s2]"].iloc[0]))
         for V, part in lugre

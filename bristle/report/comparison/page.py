@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ... import __version__
 from .experiment import CONTROLLERS, KAPPA, LAWS
@@ -201,10 +201,11 @@ def _table(title: str, name: str, table: pd.DataFrame) -> str:
     )
     unders = "<th>peak</th><th>RMS</th>" * len(_SHOWN)
     body = []
-    for (motion, g), group in table.groupby(["motion", "intensity [g]"], sort=False):
+    groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
+    for (motion, g), group in groups:
         body.append(
-            f'<tr class="group"><td colspan="{1 + 2 * len(_SHOWN)}">{escape(str(motion))}, nominal '
-            f"{float(g):g} g</td></tr>"
+            f'<tr class="group"><td colspan="{1 + 2 * len(_SHOWN)}">{escape(motion)}, nominal '
+            f"{g:g} g</td></tr>"
         )
         own = group.set_index("law")
         for law in own.index:
@@ -226,7 +227,7 @@ def _table(title: str, name: str, table: pd.DataFrame) -> str:
 """
 
 
-def _cell(own: pd.DataFrame, law: str, column: str, form: str, kind: str) -> str:
+def _cell(own: Any, law: str, column: str, form: str, kind: str) -> str:
     value = float(own.loc[law, column])
     absent = law == "no damper" and ("force" in column or "voltage" in column)
     text = "-" if absent else form.format(value)
@@ -238,8 +239,8 @@ def _cell(own: pd.DataFrame, law: str, column: str, form: str, kind: str) -> str
 
 def _figures(report: Report) -> str:
     figures = "".join(
-        f'<figure><img alt="{escape(number or "Summary")}" style="max-width:{_width(report, name)}px" '
-        f'src="{_embedded(report, name)}">'
+        f'<figure style="max-width:{_width(report, name)}px">'
+        f'<img alt="{escape(number or "Summary")}" src="{_embedded(report, name)}">'
         f"<figcaption><b>{escape(number or 'Summary')}.</b> {escape(CAPTIONS[name])}</figcaption>"
         "</figure>\n"
         for name, number in sorted(report.figures.items(), key=lambda item: item[0] != "summary")

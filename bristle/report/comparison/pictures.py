@@ -166,7 +166,7 @@ def northridge(c: Comparison) -> Page | None:
 
 def summary(c: Comparison) -> Page:
     """Fig. 17: peak and RMS of floor 2 of every law, as shares of those at 0 V."""
-    table = c.table.set_index(["motion", "intensity [g]", "law"])
+    table: Any = c.table.set_index(["motion", "intensity [g]", "law"])
     cases = [(m.name, g) for m in c.motions for g in m.intensities]
     laws = (FOUR, *CONTROLLERS)
     lowest = [min(CONTROLLERS, key=lambda law, k=k: table.loc[(*k, law), _PEAK_Y]) for k in cases]  # type: ignore[misc]
@@ -257,8 +257,8 @@ def voltages(c: Comparison) -> Page:
 
 def _mark(axes: Axes, values: pd.Series[Any], unit: str) -> None:
     """Mark the largest absolute value of a history."""
-    at = values.abs().idxmax()
-    value = float(values[at])
+    place = int(np.argmax(np.abs(values.to_numpy())))
+    at, value = float(values.index.to_numpy()[place]), float(values.to_numpy()[place])
     axes.plot(at, value, "o", color=VERMILION, markersize=4, zorder=4)
     low, high = axes.get_xlim()
     left = at > low + 0.6 * (high - low)
