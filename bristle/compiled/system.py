@@ -164,7 +164,8 @@ class System:
         records["halts"] = records["on_structure"] >= 0
         sticking = records["on_structure"][records["law"] == BINGHAM]
         for record in records:
-            record["sharing"] = max(1, np.count_nonzero(sticking == record["on_structure"]))
+            together = int(np.count_nonzero(sticking == record["on_structure"]))
+            record["sharing"] = max(1, together)
         return records
 
     def _pushed_by(self, damper: str) -> int:
