@@ -80,14 +80,13 @@ def main(arguments: argparse.Namespace) -> int:
         if fmu_only:
             wrong = f"{fmu_only[0].replace('values', 'set').replace('maps', 'map')} needs --fmu"
         raise StudyError(
-            f"{wrong}: bristle compare FOLDER, or bristle compare --fmu "
-            "FILE.fmu --data run.csv"
+            f"{wrong}: bristle compare FOLDER, or bristle compare --fmu FILE.fmu --data run.csv"
         )
     return _of_study(arguments)
 
 
 def _of_study(arguments: argparse.Namespace) -> int:
-    from ..report.comparison import draw_comparison
+    from ..report.residuals import draw_comparison
     from ..report.style import png
     from ..study.comparison import compare_study
     from ..study.study import Study
@@ -115,7 +114,7 @@ def _of_study(arguments: argparse.Namespace) -> int:
 
 def _of_fmu(arguments: argparse.Namespace) -> int:
     from ..compare.fmu import compare_fmu
-    from ..report.comparison import draw_comparison
+    from ..report.residuals import draw_comparison
     from ..study.new import parse_channel
 
     found: FmuComparison = compare_fmu(

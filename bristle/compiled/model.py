@@ -14,6 +14,7 @@ from ..cosim.scenario import Scenario
 from ..errors import RunError
 from ..physics import damper, structure
 from . import march
+from .clocks import are_whole
 from .jit import compiled
 from .system import System
 
@@ -21,6 +22,9 @@ LONGEST_SUBSTEP = 2e-4
 """Longest substep [s]; half-sine peaks are then within 0.001 % of a tight integration."""
 
 Array = NDArray[Any]
+
+_serve = march.serve
+_has_clocks = False
 
 
 class StoppedError(RunError):
@@ -53,13 +57,14 @@ def simulate(scenario: Scenario) -> dict[str, Array]:
         component and the time, `columns` holds the rows before.
     """
     system = System(scenario)
-    rows, substeps = scenario.steps, max(1, ceil(scenario.step / LONGEST_SUBSTEP - 1e-9))
+    rows, substeps = scenario.steps, _substeps(scenario.step, system.periods())
     h = scenario.step / substeps
     table = np.zeros((rows + 1, len(system.outputs)))
     slots = np.array(list(system.outputs.values()), dtype=np.int64)
-    filled, unsettled, _ = compiled_march()(
-        rows, substeps, h, *system.arrays(h), system.start_values(), slots, table
-    )
+    filled, unsettled, _ = compiled_march(bool(system.names["sampled"]))(
+        rows, substeps, h, *system.arrays(h), *system.sampled(h, rows * substeps),
+        system.start_values(), slots, table,
+    )  # fmt: skip
     what = ""
     if unsettled >= 0:
         name = system.names["damper"][unsettled]
@@ -87,14 +92,29 @@ def _columns(system: System, table: Array, step: float) -> dict[str, Array]:
     return columns
 
 
-def compiled_march() -> Callable[..., tuple[int, int, int]]:
-    """Return the compiled time march; the first call on a machine takes seconds."""
-    return _compiled(damper.evaluate, structure.effect_forces)
+def _substeps(step: float, periods: list[float]) -> int:
+    """Return into how many substeps a step is cut: at best so that instants fall on their ends."""
+    least = max(1, ceil(step / LONGEST_SUBSTEP - 1e-9))
+    return next((n for n in range(least, 4 * least) if are_whole(periods, step / n)), least)
+
+
+def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int]]:
+    """Return the compiled time march, with sampled components or without.
+
+    The first call on a machine takes seconds, more of them with sampled components. A process that
+    has the march with them uses it for everything: it gives the same numbers.
+    """
+    global _has_clocks
+    _has_clocks = _has_clocks or clocked
+    return _compiled(damper.evaluate, structure.effect_forces, _has_clocks)
 
 
 @cache
-def _compiled(evaluate: Any, effect_forces: Any) -> Callable[..., tuple[int, int, int]]:
+def _compiled(
+    evaluate: Any, effect_forces: Any, clocked: bool
+) -> Callable[..., tuple[int, int, int]]:
     """Compile the march with these woven functions: there are new ones after a new effect."""
     march.damper_evaluate = evaluate
+    march.serve = _serve if clocked else march.idle
     function: Callable[..., tuple[int, int, int]] = compiled(march.march, march.INLINE)
     return function

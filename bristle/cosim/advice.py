@@ -49,6 +49,16 @@ class Network:
                     return structure
         return None
 
+    def measured_by(self, controller: Part) -> Part | None:
+        """Return the structure whose floor acceleration a controller gets, through sensors too."""
+        part: Part | None = controller
+        for _ in self.order:
+            found = self.source(part, "floor_acceleration") if part else None
+            part = found[0] if found else None
+            if part and part.variables.keys() >= _STRUCTURE_PORTS:
+                return part
+        return None
+
 
 def advise(
     run: Run, parts: Mapping[str, Part], wires: Sequence[Wire], library: Library, findings: Findings
@@ -58,6 +68,7 @@ def advise(
     _instances(network, findings)
     _order(run, network, findings)
     _loops(network, findings)
+    _designs(network, library, findings)
     for damper in network.with_ports(_DAMPER_PORTS):
         _holding(damper, network, findings)
         _voltage(damper, network, findings)
@@ -117,6 +128,19 @@ def _loops(network: Network, findings: Findings) -> None:
             f"algebraic loop {words}: each follows the next without delay. Nothing iterates; the "
             "loop is closed with values one step old.",
         )
+
+
+def _designs(network: Network, library: Library, findings: Findings) -> None:
+    """A designed controller belongs to one building: that whose floor it measures."""
+    for part in network.parts.values():
+        structure = network.measured_by(part)
+        if part.file or structure is None or structure.fmu != "Structure":
+            continue
+        try:
+            library.check_controller(part.fmu, part.controller, structure.building)
+        except BristleError as error:
+            path = (*part.path, "controller") if part.controller else part.path
+            findings.error(path, f"[components.{part.name}]: {error}")
 
 
 def _cycle(follows: Mapping[tuple[str, str], list[tuple[str, str]]]) -> list[tuple[str, str]]:

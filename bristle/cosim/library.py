@@ -18,11 +18,15 @@ class Library:
     names
         () -> names of the built-in components.
     describe
-        (name, building file or None, files of effects) -> Description of a built-in component.
+        (name, building file or None, controller file or None, files of effects if any) ->
+        Description of a built-in component; raises BristleError where a file is wrong.
     describe_file
         (path) -> Description of an FMU file; raises FmuError.
     read_record
         (record, folder) -> the ground motion; raises RecordError.
+    check_controller
+        (name, controller file or None, building file or None); raises BristleError where the
+        component carries a design for another building.
     driven_mass
         (building file or None) -> mass [kg] that a damper's force acts on; raises PhysicsError.
     """
@@ -32,6 +36,7 @@ class Library:
     describe_file: Callable[[Path], Description]
     read_record: Callable[[str, Path], object]
     driven_mass: Callable[[Path | None], float]
+    check_controller: Callable[[str, Path | None, Path | None], None]
 
 
 def installed() -> Library:
@@ -46,6 +51,7 @@ def installed() -> Library:
         describe_file=read_description,
         read_record=read_ground_motion,
         driven_mass=driven_mass,
+        check_controller=catalogue.check_controller,
     )
 
 

@@ -31,6 +31,7 @@ class Part:
     file: Path | None = None
     building: Path | None = None
     effects: tuple[Path, ...] = ()
+    controller: Path | None = None
     step: float | None = None
     description: Description | None = None
     parameters: dict[str, Value] = field(default_factory=dict)

@@ -46,7 +46,8 @@ class Component:
     """One FMU of a scenario.
 
     `path` is the file of a foreign FMU, None for a built-in; `building` the data file that a
-    Structure is made from, None for the default; `effects` the files of a user's own effects that a
+    Structure is made from, None for the default; `controller` the controller file of a designed
+    controller, None for the one that it carries; `effects` the files of a user's own effects that a
     built-in one carries besides the library's; `parameters` the values that the scenario sets,
     inputs that are held constant included; `step` its own step [s], None for the run's.
     """
@@ -59,6 +60,7 @@ class Component:
     step: float | None
     description: Description
     effects: tuple[Path, ...] = ()
+    controller: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -184,6 +186,7 @@ def _read(
             part.step,
             description,
             part.effects,
+            part.controller,
         )
         for part in parts.values()
         if (description := part.description) is not None

@@ -28,7 +28,7 @@ def build_schema(library: Library | None = None) -> dict[str, Any]:
     """Return the JSON schema (draft 7) of a scenario file."""
     library = library or installed()
     names = list(library.names())
-    definitions = {name: _parameters(library.describe(name, None)) for name in names}
+    definitions = {name: _parameters(library.describe(name, None, None)) for name in names}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "bristle scenario",
@@ -99,6 +99,10 @@ def _component(names: list[str]) -> dict[str, Any]:
             "effects": {
                 "description": "files with effects of your own, for a built-in damper or Structure",
                 "anyOf": [{"type": "string"}, {"type": "array", "items": {"type": "string"}}],
+            },
+            "controller": {
+                "type": "string",
+                "description": "controller file of bristle design, for a designed controller",
             },
             "step": {**_TIME, "description": "the run's step divided by a whole number [s]"},
             "parameters": {"type": "object"},

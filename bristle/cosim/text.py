@@ -52,6 +52,8 @@ def _component(component: Component, folder: Path) -> list[str]:
     if component.effects:
         files = ", ".join(_value(file.absolute().as_posix()) for file in component.effects)
         lines.append(f"effects = [{files}]")
+    if component.controller is not None:
+        lines.append(f"controller = {_value(component.controller.absolute().as_posix())}")
     if component.step is not None:
         lines.append(f"step = {_value(component.step)}")
     if component.parameters:

@@ -17,7 +17,7 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
@@ -27,7 +27,7 @@ from uuid import UUID, uuid5
 from ..errors import BuildError
 from ..resources import fmus_folder
 from . import catalogue
-from .slave import BAKED, Slave
+from .slave import BAKED
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _BUNDLED = (
@@ -146,36 +146,20 @@ def plan(
             found = stem
         baked["record"] = found
     if controller is not None:
-        files[_design_file(component, kind, controller)] = controller
+        files[catalogue.design_file(component, kind, controller)] = controller
     effects = tuple(effects)
     if effects:
-        catalogue.describe(component, building, effects)  # refuses what is wrong with them
+        catalogue.describe(component, building, effects=effects)  # refuses what is wrong with them
     if starts:
         baked["starts"] = _checked_starts(component, building, effects, starts)
     return Plan(chosen, path, baked, files, effects)
-
-
-def _design_file(component: str, kind: type[Slave], controller: Path) -> str:
-    """Return under which name a component takes a controller file; refuse one that is not right."""
-    from ..control.controller import read_controller
-
-    wanted = getattr(kind, "design", "")
-    if not wanted:
-        raise BuildError(f"a controller file goes into a designed controller, not {component}.")
-    found = read_controller(controller).kind
-    if found != wanted:
-        raise BuildError(
-            f"{controller}: a controller of the kind {found!r}; {component} takes {wanted!r}: "
-            f"design it with kind = {wanted!r}."
-        )
-    return f"{wanted}.json"
 
 
 def _checked_starts(
     component: str, building: Path | None, effects: tuple[Path, ...], starts: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return start values in the types of their variables; BuildError for what cannot be."""
-    known = catalogue.describe(component, building, effects).variables
+    known = catalogue.describe(component, building, effects=effects).variables
     kinds = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,), "String": (str,)}
     checked: dict[str, Any] = {}
     for key, value in starts.items():
@@ -345,19 +329,33 @@ def _pack(loose: Path, target: Path) -> None:
         raise
 
 
-def ensure(component: str, building: Path | None = None, effects: Iterable[Path] = ()) -> Path:
-    """Return a built-in component's FMU, built on first use and reused while its digest holds."""
+def ensure(
+    component: str,
+    building: Path | None = None,
+    controller: Path | None = None,
+    effects: Iterable[Path] = (),
+) -> Path:
+    """Return a built-in component's FMU, built on first use and reused while its digest holds.
+
+    One that is made from a building, a controller file or effects is named by their content.
+    """
     effects = tuple(effects)
-    if building is None and not effects:
+    if building is None and controller is None and not effects:
         return build(plan(component), fmus_folder())
     named = hashlib.sha256()
     if building is not None:
-        data = catalogue.read_building_data(building)
-        named.update(json.dumps(data, sort_keys=True).encode())
+        named.update(json.dumps(catalogue.read_building_data(building), sort_keys=True).encode())
+    what = plan(component, building=building, controller=controller, effects=effects)
+    if controller is not None:
+        named.update(controller.read_bytes())
     for path in effects:
         named.update(path.name.encode() + path.read_bytes())
-    name = f"{component}_{named.hexdigest()[:8]}"
-    return build(plan(component, name=name, building=building, effects=effects), fmus_folder())
+    return build(replace(what, **_named(what, named.hexdigest()[:8])), fmus_folder())
+
+
+def _named(what: Plan, ending: str) -> dict[str, Any]:
+    name = f"{what.name}_{ending}"
+    return {"name": name, "baked": {**what.baked, "name": name}}
 
 
 def build_all(folder: Path, only: Iterable[str] = ()) -> list[Path]:

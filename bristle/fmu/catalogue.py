@@ -91,6 +91,7 @@ def instantiate(
     name: str,
     building: Path | None = None,
     instance: str = "",
+    controller: Path | None = None,
     effects: Iterable[Path] = (),
 ) -> Slave:
     """Return a component as a Python object, as an FMU's binary would make it."""
@@ -101,6 +102,8 @@ def instantiate(
     own = [load_effect(path) for path in effects]
     if own:
         baked["own"] = [effect.name for effect in own]
+    if controller:
+        baked["files"] = {design_file(name, kind, controller): str(controller)}
     files: tuple[str, ...] = getattr(kind, "files", ())
     resources = str((_PACKAGE / files[0]).parent) if files else None
     return kind(baked=baked, instance_name=instance or name, resources=resources)
@@ -115,7 +118,57 @@ def read_building_data(path: Path) -> dict[str, Any]:
         return tomllib.load(file)
 
 
-def describe(name: str, building: Path | None = None, effects: Iterable[Path] = ()) -> Description:
+def design_file(component: str, kind: type[Slave], controller: Path) -> str:
+    """Return under which name a component takes a controller file.
+
+    Raises
+    ------
+    BuildError, DesignError
+        If it takes none, or none of this kind; if the file is no controller.
+    """
+    from ..control.controller import read_controller
+
+    wanted = getattr(kind, "design", "")
+    if not wanted:
+        raise BuildError(f"a controller file goes into a designed controller, not {component}.")
+    found = read_controller(controller).kind
+    if found != wanted:
+        raise BuildError(
+            f"{controller}: a controller of the kind {found!r}; {component} takes {wanted!r}: "
+            f"design it with kind = {wanted!r}."
+        )
+    return f"{wanted}.json"
+
+
+def check_controller(
+    component: str, controller: Path | None = None, building: Path | None = None
+) -> None:
+    """Refuse a controller, by default the component's own, on a building it is not designed for.
+
+    A component without a design suits any building.
+
+    Raises
+    ------
+    DesignError, PhysicsError
+        Naming both; if the building is wrong.
+    """
+    from ..control.controller import read_controller
+    from ..physics.building import paper_building, read_building
+
+    kind = component_class(source(component))
+    if getattr(kind, "design", ""):
+        file = controller or _PACKAGE / kind.files[0]
+        where = str(controller) if controller else f"the design that {component} carries"
+        on = read_building(building) if building else paper_building()
+        read_controller(file).check_building(on, where)
+
+
+def describe(
+    name: str,
+    building: Path | None = None,
+    controller: Path | None = None,
+    effects: Iterable[Path] = (),
+) -> Description:
     """Return the ports and parameters of a built-in component; no FMU is needed for it.
 
     Parameters
@@ -124,16 +177,18 @@ def describe(name: str, building: Path | None = None, effects: Iterable[Path] = 
         A name of `component_names()`.
     building : path, optional
         The building file of a Structure.
+    controller : path, optional
+        The controller file of a designed controller.
     effects : iterable of path, optional
         Files with effects of a user's own that the component carries too.
 
     Raises
     ------
-    BuildError, PhysicsError
-        If there is no such component; if the building or an effect is wrong.
+    BuildError, DesignError, PhysicsError
+        If there is no such component; if the controller, the building or an effect is wrong.
     """
     effects = tuple(effects)
-    slave = instantiate(name, building, effects=effects)
+    slave = instantiate(name, building, controller=controller, effects=effects)
     if effects and not isinstance(slave, EffectSlave):
         raise BuildError(f"{name} takes no effects; a damper or a Structure does.")
     variables = {}

@@ -545,8 +545,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
 
     def resource(self, name: str) -> Path:
-        """Return the path of a file that was bundled with the component."""
-        return Path(self.resources or ".") / name
+        """Return the path of a file that was bundled with the component, or stands for one."""
+        given = self.baked.get("files", {}).get(name)
+        return Path(given or Path(self.resources or ".") / name)
 
 
 class EffectSlave(Slave):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from .. import __version__
 from ..errors import BristleError
 from . import html
-from .comparison import headline
+from .residuals import headline
 from .staircase import Tread, treads
 from .study_tables import data_table, data_words, parameter_table, ranking_table, run_errors
 from .study_verdict import badge, noise_floor, rivals, separating, untestable, words

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .comparison import telling_places
 from .panels import draw_loop, draw_map, draw_place, draw_regimes, draw_spectrum, residual_map
+from .residuals import telling_places
 from .style import BLUE, GREEN, GREY, INK, MINUS, PALE, VERMILION, Page, label, look, short_z
 
 if TYPE_CHECKING:
