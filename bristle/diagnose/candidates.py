@@ -46,6 +46,9 @@ THIN = 6
 FALL = {"bingham": ("c_0", "c_v"), "lugre": ("sigma_2", "sigma_b")}
 """The parts of the laws that fall with speed: a fit without an effect of speed inflates them."""
 
+WORTH = 0.005
+"""Share of the loss that a candidate must gain at least to be refined."""
+
 PROMISING = 0.5
 """Share of the best gain on the training runs below which a candidate is not refined."""
 
@@ -197,13 +200,12 @@ def begin(effect: str, base: Model, train: Problem, expected: Expected, deep: bo
         model, ended = Search(problem, model, expected_there, model.free()).run(QUICK)
         found.append(Begun(model, ended.cost))
     found.sort(key=lambda one: one.cost)
+    dear = not deep or bool(EFFECTS[effect].joint)
     longer = []
-    for one in found[: KEPT if deep else 0] or found[:1]:
-        model, ended = Search(problem, one.model, expected_there, one.model.free()).run(
-            LONG if deep else QUICK
-        )
-        longer.append(Begun(model, ended.cost))
-    best = min(longer, key=lambda one: one.cost).model
+    for one in found[: 1 if dear else KEPT]:
+        search = Search(problem, one.model, expected_there, one.model.free())
+        longer.append(search.run(QUICK if dear else LONG))
+    best = min(longer, key=lambda pair: pair[1].cost)[0]
     return Begun(best, float(np.mean(loss(residuals(train, best, expected)))))
 
 
@@ -285,7 +287,8 @@ def try_all(
     with ThreadPoolExecutor(cpu_count()) as pool:
         begun = list(pool.map(lambda name: begin(name, base, train, expected, deep), names))
         most = max(before - one.cost for one in begun)
-        worth = [before - one.cost >= PROMISING * most for one in begun]
+        least = max(PROMISING * most, WORTH * before)
+        worth = [before - one.cost >= least for one in begun]
 
         def finish(pair: tuple[Begun, bool]) -> Trial:
             one, fine = pair

@@ -26,6 +26,9 @@ SHARE = 0.75
 """Share of the excess that an effect must explain where its model is not adequate: its form may
 differ from ours, and then the name is right and a residual remains."""
 
+FIRST = 0.2
+"""Share of the excess that the first effect of a pair must explain by itself."""
+
 PAIR_LEFT = 0.5
 """What a second effect may leave, as a share of the excess that the first one leaves."""
 
@@ -140,7 +143,7 @@ def _pair(
     alone = {_new(trial, before)[0]: trial for trial in ranked}
     grown: list[Trial] = []
     for first in ranked[: 1 if single else 2]:
-        if missing(before, first):
+        if missing(before, first) and excess(first) <= (1.0 - FIRST) * excess(before):
             grown += grow(first)
     if not grown:
         return None

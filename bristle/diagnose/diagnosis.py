@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from scipy.signal import welch
 
 from ..compare.coordinates import coordinates_of
 from ..compare.where import Place, places
@@ -23,6 +24,12 @@ Progress = Callable[[str], None]
 
 STRONG = 0.12
 """Share of a residual's power along a coordinate (a correlation of 0.35) that is no accident."""
+
+CLEAR = 0.3
+"""Share of a residual's power along a coordinate that needs no second look."""
+
+RINGS = 0.4
+"""Share of a residual's power within a third of an octave that is a resonance."""
 
 FLIPS = 499
 """Random patterns of signs that say what chance would organise."""
@@ -197,7 +204,7 @@ def _judged(
     say("intervals")
     fitted = fit(problem, decision.best.model, max_evaluations=4)
     told = {name: s for name, s in fitted.std.items() if name not in fitted.unidentified}
-    coordinate = rest[0].coordinate if kind == "unknown" and rest else ""
+    coordinate = _coordinate(rest, before, held_out) if kind == "unknown" else ""
     if coordinate:
         words.append(f"What is unexplained is organised by {coordinate.replace('_', ' ')}.")
     return Diagnosis(
@@ -227,6 +234,40 @@ def where(trial: Trial, held_out: Problem) -> list[Place]:
         coordinates.append({name: values[run.skip :] for name, values in along.items()})
         begin += size
     return places(normalised, raw, coordinates, flips=FLIPS)
+
+
+def _coordinate(rest: Sequence[Place], trial: Trial, held_out: Problem) -> str:
+    """Return the coordinate of a residual: "frequency" where it rings and nothing else tells."""
+    if rest and rest[0].significant and rest[0].share > CLEAR:
+        return rest[0].coordinate
+    if ringing(trial, held_out) > RINGS:
+        return "frequency"
+    return rest[0].coordinate if rest else ""
+
+
+def ringing(trial: Trial, held_out: Problem) -> float:
+    """Return the largest share of a residual's power within a third of an octave, above the motion.
+
+    The motion ends where nine tenths of the velocity's power lie below.
+    """
+    largest, begin = 0.0, 0
+    powers, motions = [], []
+    size = min(1024, *(len(run.force) - run.skip for run in held_out.runs))
+    rate = 1.0 / held_out.runs[0].dt
+    for run in held_out.runs:
+        count = len(run.force) - run.skip
+        residual = np.clip(trial.residual[begin : begin + count], -50.0, 50.0)
+        begin += count
+        f, power = welch(residual, rate, nperseg=size)
+        powers.append(power)
+        motions.append(welch(run.v[run.skip :], rate, nperseg=size)[1])
+    power, motion = np.mean(powers, axis=0), np.cumsum(np.mean(motions, axis=0))
+    ends = f[int(np.searchsorted(motion, 0.9 * motion[-1]))]
+    total = float(power.sum())
+    for centre in f[f > 1.5 * ends]:
+        inside = (f >= centre / 2 ** (1 / 6)) & (f <= centre * 2 ** (1 / 6))
+        largest = max(largest, float(power[inside].sum()) / total)
+    return largest
 
 
 def _noise(runs: Sequence[Measurement]) -> dict[str, float]:

@@ -350,25 +350,30 @@ def step(
     size = len(z0)
     for i in range(size):
         z1[i] = z0[i]
+    travel, joint = series_element(on)
+    slides = law == 1 and n_moving == 0 and joint < 0
+    deflection = z0[0]
+    if slides:
+        xs, vs = inner_motion(x0, v0, a0, V0, dt, energy, z0, p, on)
+        xe, ve = inner_motion(x1, v1, a1, V1, dt, energy, z0, p, on)
+        middle = 0.5 * (vs + ve)
+        slip = p[6] / slip_reach(0.5 * (xs + xe), middle, dt, energy, z0, p, on)
+        deflection = lugre_advance(z0[0], middle, dt, slip)
+        z1[0] = 0.5 * (z0[0] + deflection)  # the bristle's share of the heat is that of the middle
     if advances:
         # At the middle of the step: second order where the inputs move, exact where they are held.
         evaluate(
             law, 0.5 * (x0 + x1), 0.5 * (v0 + v1), 0.5 * (a0 + a1), 0.5 * (V0 + V1), dt, energy,
-            halt, halts, z0, p, on, work[0:size], z1,
+            halt, halts, z1, p, on, work[0:size], z1,
         )  # fmt: skip
+        z1[0] = deflection
         # And on to the end, without time: what depends on a signal alone ends where that does.
         evaluate(law, x1, v1, a1, V1, 0.0, energy, halt, halts, z1, p, on, work[0:size], z1)
-    travel, joint = series_element(on)
+    z1[0] = deflection
     if joint >= 0:
         advance_joint(
             law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, z1, p, on, travel, joint, work
         )
-    elif law == 1 and n_moving == 0:
-        xs, vs = inner_motion(x0, v0, a0, V0, dt, energy, z0, p, on)
-        xe, ve = inner_motion(x1, v1, a1, V1, dt, energy, z1, p, on)
-        middle = 0.5 * (vs + ve)
-        slip = p[6] / slip_reach(0.5 * (xs + xe), middle, dt, energy, z0, p, on)
-        z1[0] = lugre_advance(z0[0], middle, dt, slip)
     if n_moving > 0:
         advance_implicit(
             law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, moving,
