@@ -26,6 +26,7 @@ LAYERS = (
     {"identify"},
     {"study"},
     {"run"},
+    {"ensemble", "optimise"},
     {"report"},
     {"cli"},
 )

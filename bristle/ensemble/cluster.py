@@ -1,0 +1,124 @@
+"""Runs on a Dask cluster; the library is needed, and imported, with --cluster only.
+
+A worker that is lost costs the runs that it was at: the scheduler gives them to another one. What
+has come back is kept on this side.
+"""
+
+from __future__ import annotations
+
+import queue
+from collections import deque
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from .. import __version__
+from ..errors import EnsembleError, RunError
+from .plan import Outcome, Plan
+from .worker import run_one
+
+INSTALL = 'pip install "bristle[cluster]"'
+CONNECT = 10.0
+"""Seconds in which a scheduler must answer."""
+PATIENCE = 60.0
+"""Seconds for which a cluster may be without any worker before the ensemble gives up."""
+_LOOK = 2.0
+_PER_THREAD = 4
+"""Runs under way per thread of the cluster."""
+
+
+def run_cluster(plan: Plan, runs: Iterable[int], address: str) -> Iterator[Outcome]:
+    """Yield what becomes of runs as they end, in whatever order.
+
+    Scenario, records and components are read by the workers: they must see the same files.
+
+    Raises
+    ------
+    EnsembleError
+        If Dask is not installed, nothing answers at the address, the cluster has no worker, or one
+        has another version of bristle.
+    RunError
+        If the scheduler or all workers are lost on the way.
+    """
+    client = _connected(address)
+    try:
+        yield from _gather(client, plan, deque(runs), _threads(client, address))
+    finally:
+        client.close(timeout=CONNECT)
+
+
+def _connected(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError:
+        raise EnsembleError(
+            f"--cluster needs Dask's scheduler, which is not installed: {INSTALL}"
+        ) from None
+    try:
+        return Client(address, timeout=CONNECT, set_as_default=False)
+    except (OSError, ValueError, RuntimeError) as error:
+        words = " ".join(str(error).split()) or type(error).__name__
+        raise EnsembleError(
+            f"--cluster {address}: no Dask scheduler answers ({words}). "
+            "An address such as tcp://host:8786 is right."
+        ) from None
+
+
+def _threads(client: Any, address: str) -> int:
+    """Return the cluster's number of threads, once its workers have been looked at."""
+    workers = client.scheduler_info(n_workers=-1)["workers"]
+    if not workers:
+        raise EnsembleError(f"--cluster {address}: the cluster has no worker. Start one or more.")
+    for name, version in client.run(_version).items():
+        if version != __version__:
+            raise EnsembleError(
+                f"--cluster {address}: the worker {name} has bristle {version}, here is "
+                f"{__version__}. Install the same version there."
+            )
+    return sum(int(worker["nthreads"]) for worker in workers.values())
+
+
+def _version() -> str:
+    """Return the version of bristle where this is called."""
+    try:
+        from bristle import __version__ as there
+    except ImportError:
+        return "none"
+    return there
+
+
+def _gather(client: Any, plan: Plan, waiting: deque[int], threads: int) -> Iterator[Outcome]:
+    ended: queue.Queue[Any] = queue.Queue()
+    under_way: dict[Any, int] = {}
+    alone = 0.0
+    while waiting or under_way:
+        while waiting and len(under_way) < _PER_THREAD * threads:
+            run = waiting.popleft()
+            future = client.submit(run_one, plan, run, pure=False)
+            under_way[future.key] = run
+            future.add_done_callback(ended.put)
+        try:
+            future = ended.get(timeout=_LOOK)
+        except queue.Empty:
+            alone = 0.0 if _alive(client) else alone + _LOOK
+            if alone >= PATIENCE:
+                raise RunError(f"the cluster has had no worker for {PATIENCE:g} s.") from None
+            continue
+        yield _outcome(under_way.pop(future.key), future)
+
+
+def _alive(client: Any) -> bool:
+    if client.status != "running":
+        raise RunError("the connection to the cluster's scheduler is lost.")
+    return bool(client.scheduler_info(n_workers=-1)["workers"])
+
+
+def _outcome(run: int, future: Any) -> Outcome:
+    """Return a future's outcome: what the run says of itself, or why it never could."""
+    if future.status == "finished":
+        outcome: Outcome = future.result()
+        return outcome
+    if future.status == "cancelled":
+        raise RunError("the connection to the cluster's scheduler is lost.")
+    error = future.exception()
+    words = " ".join(str(error).split())
+    return Outcome(run, reason=f"{type(error).__name__}: {words}")
