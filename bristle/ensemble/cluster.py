@@ -1,7 +1,9 @@
 """Runs on a Dask cluster; the library is needed, and imported, with --cluster only.
 
 A worker that is lost costs the runs that it was at: the scheduler gives them to another one. What
-has come back is kept on this side.
+has come back is kept on this side. The scheduler cannot tell which of the runs that a lost worker
+had been given has killed it: so runs that have lost several workers are run again at the end, one
+alone at a time, and only one that then kills again has failed.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ PATIENCE = 60.0
 _LOOK = 2.0
 _PER_THREAD = 4
 """Runs under way per thread of the cluster."""
+_KILLED = "KilledWorker: "
 
 
 def run_cluster(plan: Plan, runs: Iterable[int], address: str) -> Iterator[Outcome]:
@@ -41,7 +44,14 @@ def run_cluster(plan: Plan, runs: Iterable[int], address: str) -> Iterator[Outco
     """
     client = _connected(address)
     try:
-        yield from _gather(client, plan, deque(runs), _threads(client, address))
+        threads = _threads(client, address)
+        suspects: deque[int] = deque()
+        for outcome in _gather(client, plan, deque(runs), _PER_THREAD * threads):
+            if outcome.reason.startswith(_KILLED):
+                suspects.append(outcome.run)
+            else:
+                yield outcome
+        yield from _gather(client, plan, suspects, 1)
     finally:
         client.close(timeout=CONNECT)
 
@@ -53,8 +63,9 @@ def _connected(address: str) -> Any:
         raise EnsembleError(
             f"--cluster needs Dask's scheduler, which is not installed: {INSTALL}"
         ) from None
+    connect: Any = Client  # only partly typed
     try:
-        return Client(address, timeout=CONNECT, set_as_default=False)
+        return connect(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError, RuntimeError) as error:
         words = " ".join(str(error).split()) or type(error).__name__
         raise EnsembleError(
@@ -86,12 +97,12 @@ def _version() -> str:
     return there
 
 
-def _gather(client: Any, plan: Plan, waiting: deque[int], threads: int) -> Iterator[Outcome]:
+def _gather(client: Any, plan: Plan, waiting: deque[int], at_once: int) -> Iterator[Outcome]:
     ended: queue.Queue[Any] = queue.Queue()
     under_way: dict[Any, int] = {}
     alone = 0.0
     while waiting or under_way:
-        while waiting and len(under_way) < _PER_THREAD * threads:
+        while waiting and len(under_way) < at_once:
             run = waiting.popleft()
             future = client.submit(run_one, plan, run, pure=False)
             under_way[future.key] = run
@@ -120,5 +131,7 @@ def _outcome(run: int, future: Any) -> Outcome:
     if future.status == "cancelled":
         raise RunError("the connection to the cluster's scheduler is lost.")
     error = future.exception()
+    if type(error).__name__ == "KilledWorker":
+        return Outcome(run, reason=f"{_KILLED}the workers that ran it have died.")
     words = " ".join(str(error).split())
     return Outcome(run, reason=f"{type(error).__name__}: {words}")
