@@ -1,4 +1,5 @@
-"""What the time march knows of each component: one record of numbers per source, damper, structure.
+"""What the time march knows of each component: one record of numbers per source, damper, structure,
+sampled component.
 
 Records rather than objects, because compiled code reads their fields at no cost. Matrices lie flat
 and row by row in fields that have room for the largest building, so one compiled march fits all.
@@ -8,8 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..fmu.controller import MEASURED
 from ..physics import damper, structure
 from ..physics.building import MAX_FLOORS
+from ..physics.lugre import LuGre
 from ..physics.signals import PARAMETERS
 
 LEVELS = MAX_FLOORS + 1
@@ -94,6 +97,37 @@ def structure_record() -> np.dtype[np.void]:
             ("p", _FLOAT, (max(1, lay.p_size),)),
             ("on", _SWITCH, (max(1, len(lay.effects)),)),
             ("work", _FLOAT, (structure.work_size(n),)),
+        ],
+        align=True,
+    )
+
+
+def sampled_record() -> np.dtype[np.void]:
+    """Return the record of a controller or of sensors: what acts on a clock of its own.
+
+    `inputs`, `outputs` are slots of signals, in the order in which `sample` of the component takes
+    and gives them; `now` and `before` what the inputs were at the ends of the last two substeps. A
+    clock whose instants are all ends of substeps is `aligned`; `next` is the sample to come.
+
+    The matrices A, B, W, C begin at these places of the run's constants, the state at its place of
+    the run's memory. Of sensors, each channel has its own entry in the fields of arrays; `ring`
+    and `noise` are places in memory and constants (noise: -1 without any).
+    """
+    channels = len(MEASURED)
+    laws = ("kind", "n", "rows", "A", "B", "W", "C", "state")
+    numbers = ("v_max", "f_min", "anti_windup", "v_top", "velocity_corner", "still", "least_slope")
+    hook = ("gain", "integral_corner", "absolute", "y_before")
+    moving = ("low", "x_before", "deflection")
+    own = ("own_gain", "bias", "quantisation", "corner", "share", "channel_low", "channel_before")
+    return np.dtype(
+        [
+            *((name, _INT) for name in (*laws, "next", "last")),
+            *((name, _FLOAT) for name in ("period", *numbers, *hook, *moving)),
+            *((name, _FLAG) for name in ("aligned", "filtered", "lugre", "switches")),
+            *((name, _INT, (channels,)) for name in ("inputs", "ring", "length", "noise")),
+            *((name, _FLOAT, (channels,)) for name in ("now", "before", *own)),
+            ("outputs", _INT, (channels,)),
+            ("p", _FLOAT, (len(LuGre.parameters),)),
         ],
         align=True,
     )

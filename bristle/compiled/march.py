@@ -15,6 +15,7 @@ from __future__ import annotations
 from math import inf, isfinite
 
 from ..physics import damper, signals, structure
+from . import sampled as clocks
 
 damper_step = damper.step
 damper_evaluate = damper.evaluate
@@ -26,6 +27,7 @@ holding_force = structure.holding_force
 effect_forces = structure.effect_forces
 signal_value = signals.value
 signal_rate = signals.rate
+due, sample = clocks.due, clocks.sample
 
 TOLERANCE = 1e-6
 """Disagreement of a force, as a share of the largest force so far, at which sweeps end."""
@@ -34,6 +36,7 @@ MAX_SWEEPS = 40
 
 INLINE = (
     *("play", "start", "begin", "move", "resist", "end", "show_motion", "felt_voltage"),
+    *("due", "sample", "act"),
     *("step", "free_step", "add_force", "evaluate_law"),
     *("LuGre.advance", "LuGre.viscous", "LuGre.bristle", "falling"),
 )
@@ -41,12 +44,14 @@ INLINE = (
 
 
 def march(  # type: ignore[no-untyped-def]
-    rows, substeps, h, sources, times, samples, dampers, structures, s, outputs, table
-):
+    rows, substeps, h, sources, times, samples, dampers, structures, sampled, constants, memory,
+    s, outputs, table
+):  # fmt: skip
     """Fill `table` (rows + 1, m) with the signals `outputs` (m,), one row per `substeps` of h [s].
 
-    `sources`, `dampers`, `structures` are arrays of records (see `layout`), `times` and `samples`
-    the samples of all sources one after another, `s` the signals with their start values.
+    `sources`, `dampers`, `structures`, `sampled` are arrays of records (see `layout`), `times` and
+    `samples` the samples of all sources one after another, `constants` and `memory` what sampled
+    components compute with, `s` the signals with their start values.
 
     Returns
     -------
@@ -57,10 +62,10 @@ def march(  # type: ignore[no-untyped-def]
     scale, unsettled, first_unsettled, sweeps = 1e-9, 0, -1, 0
     play(sources, times, samples, 0.0, s)
     start(dampers, structures, s)
+    serve(sampled, dampers, structures, 0, h, constants, memory, s)
     for j in range(len(outputs)):
         table[0, j] = s[outputs[j]]
     for row in range(rows):
-        # Sampled components (controllers) will act here, on the signals of the row.
         for k in range(substeps):
             begin(dampers, structures, s)
             play(sources, times, samples, (row * substeps + k + 1) * h, s)
@@ -78,6 +83,8 @@ def march(  # type: ignore[no-untyped-def]
                 unsettled += 1
                 first_unsettled = row + 1 if first_unsettled < 0 else first_unsettled
             end(dampers, structures, h, s)
+            at = row * substeps + k + 1
+            serve(sampled, dampers, structures, at, h, constants, memory, s)
         for i in range(len(structures)):
             b = structures[i]
             show_rest(b, b.x, b.z, s)
@@ -197,6 +204,60 @@ def end(dampers, structures, h, s):  # type: ignore[no-untyped-def]
         d.smooth = d.found - s[d.friction]
         d.a0 = s[d.a] if d.a >= 0 else (s[d.v] - d.v0) / h
         s[d.energy] += 0.5 * h * (d.force0 * d.v0 + d.found * s[d.v])
+
+
+def idle(  # type: ignore[no-untyped-def]
+    sampled, dampers, structures, at, h, constants, memory, s
+):
+    """Do nothing, in place of `serve` where nothing has a clock: the march compiles sooner."""
+
+
+def serve(  # type: ignore[no-untyped-def]
+    sampled, dampers, structures, at, h, constants, memory, s
+):
+    """Let the sampled components act whose instant substep `at` reaches; the forces follow."""
+    if not due(sampled, at, h):
+        return
+    for i in range(len(structures)):
+        b = structures[i]
+        show_rest(b, b.x, b.z, s)
+    for i in range(len(dampers)):
+        dampers[i].V0 = felt_voltage(dampers[i], s)
+    sample(sampled, at, h, constants, memory, s)
+    respond(dampers, structures, h, s)
+
+
+def respond(dampers, structures, h, s):  # type: ignore[no-untyped-def]
+    """Let the forces of dampers follow voltages that are no longer V0, the motion held.
+
+    Where a damper is given the acceleration, force and acceleration follow each other as in
+    `start`. The forces are extrapolated from here with the slope that they had.
+    """
+    for _ in range(3):
+        again = False
+        for i in range(len(dampers)):
+            d = dampers[i]
+            V = felt_voltage(d, s)
+            if V == d.V0:
+                continue
+            again = again or d.a >= 0
+            d.a0 = s[d.a] if d.a >= 0 else d.a0
+            halt = 0.0
+            if d.halts:
+                halt = s[d.force] - s[d.v] / (structures[d.on_structure].gain * d.sharing)
+            s[d.force], s[d.friction] = damper_evaluate(
+                d.law, s[d.x], s[d.v], d.a0, V, h, s[d.energy], halt, d.halts, d.z[:], d.p, d.on,
+                d.z1[:], d.spare[:],
+            )  # fmt: skip
+            jump = s[d.force] - s[d.friction] - d.smooth
+            d.smooth += jump
+            d.smooth_1 += jump
+            d.smooth_2 += jump
+        if not again:
+            break
+        for i in range(len(structures)):
+            b = structures[i]
+            show_rest(b, b.x, b.z, s)
 
 
 def show_motion(b, x, s):  # type: ignore[no-untyped-def]

@@ -14,6 +14,7 @@ from ..cosim.scenario import Scenario
 from ..errors import RunError
 from ..physics import damper, structure
 from . import march
+from .clocks import are_whole
 from .jit import compiled
 from .system import System
 
@@ -21,6 +22,8 @@ LONGEST_SUBSTEP = 2e-4
 """Longest substep [s]; half-sine peaks are then within 0.001 % of a tight integration."""
 
 Array = NDArray[Any]
+
+_serve = march.serve
 
 
 def simulate(scenario: Scenario) -> dict[str, Array]:
@@ -44,19 +47,26 @@ def simulate(scenario: Scenario) -> dict[str, Array]:
         If a value stops being finite, or motion and forces do not agree; the text says when.
     """
     system = System(scenario)
-    rows, substeps = scenario.steps, max(1, ceil(scenario.step / LONGEST_SUBSTEP - 1e-9))
+    rows, substeps = scenario.steps, _substeps(scenario.step, system.periods())
     h = scenario.step / substeps
     table = np.zeros((rows + 1, len(system.outputs)))
     slots = np.array(list(system.outputs.values()), dtype=np.int64)
-    found = compiled_march()(
-        rows, substeps, h, *system.arrays(h), system.start_values(), slots, table
-    )
+    found = compiled_march(bool(system.names["sampled"]))(
+        rows, substeps, h, *system.arrays(h), *system.sampled(h, rows * substeps),
+        system.start_values(), slots, table,
+    )  # fmt: skip
     _check(scenario, substeps, *found)
     columns: dict[str, Array] = {"time": np.arange(rows + 1) * scenario.step}
     for j, name in enumerate(system.outputs):
         integer = system.kinds[name] == "Integer"
         columns[name] = table[:, j].astype(np.int32) if integer else table[:, j]
     return columns
+
+
+def _substeps(step: float, periods: list[float]) -> int:
+    """Return into how many substeps a step is cut: at best so that instants fall on their ends."""
+    least = max(1, ceil(step / LONGEST_SUBSTEP - 1e-9))
+    return next((n for n in range(least, 4 * least) if are_whole(periods, step / n)), least)
 
 
 def _check(
@@ -76,15 +86,21 @@ def _check(
         )
 
 
-def compiled_march() -> Callable[..., tuple[int, int, int, int]]:
-    """Return the compiled time march; the first call on a machine takes seconds."""
-    return _compiled(damper.evaluate, structure.effect_forces)
+def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int, int]]:
+    """Return the compiled time march, with sampled components or without.
+
+    The first call on a machine takes seconds, more of them with sampled components.
+    """
+    return _compiled(damper.evaluate, structure.effect_forces, clocked)
 
 
 @cache
-def _compiled(evaluate: Any, effect_forces: Any) -> Callable[..., tuple[int, int, int, int]]:
+def _compiled(
+    evaluate: Any, effect_forces: Any, clocked: bool
+) -> Callable[..., tuple[int, int, int, int]]:
     """Compile the march with these woven functions: there are new ones after a new effect."""
     march.damper_evaluate = evaluate
     march.effect_forces = effect_forces
+    march.serve = _serve if clocked else march.idle
     function: Callable[..., tuple[int, int, int, int]] = compiled(march.march, march.INLINE)
     return function

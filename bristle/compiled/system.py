@@ -16,7 +16,8 @@ from ..physics.damper import BINGHAM
 from ..physics.signals import CONSTANT, CSV, PARAMETERS
 from ..physics.structure import step_matrices
 from ..records import ground_motion_file
-from . import layout
+from . import layout, sampled
+from .clocks import Clocks
 
 Array = NDArray[Any]
 Port = tuple[str, str]
@@ -29,6 +30,7 @@ KINDS = {
     "GroundMotion": "source",
     "PrescribedMotion": "source",
     "SignalSource": "source",
+    **dict.fromkeys(sampled.KINDS, "sampled"),
 }
 
 
@@ -42,7 +44,9 @@ class System:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        self.names: dict[str, list[str]] = {"source": [], "damper": [], "structure": []}
+        self.names: dict[str, list[str]] = {
+            kind: [] for kind in ("source", "damper", "structure", "sampled")
+        }
         for component in scenario.components:
             self.names[kind_of(component, scenario)].append(component.name)
         self.slaves: dict[str, Any] = {
@@ -106,6 +110,16 @@ class System:
     def arrays(self, h: float) -> tuple[Array, Array, Array, Array, Array]:
         """Return sources, their times and samples, dampers and structures for substeps of h [s]."""
         return (*self._sources(), self._dampers(), self._structures(h))
+
+    def periods(self) -> list[float]:
+        """Return the sample periods [s] of the components that have a clock."""
+        return [self.slaves[name]["sample_period"] for name in self.names["sampled"]]
+
+    def sampled(self, h: float, substeps: int) -> tuple[Array, Array, Array]:
+        """Return sampled components, their constants and memory for so many substeps of h [s]."""
+        slaves = {name: self.slaves[name] for name in self.names["sampled"]}
+        clocks = Clocks(slaves, lambda *port: self.slots[port], h, substeps)
+        return clocks.records, clocks.constants, clocks.memory
 
     def _sources(self) -> tuple[Array, Array, Array]:
         """Return the sources that change, as records, and the samples of all of them."""

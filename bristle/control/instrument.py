@@ -2,11 +2,38 @@
 
 from __future__ import annotations
 
-from math import floor, isfinite, pi
+from math import floor, pi
 from random import Random
 from typing import Any
 
+from ..physics.linear import Row
 from .sensing import low_passed
+
+FINEST = 1e15
+"""Readings of more steps than this are not quantised: floats are no finer there."""
+
+
+def white_noise(k: int, channel: int, seed: int, deviation: float) -> float:
+    """Return the noise of sample k, in the signal's unit: it depends on nothing else."""
+    return deviation * Random((seed * 64 + channel) * 2**40 + k).gauss(0.0, 1.0)
+
+
+def reading(
+    k: int, value: float, ring: Row, share: float, gain: float, bias: float, disturbance: float,
+    quantisation: float,
+) -> float:  # fmt: skip
+    """Return what an instrument shows at sample k of a low-passed value.
+
+    `ring` holds the last samples, those on both sides of the delayed instant the oldest; `share` is
+    how far that instant lies from the younger to the older of them.
+    """
+    length = len(ring)
+    ring[k % length] = value
+    near, far = ring[(k + 2) % length], ring[(k + 1) % length]
+    shown = gain * (near + share * (far - near)) + bias + disturbance
+    if quantisation > 0.0 and abs(shown / quantisation) < FINEST:
+        shown = quantisation * floor(shown / quantisation + 0.5)
+    return shown  # type: ignore[no-any-return]
 
 
 class Instrument:
@@ -69,17 +96,14 @@ class Instrument:
         else:
             self.low = value
         self.before = value
-        at = k % self.length
-        self.ring[at] = self.low
-        near = self.ring[(at + 2) % self.length]
-        far = self.ring[(at + 1) % self.length]
-        reading = self.gain * (near + self.share * (far - near)) + self.bias
-        if self.deviation > 0.0:
-            key = (self.seed * 64 + self.channel) * 2**40 + k
-            reading += self.deviation * Random(key).gauss(0.0, 1.0)
-        if self.quantisation > 0.0 and isfinite(reading / self.quantisation):
-            reading = self.quantisation * floor(reading / self.quantisation + 0.5)
-        return reading
+        disturbance = self.noise(k) if self.deviation > 0.0 else 0.0
+        return reading(
+            k, self.low, self.ring, self.share, self.gain, self.bias, disturbance, self.quantisation
+        )
+
+    def noise(self, k: int) -> float:
+        """Return the noise of sample k, in the signal's unit."""
+        return white_noise(k, self.channel, self.seed, self.deviation)
 
     def get_state(self) -> Any:
         """Return a copy of the state."""
