@@ -17,6 +17,7 @@ from .parts import Part, Run
 
 _DAMPER_PORTS = frozenset(("displacement", "velocity", "voltage", "force"))
 _STRUCTURE_PORTS = frozenset(("ground_acceleration", "damper_force"))
+_CONTROLLER_PORTS = frozenset(("floor_acceleration", "base_velocity", "voltage"))
 _FORCES = ("damper_force", "extra_force")
 _RELATIVE = 1e-3
 """How far [1] moving_mass may lie from the mass that it stands for."""
@@ -63,6 +64,8 @@ def advise(
         _voltage(damper, network, findings)
     for structure in network.with_ports(_STRUCTURE_PORTS):
         _coupling(run, structure, network, library, findings)
+    for controller in network.with_ports(_CONTROLLER_PORTS):
+        _suited(controller, network, library, findings)
 
 
 def _instances(network: Network, findings: Findings) -> None:
@@ -286,3 +289,20 @@ def _mass_terms(damper: Part, mass: float, findings: Findings) -> None:
                 f"{mass:.4g} kg: from velocity differences the run diverges near the whole of it; "
                 "put it into attached_mass of the structure.",
             )
+
+
+def _suited(controller: Part, network: Network, library: Library, findings: Findings) -> None:
+    """A controller that was designed for another building looks fine and is not."""
+    part, name = controller, "floor_acceleration"
+    for _ in network.order:  # through sensors, to what they measure
+        source = network.source(part, name)
+        if source is None:
+            return
+        part = source[0]
+        if name not in part.variables:
+            break
+    if part.file is not None or part.fmu != "Structure":
+        return
+    words = library.unsuited(controller.fmu, controller.file, part.building)
+    if words:
+        findings.error(controller.path, f"[components.{controller.name}]: {words}")

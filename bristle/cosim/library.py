@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..control.controller import KINDS, Controller, parse_controller
+from ..errors import DesignError, PhysicsError
 from ..fmu.description import Description
 
 
@@ -25,6 +28,9 @@ class Library:
         (record, folder) -> the ground motion; raises RecordError.
     driven_mass
         (building file or None) -> mass [kg] that a damper's force acts on; raises PhysicsError.
+    unsuited
+        (component, its FMU file or None, building file or None) -> the words for why a designed
+        controller is not for that building; "" where it is, or is no designed controller.
     """
 
     names: Callable[[], Sequence[str]]
@@ -32,6 +38,7 @@ class Library:
     describe_file: Callable[[Path], Description]
     read_record: Callable[[str, Path], object]
     driven_mass: Callable[[Path | None], float]
+    unsuited: Callable[[str, Path | None, Path | None], str] = lambda name, file, building: ""
 
 
 def installed() -> Library:
@@ -46,6 +53,7 @@ def installed() -> Library:
         describe_file=read_description,
         read_record=read_ground_motion,
         driven_mass=driven_mass,
+        unsuited=unsuited,
     )
 
 
@@ -54,3 +62,39 @@ def driven_mass(building: Path | None) -> float:
     from ..physics.building import paper_building, read_building
 
     return (read_building(building) if building else paper_building()).M[0][0]
+
+
+def unsuited(name: str, file: Path | None, building: Path | None) -> str:
+    """Return why a designed controller is not for a building, "" where it is."""
+    from ..physics.building import paper_building, read_building
+
+    controller = _controller_in(file) if file else _built_in_controller(name)
+    if controller is None:
+        return ""
+    try:
+        controller.check_building(read_building(building) if building else paper_building(), name)
+    except DesignError as error:
+        return str(error)
+    except PhysicsError:  # the check of the building itself says so
+        return ""
+    return ""
+
+
+def _built_in_controller(name: str) -> Controller | None:
+    from ..fmu import catalogue
+
+    found = getattr(catalogue.instantiate(name), "controller", None)
+    return found if isinstance(found, Controller) else None
+
+
+def _controller_in(file: Path) -> Controller | None:
+    """Return the controller that an FMU carries; None where it carries none that can be read."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            for kind in KINDS:
+                name = f"resources/{kind}.json"
+                if name in archive.namelist():
+                    return parse_controller(archive.read(name).decode(), f"{file}: {name}")
+    except (OSError, zipfile.BadZipFile, UnicodeDecodeError, DesignError):
+        return None  # the FMU's own check says what is wrong with it
+    return None
