@@ -106,7 +106,7 @@ def _answer(found: Ensemble, files: dict[str, Path]) -> dict[str, Any]:
         "wall_time": round(found.wall_time, 3),
         "quantiles": outputs,
         "failures": [asdict(failure) for failure in found.failures],
-        **{name: str(path.absolute()) for name, path in files.items()},
+        "files": {name: str(path.absolute()) for name, path in files.items()},
     }
 
 
