@@ -8,6 +8,7 @@ at once.
 from __future__ import annotations
 
 from functools import cache
+from math import exp
 from pathlib import Path
 from typing import Any
 
@@ -67,18 +68,18 @@ def step(x, ground, at, stride, V, h, K, C, mass, p, work):  # type: ignore[no-u
         x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
 
 
-def voltage(gains, x, z, p):  # type: ignore[no-untyped-def]
-    """Return the voltage [V] at which a state x (6,) gets the force that linear feedback asks for.
+def voltage(gains, x, swing, z, p):  # type: ignore[no-untyped-def]
+    """Return the voltage [V] at which a state x (6,) gets the force that feedback asks for.
 
-    `gains` (7,): of the state [N/m, N s/m], and the voltage where it does next to nothing.
+    The feedback is linear at a given `swing` [m], the base's recent drift.
     """
-    u = 0.0
+    u, share = 0.0, swing / (swing + 0.008) - 0.5
     for i in range(6):
-        u += gains[i] * x[i]
+        u += (gains[i] + share * gains[6 + i]) * x[i]
     f_0 = lugre_force(z, x[3], 0.0, p)
     slope = lugre_force(z, x[3], 1.0, p) - f_0
     if abs(slope) < STILL:
-        return limited(gains[6], 0.0, 8.0)
+        return limited(gains[13], 0.0, 8.0)
     return limited((u - f_0) / slope, 0.0, 8.0)
 
 
@@ -98,19 +99,21 @@ def simulate(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     """Fill out (samples + 1, 2) with the second floor's absolute acceleration and the voltage."""
     x, e, spare = work[5], work[6], work[7]
-    z, V = 0.0, gains[0] if law == 0 else 0.0
+    z, swing, V = 0.0, 0.0, gains[13] if law == 0 else 0.0
+    kept = exp(-0.002 / (0.3 + abs(gains[12])))
     stride = 8 // (2 * steps)
     for k in range(len(out)):
         y = -(seen[6] * x[1] + seen[7] * x[2] + seen[8] * x[4] + seen[9] * x[5])
+        swing = max(abs(x[0]), swing * kept)
         if law == 1:
             u = command(n, hidden, 0, state[0])
             V = clipped_voltage(u, lugre_force(x[6], x[3], V, p), 0.5, 8.0)
             advance(n, A, B, W, 0, state[0], y, 0.0, state[1])
         elif law == 2:
-            V = voltage(gains, x, x[6], p)
+            V = voltage(gains, x, swing, x[6], p)
         elif law == 3:
             observe(e, y, x[0], x[3], seen, correct, spare)
-            V = voltage(gains, spare, z, p)
+            V = voltage(gains, spare, swing, z, p)
             force = lugre_force(z, x[3], V, p)
             z = estimated_deflection(z, x[3], 0.002, p[6])
             for i in range(6):
@@ -187,12 +190,14 @@ def run(law: int, ground: Array, gains: Array, quick: bool = False) -> Array:
     Parameters
     ----------
     law : int
-        PASSIVE (gains[0] is the voltage), CLIPPED (the reference H-infinity design), FEEDBACK of
+        PASSIVE (gains[13] is the voltage), CLIPPED (the reference H-infinity design), FEEDBACK of
         the true state, ESTIMATED: of what an observer makes of y, base displacement and velocity.
     ground : (n,) array
         Ground acceleration [m/s2] every 0.25 ms.
-    gains : (7,) array
-        See `voltage`.
+    gains : (14,) array
+        Of displacements and velocities [N/m, N s/m]; what is added to them times a share that goes
+        from -1/2 at rest to 1/2 under large swings; how long a swing is remembered, less 0.3 s;
+        the voltage [V] where it does next to nothing.
     quick : bool
         Two steps per sample in place of four.
     """

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import queue
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from typing import Any
 
 from .. import __version__
@@ -29,7 +29,7 @@ _PER_THREAD = 4
 _KILLED = "KilledWorker: "
 
 
-def run_cluster(plan: Plan, runs: Iterable[int], address: str) -> Iterator[Outcome]:
+def run_cluster(plan: Plan, runs: Iterable[int], address: str) -> Generator[Outcome, None, None]:
     """Yield what becomes of runs as they end, in whatever order.
 
     Scenario, records and components are read by the workers: they must see the same files.
@@ -79,7 +79,15 @@ def _threads(client: Any, address: str) -> int:
     workers = client.scheduler_info(n_workers=-1)["workers"]
     if not workers:
         raise EnsembleError(f"--cluster {address}: the cluster has no worker. Start one or more.")
-    for name, version in client.run(_version).items():
+    try:
+        versions = client.run(_version)
+    except Exception as error:  # whatever a worker answers that cannot load this module
+        words = " ".join(str(error).split()) or type(error).__name__
+        raise EnsembleError(
+            f"--cluster {address}: a worker cannot run bristle ({words}). Install bristle "
+            f"{__version__} there."
+        ) from error
+    for name, version in versions.items():
         if version != __version__:
             raise EnsembleError(
                 f"--cluster {address}: the worker {name} has bristle {version}, here is "
@@ -90,14 +98,12 @@ def _threads(client: Any, address: str) -> int:
 
 def _version() -> str:
     """Return the version of bristle where this is called."""
-    try:
-        from bristle import __version__ as there
-    except ImportError:
-        return "none"
-    return there
+    return __version__
 
 
-def _gather(client: Any, plan: Plan, waiting: deque[int], at_once: int) -> Iterator[Outcome]:
+def _gather(
+    client: Any, plan: Plan, waiting: deque[int], at_once: int
+) -> Generator[Outcome, None, None]:
     ended: queue.Queue[Any] = queue.Queue()
     under_way: dict[Any, int] = {}
     alone = 0.0

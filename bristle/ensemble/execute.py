@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Generator
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -132,13 +133,18 @@ def _go(
 ) -> None:  # fmt: skip
     if not left:
         return
-    with Progress(plan.title, plan.runs, progress) as bar:
-        for outcome in _outcomes(plan, left, workers, cluster):
+    with (
+        Progress(plan.title, plan.runs, progress) as bar,
+        closing(_outcomes(plan, left, workers, cluster)) as outcomes,
+    ):
+        for outcome in outcomes:
             table.add(outcome)
             bar.show(len(table.outcomes))
 
 
-def _outcomes(plan: Plan, left: list[int], workers: int, cluster: str | None) -> Iterator[Outcome]:
+def _outcomes(
+    plan: Plan, left: list[int], workers: int, cluster: str | None
+) -> Generator[Outcome, None, None]:
     if cluster is not None:
         from .cluster import run_cluster
 

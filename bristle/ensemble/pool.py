@@ -11,7 +11,7 @@ import os
 import signal
 import sys
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
@@ -36,7 +36,7 @@ class _Process:
     given: deque[int] = field(default_factory=deque)
 
 
-def run_local(plan: Plan, runs: Iterable[int], workers: int) -> Iterator[Outcome]:
+def run_local(plan: Plan, runs: Iterable[int], workers: int) -> Generator[Outcome, None, None]:
     """Yield what becomes of runs as they end, in whatever order.
 
     Parameters
