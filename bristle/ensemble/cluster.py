@@ -21,7 +21,7 @@ from .worker import run_one
 INSTALL = 'pip install "bristle[cluster]"'
 CONNECT = 10.0
 """Seconds in which a scheduler must answer."""
-PATIENCE = 60.0
+PATIENCE = 300.0
 """Seconds for which a cluster may be without any worker before the ensemble gives up."""
 _LOOK = 2.0
 _PER_THREAD = 4

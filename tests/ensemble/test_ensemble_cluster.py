@@ -30,9 +30,14 @@ pytestmark = [
 @pytest.fixture(scope="module")
 def local() -> Iterator[Any]:
     """Return a cluster of two worker processes of one thread each."""
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
-    ) as found:
+    import dask
+
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+        ) as found,
+    ):
         yield found
 
 
