@@ -38,7 +38,7 @@ def main() -> int:
 
 
 def show(rows: list[Row]) -> None:
-    """Print rows as a table; `ratio` is measured / goal, 1 or less is reached."""
+    """Print figures with a goal as a table, where `ratio` is measured / goal; then the others."""
     from rich.console import Console
     from rich.table import Table
 
@@ -47,13 +47,22 @@ def show(rows: list[Row]) -> None:
         table.add_column(column, overflow="fold")
     table.add_column("ratio", justify="right")
     table.add_column("")
+    lines = []
     for row in rows:
-        ratio = "" if row.ratio is None else f"{row.ratio:.3f}"
-        verdict = "" if row.ratio is None else "reached" if row.ratio <= 1 else "missed"
-        table.add_row(row.name, row.measured, row.goal, ratio, verdict)
+        if row.ratio is None:
+            lines.append(f"{row.name}: {row.measured}")
+        else:
+            verdict = "reached" if row.ratio <= 1 else "missed"
+            table.add_row(row.name, row.measured, row.goal, f"{row.ratio:.3f}", verdict)
         if row.note:
-            table.add_row(f"  {row.note}")
-    Console(highlight=False, markup=False).print(table)
+            lines.append(f"{row.name}: {row.note}")
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = 150  # a pipe or a file has no edge to fold at
+    if table.row_count:
+        console.print(table)
+    if lines:
+        console.print("", "Reported beside:", *lines, sep="\n")
 
 
 if __name__ == "__main__":

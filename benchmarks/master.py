@@ -63,7 +63,7 @@ def _against(name: str, master: Times, other: Times, goal: float | None = None) 
 
 
 def _fmus(scenario: Scenario) -> Fmus:
-    paths = {c.name: c.path or ensure(c.fmu, c.building) for c in scenario.components}
+    paths = {c.name: c.path or ensure(c.fmu, c.building, c.controller) for c in scenario.components}
     descriptions = {name: read_description(path) for name, path in paths.items()}
     folder = scenario.file.parent
     return paths, descriptions, {c.name: fmu_parameters(c, folder) for c in scenario.components}

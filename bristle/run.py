@@ -151,16 +151,20 @@ class _Job:
 
     def solve(self) -> pd.DataFrame:
         """Solve the scenario with the compiled laws."""
-        from .compiled import simulate
+        from .compiled.model import StoppedError, simulate
 
-        values = simulate(self.scenario)
+        stopped: RunError | None = None
+        try:
+            values = simulate(self.scenario)
+        except StoppedError as error:
+            stopped, values = error, error.columns
         columns = make_columns(
             self.scenario, {c.name: c.description for c in self.scenario.components}
         )
         time = times(0, len(values["time"]), self.scenario.step)
         table = Table(time, columns, {c.name: values[c.name].astype(c.dtype) for c in columns})
         self.output.begin(table, self.made)
-        return self._finish(table, complete=True)
+        return self._end(table, stopped, interrupted=False)
 
     def step(self, progress: bool, end_process: bool) -> pd.DataFrame:
         """Step the scenario's FMUs; keep what there is, whatever happens."""
@@ -249,7 +253,7 @@ class _Job:
 
         paths, descriptions = {}, {}
         for component in self.scenario.components:
-            path = component.path or ensure(component.fmu, component.building)
+            path = component.path or ensure(component.fmu, component.building, component.controller)
             # A missing binary is explained when the FMU is loaded, with the way out.
             description = read_description(path, any_platform=True)
             paths[component.name], descriptions[component.name] = path, description

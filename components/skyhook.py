@@ -11,7 +11,8 @@ class Skyhook(ControllerSlave):
 
     def declare_law(self):
         super().declare_law()
-        self.add_parameter("kind", "switch", None, "switch: 0 or v_max; inverse: any voltage")
+        text = "one of switch, inverse: 0 or v_max, or any voltage"
+        self.add_parameter("kind", "switch", None, text)
         self.add_parameter("gain", 50.0, "N.s/m", "the dashpot's coefficient", (0.0, 1e9))
         text = "the velocity is the acceleration's integral above this frequency"
         self.add_parameter("integral_corner", 0.2, "Hz", text, (1e-4, 1e4))

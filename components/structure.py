@@ -44,10 +44,11 @@ class Structure(EffectSlave):
         self.ground_before = self.ground_acceleration
 
     def advance(self, time, step):
-        force = self.damper_force + self.extra_force
-        self.model.step(step, self.ground_before, self.ground_acceleration, force)
-        self.ground_before = self.ground_acceleration
-        x, n, values, at = self.model.x, self.model.m.n, self._values, self.first_output
+        values, at = self._values, self.first_output
+        ground, damper, extra = values[0:3]  # the inputs, in the order of their declaration
+        self.model.step(step, self.ground_before, ground, damper + extra)
+        self.ground_before = ground
+        x, n = self.model.x, self.model.m.n
         for i in range(n):
             values[at], values[at + 1] = x[i], x[n + i]
             at += 3
@@ -57,12 +58,13 @@ class Structure(EffectSlave):
 
     def refresh(self):
         values, at = self._values, self.first_output + 2
-        for absolute in self.model.absolute_accelerations(self.damper_force + self.extra_force):
+        ground, damper, extra = values[0:3]
+        for absolute in self.model.absolute_accelerations(damper + extra):
             values[at] = absolute
             at += 3
-        self.holding_force = self.model.holding_force(self.ground_acceleration, self.extra_force)
+        self.holding_force = self.model.holding_force(ground, extra)
         if not self.stepping:  # before the first step the ground has no earlier value
-            self.ground_before = self.ground_acceleration
+            self.ground_before = ground
 
     def get_inner(self):
         return [list(self.model.x), list(self.model.z), self.ground_before]

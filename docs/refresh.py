@@ -19,6 +19,7 @@ FIGURES = ROOT / "docs" / "figures"
 def figures() -> None:
     """Draw the figures of README and pages into docs/figures."""
     import bristle
+    from bristle.report.comparison.make import make as comparison
     from bristle.report.figures import run_figure
     from bristle.report.paper import make, paper_figures
 
@@ -27,6 +28,8 @@ def figures() -> None:
         run_figure(bristle.run("el_centro_lugre_passive"), folder / "el_centro_lugre_passive.png")
         for figure in paper_figures():
             make(figure, folder)
+        summary = comparison(folder / "comparison").folder / "summary.png"
+        print(shrunk(summary, FIGURES / "controllers-summary.png"))
         for image in sorted(folder.glob("*.png")):
             print(shrunk(image, FIGURES / image.name))
 

@@ -43,7 +43,7 @@ INLINE = (
 """What becomes part of its caller: it is short or has one caller. Saves time, twice."""
 
 
-def march(  # type: ignore[no-untyped-def]
+def march(
     rows, substeps, h, sources, times, samples, dampers, structures, sampled, constants, memory,
     s, outputs, table
 ):  # fmt: skip
@@ -56,10 +56,11 @@ def march(  # type: ignore[no-untyped-def]
     Returns
     -------
     tuple of int
-        The row at which a value stopped being finite (-1: none), how many substeps ended before
-        the forces agreed, the row of the first of them, and the number of sweeps.
+        How many rows are filled, the last of them perhaps with values that are not finite; the
+        damper whose force and motion did not agree, which ends the march before the next row (-1:
+        none); the number of sweeps.
     """
-    scale, unsettled, first_unsettled, sweeps = 1e-9, 0, -1, 0
+    scale, sweeps = 1e-9, 0
     play(sources, times, samples, 0.0, s)
     start(dampers, structures, s)
     serve(sampled, dampers, structures, 0, h, constants, memory, s)
@@ -80,8 +81,10 @@ def march(  # type: ignore[no-untyped-def]
                 sweep += 1
             sweeps += sweep
             if change > TOLERANCE * scale:
-                unsettled += 1
-                first_unsettled = row + 1 if first_unsettled < 0 else first_unsettled
+                worst = 0
+                for i in range(len(dampers)):
+                    worst = i if abs(dampers[i].excess) == change else worst
+                return row + 1, worst, sweeps
             end(dampers, structures, h, s)
             at = row * substeps + k + 1
             serve(sampled, dampers, structures, at, h, constants, memory, s)
@@ -95,11 +98,11 @@ def march(  # type: ignore[no-untyped-def]
             table[row + 1, j] = s[outputs[j]]
             total += s[outputs[j]]
         if not isfinite(total):
-            return row + 1, unsettled, first_unsettled, sweeps
-    return -1, unsettled, first_unsettled, sweeps
+            return row + 2, -1, sweeps
+    return rows + 1, -1, sweeps
 
 
-def play(sources, times, samples, t, s):  # type: ignore[no-untyped-def]
+def play(sources, times, samples, t, s):
     """Write what the sources give at time t [s] into the signals."""
     for i in range(len(sources)):
         g = sources[i]
@@ -109,7 +112,7 @@ def play(sources, times, samples, t, s):  # type: ignore[no-untyped-def]
             s[g.rate_out] = signal_rate(g.kind, t - g.delay, g.p, own_times, own)
 
 
-def start(dampers, structures, s):  # type: ignore[no-untyped-def]
+def start(dampers, structures, s):
     """Settle the signals at the begin: accelerations and forces may follow each other."""
     for _ in range(3):
         for i in range(len(structures)):
@@ -129,7 +132,7 @@ def start(dampers, structures, s):  # type: ignore[no-untyped-def]
             s[d.stroke_ratio] = abs(s[d.x]) / d.stroke
 
 
-def begin(dampers, structures, s):  # type: ignore[no-untyped-def]
+def begin(dampers, structures, s):
     """Keep what a substep begins from, and extrapolate the forces to its end."""
     for i in range(len(structures)):
         b = structures[i]
@@ -142,7 +145,7 @@ def begin(dampers, structures, s):  # type: ignore[no-untyped-def]
         d.smooth_2, d.smooth_1 = d.smooth_1, d.smooth
 
 
-def move(b, sweep, h, s):  # type: ignore[no-untyped-def]
+def move(b, sweep, h, s):
     """Take a structure to the end of the substep under the forces of the present sweep."""
     friction = s[b.friction] + s[b.extra_friction]
     f0, f1 = b.smooth0 + friction, s[b.force] + s[b.extra]
@@ -164,7 +167,7 @@ def move(b, sweep, h, s):  # type: ignore[no-untyped-def]
         show_rest(b, x1, b.z1, s)
 
 
-def resist(d, structures, sweep, h, s):  # type: ignore[no-untyped-def]
+def resist(d, structures, sweep, h, s):
     """Take a damper to the end of the substep and correct its force; return its disagreement [N].
 
     The correction is the secant's, from the second sweep on and while friction stays: a plain
@@ -187,7 +190,7 @@ def resist(d, structures, sweep, h, s):  # type: ignore[no-untyped-def]
     return abs(excess)
 
 
-def end(dampers, structures, h, s):  # type: ignore[no-untyped-def]
+def end(dampers, structures, h, s):
     """Accept a substep."""
     for i in range(len(structures)):
         b = structures[i]
@@ -206,15 +209,11 @@ def end(dampers, structures, h, s):  # type: ignore[no-untyped-def]
         s[d.energy] += 0.5 * h * (d.force0 * d.v0 + d.found * s[d.v])
 
 
-def idle(  # type: ignore[no-untyped-def]
-    sampled, dampers, structures, at, h, constants, memory, s
-):
+def idle(sampled, dampers, structures, at, h, constants, memory, s):
     """Do nothing, in place of `serve` where nothing has a clock: the march compiles sooner."""
 
 
-def serve(  # type: ignore[no-untyped-def]
-    sampled, dampers, structures, at, h, constants, memory, s
-):
+def serve(sampled, dampers, structures, at, h, constants, memory, s):
     """Let the sampled components act whose instant substep `at` reaches; the forces follow."""
     if not due(sampled, at, h):
         return
@@ -227,7 +226,7 @@ def serve(  # type: ignore[no-untyped-def]
     respond(dampers, structures, h, s)
 
 
-def respond(dampers, structures, h, s):  # type: ignore[no-untyped-def]
+def respond(dampers, structures, h, s):
     """Let the forces of dampers follow voltages that are no longer V0, the motion held.
 
     Where a damper is given the acceleration, force and acceleration follow each other as in
@@ -260,7 +259,7 @@ def respond(dampers, structures, h, s):  # type: ignore[no-untyped-def]
             show_rest(b, b.x, b.z, s)
 
 
-def show_motion(b, x, s):  # type: ignore[no-untyped-def]
+def show_motion(b, x, s):
     """Write the displacements and velocities of a structure in state x into the signals."""
     at = b.first_output
     for i in range(b.n):
@@ -269,7 +268,7 @@ def show_motion(b, x, s):  # type: ignore[no-untyped-def]
         at += 3
 
 
-def show_rest(b, x, z, s):  # type: ignore[no-untyped-def]
+def show_rest(b, x, z, s):
     """Write the accelerations, drifts and the holding force of a structure into the signals."""
     n = b.n
     loads, absolute = b.work[0:n], b.absolute
@@ -290,6 +289,6 @@ def show_rest(b, x, z, s):  # type: ignore[no-untyped-def]
     s[b.holding] = holding_force(n, b.c, b.k, b.mass, x, s[b.ground], others)
 
 
-def felt_voltage(d, s):  # type: ignore[no-untyped-def]
+def felt_voltage(d, s):
     """Return the voltage of a damper within the limits at which it saturates [V]."""
     return min(max(s[d.V], 0.0), d.v_max)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from math import ceil
+from math import ceil, isfinite
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,14 @@ Array = NDArray[Any]
 _serve = march.serve
 
 
+class StoppedError(RunError):
+    """A march that had to stop; `columns` holds the rows before."""
+
+    def __init__(self, text: str, columns: dict[str, Array]) -> None:
+        super().__init__(text)
+        self.columns = columns
+
+
 def simulate(scenario: Scenario) -> dict[str, Array]:
     """Return the columns of a run, time [s] first, then every output as `component.port`.
 
@@ -43,20 +51,40 @@ def simulate(scenario: Scenario) -> dict[str, Array]:
     ------
     ScenarioError
         Naming a component that cannot be compiled.
-    RunError
-        If a value stops being finite, or motion and forces do not agree; the text says when.
+    StoppedError
+        If a value stops being finite, or motion and forces do not agree; the text names the
+        component and the time, `columns` holds the rows before.
     """
     system = System(scenario)
     rows, substeps = scenario.steps, _substeps(scenario.step, system.periods())
     h = scenario.step / substeps
     table = np.zeros((rows + 1, len(system.outputs)))
     slots = np.array(list(system.outputs.values()), dtype=np.int64)
-    found = compiled_march(bool(system.names["sampled"]))(
+    filled, unsettled, _ = compiled_march(bool(system.names["sampled"]))(
         rows, substeps, h, *system.arrays(h), *system.sampled(h, rows * substeps),
         system.start_values(), slots, table,
     )  # fmt: skip
-    _check(scenario, substeps, *found)
-    columns: dict[str, Array] = {"time": np.arange(rows + 1) * scenario.step}
+    what = ""
+    if unsettled >= 0:
+        name = system.names["damper"][unsettled]
+        what = f"{name} before t = {filled * scenario.step:.9g} s: force and motion do not agree"
+    elif not np.isfinite(table[filled - 1]).all():
+        filled -= 1
+        wrong = [n for n, v in zip(system.outputs, table[filled], strict=True) if not isfinite(v)]
+        component = wrong[0].partition(".")[0]
+        others = f" (as are {', '.join(wrong[1:4])})" if wrong[1:] else ""
+        when = f"at t = {filled * scenario.step:.9g} s"
+        what = f"{component} {when}: {wrong[0]} is not finite{others}"
+    columns = _columns(system, table[:filled], scenario.step)
+    if what:
+        raise StoppedError(
+            f"{what}.\n  A shorter step or parameters within their bounds would be right.", columns
+        )
+    return columns
+
+
+def _columns(system: System, table: Array, step: float) -> dict[str, Array]:
+    columns: dict[str, Array] = {"time": np.arange(len(table)) * step}
     for j, name in enumerate(system.outputs):
         integer = system.kinds[name] == "Integer"
         columns[name] = table[:, j].astype(np.int32) if integer else table[:, j]
@@ -69,24 +97,7 @@ def _substeps(step: float, periods: list[float]) -> int:
     return next((n for n in range(least, 4 * least) if are_whole(periods, step / n)), least)
 
 
-def _check(
-    scenario: Scenario, substeps: int, wrong: int, unsettled: int, first: int, sweeps: int
-) -> None:
-    """Refuse what the march could not solve."""
-    if wrong >= 0:
-        raise RunError(
-            f"{scenario.file}: a value is not finite at {wrong * scenario.step:g} s. "
-            "A shorter step or parameters within their bounds would be right."
-        )
-    if unsettled > 0:
-        raise RunError(
-            f"{scenario.file}: motion and forces did not agree in {unsettled} of "
-            f"{scenario.steps * substeps} substeps, first before {first * scenario.step:g} s. "
-            "A shorter step or parameters within their bounds would be right."
-        )
-
-
-def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int, int]]:
+def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int]]:
     """Return the compiled time march, with sampled components or without.
 
     The first call on a machine takes seconds, more of them with sampled components.
@@ -97,10 +108,10 @@ def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int, 
 @cache
 def _compiled(
     evaluate: Any, effect_forces: Any, clocked: bool
-) -> Callable[..., tuple[int, int, int, int]]:
+) -> Callable[..., tuple[int, int, int]]:
     """Compile the march with these woven functions: there are new ones after a new effect."""
     march.damper_evaluate = evaluate
     march.effect_forces = effect_forces
     march.serve = _serve if clocked else march.idle
-    function: Callable[..., tuple[int, int, int, int]] = compiled(march.march, march.INLINE)
+    function: Callable[..., tuple[int, int, int]] = compiled(march.march, march.INLINE)
     return function

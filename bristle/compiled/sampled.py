@@ -38,7 +38,7 @@ skyhook_switch = sensing.skyhook_switch
 reading = instrument.reading
 
 
-def due(sampled, at, h):  # type: ignore[no-untyped-def]
+def due(sampled, at, h):
     """Return whether a component has to look at the end of substep `at` (0: the begin)."""
     some = False
     for i in range(len(sampled)):
@@ -48,7 +48,7 @@ def due(sampled, at, h):  # type: ignore[no-untyped-def]
     return some
 
 
-def sample(sampled, at, h, constants, memory, s):  # type: ignore[no-untyped-def]
+def sample(sampled, at, h, constants, memory, s):
     """Let every component take the samples that substep `at` of h [s] ends on or passes.
 
     An instant within the substep is measured as if the inputs were linear over it.
@@ -67,7 +67,7 @@ def sample(sampled, at, h, constants, memory, s):  # type: ignore[no-untyped-def
             c.before[j] = c.now[j]
 
 
-def act(c, k, share, constants, memory, s):  # type: ignore[no-untyped-def]
+def act(c, k, share, constants, memory, s):
     """Take sample k, `share` of the way from the inputs before to those now."""
     if c.kind == SENSORS:
         for j in range(len(c.inputs)):
@@ -90,14 +90,14 @@ def act(c, k, share, constants, memory, s):  # type: ignore[no-untyped-def]
     s[c.outputs[2]] = v
 
 
-def measured(c, j, share):  # type: ignore[no-untyped-def]
+def measured(c, j, share):
     """Return input j at an instant; at the substep's end to the last digit."""
     if share == 1.0:
         return c.now[j]
     return c.before[j] + share * (c.now[j] - c.before[j])
 
 
-def designed(c, y, v, f, constants, memory):  # type: ignore[no-untyped-def]
+def designed(c, y, v, f, constants, memory):
     """Return voltage [V] and raw command of a state-space law, and move its state on."""
     n, size = c.n, c.rows * c.n
     x, spare = memory[c.state : c.state + n], memory[c.state + n : c.state + 2 * n]
@@ -120,7 +120,7 @@ def designed(c, y, v, f, constants, memory):  # type: ignore[no-untyped-def]
     return voltage, u
 
 
-def inverted(c, u, v):  # type: ignore[no-untyped-def]
+def inverted(c, u, v):
     """Return the voltage [V] for the commanded force, and the force [N] that it gives by the law.
 
     Moves the estimated bristle deflection on.
@@ -134,7 +134,7 @@ def inverted(c, u, v):  # type: ignore[no-untyped-def]
     return voltage, applied
 
 
-def hooked(c, y, v):  # type: ignore[no-untyped-def]
+def hooked(c, y, v):
     """Return voltage [V] and command [N] of the skyhook law, and move its integral on."""
     c.absolute = leaky_integral(c.absolute, c.y_before, y, c.integral_corner, c.period)
     c.y_before = y
@@ -145,7 +145,7 @@ def hooked(c, y, v):  # type: ignore[no-untyped-def]
     return voltage, u
 
 
-def shown(c, j, k, value, constants, memory):  # type: ignore[no-untyped-def]
+def shown(c, j, k, value, constants, memory):
     """Return what the instrument of channel j shows at sample k, and move it on."""
     ring = memory[c.ring[j] : c.ring[j] + c.length[j]]
     if k == 0:

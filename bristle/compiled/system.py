@@ -164,7 +164,8 @@ class System:
         records["halts"] = records["on_structure"] >= 0
         sticking = records["on_structure"][records["law"] == BINGHAM]
         for record in records:
-            record["sharing"] = max(1, np.count_nonzero(sticking == record["on_structure"]))
+            together = int(np.count_nonzero(sticking == record["on_structure"]))
+            record["sharing"] = max(1, together)
         return records
 
     def _pushed_by(self, damper: str) -> int:
@@ -237,7 +238,9 @@ def kind_of(component: Component, scenario: Scenario) -> str:
 
 def configured(component: Component, scenario: Scenario) -> Slave:
     """Return the component's Python object with the scenario's values, its model built."""
-    slave = catalogue.instantiate(component.fmu, component.building, component.name)
+    slave = catalogue.instantiate(
+        component.fmu, component.building, component.name, component.controller
+    )
     for name, value in component.parameters.items():
         if name == "record":
             value = ground_motion_file(str(value), scenario.file.parent)

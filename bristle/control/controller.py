@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from functools import lru_cache
 from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -127,6 +128,7 @@ def read_controller(path: str | Path) -> Controller:
     return parse_controller(text, str(path))
 
 
+@lru_cache(maxsize=8)
 def parse_controller(text: str, where: str = "controller") -> Controller:
     """Return the controller that a text describes.
 

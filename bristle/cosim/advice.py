@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import sqrt
 
-from ..errors import BristleError
+from ..errors import BristleError, PhysicsError
 from .connections import Wire
 from .findings import Findings
 from .library import Library
@@ -17,7 +17,6 @@ from .parts import Part, Run
 
 _DAMPER_PORTS = frozenset(("displacement", "velocity", "voltage", "force"))
 _STRUCTURE_PORTS = frozenset(("ground_acceleration", "damper_force"))
-_CONTROLLER_PORTS = frozenset(("floor_acceleration", "base_velocity", "voltage"))
 _FORCES = ("damper_force", "extra_force")
 _RELATIVE = 1e-3
 """How far [1] moving_mass may lie from the mass that it stands for."""
@@ -50,6 +49,16 @@ class Network:
                     return structure
         return None
 
+    def measured_by(self, controller: Part) -> Part | None:
+        """Return the structure whose floor acceleration a controller gets, through sensors too."""
+        part: Part | None = controller
+        for _ in self.order:
+            found = self.source(part, "floor_acceleration") if part else None
+            part = found[0] if found else None
+            if part and part.variables.keys() >= _STRUCTURE_PORTS:
+                return part
+        return None
+
 
 def advise(
     run: Run, parts: Mapping[str, Part], wires: Sequence[Wire], library: Library, findings: Findings
@@ -59,13 +68,12 @@ def advise(
     _instances(network, findings)
     _order(run, network, findings)
     _loops(network, findings)
+    _designs(network, library, findings)
     for damper in network.with_ports(_DAMPER_PORTS):
         _holding(damper, network, findings)
         _voltage(damper, network, findings)
     for structure in network.with_ports(_STRUCTURE_PORTS):
         _coupling(run, structure, network, library, findings)
-    for controller in network.with_ports(_CONTROLLER_PORTS):
-        _suited(controller, network, library, findings)
 
 
 def _instances(network: Network, findings: Findings) -> None:
@@ -120,6 +128,24 @@ def _loops(network: Network, findings: Findings) -> None:
             f"algebraic loop {words}: each follows the next without delay. Nothing iterates; the "
             "loop is closed with values one step old.",
         )
+
+
+def _designs(network: Network, library: Library, findings: Findings) -> None:
+    """A designed controller belongs to one building: that whose floor it measures."""
+    for part in network.parts.values():
+        structure = network.measured_by(part)
+        if structure is None or structure.fmu != "Structure":
+            continue
+        try:
+            if part.file:
+                library.check_carried(part.file, structure.building)
+            else:
+                library.check_controller(part.fmu, part.controller, structure.building)
+        except PhysicsError:
+            continue  # the building is no building: its own check has said so
+        except BristleError as error:
+            path = (*part.path, "controller") if part.controller else part.path
+            findings.error(path, f"[components.{part.name}]: {error}")
 
 
 def _cycle(follows: Mapping[tuple[str, str], list[tuple[str, str]]]) -> list[tuple[str, str]]:
@@ -289,20 +315,3 @@ def _mass_terms(damper: Part, mass: float, findings: Findings) -> None:
                 f"{mass:.4g} kg: from velocity differences the run diverges near the whole of it; "
                 "put it into attached_mass of the structure.",
             )
-
-
-def _suited(controller: Part, network: Network, library: Library, findings: Findings) -> None:
-    """A controller that was designed for another building looks fine and is not."""
-    part, name = controller, "floor_acceleration"
-    for _ in network.order:  # through sensors, to what they measure
-        source = network.source(part, name)
-        if source is None:
-            return
-        part = source[0]
-        if name not in part.variables:
-            break
-    if part.file is not None or part.fmu != "Structure":
-        return
-    words = library.unsuited(controller.fmu, controller.file, part.building)
-    if words:
-        findings.error(controller.path, f"[components.{controller.name}]: {words}")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BristleError
-from .document import COMPONENT_KEYS, Document, flatten
+from .document import COMPONENT_KEYS, MADE_FROM, Document, flatten
 from .findings import Findings, number, unknown, written
 from .library import Library
 from .lines import KeyPath
@@ -202,6 +202,7 @@ def _check_component(
     part.step = _seconds(findings, settings, (*part.path, "step"), f"{where} step")
     folder = document.file.parent
     _choose_building(part, settings, folder, findings)
+    _choose_controller(part, settings, folder, findings)
     _choose_fmu(part, settings, folder, library, findings)
     for key in settings:
         if key in COMPONENT_KEYS:
@@ -238,6 +239,22 @@ def _choose_building(
         part.building = existing_file(value, folder, path, where, findings)
 
 
+def _choose_controller(
+    part: Part, settings: Mapping[str, Any], folder: Path, findings: Findings
+) -> None:
+    """Read `controller` of a component; whether it takes one, its description says."""
+    if "controller" not in settings:
+        return
+    path, value = (*part.path, "controller"), settings["controller"]
+    where = f"[components.{part.name}] controller"
+    if not isinstance(value, str):
+        findings.error(
+            path, f"{where} is {written(value)}; the path of a controller file is right."
+        )
+    else:
+        part.controller = existing_file(value, folder, path, where, findings)
+
+
 def _choose_fmu(
     part: Part,
     settings: Mapping[str, Any],
@@ -258,12 +275,16 @@ def _choose_fmu(
     try:
         if value.lower().endswith(".fmu") or "/" in value or "\\" in value:
             part.file = existing_file(value, folder, path, where, findings)
+            if part.controller:
+                words = "a foreign FMU takes no controller file; the built-in controllers do."
+                findings.error((*part.path, "controller"), f"{where}: {words}")
             if part.file:
                 part.description = library.describe_file(part.file)
         elif value not in library.names():
             findings.error(path, f"{where}: {unknown('built-in FMU', value, library.names())}")
-        elif part.building or "building" not in settings:
-            part.description = library.describe(value, part.building)
+        elif all(getattr(part, key) or key not in settings for key in MADE_FROM):
+            part.description = library.describe(value, part.building, part.controller)
     except BristleError as error:
-        at = (*part.path, "building") if part.building else path
+        given = [key for key in MADE_FROM if getattr(part, key)]
+        at = (*part.path, given[0]) if given else path
         findings.error(at, f"{where}: {error}")

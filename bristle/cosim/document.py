@@ -16,7 +16,9 @@ from .lines import KeyPath, key_lines, repeated_keys
 MAX_BYTES = 1_000_000
 """A scenario is a page of text; a file larger than this [byte] is something else."""
 
-COMPONENT_KEYS = ("fmu", "building", "step", "parameters")
+COMPONENT_KEYS = ("fmu", "building", "controller", "step", "parameters")
+MADE_FROM = ("building", "controller")
+"""Those of them that name a file which a component is made from."""
 FILE_PARAMETERS = ("record", "file")
 """Parameters that may name a file, relative to the scenario's folder."""
 
@@ -151,7 +153,7 @@ def _target(data: Mapping[str, Any], name: str) -> tuple[str, ...] | str:
         return f'a dotted name is right, as in "{first}.step".'
     if first in ("run", "connections"):
         return first, rest
-    if rest in COMPONENT_KEYS[:3]:
+    if rest in COMPONENT_KEYS[:-1]:
         return "components", first, rest
     return "components", first, "parameters", rest.removeprefix("parameters.")
 
@@ -176,7 +178,7 @@ def _plain(value: object, key: str) -> object:
     item = getattr(value, "item", None)
     if callable(item) and getattr(value, "size", 1) == 1:  # numbers of numpy
         value = item()
-    is_file_name = key in (*FILE_PARAMETERS, "fmu", "building")
+    is_file_name = key in (*FILE_PARAMETERS, *MADE_FROM, "fmu")
     if is_file_name and isinstance(value, str) and Path(value).suffix:
         here = Path(value).absolute()
         return str(here) if exists(here) else value

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..control.controller import KINDS, Controller, parse_controller
-from ..errors import DesignError, PhysicsError
+from ..errors import DesignError
 from ..fmu.description import Description
 
 
@@ -21,24 +21,28 @@ class Library:
     names
         () -> names of the built-in components.
     describe
-        (name, building file or None) -> Description of a built-in component.
+        (name, building file or None, controller file or None) -> Description of a built-in
+        component; raises BristleError where a file is wrong.
     describe_file
         (path) -> Description of an FMU file; raises FmuError.
     read_record
         (record, folder) -> the ground motion; raises RecordError.
+    check_controller
+        (name, controller file or None, building file or None); raises BristleError where the
+        component carries a design for another building.
+    check_carried
+        (FMU file, building file or None); likewise for the design that a built FMU carries.
     driven_mass
         (building file or None) -> mass [kg] that a damper's force acts on; raises PhysicsError.
-    unsuited
-        (component, its FMU file or None, building file or None) -> the words for why a designed
-        controller is not for that building; "" where it is, or is no designed controller.
     """
 
     names: Callable[[], Sequence[str]]
-    describe: Callable[[str, Path | None], Description]
+    describe: Callable[[str, Path | None, Path | None], Description]
     describe_file: Callable[[Path], Description]
     read_record: Callable[[str, Path], object]
     driven_mass: Callable[[Path | None], float]
-    unsuited: Callable[[str, Path | None, Path | None], str] = lambda name, file, building: ""
+    check_controller: Callable[[str, Path | None, Path | None], None]
+    check_carried: Callable[[Path, Path | None], None]
 
 
 def installed() -> Library:
@@ -53,7 +57,8 @@ def installed() -> Library:
         describe_file=read_description,
         read_record=read_ground_motion,
         driven_mass=driven_mass,
-        unsuited=unsuited,
+        check_controller=catalogue.check_controller,
+        check_carried=check_carried,
     )
 
 
@@ -64,27 +69,22 @@ def driven_mass(building: Path | None) -> float:
     return (read_building(building) if building else paper_building()).M[0][0]
 
 
-def unsuited(name: str, file: Path | None, building: Path | None) -> str:
-    """Return why a designed controller is not for a building, "" where it is."""
+def check_carried(file: Path, building: Path | None) -> None:
+    """Refuse a building that the controller in an FMU is not designed for.
+
+    An FMU without a design suits any building.
+
+    Raises
+    ------
+    DesignError, PhysicsError
+        Naming both; if the building is wrong.
+    """
     from ..physics.building import paper_building, read_building
 
-    controller = _controller_in(file) if file else _built_in_controller(name)
-    if controller is None:
-        return ""
-    try:
-        controller.check_building(read_building(building) if building else paper_building(), name)
-    except DesignError as error:
-        return str(error)
-    except PhysicsError:  # the check of the building itself says so
-        return ""
-    return ""
-
-
-def _built_in_controller(name: str) -> Controller | None:
-    from ..fmu import catalogue
-
-    found = getattr(catalogue.instantiate(name), "controller", None)
-    return found if isinstance(found, Controller) else None
+    controller = _controller_in(file)
+    if controller is not None:
+        on = read_building(building) if building else paper_building()
+        controller.check_building(on, f"the design that {file.name} carries")
 
 
 def _controller_in(file: Path) -> Controller | None:

@@ -30,6 +30,7 @@ class Part:
     fmu: str = ""
     file: Path | None = None
     building: Path | None = None
+    controller: Path | None = None
     step: float | None = None
     description: Description | None = None
     parameters: dict[str, Value] = field(default_factory=dict)

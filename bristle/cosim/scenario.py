@@ -46,7 +46,8 @@ class Component:
     """One FMU of a scenario.
 
     `path` is the file of a foreign FMU, None for a built-in; `building` the data file that a
-    Structure is made from, None for the default; `parameters` the values that the scenario sets,
+    Structure is made from, None for the default; `controller` the controller file of a designed
+    controller, None for the one that it carries; `parameters` the values that the scenario sets,
     inputs that are held constant included; `step` its own step [s], None for the run's.
     """
 
@@ -57,6 +58,7 @@ class Component:
     parameters: dict[str, Value]
     step: float | None
     description: Description
+    controller: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -174,7 +176,14 @@ def _read(
     assert run.step is not None
     components = tuple(
         Component(
-            part.name, part.fmu, part.file, part.building, part.parameters, part.step, description
+            part.name,
+            part.fmu,
+            part.file,
+            part.building,
+            part.parameters,
+            part.step,
+            description,
+            part.controller,
         )
         for part in parts.values()
         if (description := part.description) is not None

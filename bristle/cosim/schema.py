@@ -28,7 +28,7 @@ def build_schema(library: Library | None = None) -> dict[str, Any]:
     """Return the JSON schema (draft 7) of a scenario file."""
     library = library or installed()
     names = list(library.names())
-    definitions = {name: _parameters(library.describe(name, None)) for name in names}
+    definitions = {name: _parameters(library.describe(name, None, None)) for name in names}
     return {
         "$schema": "http://json-schema.org/draft-07/schema#",
         "title": "bristle scenario",
@@ -96,6 +96,10 @@ def _component(names: list[str]) -> dict[str, Any]:
                 "anyOf": [{"enum": names}, {"type": "string", "pattern": r"(\.[fF][mM][uU]|/|\\)"}],
             },
             "building": {"type": "string", "description": "data file of another building"},
+            "controller": {
+                "type": "string",
+                "description": "controller file of bristle design, for a designed controller",
+            },
             "step": {**_TIME, "description": "the run's step divided by a whole number [s]"},
             "parameters": {"type": "object"},
         },

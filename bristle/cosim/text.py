@@ -49,6 +49,8 @@ def _component(component: Component, folder: Path) -> list[str]:
     lines = [f"fmu = {_value(fmu)}"]
     if component.building is not None:
         lines.append(f"building = {_value(component.building.absolute().as_posix())}")
+    if component.controller is not None:
+        lines.append(f"controller = {_value(component.controller.absolute().as_posix())}")
     if component.step is not None:
         lines.append(f"step = {_value(component.step)}")
     if component.parameters:

@@ -23,8 +23,8 @@ from .task import Scheduling, Task
 TITLE = "reference design of the base-isolated two-storey model"
 
 
-def write(folder: Path, rows: int | None = None) -> list[Path]:
-    """Design and write hinf.json, lpv.json and lqg.json; return their paths.
+def write(folder: Path, rows: int | None = None, kinds: Sequence[str] = KINDS) -> list[Path]:
+    """Design and write hinf.json, lpv.json and lqg.json, or those of `kinds`; return their paths.
 
     Parameters
     ----------
@@ -32,6 +32,8 @@ def write(folder: Path, rows: int | None = None) -> list[Path]:
         Where they go; made if need be.
     rows : int, optional
         Rows of the LPV controller's table; else the design's own.
+    kinds : sequence of str
+        What is designed.
 
     Raises
     ------
@@ -43,7 +45,7 @@ def write(folder: Path, rows: int | None = None) -> list[Path]:
     except OSError as error:
         raise DesignError(f"{folder}: cannot be made ({error.strerror}).") from error
     paths = []
-    for kind in KINDS:
+    for kind in kinds:
         path = folder / f"{kind}.json"
         scheduling = Scheduling() if rows is None else Scheduling(rows=rows)
         design(Task(kind, title=TITLE, scheduling=scheduling)).controller.save(path)
@@ -56,9 +58,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m bristle.design.reference", description=TITLE)
     parser.add_argument("--out", type=Path, required=True, help="folder of the controller files")
     parser.add_argument("--rows", type=int, help="rows of the LPV controller's table")
+    parser.add_argument("--only", nargs="+", choices=KINDS, default=KINDS, help="what is designed")
     given = parser.parse_args(arguments)
     try:
-        for path in write(given.out, given.rows):
+        for path in write(given.out, given.rows, given.only):
             print(path)
     except BristleError as error:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)

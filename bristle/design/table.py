@@ -55,7 +55,7 @@ def reconstruct(s: Solution, plants: list[Plant], r: Array, units: Units) -> Ban
         np.array([getattr(plant, name) for plant in plants]) for name in ("A", "B2", "C2", "D22")
     )
     inner = Ah - X @ A @ Y - Bh @ C2 @ Y - X @ B2 @ Ch
-    right = np.linalg.solve(Mt.transpose(0, 2, 1), np.eye(n)).transpose(0, 2, 1)  # M^-T
+    right = np.linalg.solve(Mt.transpose(0, 2, 1), unit).transpose(0, 2, 1)  # M^-T
     A_K = np.linalg.solve(N, inner) @ right
     B_K = np.linalg.solve(N, Bh)
     C_K = Ch @ right

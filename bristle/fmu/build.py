@@ -17,7 +17,7 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
@@ -27,7 +27,7 @@ from uuid import UUID, uuid5
 from ..errors import BuildError
 from ..resources import fmus_folder
 from . import catalogue
-from .slave import BAKED, Slave
+from .slave import BAKED
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _BUNDLED = (
@@ -146,7 +146,7 @@ def plan(
             found = stem
         baked["record"] = found
     if controller is not None:
-        files[_design_file(component, kind, controller)] = controller
+        files[catalogue.design_file(component, kind, controller)] = controller
     if starts:
         baked["starts"] = _checked_starts(component, building, starts)
     effects = tuple(effects)
@@ -154,22 +154,6 @@ def plan(
         if not file.is_file():
             raise BuildError(f"{file}: there is no such file with an effect.")
     return Plan(chosen, path, baked, files, effects)
-
-
-def _design_file(component: str, kind: type[Slave], controller: Path) -> str:
-    """Return under which name a component takes a controller file; refuse one that is not right."""
-    from ..control.controller import read_controller
-
-    wanted = getattr(kind, "design", "")
-    if not wanted:
-        raise BuildError(f"a controller file goes into a designed controller, not {component}.")
-    found = read_controller(controller).kind
-    if found != wanted:
-        raise BuildError(
-            f"{controller}: a controller of the kind {found!r}; {component} takes {wanted!r}: "
-            f"design it with kind = {wanted!r}."
-        )
-    return f"{wanted}.json"
 
 
 def _checked_starts(
@@ -346,15 +330,25 @@ def _pack(loose: Path, target: Path) -> None:
         raise
 
 
-def ensure(component: str, building: Path | None = None) -> Path:
-    """Return a built-in component's FMU, built on first use and reused while its digest holds."""
-    if building is None:
+def ensure(component: str, building: Path | None = None, controller: Path | None = None) -> Path:
+    """Return a built-in component's FMU, built on first use and reused while its digest holds.
+
+    One that is made from a building or a controller file is named by the file's content.
+    """
+    if building is None and controller is None:
         return build(plan(component), fmus_folder())
-    named = hashlib.sha256(
-        json.dumps(catalogue.read_building_data(building), sort_keys=True).encode()
-    )
-    name = f"{component}_{named.hexdigest()[:8]}"
-    return build(plan(component, name=name, building=building), fmus_folder())
+    named = hashlib.sha256()
+    if building is not None:
+        named.update(json.dumps(catalogue.read_building_data(building), sort_keys=True).encode())
+    what = plan(component, building=building, controller=controller)
+    if controller is not None:
+        named.update(controller.read_bytes())
+    return build(replace(what, **_named(what, named.hexdigest()[:8])), fmus_folder())
+
+
+def _named(what: Plan, ending: str) -> dict[str, Any]:
+    name = f"{what.name}_{ending}"
+    return {"name": name, "baked": {**what.baked, "name": name}}
 
 
 def build_all(folder: Path, only: Iterable[str] = ()) -> list[Path]:

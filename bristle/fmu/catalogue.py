@@ -86,10 +86,17 @@ def _load(path: Path) -> ModuleType:
     return module
 
 
-def instantiate(name: str, building: Path | None = None, instance: str = "") -> Slave:
+def instantiate(
+    name: str,
+    building: Path | None = None,
+    instance: str = "",
+    controller: Path | None = None,
+) -> Slave:
     """Return a component as a Python object, as an FMU's binary would make it."""
     baked: dict[str, Any] = {"building": read_building_data(building)} if building else {}
     kind = component_class(source(name))
+    if controller:
+        baked["files"] = {design_file(name, kind, controller): str(controller)}
     files: tuple[str, ...] = getattr(kind, "files", ())
     resources = str((_PACKAGE / files[0]).parent) if files else None
     return kind(baked=baked, instance_name=instance or name, resources=resources)
@@ -104,7 +111,54 @@ def read_building_data(path: Path) -> dict[str, Any]:
         return tomllib.load(file)
 
 
-def describe(name: str, building: Path | None = None) -> Description:
+def design_file(component: str, kind: type[Slave], controller: Path) -> str:
+    """Return under which name a component takes a controller file.
+
+    Raises
+    ------
+    BuildError, DesignError
+        If it takes none, or none of this kind; if the file is no controller.
+    """
+    from ..control.controller import read_controller
+
+    wanted = getattr(kind, "design", "")
+    if not wanted:
+        raise BuildError(f"a controller file goes into a designed controller, not {component}.")
+    found = read_controller(controller).kind
+    if found != wanted:
+        raise BuildError(
+            f"{controller}: a controller of the kind {found!r}; {component} takes {wanted!r}: "
+            f"design it with kind = {wanted!r}."
+        )
+    return f"{wanted}.json"
+
+
+def check_controller(
+    component: str, controller: Path | None = None, building: Path | None = None
+) -> None:
+    """Refuse a controller, by default the component's own, on a building it is not designed for.
+
+    A component without a design suits any building.
+
+    Raises
+    ------
+    DesignError, PhysicsError
+        Naming both; if the building is wrong.
+    """
+    from ..control.controller import read_controller
+    from ..physics.building import paper_building, read_building
+
+    kind = component_class(source(component))
+    if getattr(kind, "design", ""):
+        file = controller or _PACKAGE / kind.files[0]
+        where = str(controller) if controller else f"the design that {component} carries"
+        on = read_building(building) if building else paper_building()
+        read_controller(file).check_building(on, where)
+
+
+def describe(
+    name: str, building: Path | None = None, controller: Path | None = None
+) -> Description:
     """Return the ports and parameters of a built-in component; no FMU is needed for it.
 
     Parameters
@@ -113,13 +167,15 @@ def describe(name: str, building: Path | None = None) -> Description:
         A name of `component_names()`.
     building : path, optional
         The building file of a Structure.
+    controller : path, optional
+        The controller file of a designed controller.
 
     Raises
     ------
-    BuildError, PhysicsError
-        If there is no such component; if the building is wrong.
+    BuildError, DesignError, PhysicsError
+        If there is no such component; if the controller or the building is wrong.
     """
-    slave = instantiate(name, building)
+    slave = instantiate(name, building, controller=controller)
     variables = {}
     for index, declared in slave.vars.items():
         key = declared.name

@@ -147,7 +147,7 @@ class ControllerSlave(SampledSlave):
         self.add_output("command_raw", self.command_unit, text)
         self.add_output("scheduling", "m/s", "velocity that the law works with")
         self.add_parameter("v_max", 8.0, "V", "largest voltage", (1e-3, 1e4))
-        text = "direct, or filtered: the rate of the low-passed base_displacement"
+        text = "one of direct, filtered: the rate of the low-passed base_displacement"
         self.add_parameter("velocity", "direct", None, text)
         text = "corner frequency of that low-pass"
         self.add_parameter("velocity_corner", 18.0, "Hz", text, (1e-3, 1e5))
@@ -254,7 +254,8 @@ class DamperInverse:
     @staticmethod
     def declare(slave: Slave) -> None:
         """Declare the parameters."""
-        slave.add_parameter("inverse", "lugre", None, "law that is inverted: lugre or bingham")
+        text = "the law that is inverted, one of lugre, bingham"
+        slave.add_parameter("inverse", "lugre", None, text)
         for law in (LuGre, Bingham):
             for name, p in law.parameters.items():
                 slave.add_parameter(f"{law.name}.{name}", p.value, p.unit, p.text, p.bounds)

@@ -12,6 +12,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from math import isfinite
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement
@@ -105,6 +106,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             None,
             "0, or why the component stopped: 1 input, 2 step, 3 mode, 4 state, 5 parameter",
         )
+        # All Real outputs in one call; `fault` stands twice behind them, for it must give a tuple.
+        fault = self._index["fault"]
+        self._shown = itemgetter(*self._outputs, fault, fault)
         for name, value in self.baked.get("starts", {}).items():
             self._values[self._index[name]] = value
 
@@ -267,7 +271,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         for index in self._inputs:
             if not isfinite(values[index]):
                 return self._stop(NOT_FINITE_INPUT, f"{self.vars[index].name} = {values[index]!r}.")
-        held = [values[index] for index in self._outputs]
+        held = self._shown(values)
         before = self.time
         self.time = current_time + step_size
         try:
@@ -286,10 +290,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def _not_finite(self) -> str:
         values = self._values
-        total = 0.0
-        for index in self._outputs:
-            total += values[index]
-        if isfinite(total):
+        if isfinite(sum(self._shown(values))):
             return ""
         names = [self.vars[i].name for i in self._outputs if not isfinite(values[i])]
         return "not finite: {}.".format(", ".join(names) or "the sum of the outputs")
@@ -319,13 +320,16 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if self.fault or self._mode == _TERMINATED:
             return
         values = self._values
-        held = [values[index] for index in self._outputs]
+        held = self._shown(values)
         try:
             if self._unbuilt:
                 self._check_parameters()
                 self.configure()
                 self._unbuilt = False
-            if all(isfinite(values[index]) for index in self._inputs):
+            for index in self._inputs:
+                if not isfinite(values[index]):
+                    break
+            else:
                 self.refresh()
             wrong = self._not_finite()
         except Exception as error:  # an exception would poison the binary: it becomes a fault
@@ -541,8 +545,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
 
     def resource(self, name: str) -> Path:
-        """Return the path of a file that was bundled with the component."""
-        return Path(self.resources or ".") / name
+        """Return the path of a file that was bundled with the component, or stands for one."""
+        given = self.baked.get("files", {}).get(name)
+        return Path(given or Path(self.resources or ".") / name)
 
 
 class EffectSlave(Slave):

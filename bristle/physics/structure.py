@@ -102,13 +102,13 @@ def add_force(n: int, held: Row, ramp: Row, level: int, f0: float, f1: float, x1
 def accelerations(n: int, M_inverse: Row, C: Row, K: Row, x: Row, forces: Row, out: Row) -> None:
     """Fill `out` (n,) with the absolute accelerations q'' + a_g [m/s2] under `forces` (n,) [N]."""
     for i in range(n):
-        total = 0.0
-        for j in range(n):
-            load = forces[j]
-            for k in range(n):
-                load += K[j * n + k] * x[k] + C[j * n + k] * x[n + k]
-            total -= M_inverse[i * n + j] * load
-        out[i] = total
+        out[i] = 0.0
+    for j in range(n):
+        load = forces[j]
+        for k in range(n):
+            load += K[j * n + k] * x[k] + C[j * n + k] * x[n + k]
+        for i in range(n):
+            out[i] -= M_inverse[i * n + j] * load
 
 
 def holding_force(n: int, C: Row, K: Row, mass: float, x: Row, a_g: float, others: float) -> float:
@@ -267,6 +267,7 @@ class StructureModel:
         self.z = [values.get(name + "_0", 0.0) for name in LAYOUT.states]
         self._step: dict[float, tuple[int, StepMatrices]] = {}
         self._unloaded = [0.0] * self.m.n
+        self._gives = self.m.M_inverse[:: self.m.n]  # acceleration per force on the first level
         self.settle()
 
     def step(self, dt: float, a0: float, a1: float, force: float) -> None:
@@ -311,8 +312,7 @@ class StructureModel:
 
     def absolute_accelerations(self, force: float) -> list[float]:
         """Return q'' + a_g (n,) [m/s2] under the devices' force [N] on the first level."""
-        n, inertia = self.m.n, self.m.M_inverse
-        return [self._unloaded[i] - inertia[i * n] * force for i in range(n)]
+        return [free - give * force for free, give in zip(self._unloaded, self._gives)]
 
     def holding_force(self, a_g: float, others: float) -> float:
         """Return the damper force [N] at which the first level stays at its velocity."""

@@ -155,7 +155,7 @@ def make(
         A run failed; or, with exit code 2, a file cannot be written.
     """
     figure = find_figure(name)
-    _prepare(folder, format)
+    prepare(folder, format)
     with Progress(figure.name, figure.runs, progress) as bar, look():
         drawing = figure.draw(Runs(engine, bar.show))
         image = folder / f"{name}.{format}"
@@ -168,7 +168,7 @@ def make(
     return written
 
 
-def _prepare(folder: Path, format: str) -> None:
+def prepare(folder: Path, format: str) -> None:
     """Refuse a folder or format that cannot be written before anything is run."""
     if format not in FORMATS:
         raise not_usable(f'format "{format}" is not known; there are {", ".join(FORMATS)}.')

@@ -73,7 +73,10 @@ def draw(runs: Runs) -> Drawing:
     below = page.grid(1, 1, top=5.1, left=0.5, bottom=0.45)
     _heights(page.figure.add_subplot(below[0, 0]), peaks, smooth)
     curves = [_labelled(frames[case], *case) for case in SHOWN]
-    found = [pd.DataFrame({**_names(*case), **table}) for case, table in peaks.items()]
+    found = [
+        pd.DataFrame({**_names(*case), **table, "crest [m/s2]": smooth[case]})
+        for case, table in peaks.items()
+    ]
     return Drawing(
         page,
         {

@@ -140,7 +140,7 @@ COMPONENTS = {
 }
 
 
-def describe(name, building=None):
+def describe(name, building=None, controller=None):
     if building is not None and "wrong" in building.name:
         raise PhysicsError(f"{building}: masses[0] = -1.0 must be positive.")
     return COMPONENTS[name]
@@ -175,4 +175,6 @@ FAKE = Library(
     describe_file=describe_file,
     read_record=read_record,
     driven_mass=lambda building: BASE_MASS,
+    check_controller=lambda name, controller, building: None,
+    check_carried=lambda file, building: None,
 )

@@ -125,6 +125,13 @@ FAILING = [
     ("random", "state replay", "y at"),
     ("forget inputs", "set values stay", "before the step u is"),
     ("secret dependency", "direct dependencies", "y follows u"),
+    ("crash on infinity", "infinite input", "crashed in fmi2DoStep: SIGSEGV"),
+    ("crash on large numbers", "huge input", "crashed in fmi2DoStep: SIGSEGV"),
+    ("remember NaN", "NaN input", "fmi2Reset does not mend it: y at"),
+    ("count in the process", "two libraries", "beside its copy: y at"),
+    ("look at the path", "another FMU before", "y at"),
+    ("look at the path", "another FMU after", "y at"),
+    ("use numpy if there is one", "bare interpreter", "without installed packages: y at"),
 ]
 
 
@@ -139,6 +146,7 @@ def test_spoilt_toy_fails(trait: Callable[[str], Path], name: str, probe: str, s
 
 
 NOTED = [
+    ("NaN when driven", "driven run", "not finite at t = 0.06 s: y = nan"),
     ("random", "repeatable", "not repeatable: y at"),
     ("random", "reset", "cannot be judged"),
     ("leak", "memory", "KiB per instance"),
@@ -378,3 +386,48 @@ def test_built_in_fmu_conforms(name: str) -> None:
         assert report.row(probe).verdict == "pass"
     for probe in ("another FMU before", "another FMU after", "repeatable", "bare interpreter"):
         assert report.row(probe).verdict == "pass"
+
+
+# The line of the bundled slave base that is replaced, by what, the probe that must fail, its words.
+BREAKS_RULES = [
+    ("_stop(NOT_FINITE_INPUT,", "_stop(BAD_STATE,", "fault: input", "fault = 4"),
+    ("_stop(BAD_STEP,", "_stop(BAD_STATE,", "fault: step", "fault = 4"),
+    ('_stop(WRONG_MODE, "doStep', '_stop(BAD_STEP, "doStep', "fault: order", "fault = 2"),
+    ("_stop(BAD_PARAMETER,", "_stop(BAD_STATE,", "fault: parameter", "fault = 4"),
+    (
+        "if self.fault:\n            return False",
+        "pass",
+        "fault: input",
+        "the step after displacement = nan: answered OK",
+    ),
+    (
+        'self._values[:] = state["values"]',
+        'self._values[:-1] = state["values"][:-1]',
+        "fault: earlier state",
+        "Discard",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "probe", "seen"), BREAKS_RULES, ids=[f"{p}-{s}" for *_, p, s in BREAKS_RULES]
+)
+def test_built_in_fmu_that_breaks_a_rule_of_ours_fails(
+    old: str, new: str, probe: str, seen: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "Spoilt.fmu"
+    found = 0
+    with (
+        zipfile.ZipFile(build.ensure("BinghamDamper")) as source,
+        zipfile.ZipFile(path, "w") as sink,
+    ):
+        for name in source.namelist():
+            data = source.read(name)
+            if name.endswith("/fmu/slave.py"):
+                found += data.decode().count(old)
+                data = data.decode().replace(old, new).encode()
+            sink.writestr(name, data)
+    assert found == 1
+    report = conform(path, only=[probe])
+    assert report.row(probe).verdict == "fail"
+    assert seen in report.row(probe).seen

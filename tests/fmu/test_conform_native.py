@@ -11,9 +11,11 @@ from pathlib import Path
 
 import fmpy
 import pytest
+import test_conform
 
 from bristle.fmu.archive import library_member
 from bristle.fmu.conform import conform
+from bristle.fmu.conform.probes import PROBES
 
 SOURCE = Path(__file__).with_name("toy.c")
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -116,6 +118,28 @@ FAILING = [
     ("ODD_STATUS", "legal run", "answered 17, which is no status"),
     ("CRASH_ON_BAD_REFERENCE", "reading what is not there", "crashed in fmi2GetReal: SIGABRT"),
     ("CRASH_ON_BAD_REFERENCE", "setting what is not there", "crashed in fmi2SetReal: SIGABRT"),
+    ("CRASH_ON_WRONG_GUID", "wrong guid", "crashed in fmi2Instantiate: SIGABRT"),
+    ("CRASH_ON_EARLY_FREE", "free without terminate", "crashed in fmi2FreeInstance: SIGABRT"),
+    ("CRASH_ON_EMPTY_LIST", "empty lists", "crashed in fmi2GetReal: SIGABRT"),
+    ("COPY_CHANGES_RUN", "freeing states", "making copies changes the run: y at"),
+    ("CRASH_ON_NULL_STATE", "freeing states", "crashed in fmi2FreeFMUstate: SIGSEGV"),
+    *(
+        ("ABORT_INSTEAD_OF_ERROR", probe, f"crashed in fmi2{function}: SIGABRT")
+        for probe, function in {
+            "step before initialisation": "DoStep",
+            "step in initialisation": "DoStep",
+            "step after terminate": "DoStep",
+            "initialise twice": "EnterInitializationMode",
+            "leave what was not entered": "ExitInitializationMode",
+            "fixed parameter in mid-run": "SetReal",
+            "setting an output": "SetReal",
+            "step past the stop time": "DoStep",
+            "zero step": "DoStep",
+            "negative step": "DoStep",
+            "NaN step": "DoStep",
+            "infinite step": "DoStep",
+        }.items()
+    ),
 ]
 
 
@@ -127,6 +151,18 @@ def test_spoilt_fmu_fails(compiled: Compile, trait: str, probe: str, seen: str) 
     assert not report.ok
     failed = [row for row in report.rows if row.verdict == "fail"]
     assert any(seen in row.seen for row in failed), report.to_text()
+
+
+# Probes that judge nothing, and those with a test of their own in which they fail.
+NEVER_FAIL = {"memory", "repeatable", "driven run"}
+ELSEWHERE = {"archive", "claimed capabilities"}
+
+
+def test_every_probe_has_an_fmu_that_fails_it() -> None:
+    spoilt = (*FAILING, *test_conform.FAILING)
+    failing = {probe for _, probe, _ in spoilt} | NEVER_FAIL | ELSEWHERE
+    failing |= {row[2] for row in (*test_conform.BAD_FILES, *test_conform.BREAKS_RULES)}
+    assert failing == set(PROBES)
 
 
 def test_every_c_trait_is_used() -> None:

@@ -19,6 +19,7 @@ from bristle.physics.damper import LAWS
 from bristle.physics.effect import effects_of
 
 DAMPERS = ["BinghamDamper", "LuGreDamper"]
+CONTROLLERS = ["ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped", "Skyhook"]
 each_component = pytest.mark.parametrize("component", COMPONENTS)
 each_damper = pytest.mark.parametrize("component", DAMPERS)
 
@@ -31,6 +32,22 @@ DAMPER_INPUTS = {
     "acceleration": "m/s2",
 }
 DAMPER_OUTPUTS = {"force": "N", "dissipated_energy": "J", "stroke_ratio": "1"}
+MEASURED = {
+    "floor_acceleration": "m/s2",
+    "base_displacement": "m",
+    "base_velocity": "m/s",
+    "damper_force": "N",
+}
+CONTROLLER_PARAMETERS = {
+    "v_max": 8.0,
+    "velocity": "direct",
+    "velocity_corner": 18.0,
+    "sample_period": 0.002,
+}
+FAULTLESS = {"gain": 1.0, "bias": 0.0, "noise_density": 0.0, "quantisation": 0.0} | {
+    "delay": 0.0,
+    "cut_off": 0.0,
+}
 LEVELS = ("base", "floor1", "floor2")
 INPUTS: dict[str, dict[str, str]] = {
     "Structure": {"ground_acceleration": "m/s2", "damper_force": "N", "extra_force": "N"},
@@ -40,6 +57,8 @@ INPUTS: dict[str, dict[str, str]] = {
     "ConstantVoltage": {},
     "SignalSource": {},
     "PrescribedMotion": {},
+    "Sensors": MEASURED,
+    **dict.fromkeys(CONTROLLERS, MEASURED),
 }
 OUTPUTS: dict[str, dict[str, str | None]] = {
     "Structure": {
@@ -56,6 +75,9 @@ OUTPUTS: dict[str, dict[str, str | None]] = {
     "ConstantVoltage": {"voltage": "V"},
     "SignalSource": {"value": None},
     "PrescribedMotion": {"displacement": "m", "velocity": "m/s"},
+    "Sensors": {f"{name}_measured": unit for name, unit in MEASURED.items()},
+    **{name: {"voltage": "V", "command_raw": "N", "scheduling": "m/s"} for name in CONTROLLERS},
+    "Lpv": {"voltage": "V", "command_raw": "V", "scheduling": "m/s"},
 }
 PARAMETERS: dict[str, dict[str, Any]] = {
     "Structure": {"attached_mass": 0.0},
@@ -65,6 +87,13 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     "ConstantVoltage": {"level": 4.0},
     "SignalSource": {"kind": "constant", "level": 0.0},
     "PrescribedMotion": {"kind": "constant", "level": 0.0},
+    "Sensors": {"sample_period": 0.002, "seed": 1}
+    | {f"{name}.{key}": value for name in MEASURED for key, value in FAULTLESS.items()},
+    "ClippedOptimal": {**CONTROLLER_PARAMETERS, "f_min": 0.5},
+    "LqgClipped": {**CONTROLLER_PARAMETERS, "f_min": 0.5},
+    "HinfInverse": {**CONTROLLER_PARAMETERS, "inverse": "lugre", "anti_windup": 0.0},
+    "Lpv": {**CONTROLLER_PARAMETERS, "anti_windup": 200.0},
+    "Skyhook": {**CONTROLLER_PARAMETERS, "kind": "switch", "gain": 50.0, "inverse": "lugre"},
 }
 
 
@@ -101,7 +130,7 @@ def test_parameters_have_their_defaults(component: str) -> None:
     found = variables(component)
     for name, value in PARAMETERS[component].items():
         start = found[name].start
-        assert (float(start) if isinstance(value, float) else start) == value
+        assert type(value)(start) == value
         assert found[name].causality == "parameter"
         assert found[name].variability == "fixed"
 

@@ -17,6 +17,12 @@
 #define ODD_STATUS 8
 #define LEAK_ON_FREE 9
 #define CRASH_ON_BAD_REFERENCE 10
+#define ABORT_INSTEAD_OF_ERROR 11
+#define CRASH_ON_WRONG_GUID 12
+#define CRASH_ON_EARLY_FREE 13
+#define CRASH_ON_EMPTY_LIST 14
+#define COPY_CHANGES_RUN 15
+#define CRASH_ON_NULL_STATE 16
 #ifndef TRAIT
 #define TRAIT HEALTHY
 #endif
@@ -41,6 +47,7 @@ static int made;
 void *volatile leaked;
 
 static fmi2Status refuse(Toy *toy, const char *text) {
+    if (TRAIT == ABORT_INSTEAD_OF_ERROR) abort();
     toy->s.mode = BROKEN;
     if (toy->logging) {
         const char *name = TRAIT == NO_NAME_IN_LOG ? NULL : toy->name;
@@ -56,6 +63,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *callbacks, fmi2Boolean visible,
                               fmi2Boolean logging) {
     (void)where, (void)visible;
+    if (TRAIT == CRASH_ON_WRONG_GUID && strcmp(guid, GUID) != 0) abort();
     if (strcmp(guid, GUID) != 0 || type != fmi2CoSimulation) return NULL;
     if (TRAIT == REFUSE_SECOND && made) return NULL;
     made++;
@@ -72,6 +80,7 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
 
 void fmi2FreeInstance(fmi2Component c) {
     if (TRAIT == CRASH_ON_NULL) *(volatile char *)c;
+    if (TRAIT == CRASH_ON_EARLY_FREE && c && ((Toy *)c)->s.mode == STEPPING) abort();
     if (TRAIT != LEAK_ON_FREE) free(c);
     else if (c) memset(leaked = malloc(1 << 20), 1, 1 << 20);
 }
@@ -115,6 +124,7 @@ static double *slot(Toy *toy, fmi2ValueReference r) {
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference r[], size_t n, fmi2Real v[]) {
+    if (TRAIT == CRASH_ON_EMPTY_LIST && n == 0) abort();
     for (size_t i = 0; i < n; i++) {
         double *x = slot(c, r[i]);
         if (!x) return refuse(c, "no such reference");
@@ -162,6 +172,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
 fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     if (!*state) *state = malloc(sizeof(State));
     memcpy(*state, &((Toy *)c)->s, sizeof(State));
+    if (TRAIT == COPY_CHANGES_RUN) ((Toy *)c)->s.y += 1e-3;
     return fmi2OK;
 }
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
@@ -170,6 +181,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
 }
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
     (void)c;
+    if (TRAIT == CRASH_ON_NULL_STATE) *(volatile char *)*state;
     free(*state);
     *state = NULL;
     return fmi2OK;

@@ -3,9 +3,11 @@
 The tests put one word in place of "healthy" below, and each word spoils one thing.
 """
 
+import importlib.util
 import os
 import random
 import signal
+import sys
 import time
 from pathlib import Path
 from xml.etree.ElementTree import SubElement
@@ -84,6 +86,10 @@ class Toy(Fmi2Slave):
             raise ValueError("a toy that raises")
         if TRAIT == "crash on NaN" and self.u != self.u:
             os.kill(os.getpid(), signal.SIGSEGV)
+        if TRAIT == "crash on infinity" and abs(self.u) == float("inf"):
+            os.kill(os.getpid(), signal.SIGSEGV)
+        if TRAIT == "crash on large numbers" and 1e200 < abs(self.u) < float("inf"):
+            os.kill(os.getpid(), signal.SIGSEGV)
         if TRAIT == "hang on infinity" and step == float("inf"):
             time.sleep(1000.0)
         if TRAIT == "crash before initialisation" and not self.ready:
@@ -106,6 +112,18 @@ class Toy(Fmi2Slave):
             self.y += 1e-6 * random.random()
         if TRAIT == "NaN":
             self.y = float("nan") if self.steps > 5 else self.y
+        if TRAIT == "NaN when driven" and self.u != 0.0 and self.steps > 5:
+            self.y = float("nan")
+        if TRAIT == "remember NaN":
+            SHARED["spoilt"] = SHARED.get("spoilt", 0.0) + (self.u != self.u)
+            self.y += SHARED["spoilt"]
+        if TRAIT == "count in the process":
+            sys.toy_steps = getattr(sys, "toy_steps", 0) + 1
+            self.y += 1e-3 * sys.toy_steps
+        if TRAIT == "look at the path":
+            self.y += 1e-3 * len(sys.path)
+        if TRAIT == "use numpy if there is one":
+            self.y += 1e-3 * (importlib.util.find_spec("numpy") is not None)
         if TRAIT == "leave a file":
             Path("left.txt").write_text("left")
         if TRAIT == "strange category":

@@ -1,0 +1,52 @@
+"""The build of all FMUs into an empty folder, and again where nothing has changed."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from ._rows import Row
+
+ROOT = Path(__file__).resolve().parent.parent
+BUILD = (
+    "import sys, pathlib; from bristle.fmu.build import build_all; "
+    "print(len(build_all(pathlib.Path(sys.argv[1]))))"
+)
+
+
+def run() -> list[Row]:
+    """Return the wall time of a first and of a second build, each in a fresh process."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        first, count = _build(folder)
+        built = _written(folder)
+        second, _ = _build(folder)
+        rebuilt = len(set(_written(folder).items()) - set(built.items()))
+    return [
+        Row(f"build of all {count} FMUs", f"{first:.2f} s", "<= 10 s", first / 10.0),
+        Row(
+            "the same a second time",
+            f"{second:.2f} s; {rebuilt} built again",
+            "0 built again",
+            1.0 + rebuilt if rebuilt else 0.0,
+        ),
+    ]
+
+
+def _build(folder: Path) -> tuple[float, int]:
+    """Build into a folder; return the seconds of the whole process and the number of FMUs."""
+    path = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
+    before = time.perf_counter()
+    done = subprocess.run(
+        [sys.executable, "-c", BUILD, str(folder)],
+        env={**os.environ, "PYTHONPATH": path}, check=True, capture_output=True, text=True,
+    )  # fmt: skip
+    return time.perf_counter() - before, int(done.stdout)
+
+
+def _written(folder: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_mtime_ns for path in folder.glob("*.fmu")}

@@ -1,0 +1,8 @@
+"""The comparison of controllers in Shirazi et al. (2012), done anew from end to end.
+
+experiment      the runs: motions, intensities, laws; peak and RMS of each
+identification  how well each damper law fits a damper that is known
+ledger          what the paper's text states, each with a verdict by the numbers
+pictures        its figures
+page            one HTML file with everything
+"""
