@@ -29,7 +29,24 @@ POWER = 6.0
 """Of the mean over motions: the larger, the more the worst motion counts."""
 NONE = np.zeros(14)
 
-CHOSEN = NONE
+CHOSEN = np.array(
+    [
+        3630.1366,
+        -3703.1385,
+        951.3914,
+        177.13314,
+        61.709329,
+        -86.847305,
+        -633.50681,
+        -975.72396,
+        -95.444073,
+        -21.223632,
+        -147.41179,
+        41.669755,
+        4.7033787,
+        3.780693,
+    ]
+)
 """Found by `choose` on Kobe and synthetic motions."""
 ORACLE = NONE
 """Found by `choose` on the reported motions themselves: what hindsight would give, no design."""
@@ -87,6 +104,8 @@ def choose(motions: list[Array], rounds: tuple[int, int] = (60, 120)) -> tuple[A
         (LINEAR, 0.8, rounds[0], 1),
         (np.arange(14), 0.5, rounds[1], 2),
     ):
+        if not count:
+            continue
         around = best.copy()
 
         def gains(x: Array, places: Array = places, around: Array = around) -> Array:
@@ -105,10 +124,14 @@ def choose(motions: list[Array], rounds: tuple[int, int] = (60, 120)) -> tuple[A
 
 
 def main() -> int:
-    """Search on the training motions, then on the reported ones, and print both sets of gains."""
-    for name, motions in (("CHOSEN", training()), ("ORACLE", list(reported().values()))):
+    """Search on the training motions, on the reported ones, and on each of these alone."""
+    cases = reported()
+    for name, motions in (("CHOSEN", training()), ("ORACLE", list(cases.values()))):
         gains, value = choose(motions)
         print(f"{name} = {np.array2string(gains, separator=', ')}  # {value:.4f}", flush=True)
+    for name, ground in cases.items():
+        _, value = choose([ground], (45, 0))
+        print(f"{name}, tuned on it alone: {100 * (1 - value):.1f} % below", flush=True)
     return 0
 
 

@@ -32,7 +32,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import resources
-from ..cosim.document import FILE_PARAMETERS
+from ..cosim.document import FILE_PARAMETERS, MADE_FROM
 from ..cosim.findings import nearest, unknown, written
 from ..cosim.lines import KeyPath, key_lines
 from ..cosim.parameters import Wrong, typed
@@ -49,7 +49,7 @@ LARGEST = 4 * 1024**2
 """Largest ensemble file [bytes]."""
 MOST_RUNS = 10_000_000
 _KEYS = ("schema", "title", "scenario", "engine", "runs", "seed", "set", "vary", "outputs")
-_FILES = (*FILE_PARAMETERS, "building", "fmu")
+_FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu")
 
 
 def stock_ensembles() -> list[Path]:
@@ -327,7 +327,7 @@ def _files_read(base: Scenario, varied: tuple[Varied, ...]) -> list[Path]:
     """Return the files whose content decides the numbers: records, signals, buildings."""
     named: list[object] = []
     for component in base.components:
-        named += [component.building, component.path]
+        named += [component.building, component.controller, component.path]
         named += [component.parameters.get(key) for key in FILE_PARAMETERS]
     for one in varied:
         if one.name.rpartition(".")[2] in _FILES:
