@@ -48,7 +48,24 @@ CHOSEN = np.array(
     ]
 )
 """Found by `choose` on Kobe and synthetic motions."""
-ORACLE = NONE
+ORACLE = np.array(
+    [
+        3366.3623,
+        -4512.8798,
+        1319.0935,
+        298.67131,
+        32.947302,
+        -130.21908,
+        -183.43418,
+        -626.62559,
+        182.52436,
+        1.6282212,
+        -28.363416,
+        -1.6752589,
+        2.1021849,
+        0.50960234,
+    ]
+)
 """Found by `choose` on the reported motions themselves: what hindsight would give, no design."""
 
 

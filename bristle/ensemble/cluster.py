@@ -3,7 +3,8 @@
 A worker that is lost costs the runs that it was at: the scheduler gives them to another one. What
 has come back is kept on this side. The scheduler cannot tell which of the runs that a lost worker
 had been given has killed it: so runs that have lost several workers are run again at the end, one
-alone at a time, and only one that then kills again has failed.
+alone at a time, and once more in the opposite order, for a worker is seen to be dead only a moment
+after it has died. One that kills then as well has failed.
 """
 
 from __future__ import annotations
@@ -45,13 +46,15 @@ def run_cluster(plan: Plan, runs: Iterable[int], address: str) -> Generator[Outc
     client = _connected(address)
     try:
         threads = _threads(client, address)
-        suspects: deque[int] = deque()
-        for outcome in _gather(client, plan, deque(runs), _PER_THREAD * threads):
-            if outcome.reason.startswith(_KILLED):
-                suspects.append(outcome.run)
-            else:
-                yield outcome
-        yield from _gather(client, plan, suspects, 1)
+        waiting, at_once = deque(runs), _PER_THREAD * threads
+        for last in (False, False, True):
+            suspects: deque[int] = deque()
+            for outcome in _gather(client, plan, waiting, at_once):
+                if outcome.reason.startswith(_KILLED) and not last:
+                    suspects.appendleft(outcome.run)
+                else:
+                    yield outcome
+            waiting, at_once = suspects, 1
     finally:
         client.close(timeout=CONNECT)
 
@@ -76,9 +79,13 @@ def _connected(address: str) -> Any:
 
 def _threads(client: Any, address: str) -> int:
     """Return the cluster's number of threads, once its workers have been looked at."""
+    try:
+        client.wait_for_workers(1, timeout=CONNECT)
+    except TimeoutError:
+        raise EnsembleError(
+            f"--cluster {address}: the cluster has no worker. Start one or more."
+        ) from None
     workers = client.scheduler_info(n_workers=-1)["workers"]
-    if not workers:
-        raise EnsembleError(f"--cluster {address}: the cluster has no worker. Start one or more.")
     try:
         versions = client.run(_version)
     except Exception as error:  # whatever a worker answers that cannot load this module

@@ -101,7 +101,8 @@ def test_a_cluster_that_is_not_there_is_named(
         assert message.count("\n") == 1
 
 
-def test_a_cluster_without_workers_is_named(write: Write) -> None:
+def test_a_cluster_without_workers_is_named(write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "CONNECT", 2.0)
     with (
         distributed.LocalCluster(
             n_workers=0, dashboard_address=None, host="127.0.0.1", protocol="tcp"
