@@ -24,6 +24,7 @@ LONGEST_SUBSTEP = 2e-4
 Array = NDArray[Any]
 
 _serve = march.serve
+_has_clocks = False
 
 
 class StoppedError(RunError):
@@ -100,9 +101,12 @@ def _substeps(step: float, periods: list[float]) -> int:
 def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int]]:
     """Return the compiled time march, with sampled components or without.
 
-    The first call on a machine takes seconds, more of them with sampled components.
+    The first call on a machine takes seconds, more of them with sampled components. A process that
+    has the march with them uses it for everything: it gives the same numbers.
     """
-    return _compiled(damper.evaluate, structure.effect_forces, clocked)
+    global _has_clocks
+    _has_clocks = _has_clocks or clocked
+    return _compiled(damper.evaluate, structure.effect_forces, _has_clocks)
 
 
 @cache

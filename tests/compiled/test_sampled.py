@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bristle.compiled import simulate
+from bristle.compiled import model, simulate
 from bristle.cosim.scenario import load_scenario
 from bristle.fmu import catalogue
 from bristle.fmu.controller import MEASURED
@@ -217,3 +217,13 @@ def test_filtered_velocity_is_the_rate_of_the_low_passed_displacement(tmp_path: 
     ratio = own[loud] / spectrum[loud]
     expected = 1.0 / (1.0 + 1j * f[loud] / 18.0)
     assert np.abs(ratio - expected).max() < 0.1
+
+
+def test_the_march_with_clocks_gives_the_same_without_any(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = load_scenario("half_sine_pulse", {"run.stop": 1.0})
+    runs = []
+    for has_clocks in (False, True):
+        monkeypatch.setattr(model, "_has_clocks", has_clocks)
+        runs.append(simulate(scenario))
+    for name, values in runs[0].items():
+        assert np.array_equal(values, runs[1][name]), name

@@ -81,6 +81,8 @@ def make(folder: Path, newhall: Path | None = None, progress: bool = False) -> R
     prepare(folder, "png")
     total = len(cases(found)) + stiction.RUNS + optimum.RUNS + identification.RUNS
     with designing(folder) as controllers, Progress("controllers", total, progress) as bar:
+        # The march that controllers need serves the other runs as well: it alone is compiled.
+        Runs()("el_centro_0p6g_clipped", {"run.stop": 0.01})
         runs = Runs(done=bar.show)
         with look():
             peaks, best = stiction.draw(runs), optimum.draw(runs)
