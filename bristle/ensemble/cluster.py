@@ -10,6 +10,7 @@ after it has died. One that kills then as well has failed.
 from __future__ import annotations
 
 import queue
+import time
 from collections import deque
 from collections.abc import Generator, Iterable
 from typing import Any
@@ -24,6 +25,8 @@ CONNECT = 10.0
 """Seconds in which a scheduler must answer."""
 PATIENCE = 300.0
 """Seconds for which a cluster may be without any worker before the ensemble gives up."""
+SETTLE = 3.0
+"""Seconds in which the scheduler sees that a worker is dead."""
 _LOOK = 2.0
 _PER_THREAD = 4
 """Runs under way per thread of the cluster."""
@@ -50,11 +53,16 @@ def run_cluster(plan: Plan, runs: Iterable[int], address: str) -> Generator[Outc
         for last in (False, False, True):
             suspects: deque[int] = deque()
             for outcome in _gather(client, plan, waiting, at_once):
-                if outcome.reason.startswith(_KILLED) and not last:
+                killed = outcome.reason.startswith(_KILLED)
+                if killed and at_once == 1:
+                    time.sleep(SETTLE)  # else the next one goes to a worker that is dead
+                if killed and not last:
                     suspects.appendleft(outcome.run)
                 else:
                     yield outcome
             waiting, at_once = suspects, 1
+            if suspects:
+                time.sleep(SETTLE)
     finally:
         client.close(timeout=CONNECT)
 

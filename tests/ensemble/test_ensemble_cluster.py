@@ -33,7 +33,7 @@ def local() -> Iterator[Any]:
     import dask
 
     with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
+        dask.config.set({"distributed.scheduler.allowed-failures": 2}),
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
         ) as found,
@@ -47,6 +47,14 @@ def test_numbers_are_those_of_this_machine(write: Write, tmp_path: Path, local: 
     pd.testing.assert_frame_equal(here.runs, there.runs)
     files = [(tmp_path / name / "runs.csv").read_bytes() for name in ("here", "there")]
     assert files[0] == files[1]
+
+
+def test_another_version_on_a_worker_is_named(
+    write: Write, local: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cluster, "__version__", "99.0")
+    with pytest.raises(EnsembleError, match=r"has bristle .*, here is 99.0"):
+        bristle.ensemble(write(), cluster=local.scheduler_address)
 
 
 def _slow(plan: Plan, run: int) -> Outcome:
@@ -110,14 +118,6 @@ def test_a_cluster_without_workers_is_named(write: Write, monkeypatch: pytest.Mo
         pytest.raises(EnsembleError, match="has no worker"),
     ):
         bristle.ensemble(write(), cluster=empty.scheduler_address)
-
-
-def test_another_version_on_a_worker_is_named(
-    write: Write, local: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(cluster, "__version__", "99.0")
-    with pytest.raises(EnsembleError, match=r"has bristle .*, here is 99.0"):
-        bristle.ensemble(write(), cluster=local.scheduler_address)
 
 
 def test_the_library_is_asked_for_where_it_is_missing(
