@@ -93,8 +93,11 @@ def test_a_run_that_kills_every_worker_is_a_failure(
     monkeypatch.setattr(deadly, "__module__", "__main__")
     monkeypatch.setattr(cluster, "run_one", deadly)
     found = bristle.ensemble(write(), cluster=local.scheduler_address)
-    assert found.runs.index[found.runs["status"] == "failed"].tolist() == [3]
-    assert "KilledWorker" in found.runs.loc[3, "reason"]
+    # Dask may blame a neighbour as well, while a dead worker is not yet seen to be dead.
+    failed = found.runs[found.runs["status"] == "failed"]
+    assert 3 in failed.index
+    assert len(found.runs) == 12
+    assert failed["reason"].str.startswith("KilledWorker").all()
 
 
 def test_a_cluster_that_is_not_there_is_named(
