@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from .ensemble import ensemble as ensemble
     from .run import run as run
 
-_LAZY = {"run": "run"}
+_LAZY = {"ensemble": "ensemble", "run": "run"}
 
-__all__ = ["__version__", "run"]
+__all__ = ["__version__", "ensemble", "run"]
 
 
 def __getattr__(name: str) -> object:

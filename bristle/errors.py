@@ -40,6 +40,10 @@ class DesignError(BristleError):
     """A controller that cannot be designed, or a controller file that must not be used."""
 
 
+class EnsembleError(BristleError):
+    """An ensemble that cannot be run: its file, its folder or its cluster is wrong."""
+
+
 class RunError(BristleError):
     """A run that started and failed; the text says what is kept, and where."""
 

@@ -24,6 +24,11 @@ def scenarios_folder() -> Path:
     return (root() or _PACKAGE) / "scenarios"
 
 
+def ensembles_folder() -> Path:
+    """Return the folder with the stock ensembles."""
+    return (root() or _PACKAGE) / "ensembles"
+
+
 def cache_folder() -> Path:
     """Return the user's cache folder, `$BRISTLE_CACHE` where that is set; it may not exist yet."""
     chosen = os.environ.get("BRISTLE_CACHE")

@@ -35,7 +35,7 @@ _FENCE = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 _CUT = "-- end of block --"
-_TOOK = re.compile(r"(?<=rows in )[\d.]+(?= s)|(?<=guid )[0-9a-f-]{36}")
+_TOOK = re.compile(r"(?<=rows in |runs in )[\d.]+(?= s)|(?<=guid )[0-9a-f-]{36}")
 
 
 class SnippetError(Exception):

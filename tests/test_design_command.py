@@ -20,12 +20,26 @@ from bristle.design.plant import Plant, StateSpace
 from bristle.fmu.build import plan
 from bristle.report.singular import draw_design
 
+IMPROPER = "[weights]\ncommand = { numerator = [1, 2, 3], denominator = [1, 4] }"
+ROLLING_OFF = "[weights]\ncommand = { gain = 2.0, corner = 50.0 }"
+UNSTABLE_WEIGHT = "[weights]\nacceleration = { gain = 1.5, corner = -12.0 }"
+CANCELLING = "[weights]\nacceleration = { numerator = [1, 5], denominator = [1, 5] }"
+BUILDINGS = {
+    "undamped": "masses = [2, 1]\nstiffnesses = [1e3, 1e3]\ndamping_ratio = 0.0\n",
+    "active": "M = [[2.0, 0], [0, 1]]\nC = [[-5.0, 0], [0, 1]]\nK = [[2e3, -1e3], [-1e3, 1e3]]\n",
+    "apart": "M = [[2.0, 0], [0, 1]]\nC = [[5.0, 0], [0, 1]]\nK = [[2e3, 0], [0, 1e3]]\n",
+}
+"""An undamped one, one that drives itself, one whose floor hangs on nothing that moves."""
+
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return the current folder, empty but for design files."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "my_hinf.toml").write_text('schema = 1\nkind = "hinf"\ntitle = "mine"\n')
+    (tmp_path / "houses").mkdir()
+    for name, text in BUILDINGS.items():
+        (tmp_path / "houses" / f"{name}.toml").write_text("schema = 1\n" + text)
     (tmp_path / "my_lpv.toml").write_text(
         'schema = 1\nkind = "lpv"\n[scheduling]\nrows = 61\ngrid = [0.0, 0.02, 0.08, 0.3]\n'
     )
@@ -40,7 +54,7 @@ def test_hinf_tells_gamma_norm_poles_and_margins(
     for words in ("gamma 6.01", "no controller below 4.900", "closed-loop norm", "-5.06", "phase"):
         assert words in said
     assert sorted(path.name for path in here.iterdir()) == [
-        "my_hinf.json", "my_hinf.png", "my_hinf.toml", "my_lpv.toml",
+        "houses", "my_hinf.json", "my_hinf.png", "my_hinf.toml", "my_lpv.toml",
     ]  # fmt: skip
     assert read_controller("my_hinf.json").title == "mine"
     assert (here / "my_hinf.png").read_bytes()[:4] == b"\x89PNG"
@@ -72,6 +86,23 @@ def test_lpv_as_json_goes_where_it_is_told(here: Path, capsys: pytest.CaptureFix
         (["hinf", "bad.toml"], 'kind = "hinf"\n[damper]\nv_max = 0.0', "nothing to control"),
         (["lpv", "bad.toml"], 'kind = "lpv"\n[scheduling]\ngrid = [0.0]', "give two"),
         (["lpv", "bad.toml"], 'kind = "lpv"\n[scheduling]\ngrid = [0.0, 0.2, 0.1]', "must rise"),
+        (["hinf", "bad.toml"], f'kind = "hinf"\n{IMPROPER}', "improper"),
+        (["lpv", "bad.toml"], f'kind = "lpv"\n{ROLLING_OFF}', "singular"),
+        (["hinf", "bad.toml"], f'kind = "hinf"\n{UNSTABLE_WEIGHT}', "must be < 0"),
+        (["hinf", "bad.toml"], f'kind = "hinf"\n{CANCELLING}', "cannot be balanced"),
+        (["lqg", "bad.toml"], 'kind = "lqg"\n[lqg]\nnoise = 0.0', "singular"),
+        (["hinf", "bad.toml"], 'kind = "hinf"\nbuilding = "houses/undamped.toml"', "is not damped"),
+        (["lpv", "bad.toml"], 'kind = "lpv"\nbuilding = "houses/undamped.toml"', "is not damped"),
+        (["lqg", "bad.toml"], 'kind = "lqg"\nbuilding = "houses/active.toml"', "is not damped"),
+        (["hinf", "bad.toml"], 'kind = "hinf"\nbuilding = "houses/apart.toml"', "not controllable"),
+        (["lpv", "bad.toml"], 'kind = "lpv"\n[scheduling]\ngrid = []', "give two"),
+        (["lpv", "bad.toml"], 'kind = "lpv"\n[scheduling]\ngrid = [0.0, 0.0]', "must rise"),
+        (["lpv", "bad.toml"], 'kind = "lpv"\n[scheduling]\ngrid = [0.0, inf]', "finite"),
+        (["lpv", "bad.toml"], 'kind = "lpv"\n[scheduling]\ngrid = [0.1, 0.2]', "begin at 0"),
+        (["lpv", "bad.toml"], 'kind = "lpv"\n[damper]\nknown_to = 0.2', "beyond the 0.2 m/s"),
+        (["lpv", "bad.toml"], 'kind = "lpv"\n[damper]\nv_max = -1.0', "nothing to control"),
+        (["lpv", "bad.toml"], 'kind = "lpv"\n[damper]\nv_max = nan', "finite number"),
+        (["lqg", "bad.toml"], 'kind = "lqg"\nsample_period = -0.002', "must be positive"),
         (["hinf", "my_hinf.toml", "--out", "my_hinf.toml"], None, "named FILE.json"),
         (["hinf", "my_hinf.toml", "--out", "gone/my.json"], None, "cannot be written"),
     ],
@@ -82,13 +113,117 @@ def test_a_refusal_has_exit_code_2_one_message_and_no_file(
 ) -> None:  # fmt: skip
     if text is not None:
         (here / "bad.toml").write_text("schema = 1\n" + text)
-    before = {path.name: path.read_bytes() for path in here.iterdir()}
+    before = {path.name: path.read_bytes() for path in here.rglob("*.*")}
     assert main(["design", *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert err.startswith("DesignError: ")
     assert any(word in err for word in words.split("|"))
-    assert {path.name: path.read_bytes() for path in here.iterdir()} == before
+    assert {path.name: path.read_bytes() for path in here.rglob("*.*")} == before
+
+
+def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from bristle.physics.building import read_building
+    from bristle.study.model import new_model, write_model
+
+    model = new_model("lugre").with_effect("gas_spring")
+    found = {"sigma_a": 720.0, "sigma_0": 390.0, "gas_spring.k": 60.0}
+    model = model.with_values(found, {"sigma_a": 12.0})
+    (here / "my_study").mkdir()
+    write_model(here / "my_study" / "model.toml", model)
+    (here / "houses" / "mine.toml").write_text(
+        "schema = 1\nmasses = [2.2, 1.3, 1.1]\nstiffnesses = [1100.0, 1500.0, 1400.0]\n"
+        "damping_ratio = 0.02\n"
+    )
+    text = """
+        schema = 1
+        kind = "{}"
+        building = "houses/mine.toml"
+        [damper]
+        model = "my_study/model.toml"
+        """
+    for kind, more in (("hinf", ""), ("lpv", "[scheduling]\nrows = 21\ngrid = [0, 0.05, 0.3]\n")):
+        (here / "task.toml").write_text(text.format(kind) + more)
+        assert main(["design", kind, "task.toml", "--out", f"{kind}.json"]) == 0
+        controller = read_controller(here / f"{kind}.json")
+        controller.check_building(read_building(here / "houses" / "mine.toml"))
+        damper = controller.design["damper"]
+        assert damper["law"] == "lugre"
+        assert damper["effects"] == ["gas_spring"]
+        assert {name: damper["parameters"][name] for name in found} == found
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (("sigma_a", "sigma_x"), "sigma_x is not a parameter"),
+        (('law = "lugre"', 'law = "maxwell"'), "bingham, lugre"),
+        (("value = 650.0", 'value = "650"'), "finite number"),
+        (("value = 650.0", "value = -650.0"), "outside"),
+        (('unit = "N/m"', 'unit = "kg"'), "dimension"),
+    ],
+)
+def test_a_study_model_that_is_wrong_is_one_message(
+    edit: tuple[str, str], words: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from bristle.study.model import new_model, write_model
+
+    write_model(here / "model.toml", new_model("lugre"))
+    text = (here / "model.toml").read_text()
+    assert edit[0] in text
+    (here / "model.toml").write_text(text.replace(*edit, 1))
+    (here / "task.toml").write_text('schema = 1\nkind = "hinf"\n[damper]\nmodel = "model.toml"\n')
+    assert main(["design", "hinf", "task.toml"]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert "model.toml" in error
+    assert "Traceback" not in error
+    assert not list(here.glob("task.json"))
+
+
+def test_a_solver_that_fails_is_one_message_and_no_file(
+    here: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import cvxpy as cp
+
+    def breaks(self: object, **settings: object) -> None:
+        raise cp.error.SolverError("it broke down")
+
+    monkeypatch.setattr(cp.Problem, "solve", breaks)
+    for kind in ("hinf", "lpv"):
+        assert main(["design", kind, f"my_{kind}.toml"]) == 2
+        assert "DesignError: the solver CLARABEL failed: it broke down" in capsys.readouterr().err
+    assert not list(here.glob("*.json"))
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (('"C":[', '"C":[1.0,'), "does not match its digest"),
+        (('"C":[', '"C":[NaN,'), "not a finite number"),
+        (('"sample_period":0.002', '"sample_period":0.0'), "does not match its digest"),
+    ],
+)
+def test_a_controller_file_edited_by_hand_is_not_built(
+    edit: tuple[str, str], words: str, here: Path, capsys: pytest.CaptureFixture[str], frozen: Path
+) -> None:
+    text = (frozen / "hinf.json").read_text()
+    assert edit[0] in text
+    (here / "mine.json").write_text(text.replace(*edit, 1))
+    assert main(["build", "HinfInverse", "--controller", "mine.json", "--name", "Mine"]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
+    assert not list(here.glob("*.fmu"))
+
+
+@pytest.fixture
+def frozen() -> Path:
+    """Return the folder of the frozen controllers."""
+    return Path(__file__).parent / "reference" / "controllers"
 
 
 # -- margins

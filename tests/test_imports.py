@@ -28,6 +28,7 @@ LAYERS = (
     {"diagnose"},
     {"study"},
     {"run"},
+    {"ensemble", "optimise"},
     {"report"},
     {"cli"},
 )

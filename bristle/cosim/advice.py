@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import sqrt
 
-from ..errors import BristleError
+from ..errors import BristleError, PhysicsError
 from .connections import Wire
 from .findings import Findings
 from .library import Library
@@ -134,10 +134,15 @@ def _designs(network: Network, library: Library, findings: Findings) -> None:
     """A designed controller belongs to one building: that whose floor it measures."""
     for part in network.parts.values():
         structure = network.measured_by(part)
-        if part.file or structure is None or structure.fmu != "Structure":
+        if structure is None or structure.fmu != "Structure":
             continue
         try:
-            library.check_controller(part.fmu, part.controller, structure.building)
+            if part.file:
+                library.check_carried(part.file, structure.building)
+            else:
+                library.check_controller(part.fmu, part.controller, structure.building)
+        except PhysicsError:
+            continue  # the building is no building: its own check has said so
         except BristleError as error:
             path = (*part.path, "controller") if part.controller else part.path
             findings.error(path, f"[components.{part.name}]: {error}")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..control.controller import KINDS, Controller, parse_controller
+from ..errors import DesignError
 from ..fmu.description import Description
 
 
@@ -27,6 +30,8 @@ class Library:
     check_controller
         (name, controller file or None, building file or None); raises BristleError where the
         component carries a design for another building.
+    check_carried
+        (FMU file, building file or None); likewise for the design that a built FMU carries.
     driven_mass
         (building file or None) -> mass [kg] that a damper's force acts on; raises PhysicsError.
     """
@@ -37,6 +42,7 @@ class Library:
     read_record: Callable[[str, Path], object]
     driven_mass: Callable[[Path | None], float]
     check_controller: Callable[[str, Path | None, Path | None], None]
+    check_carried: Callable[[Path, Path | None], None]
 
 
 def installed() -> Library:
@@ -52,6 +58,7 @@ def installed() -> Library:
         read_record=read_ground_motion,
         driven_mass=driven_mass,
         check_controller=catalogue.check_controller,
+        check_carried=check_carried,
     )
 
 
@@ -60,3 +67,34 @@ def driven_mass(building: Path | None) -> float:
     from ..physics.building import paper_building, read_building
 
     return (read_building(building) if building else paper_building()).M[0][0]
+
+
+def check_carried(file: Path, building: Path | None) -> None:
+    """Refuse a building that the controller in an FMU is not designed for.
+
+    An FMU without a design suits any building.
+
+    Raises
+    ------
+    DesignError, PhysicsError
+        Naming both; if the building is wrong.
+    """
+    from ..physics.building import paper_building, read_building
+
+    controller = _controller_in(file)
+    if controller is not None:
+        on = read_building(building) if building else paper_building()
+        controller.check_building(on, f"the design that {file.name} carries")
+
+
+def _controller_in(file: Path) -> Controller | None:
+    """Return the controller that an FMU carries; None where it carries none that can be read."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            for kind in KINDS:
+                name = f"resources/{kind}.json"
+                if name in archive.namelist():
+                    return parse_controller(archive.read(name).decode(), f"{file}: {name}")
+    except (OSError, zipfile.BadZipFile, UnicodeDecodeError, DesignError):
+        return None  # the FMU's own check says what is wrong with it
+    return None

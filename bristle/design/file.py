@@ -37,7 +37,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import BristleError, DesignError
+from ..errors import BristleError, DesignError, UnitError
 from ..physics.building import paper_building, read_building
 from ..physics.damper import LAWS
 from ..physics.effect import EFFECTS
@@ -165,7 +165,10 @@ def _model_values(
         if not isinstance(entry, dict) or "value" not in entry:
             raise DesignError(f"{where} must be a table with a value.")
         value = _number(entry["value"], name, str(path))
-        values[prefix + name] = convert(value, str(entry.get("unit", units[name])), units[name])
+        try:
+            values[prefix + name] = convert(value, str(entry.get("unit", units[name])), units[name])
+        except UnitError as error:
+            raise UnitError(f"{where}: {error}") from None
     return values
 
 

@@ -176,4 +176,5 @@ FAKE = Library(
     read_record=read_record,
     driven_mass=lambda building: BASE_MASS,
     check_controller=lambda name, controller, building: None,
+    check_carried=lambda file, building: None,
 )

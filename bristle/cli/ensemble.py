@@ -1,0 +1,137 @@
+"""Run an ensemble: many runs of one scenario, with what is uncertain drawn anew each time."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..ensemble.execute import Ensemble
+
+HELP = "run a scenario hundreds of times with what is uncertain varied"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle ensemble`."""
+    parser.add_argument("file", metavar="FILE", help="ensemble file, or name of a stock ensemble")
+    parser.add_argument("--runs", type=int, metavar="N", help="in place of the file's number")
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument("--workers", type=int, metavar="N", help="processes; else one per core")
+    where.add_argument(
+        "--cluster", metavar="ADDRESS", help="run on a Dask cluster, e.g. tcp://host:8786"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="where runs, quantiles and figure go; an ensemble that was stopped there goes on; "
+        "else results/NAME/",
+    )
+    parser.add_argument("--fresh", action="store_true", help="start anew, whatever is there")
+    parser.add_argument("--retry", action="store_true", help="run again what failed")
+    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Run what is left, write tables and figure; return 1 if every run failed, else 0."""
+    from ..ensemble.execute import EnsembleInterrupted, ensemble
+    from ..ensemble.file import resolve_ensemble
+
+    file = resolve_ensemble(arguments.file)
+    folder: Path = arguments.out or Path("results", file.stem)
+    try:
+        found = ensemble(
+            file,
+            out=folder,
+            runs=arguments.runs,
+            workers=arguments.workers,
+            cluster=arguments.cluster,
+            fresh=arguments.fresh,
+            retry=arguments.retry,
+            progress=True,
+        )
+    except EnsembleInterrupted as stopped:
+        print(stopped, file=sys.stderr)
+        return 130
+    files = _write(found, folder, not arguments.no_figure)
+    if arguments.json:
+        import json
+
+        print(json.dumps(_answer(found, files), indent=2, allow_nan=False))
+    else:
+        _print(found, files)
+    if not (found.runs["status"] == "done").any():
+        print(f"RunError: all {len(found.runs)} runs failed.", file=sys.stderr)
+        return 1
+    return 0
+
+
+def _write(found: Ensemble, folder: Path, figure: bool) -> dict[str, Path]:
+    from ..results import not_usable
+
+    files = {"runs": folder / "runs.csv", "quantiles": folder / "quantiles.csv"}
+    try:
+        found.quantiles.to_csv(files["quantiles"], float_format="%.9g")
+    except OSError as error:
+        raise not_usable(
+            f"{files['quantiles']}: cannot be written: {error.strerror or error}."
+        ) from error
+    if figure and (found.runs["status"] == "done").sum() > 1:
+        from ..report.ensemble import ensemble_figure
+
+        files["figure"] = folder / "figure.png"
+        ensemble_figure(found, files["figure"])
+    return files
+
+
+def _answer(found: Ensemble, files: dict[str, Path]) -> dict[str, Any]:
+    from dataclasses import asdict
+
+    table = found.quantiles
+    levels = [name for name in table if str(name).endswith(" %")]
+    done = int((found.runs["status"] == "done").sum())
+    outputs = [
+        {key: None if value != value else value for key, value in row.items()}  # JSON has no NaN
+        for row in table[["unit", *levels]].reset_index().to_dict("records")
+    ]
+    return {
+        "title": found.plan.title,
+        "runs": len(found.runs),
+        "done": done,
+        "failed": len(found.runs) - done,
+        "continued": found.continued,
+        "wall_time": round(found.wall_time, 3),
+        "quantiles": outputs,
+        "failures": [asdict(failure) for failure in found.failures],
+        "files": {name: str(path.absolute()) for name, path in files.items()},
+    }
+
+
+def _print(found: Ensemble, files: dict[str, Path]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    done = int((found.runs["status"] == "done").sum())
+    failed = len(found.runs) - done
+    heading = f"{found.plan.title}: {done} runs done, {failed} failed"
+    table = Table(title=heading, title_justify="left", box=None, pad_edge=False)
+    table.add_column("output", no_wrap=True)
+    levels = [str(name) for name in found.quantiles if str(name).endswith(" %")]
+    for level in levels:
+        table.add_column(level, justify="right")
+    table.add_column("unit")
+    for name, row in found.quantiles.iterrows():
+        unit = row["unit"] if row["unit"] != "1" else ""
+        table.add_row(str(name), *(f"{row[level]:.5g}" for level in levels), unit)
+    # In a pipe there is no width to fit.
+    width = None if sys.stdout.isatty() else 140
+    Console(highlight=False, markup=False, width=width).print(table)
+    for failure in found.failures:
+        print(f"failed {failure.count} times, first in run {failure.run}: {failure.reason}")
+    before = f", {found.continued} of them from before" if found.continued else ""
+    print(f"{len(found.runs)} runs{before} in {found.wall_time:.1f} s")
+    for path in files.values():
+        print(f"  {path}")

@@ -1,0 +1,163 @@
+"""Optimise what a scenario leaves open: the best constant voltage for a set of ground motions."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..optimise import Passive
+
+HELP = "find the best constant voltage for a set of ground motions"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle optimise`."""
+    parser.add_argument("what", choices=("passive",), help="what is optimised")
+    parser.add_argument(
+        "--scenario",
+        default="el_centro_0p6g_constant_voltage",
+        metavar="FILE",
+        help="with a GroundMotion and a ConstantVoltage; else El Centro with a LuGre damper",
+    )
+    parser.add_argument(
+        "--motions",
+        nargs="+",
+        default=["el_centro_1940_ns"],
+        metavar="RECORD",
+        help="names of ground motions, or files; see `bristle list records`",
+    )
+    parser.add_argument(
+        "--intensities",
+        nargs="+",
+        type=float,
+        metavar="G",
+        help="peaks [g] that each is scaled to, 0: as recorded; else 0.2 0.4 0.6 0.8",
+    )
+    parser.add_argument(
+        "--output",
+        default="structure.floor2_acceleration_absolute",
+        metavar="NAME",
+        help="what is to be least; else the second floor's absolute acceleration",
+    )
+    parser.add_argument(
+        "--statistic", choices=("peak", "rms"), default="peak", help="by which it is judged"
+    )
+    parser.add_argument(
+        "--grid", type=int, default=17, metavar="N", help="voltages that are run first; else 17"
+    )
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="take a value in place of the scenario's, e.g. --set damper.sigma_a=600",
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("results", "optimise"),
+        metavar="FOLDER",
+        help="where passive.csv and passive.png go; else results/optimise/",
+    )
+    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Optimise, write table and figure, print what was found."""
+    from ..cosim.scenario import parse_overrides
+    from ..errors import ScenarioError
+    from ..optimise import Motion, optimise_passive
+    from ..optimise.passive import INTENSITIES
+
+    intensities = arguments.intensities or INTENSITIES
+    for intensity in intensities:
+        if not 0.0 <= intensity < 1e3:
+            raise ScenarioError(f"--intensities {intensity:g}: a peak in g, 0 or more, is right.")
+    found = optimise_passive(
+        [Motion(record, i) for record in arguments.motions for i in intensities],
+        scenario=arguments.scenario,
+        overrides=parse_overrides(arguments.overrides),
+        output=arguments.output,
+        statistic=arguments.statistic,
+        grid=arguments.grid,
+        progress=True,
+    )
+    files = _write(found, arguments.out, not arguments.no_figure)
+    if arguments.json:
+        import json
+
+        print(json.dumps(_answer(found, files), indent=2, allow_nan=False))
+    else:
+        _print(found, files)
+    return 0
+
+
+def _write(found: Passive, folder: Path, figure: bool) -> dict[str, Path]:
+    import pandas as pd
+
+    from ..results import not_usable
+
+    table = pd.DataFrame(found.values.T, columns=[motion.name for motion in found.motions])
+    table.insert(0, "voltage [V]", found.grid)
+    files = {"table": folder / "passive.csv"}
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        table.to_csv(files["table"], index=False, float_format="%.9g")
+    except OSError as error:
+        raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
+    if figure:
+        from ..report.passive import passive_figure
+
+        files["figure"] = folder / "passive.png"
+        passive_figure(found, files["figure"])
+    return files
+
+
+def _answer(found: Passive, files: dict[str, Path]) -> dict[str, Any]:
+    motions = [
+        {"record": m.record, "intensity": m.intensity, "voltage": b.voltage, "value": b.value}
+        for m, b in zip(found.motions, found.best, strict=True)
+    ]
+    return {
+        "output": found.output,
+        "statistic": found.statistic,
+        "unit": found.unit,
+        "motions": motions,
+        "set": {goal: vars(optimum) for goal, optimum in found.goals.items()},
+        "runs": found.runs,
+        **{name: str(path.absolute()) for name, path in files.items()},
+    }
+
+
+_GOALS = {
+    "worst": "least for the worst motion",
+    "mean": "least mean of the motions",
+    "regret": "least excess over each motion's own best",
+}
+
+
+def _print(found: Passive, files: dict[str, Path]) -> None:
+    width = max(len(motion.name) for motion in found.motions)
+    at = [round(k) for k in (0, (len(found.grid) - 1) / 2, len(found.grid) - 1)]
+    heads = "".join(f"{f'{found.grid[k]:g} V':>9}" for k in at)
+    print(f"{found.statistic} of {found.output} [{found.unit}]")
+    print(f"{'':{width}}  best voltage   value {heads}")
+    for motion, best, row in zip(found.motions, found.best, found.values, strict=True):
+        values = "".join(f"{row[k]:9.4g}" for k in at)
+        print(f"{motion.name:{width}}  {best.voltage:10.2f} V {best.value:7.4g} {values}")
+    print("for all of them")
+    for goal, words in _GOALS.items():
+        optimum = found.goals[goal]
+        value = (
+            f"at most {100 * (optimum.value - 1):.1f} % above"
+            if goal == "regret"
+            else f"{optimum.value:.4g}"
+        )
+        print(f"  {words}: {optimum.voltage:.2f} V ({value})")
+    print(f"{found.runs} runs")
+    for path in files.values():
+        print(f"  {path}")

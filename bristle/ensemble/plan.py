@@ -1,0 +1,122 @@
+"""An ensemble as data: what is run, what varies, what is kept of each run."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass, field
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from .distributions import Distribution, Value, share
+
+STATISTICS = ("peak", "rms", "max", "min", "mean", "last")
+
+
+@dataclass(frozen=True)
+class Varied:
+    """One name that varies, e.g. "damper.sigma_a", and what it is drawn from.
+
+    `place` says where the value goes: "parameter" of a component, "building" for a number of a
+    building's data, "scenario" for what the scenario must be read anew for (records, steps, FMUs).
+    """
+
+    name: str
+    distribution: Distribution
+    place: str = "parameter"
+
+
+@dataclass(frozen=True)
+class Output:
+    """One number that is kept of each run: a statistic of a column; "peak" is of its size."""
+
+    column: str
+    statistic: str
+    unit: str = ""
+
+    @property
+    def name(self) -> str:
+        """The output's name in tables: "peak damper.force"."""
+        return f"{self.statistic} {self.column}"
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A checked ensemble.
+
+    Attributes
+    ----------
+    file : Path
+        The ensemble file.
+    scenario : Path
+        The base scenario.
+    fixed : mapping
+        Values in place of the scenario's, the same for all runs.
+    engine : str
+        "compiled" or "fmu".
+    runs, seed : int
+    varied, outputs : tuple
+    content : str
+        Digest of the base scenario and of the files that it reads.
+    """
+
+    file: Path
+    title: str
+    scenario: Path
+    engine: str
+    runs: int
+    seed: int
+    varied: tuple[Varied, ...]
+    outputs: tuple[Output, ...]
+    fixed: dict[str, Value] = field(default_factory=dict)
+    content: str = ""
+
+    def values(self, run: int) -> dict[str, Value]:
+        """Return what the varied names are in a run; it depends on seed, run and name alone."""
+        cycled = [v for v in self.varied if v.distribution.kind == "each"]
+        turn, chosen = run, {}
+        for varied in reversed(cycled):
+            turn, place = divmod(turn, len(varied.distribution.values))
+            chosen[varied.name] = varied.distribution.values[place]
+        return {
+            varied.name: chosen[varied.name]
+            if varied.name in chosen
+            else varied.distribution.draw(share(self.seed, run, varied.name))
+            for varied in self.varied
+        }
+
+    @property
+    def combinations(self) -> int:
+        """How many combinations of the values of "each" there are; the runs go through them."""
+        return prod(
+            len(v.distribution.values) for v in self.varied if v.distribution.kind == "each"
+        )
+
+    def digest(self) -> str:
+        """Return 16 hexadecimal digits that stand for all that decides a run's numbers.
+
+        The number of runs and the title are no part of it: more runs continue an ensemble.
+        """
+        decides: dict[str, Any] = {
+            "version": __version__,
+            "content": self.content,
+            "engine": self.engine,
+            "seed": self.seed,
+            "varied": [asdict(v) for v in self.varied],
+            "outputs": [o.name for o in self.outputs],
+        }
+        return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()[:16]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a run: the kept numbers in the order of `Plan.outputs`, or why there are none.
+
+    `reason` is "" for a run that is done.
+    """
+
+    run: int
+    numbers: tuple[float, ...] = ()
+    reason: str = ""

@@ -1,0 +1,138 @@
+"""The figure of an ensemble: how each output is spread, and which of the varied names moves it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .style import BLUE, GREY, INK, PALE, VERMILION, Page, look
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+    from ..ensemble import Ensemble
+    from ..ensemble.plan import Output
+
+MOST_OUTPUTS = 6
+MOST_NAMES = 8
+_HEIGHT = 1.75
+"""Of one output's row [in]."""
+_SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (1.0, "")}
+_DPI = 160
+
+
+def ensemble_figure(found: Ensemble, path: str | Path) -> None:
+    """Draw an ensemble of at least two runs that are done into an image file.
+
+    One row per output, at most six. Left: a histogram with the median and the bands between the
+    quantiles of 5 and 95, 25 and 75 %. Right: rank correlations (Spearman) of the output with the
+    numbers that vary, largest first, and what chance alone would give.
+
+    Raises
+    ------
+    RunError
+        If the file cannot be written or its ending is no format.
+    """
+    with look():
+        page = draw_ensemble(found)
+        page.save(Path(path), dpi=_DPI)
+
+
+def draw_ensemble(found: Ensemble) -> Page:
+    """Return the figure, drawn and not yet written."""
+    done = found.runs[found.runs["status"] == "done"]
+    outputs = found.plan.outputs[:MOST_OUTPUTS]
+    numbers = varying_numbers(found.plan, done)
+    failed = len(found.runs) - len(done)
+    failures = f"{failed} runs failed" if failed else "none failed"
+    left_out = len(found.plan.outputs) - len(outputs)
+    more = f" {left_out} more outputs are in the table." if left_out else ""
+    subtitle = (
+        f"{len(done)} runs, {failures}. Line: median; bands: 25 to 75 % and 5 to 95 % of the runs."
+        + (" Right: how strongly each varied number moves the output (rank correlation); "
+           "grey: no more than chance." if numbers else "")
+        + more
+    )  # fmt: skip
+    page = Page(8.2 if numbers else 5.6, _HEIGHT * len(outputs), found.plan.title, subtitle)
+    columns = 2 if numbers else 1
+    ratios: dict[str, Any] = {"width_ratios": [1.0, 0.8]} if numbers else {}
+    grid = page.grid(
+        len(outputs), columns, left=0.55, right=0.25, column_gap=2.15, row_gap=0.68, **ratios
+    )
+    for row, output in enumerate(outputs):
+        axes = page.figure.add_subplot(grid[row, 0])
+        _histogram(axes, output, done[output.name].to_numpy())
+        if numbers:
+            side = page.figure.add_subplot(grid[row, 1])
+            _influence(side, correlations(done, output.name, numbers), len(done))
+            if row == len(outputs) - 1:
+                side.set_xlabel("rank correlation")
+    return page
+
+
+def varying_numbers(plan: Any, done: pd.DataFrame) -> list[str]:
+    """Return the varied names whose values are numbers and not all the same."""
+    return [
+        varied.name
+        for varied in plan.varied
+        if done[varied.name].dtype.kind in "fi" and done[varied.name].nunique() > 1
+    ]
+
+
+def correlations(done: pd.DataFrame, output: str, names: list[str]) -> list[tuple[str, float]]:
+    """Return names with Spearman's rank correlation with an output, largest size first."""
+    ranks = done[[*names, output]].rank()
+    if ranks[output].nunique() < 2:
+        return [(name, 0.0) for name in names]
+    found = [(name, float(np.corrcoef(ranks[name], ranks[output])[0, 1])) for name in names]
+    return sorted(found, key=lambda pair: -abs(pair[1]))
+
+
+def _histogram(axes: Axes, output: Output, values: Any) -> None:
+    factor, unit = _SHOWN.get(output.unit, (1.0, output.unit))
+    values = values * factor
+    q05, q25, q50, q75, q95 = np.quantile(values, (0.05, 0.25, 0.5, 0.75, 0.95))
+    # Freedman and Diaconis (1981), within reason.
+    width = 2.0 * (q75 - q25) / len(values) ** (1.0 / 3.0)
+    span = float(np.ptp(values))
+    bins = int(np.clip(span / width, 8, 60)) if width > 0.0 and span > 0.0 else 8
+    axes.axvspan(q05, q95, color=BLUE, alpha=0.10, linewidth=0)
+    axes.axvspan(q25, q75, color=BLUE, alpha=0.16, linewidth=0)
+    axes.hist(values, bins=bins, color=BLUE, alpha=0.75, edgecolor="white", linewidth=0.4)
+    axes.axvline(q50, color=VERMILION, linewidth=1.6)
+    axes.set_title(f"{_words(output)} [{unit}]" if unit else _words(output))
+    axes.grid(axis="y", visible=False)
+    axes.spines["left"].set_visible(False)
+    axes.set_yticks([])
+    axes.margins(x=0.02)
+    text = f"median {q50:.3g}\n5 to 95 %: {q05:.3g} to {q95:.3g}"
+    axes.text(
+        0.985, 0.95, text, transform=axes.transAxes, ha="right", va="top", fontsize=7.5,
+        color=GREY, bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.5},
+    )  # fmt: skip
+
+
+def _influence(axes: Axes, pairs: list[tuple[str, float]], runs: int) -> None:
+    pairs = pairs[:MOST_NAMES][::-1]
+    chance = 2.0 / np.sqrt(max(runs - 1, 1))
+    places = np.arange(len(pairs))
+    values = np.array([value for _, value in pairs])
+    colours = [BLUE if abs(value) > chance else PALE for value in values]
+    axes.barh(places, values, height=0.66, color=colours)
+    axes.axvline(0.0, color=INK, linewidth=0.7)
+    axes.set_yticks(places, [name for name, _ in pairs], fontsize=6.8)
+    axes.tick_params(axis="y", length=0)
+    axes.set_xlim(-1.0, 1.0)
+    axes.set_xticks([-1.0, -0.5, 0.0, 0.5, 1.0])
+    axes.spines["left"].set_visible(False)
+    axes.grid(axis="y", visible=False)
+
+
+def _words(output: Output) -> str:
+    """Return an output as words: "peak of floor2 acceleration absolute"."""
+    component, _, port = output.column.rpartition(".")
+    statistic = {"rms": "RMS"}.get(output.statistic, output.statistic)
+    return f"{statistic} of {port.replace('_', ' ')} ({component})"
