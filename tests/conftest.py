@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from toys import Maker, build_toys
+
+from bristle.physics.user import unload_effects
 
 _STATUS = pytest.StashKey[int]()
 
@@ -27,6 +30,13 @@ def pytest_unconfigure(config: pytest.Config) -> None:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(config.stash[_STATUS])
+
+
+@pytest.fixture(autouse=True)
+def library() -> Iterator[None]:
+    """Leave the library of effects as it came, whatever a test has loaded."""
+    yield
+    unload_effects()
 
 
 @pytest.fixture(scope="session")

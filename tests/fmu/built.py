@@ -39,6 +39,10 @@ def built(component: str) -> Path:
 
 
 def lively(component: str) -> dict[str, Any]:
-    """Return parameters with every effect of the component on."""
+    """Return parameters with every effect of the component on that the ones before it allow."""
     effects = effects_of(*SITES[component]) if component in SITES else ()
-    return {**LIVELY.get(component, {}), **{f"{effect.name}.on": True for effect in effects}}
+    on: list[str] = []
+    for effect in effects:
+        if not set(effect.excludes) & set(on):
+            on.append(effect.name)
+    return {**LIVELY.get(component, {}), **{f"{name}.on": True for name in on}}
