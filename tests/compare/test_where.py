@@ -28,8 +28,15 @@ def found(held):
     )
 
 
-@pytest.mark.parametrize("kind", ["random", "sine"])
-@pytest.mark.parametrize("phi", [0.0, 0.9])
+@pytest.mark.parametrize(
+    ("kind", "phi"),
+    [
+        ("sine", 0.9),
+        pytest.param("random", 0.9, marks=pytest.mark.slow),
+        pytest.param("sine", 0.0, marks=pytest.mark.slow),
+        pytest.param("random", 0.0, marks=pytest.mark.slow),
+    ],
+)
 def test_a_true_model_is_accused_no_more_often_than_stated(kind, phi):
     """At 5 and 1 %, all coordinates together, on white and on coloured noise."""
     along = [
