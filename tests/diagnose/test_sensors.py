@@ -43,9 +43,7 @@ def measured(seed, late=0.0, spoil=lambda channels: None, after=lambda channels:
         name: ChannelSpec(column=f"{name} [{unit}]", noise=noise[name])
         for name, unit in titles.items()
     }
-    (run,) = measurements_of_frame(
-        frame, f"run_{seed}", {"time": ChannelSpec("time [s]"), **specs}
-    )
+    (run,) = measurements_of_frame(frame, f"run_{seed}", {"time": ChannelSpec("time [s]"), **specs})
     return run
 
 
