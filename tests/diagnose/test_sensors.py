@@ -1,0 +1,135 @@
+"""Planted sensor faults are found with their value; clean channels show none."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.signal import lfilter
+
+from bristle.diagnose.sensors import mended, sensor_faults
+from bristle.records.measurement import ChannelSpec, measurements_of_frame
+
+STEP, SECONDS, NOISE = 0.002, 10.0, 0.01
+T = STEP * np.arange(round(SECONDS / STEP))
+
+
+def motion(seed, late=0.0):
+    """Return displacement [m] and its exact rate [m/s] of a sum of sines; the rate `late` s."""
+    random = np.random.default_rng(seed)
+    w = 2.0 * np.pi * random.uniform(0.3, 5.0, 12)
+    phase, size = random.uniform(0.0, 6.28, 12), 0.01 / w
+    x = size @ np.sin(w[:, None] * T + phase[:, None])
+    v = (size * w) @ np.cos(w[:, None] * (T - late) + phase[:, None])
+    return x, v
+
+
+def measured(seed, late=0.0, spoil=lambda channels: None, after=lambda channels: None):
+    """Return a run of a yielding damper; `spoil` acts before the noise is added, `after` then."""
+    x, v = motion(seed, late)
+    _, true = motion(seed)
+    V = 2.0 + 1.5 * np.sin(1.7 * T)
+    F = (1.3 + 0.8 * V) * np.tanh(true / 2e-3) + 100.0 * true
+    channels = {"displacement": x, "velocity": v, "voltage": V, "force": F}
+    spoil(channels)
+    random = np.random.default_rng([seed, 1])
+    noise = {name: float(NOISE * np.std(values)) for name, values in channels.items()}
+    channels = {k: y + noise[k] * random.standard_normal(len(T)) for k, y in channels.items()}
+    after(channels)
+    titles = {"displacement": "m", "velocity": "m/s", "voltage": "V", "force": "N"}
+    columns = {f"{name} [{titles[name]}]": values for name, values in channels.items()}
+    frame = pd.DataFrame({"time [s]": T, **columns})
+    specs = {
+        name: ChannelSpec(column=f"{name} [{unit}]", noise=noise[name])
+        for name, unit in titles.items()
+    }
+    (run,) = measurements_of_frame(frame, f"run_{seed}", {"time": ChannelSpec("time [s]"), **specs})
+    return run
+
+
+def only(faults):
+    """Return the one fault there is."""
+    assert len(faults) == 1, [(one.channel, one.fault, one.value) for one in faults]
+    return faults[0]
+
+
+def runs(**choices):
+    return [measured(seed, **choices) for seed in (1, 2, 3)]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_clean_channels_show_no_fault(seed):
+    assert sensor_faults([measured(100 + seed), measured(200 + seed)]) == []
+
+
+@pytest.mark.parametrize("gain", [0.93, 1.05, 1.2])
+def test_a_gain(gain):
+    fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=gain * c["velocity"]))))
+    assert (fault.channel, fault.fault) == ("velocity", "gain")
+    assert fault.value == pytest.approx(gain, abs=max(3.0 * fault.std, 0.003))
+
+
+@pytest.mark.parametrize("late", [0.003, 0.008])
+def test_a_late_velocity(late):
+    fault = only(sensor_faults(runs(late=late)))
+    assert (fault.channel, fault.fault) == ("velocity", "delay")
+    assert fault.value == pytest.approx(late, rel=0.1)
+
+
+def test_a_late_displacement():
+    fault = only(sensor_faults(runs(late=-0.004)))
+    assert (fault.channel, fault.fault) == ("displacement", "delay")
+    assert fault.value == pytest.approx(0.004, rel=0.1)
+
+
+@pytest.mark.parametrize("bias", [-0.006, 0.004])
+def test_a_bias_of_the_velocity(bias):
+    fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=c["velocity"] + bias))))
+    assert (fault.channel, fault.fault) == ("velocity", "bias")
+    assert fault.value == pytest.approx(bias, rel=0.1)
+
+
+@pytest.mark.parametrize("channel", ["displacement", "velocity"])
+def test_a_turned_motion(channel):
+    found = sensor_faults(runs(spoil=lambda c: c.update({channel: -c[channel]})))
+    assert [one.fault for one in found] == ["sign"]
+
+
+@pytest.mark.parametrize("channel", ["force", "voltage"])
+def test_a_turned_force_or_voltage(channel):
+    fault = only(sensor_faults(runs(spoil=lambda c: c.update({channel: -c[channel]}))))
+    assert (fault.channel, fault.fault, fault.value) == (channel, "sign", -1.0)
+
+
+@pytest.mark.parametrize("channel", ["force", "displacement", "velocity"])
+def test_a_clipped_channel(channel):
+    def clip(channels):
+        values = channels[channel]
+        level = 0.7 * np.max(np.abs(values))
+        channels[channel] = np.clip(values, -level, level)
+
+    all_runs = runs(after=clip)
+    fault = only(sensor_faults(all_runs))
+    assert (fault.channel, fault.fault) == (channel, "clipping")
+    assert fault.value == pytest.approx(max(np.max(np.abs(one[channel])) for one in all_runs))
+
+
+@pytest.mark.parametrize("tau", [0.004, 0.01])
+def test_a_velocity_that_lags(tau):
+    def lag(channels):
+        part = STEP / tau
+        # Bilinear, so that the discrete filter has the same lag as the continuous one.
+        b, a = [part, part], [2.0 + part, part - 2.0]
+        v = channels["velocity"]
+        channels["velocity"] = lfilter(b, a, v, zi=[v[0] * (1.0 - b[0] / a[0])])[0]
+
+    fault = only(sensor_faults(runs(spoil=lag)))
+    assert (fault.channel, fault.fault) == ("velocity", "lag")
+    assert fault.value == pytest.approx(tau, rel=0.15)
+
+
+def test_mended_channels_show_no_fault():
+    spoilt = runs(late=0.006, spoil=lambda c: c.update(velocity=1.1 * c["velocity"]))
+    found = sensor_faults(spoilt)
+    assert {one.fault for one in found} == {"gain", "delay"}
+    assert sensor_faults(mended(spoilt, found)) == []
