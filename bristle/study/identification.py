@@ -24,6 +24,8 @@ from .study import Runs, Study
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ..identify.structure import StructureProblem
+
 Show = Callable[[int], None]
 
 STAGES = 4
@@ -191,12 +193,18 @@ def identify_building(
     if table and site == "damper" and model.base_law == "lugre":
         rows = error_table(train, holdout, cutoff, starts=min(starts, _TABLE_STARTS))
     show(4)
-    notes += [*found.notes(), *_weighing(rows, model, after)]
+    notes += [*found.notes(), _by_site(held), *_weighing(rows, model, after)]
     if train.reconstructed:
         notes.append("The damper's force was not measured: it is what equilibrium asks for.")
     return Identified(
         fit, after_model, rows, cutoff, before, after, tuple(notes), None, train, holdout, drawn
     )
+
+
+def _by_site(held: Mapping[str, tuple[Model, tuple[StructureProblem, StructureProblem]]]) -> str:
+    z = {site: robust_z(pair[1], own) for site, (own, pair) in held.items()}
+    told = ", ".join(f"{site} {z[site]:.3g}" for site in sorted(z, key=lambda site: -z[site]))
+    return f"z on held-out runs by site: {told}; the errors' z is the worst site's."
 
 
 def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:

@@ -98,11 +98,16 @@ class Sites:
                 fits[site] = _fit_line(at_site(model, site, problems), site, pair, begin or {})
         return SiteFits(fits, problems)
 
-    def lines(self, model: Model) -> dict[str, tuple[Model, Pair]]:
-        """Return by site the model as it stands; only lines are fitted, to the training runs."""
+    def lines(self, model: Model, only: str = "") -> dict[str, tuple[Model, Pair]]:
+        """Return by site the model as it stands; only lines are fitted, to the training runs.
+
+        `only` names the one site that is asked for.
+        """
         problems = self.placed(model)
         out = {}
         for site, pair in problems.items():
+            if only and site != only:
+                continue
             own = at_site(model, site, problems)
             if site != "damper":
                 line = fit_line(pair[0], own.law).model.values
