@@ -204,8 +204,7 @@ def diagnose_structure(
     base, verdict = None, None
     if "damper" in problems:
         say("damper: its law, then effects")
-        own = at_site(present, "damper", problems)
-        base = fit_damper(problems["damper"][0], own)
+        base = fit_damper(problems["damper"][0], at_site(present, "damper", problems))
         verdict = damper_verdict(base, *problems["damper"])
     sensors = tuple(sensor_faults([_as_bench(one, building) for one in train]))
     return combine(findings, base, verdict, problems, sensors)

@@ -185,7 +185,13 @@ def identify_building(
     fit = found.one(start)
     after_model = _with_fit(model, fit)
     held = sites.lines(as_model(after_model))
-    before, after = sites.errors(start, cutoff), errors_of_sites(held, cutoff)
+    # An effect that was never fitted is being added: before, there was none.
+    fitted = {
+        name: values for name, values in model.effects.items()
+        if any(value.origin == "identified" for value in values.values())
+    }  # fmt: skip
+    before = sites.errors(as_model(replace(model, effects=fitted)), cutoff)
+    after = errors_of_sites(held, cutoff)
     show(3)
     rows: list[LawError] = []
     site = "damper" if "damper" in held else next(iter(held))

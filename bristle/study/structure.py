@@ -22,6 +22,7 @@ from ..identify.response import Response, responses
 from ..identify.structure import StructureProblem, problems_of
 from ..identify.table import error_rms, force_rms
 from ..physics.building import Building, paper_building, read_building
+from ..physics.effect import EFFECTS
 from .errors import StudyError
 from .judged import robust_z
 from .model import StudyModel
@@ -173,7 +174,8 @@ class SiteFits:
             lost = list(dict.fromkeys([*damper.unidentified, *lost]))
         return Fit(
             replace(model, values=values), std, max(f.cost for f in self.fits.values()),
-            tuple(lost), starts=damper.starts if damper else 1, agreed=damper.agreed if damper else 1,
+            tuple(lost), starts=damper.starts if damper else 1,
+            agreed=damper.agreed if damper else 1,
         )  # fmt: skip
 
     def _damper(self) -> dict[str, float]:
@@ -198,8 +200,6 @@ def _fit_damper(
     """Return the damper's law fitted from several starts, and from `begin`."""
     train, held_out = problems["damper"]
     own = at_site(model, "damper", problems)
-    from ..physics.effect import EFFECTS
-
     layer = [name for name in own.effects if EFFECTS[name].site == "structure"]
     if not layer:
         found = identify(
@@ -241,5 +241,3 @@ def _fit_line(own: Model, site: str, pair: Pair, begin: Mapping[str, float]) -> 
         if values:
             tried.append(replace(tried[0], values={**grown.values, **values}))
     return min((fit(train, model) for model in tried), key=lambda one: one.cost)
-
-
