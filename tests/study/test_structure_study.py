@@ -93,7 +93,7 @@ def test_damper_beside_a_hidden_spring_keeps_its_values(tmp_path):
 def test_effect_without_a_site_is_refused(tmp_path):
     study = study_of(tmp_path)
     model = study.model().with_effect("gas_spring")
-    with pytest.raises(StudyError, match="gas_spring: acts at no site.*storey1, layer"):
+    with pytest.raises(StudyError, match=r"gas_spring: acts at no site.*storey1, layer"):
         identify_study(study, model=model, table=False)
 
 
