@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..diagnose import Diagnosis
+    from ..study.learning import Verdict
 
 HELP = "what a study's model is missing, how sure, what else it could be"
 
@@ -53,7 +53,7 @@ TITLES = {
 }
 
 
-def text(found: Diagnosis, folder: Path) -> str:
+def text(found: Verdict, folder: Path) -> str:
     """Return the verdict as text."""
     from ..physics.effect import EFFECTS
 
@@ -80,7 +80,7 @@ def text(found: Diagnosis, folder: Path) -> str:
     return "\n".join([*lines, *_next(found, folder)])
 
 
-def _next(found: Diagnosis, folder: Path) -> list[str]:
+def _next(found: Verdict, folder: Path) -> list[str]:
     if found.kind in ("effect", "class"):
         names = " ".join(found.effects) if found.kind == "effect" else found.effects[0]
         return ["", f"Next:  bristle add {folder} {names}"]

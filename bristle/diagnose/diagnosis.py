@@ -62,6 +62,11 @@ class Diagnosis:
     explained: float = 0.0
     std: Mapping[str, float] = field(default_factory=dict)
 
+    @property
+    def values(self) -> dict[str, float]:
+        """Values of the parameters by name [SI] of the model that the verdict names."""
+        return {} if self.after is None else dict(self.after.model.values)
+
     def as_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""
         before = self.before

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ..identify.line import fit_line
+from ..identify.placed import corrected
 from ..identify.response import Response
 from ..identify.structure import LinearLayer, StructureProblem, layer_run
 from ..physics.building import Building
@@ -35,7 +36,7 @@ def load_cell(
     if z_1 >= own or 1.0 - z_1 / layer.z_before < GAIN or (z_1 > CLEAN and share < SHARE):
         return None
     name = "delay" if delay else "force_gain"
-    right = tuple([_corrected(r, delay, gain) for r in part] for part in (train, holdout))
+    right = tuple([corrected(r, delay, gain) for r in part] for part in (train, holdout))
     told = replace(
         finding, site="force", kind="effect", effects=(name,), z_before=layer.z_before, share=share,
         coordinate=f"{delay:.3g} s" if delay else f"{gain:.4g}",
@@ -50,7 +51,7 @@ def _search_cell(
 
     def problem(value: float, part: list[Response]) -> StructureProblem:
         delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
-        return StructureProblem([layer_run(_corrected(r, delay, gain), building) for r in part])
+        return StructureProblem([layer_run(corrected(r, delay, gain), building) for r in part])
 
     def cost(value: float) -> float:
         return fit_line(problem(value, train), LinearLayer.name).cost
@@ -72,11 +73,3 @@ def _search_cell(
     finding = Finding("force", "none", (), 0.0, after.z, 0.0, detectable(other), "", base.model)
     delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
     return after.z, delay, gain, finding
-
-
-def _corrected(response: Response, delay: float, gain: float) -> Response:
-    """Return a response whose force is what a cell of that delay [s] and gain has measured."""
-    assert response.force is not None
-    time = np.arange(len(response.force)) * response.dt
-    force = np.interp(time + delay, time, response.force) if delay else response.force
-    return replace(response, force=force / gain, noise_force=response.noise_force / gain)

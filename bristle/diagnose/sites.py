@@ -68,15 +68,27 @@ class Finding:
     coordinate: str = ""
     model: Model | None = None
     trials: tuple[Trial, ...] = ()
+    before: Trial | None = None
 
 
-def look_at(site: str, train: StructureProblem, held_out: StructureProblem) -> Finding:
-    """Return what a layer's or storey's problem shows."""
+def look_at(
+    site: str, train: StructureProblem, held_out: StructureProblem, present: Model | None = None
+) -> Finding:
+    """Return what a layer's or storey's problem shows.
+
+    `present` holds the effects that the model has at this site already, with their values.
+    """
     linear = LinearLayer if site == "layer" else LinearStorey
     hook = "force" if site == "layer" else "spring"
     base = fit_line(train, linear.name)
+    taken: set[str] = set()
+    if present is not None and present.effects:
+        values = {**base.model.values, **present.values}
+        base = fit(train, replace(present, law=linear.name, values=values), with_std=False)
+        taken = set(present.effects).union(*(EFFECTS[name].excludes for name in present.effects))
     before = judge(base.model, train, held_out)
-    names = [e.name for e in effects_of("structure") if hook in e.hooks()]
+    able = [e for e in effects_of("structure") if hook in e.hooks() and e.name not in taken]
+    names = [e.name for e in able]
     if before.z <= 1.0 + 0.5 * GAIN and before.train <= CLEAN:
         names = []  # a line leaves nothing that a further effect could explain
     trials = [try_effect(name, base.model, train, held_out) for name in names]
@@ -145,9 +157,13 @@ def judge_site(
     if best is None or not better(before, best) or 1.0 - best.z / before.z < GAIN:
         kind = "none" if before.z <= CLEAN else "unknown"
         where = coordinate_of(before.residual, held_out) if kind == "unknown" else ""
-        return Finding(site, kind, (), before.z, before.z, 0.0, seen, where, before.model, tried)
+        return Finding(
+            site, kind, (), before.z, before.z, 0.0, seen, where, before.model, tried, before
+        )
     share = 1.0 - excess(best) / excess(before)
-    found = Finding(site, "unknown", (), before.z, best.z, share, seen, "", best.model, tried)
+    found = Finding(
+        site, "unknown", (), before.z, best.z, share, seen, "", best.model, tried, before
+    )
     if best.z > CLEAN and share < SHARE:
         return replace(found, coordinate=coordinate_of(best.residual, held_out))
     rivals = [best.effects[-1]]

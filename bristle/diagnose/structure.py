@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from ..identify.fit import Fit, identify
+from ..identify.fit import Fit, Model, identify
+from ..identify.placed import at_site, on_time
 from ..identify.response import responses
 from ..identify.structure import StructureProblem, problems_of
 from ..physics.building import Building
@@ -22,6 +23,7 @@ from ..physics.effect import EFFECTS, effects_of
 from ..records.measurement import Measurement
 from .candidates import Trial, judge, refine, try_all, try_members
 from .decision import Decision, decide
+from .experiments import Experiment
 from .load_cell import load_cell
 from .sensors import SensorFault, sensor_faults
 from .sites import Finding, coordinate_of, look_at, try_effect
@@ -41,6 +43,8 @@ WHY = {
     "f_c": "friction under the base and the damper's own yield force add up to one force",
 }
 
+NAMES = {"base_mass": "a mass of the base that the file does not know", "f_c": "f_c of the damper"}
+"""Rivals that are no effects, as words name them."""
 
 _NOTHING = Finding("", "none", (), 1.0, 1.0, 0.0, 0.0)
 
@@ -78,6 +82,44 @@ class StructureDiagnosis:
     reconstructed: bool
     sensors: tuple[SensorFault, ...] = ()
     problems: dict[str, tuple[StructureProblem, StructureProblem]] = field(default_factory=dict)
+    experiment: Experiment | None = None
+
+    @property
+    def worst(self) -> str:
+        """The site whose model errs the most on held-out runs, "" where there is none."""
+        tried = self._tried()
+        return max(tried, key=lambda one: one[2])[0] if tried else ""
+
+    @property
+    def before(self) -> Trial | None:
+        """The trial of the model as it was, at the worst site."""
+        site = self.worst
+        if site == "damper" and self.damper_verdict is not None:
+            return self.damper_verdict.before
+        return next((f.before for f in self.findings.values() if f.site == site), None)
+
+    @property
+    def trials(self) -> tuple[Trial, ...]:
+        """The trials of single effects at the worst site, best first."""
+        return next((trials for site, trials, _ in self._tried() if site == self.worst), ())
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values of the parameters by name [SI], of the law and of the effects named."""
+        out: dict[str, float] = {}
+        if self.damper_verdict is not None:
+            out.update(self.damper_verdict.decision.best.model.values)
+        for finding in self.findings.values():
+            model = finding.model.values if finding.model is not None else {}
+            own = {n: v for n, v in model.items() if n.partition(".")[0] in finding.effects}
+            out.update(own)
+            if finding.effects == ("delay",):
+                out["delay.time"] = float(finding.coordinate.split()[0])
+        soft = [f.site for f in self.findings.values() if "storey_softening" in f.effects]
+        storeys = [site for site in self.findings if site.startswith("storey")]
+        if len(soft) == 1 < len(storeys):  # else it is in every storey, which is 0
+            out["storey_softening.which"] = float(soft[0].removeprefix("storey"))
+        return out
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""
@@ -95,9 +137,7 @@ class StructureDiagnosis:
             "ranking": sorted(ranking, key=lambda row: -row["gain"]),
             "z_holdout_before": round(self.z_before, 4), "z_holdout_after": round(self.z_after, 4),
             "untestable": list(self.untestable), "sites": self.sites,
-            "sensors": [
-                {"channel": f.channel, "fault": f.fault, "value": f.value} for f in self.sensors
-            ],
+            "sensors": [fault.as_dict() for fault in self.sensors],
             "force": "reconstructed" if self.reconstructed else "measured", "words": self.words,
         }  # fmt: skip
         if np.isfinite(self.detectable):
@@ -121,6 +161,7 @@ def diagnose_structure(
     building: Building,
     *,
     law: str = "lugre",
+    present: Model | None = None,
     say: Say | None = None,
 ) -> StructureDiagnosis:
     """Return what is missing in the model of a building and its damper.
@@ -130,6 +171,7 @@ def diagnose_structure(
     train, holdout : measurements with the channels of a building
     building : its masses are taken as known; stiffnesses and damping are fitted anew
     law : the damper's law
+    present : the model as it is: effects of all sites with their values; its law counts
     say : is told what is being done
 
     Raises
@@ -138,15 +180,18 @@ def diagnose_structure(
         If a channel is missing, or the building has other levels than were measured.
     """
     say = say or (lambda text: None)
+    present = present or Model(law)
+    law = present.law
     say("smoothing the motion of each level")
-    found = responses([*train, *holdout], building)
+    found, present = on_time(responses([*train, *holdout], building), present)
     ours, theirs = found[: len(train)], found[len(train) :]
-    problems = problems_of(ours, theirs, building, law)
+    straight = "storey_softening" not in present.effects
+    problems = problems_of(ours, theirs, building, law, linear_storeys=straight)
     findings = {}
     for site, (own, other) in problems.items():
         if site != "damper":
             say(f"{site}: effects of the structure")
-            findings[site] = look_at(site, own, other)
+            findings[site] = look_at(site, own, other, at_site(present, site, problems))
     if "damper" in problems and findings.get("layer", _NOTHING).kind != "none":
         say("layer: the load cell")
         late = load_cell(findings["layer"], ours, theirs, building, law)
@@ -159,10 +204,21 @@ def diagnose_structure(
     base, verdict = None, None
     if "damper" in problems:
         say("damper: its law, then effects")
-        base = identify(problems["damper"][0], law)
+        base = fit_damper(problems["damper"][0], at_site(present, "damper", problems))
         verdict = damper_verdict(base, *problems["damper"])
     sensors = tuple(sensor_faults([_as_bench(one, building) for one in train]))
     return combine(findings, base, verdict, problems, sensors)
+
+
+def fit_damper(problem: StructureProblem, present: Model) -> Fit:
+    """Return the damper's law fitted anew, with the effects that the model has already."""
+    effects = present.effects
+    known = {n: v for n, v in present.values.items() if n.partition(".")[0] in effects}
+    kept = {n: v for n, v in present.values.items() if n in present.held}
+    return identify(
+        problem, present.law, effects, values={**known, **kept}, held=present.held,
+        limits=present.limits,
+    )  # fmt: skip
 
 
 def damper_verdict(base: Fit, train: StructureProblem, held_out: StructureProblem) -> DamperVerdict:
@@ -204,7 +260,11 @@ def combine(
 ) -> StructureDiagnosis:
     """Return one diagnosis from what the sites show."""
     reconstructed = "damper" in problems and problems["damper"][0].reconstructed
-    parts = [(f.site, f.kind, f.effects, f.z_before, f.z_after) for f in findings.values()]
+    sensors = (*sensors, *_of_load_cell(findings))
+    parts = [
+        (f.site, *(("none", ()) if _is_gain(f) else (f.kind, f.effects)), f.z_before, f.z_after)
+        for f in findings.values()
+    ]
     if verdict is not None:
         made = verdict.decision
         parts.append(("damper", made.kind, made.effects, verdict.before.z, made.best.z))
@@ -216,7 +276,9 @@ def combine(
         twins = lookalikes(effects) if reconstructed and site == "damper" else []
         alike += twins
         sure = kind == "effect" and not twins
-        (named if sure else rivals).extend([*effects, *twins] if kind != "unknown" else [])
+        # What is no effect, such as a mass of the base, is a rival that words alone can name.
+        known = [one for one in (*effects, *twins) if one in EFFECTS]
+        (named if sure else rivals).extend(known if kind != "unknown" else [])
         sites.update({effect: sites.get(effect, _site_of(effect, site)) for effect in effects})
     effects = tuple(dict.fromkeys([*named, *rivals]))
     unknown = [part for part in parts if part[1] == "unknown"]
@@ -250,6 +312,24 @@ def lookalikes(effects: tuple[str, ...]) -> list[str]:
     return [twin for twin in dict.fromkeys(twins) if twin not in effects]
 
 
+def _is_gain(finding: Finding) -> bool:
+    return "force_gain" in finding.effects
+
+
+def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
+    """Return the faults of the load cell that equilibrium shows and that are no effects."""
+    out = []
+    for finding in findings.values():
+        if _is_gain(finding):
+            gain = float(finding.coordinate)
+            said = (
+                f"The load cell shows {gain:.4g} times the force that equilibrium asks for "
+                f"(z {finding.z_before:.3g} before, {finding.z_after:.3g} with that set right)."
+            )
+            out.append(SensorFault("force", "gain", gain, float("nan"), said))
+    return out
+
+
 def words(
     kind: str, effects: tuple[str, ...], sites: Mapping[str, str], alike: list[str], coordinate: str
 ) -> str:
@@ -260,7 +340,10 @@ def words(
     elif kind == "effect":
         told.append(f"Missing: {', '.join(f'{e} ({sites[e]})' for e in effects)}.")
     elif kind == "class":
-        told.append(f"Missing is one of {', '.join(effects)}; these runs cannot say which.")
+        others = [NAMES[twin] for twin in alike if twin in NAMES]
+        told.append(
+            f"Missing is one of {', '.join([*effects, *others])}; these runs cannot say which."
+        )
     else:
         told.append(f"Something is missing that no effect explains, along {coordinate}.")
         told += [f"Besides, {e} is missing ({sites[e]})." for e in effects if e in sites]

@@ -71,10 +71,10 @@ def gather(study: Study) -> Content:
         hold = holder(study)
         now = compare_held(hold(model))
         for step in reversed(steps):
-            gone = set(read_model(study.history.model_file(step.number)).effects)
+            gone = set(read_model(study.history.model_file(step.number), study.folder).effects)
             if step.number == 0 or not gone <= set(model.effects):
                 break
-            earlier = read_model(study.history.model_file(step.number - 1))
+            earlier = read_model(study.history.model_file(step.number - 1), study.folder)
             new = [name for name in model.effects if name not in earlier.effects]
             if new:
                 before, added = compare_held(hold(earlier)), " and ".join(new)
@@ -98,7 +98,7 @@ def _judged(tread: Tread, hold: Any, study: Study) -> Tread:
 
     if tread.z is not None or tread.number == 0:
         return tread  # the model that a study begins with is nobody's guess of this damper
-    held = hold(read_model(study.history.model_file(tread.number)))
+    held = hold(read_model(study.history.model_file(tread.number), study.folder))
     return replace(tread, z=z_scale(np.concatenate([one.normalised for one in held])))
 
 

@@ -9,16 +9,20 @@ from ..compare.comparison import Comparison, compare_held
 from ..compare.held import Held, held_runs
 from ..identify.fit import Problem
 from ..identify.prepare import prepare
-from ..identify.response import responses
-from ..identify.structure import StructureProblem, damper_run, sliding
-from ..physics.building import paper_building, read_building
 from ..physics.effect import EFFECTS
 from .errors import StudyError
 from .identification import as_model
+from .judged import robust_z
 from .model import StudyModel
+from .structure import Sites, building_of
 from .study import Study
 
 Holder = Callable[[StudyModel], list[Held]]
+
+QUANTITIES = {"damper": "force", "layer": "force of the isolation layer"}
+"""What is compared at a site of a building."""
+
+_MISFIT = 1.15  # z above which an error is more than noise
 
 
 def holder(study: Study, role: str = "holdout") -> Holder:
@@ -55,30 +59,37 @@ def hold_bench(study: Study, role: str) -> Holder:
 
 
 def hold_structure(study: Study, role: str) -> Holder:
-    """Return what holds dampers against a building's runs: base motion in, force out.
+    """Return what holds models against a building's runs at one site, the same for all models.
 
-    A force that was not measured is reconstructed from equilibrium, and carries its noise.
+    It is the site where the present model errs the most; where it errs nowhere, the one where the
+    law without any effect does. A force that was not measured is reconstructed from equilibrium,
+    and carries its noise.
     """
-    file = study.model().building
-    building = read_building(study.folder / file) if file else paper_building()
-    runs = study.runs()
-    found = responses(runs.all, building)
-    chosen = found[: len(runs.train)] if role == "train" else found[len(runs.train) :]
-    reconstructed = any(one.force is None for one in found)
-    whole = [damper_run(one, building, "lugre") for one in chosen]
-    moving = [replace(run, measured=sliding(one)) for run, one in zip(whole, chosen, strict=True)]
+    present = study.model()
+    sites = Sites(study.runs(), building_of(study, present))
+    index = 0 if role == "train" else 1
+    site, z = _worst(sites, present, index)
+    if z <= _MISFIT and present.effects:
+        site, z = _worst(sites, replace(present, effects={}), index)
+    if z <= _MISFIT:  # nothing fails anywhere: the damper is what a study is about
+        site = "damper" if "damper" in sites.problems(as_model(present)) else site
 
     def hold(model: StudyModel) -> list[Held]:
-        # A base that dry friction holds tells nothing of the force of a law that jumps at v = 0.
-        part = moving if model.base_law == "bingham" else whole
-        held = held_runs(StructureProblem(part, 0, reconstructed), as_model(model))
-        return (
-            [replace(one, quantity="reconstructed force") for one in held]
-            if (reconstructed)
-            else held
-        )
+        own, pair = sites.lines(as_model(model), only=site)[site]
+        held = held_runs(pair[index], own)
+        name = "reconstructed force" if pair[index].reconstructed else QUANTITIES.get(site, "force")
+        name = f"shear of {site}" if site.startswith("storey") else name
+        return [replace(one, quantity=name) for one in held]
 
     return hold
+
+
+def _worst(sites: Sites, model: StudyModel, index: int) -> tuple[str, float]:
+    """Return the site where a model errs the most, and z there."""
+    held = sites.lines(as_model(model))
+    z = {site: robust_z(pair[index], own) for site, (own, pair) in held.items()}
+    site = max(z, key=lambda name: z[name])
+    return site, z[site]
 
 
 HOLDERS: dict[str, Callable[[Study, str], Holder]] = {

@@ -24,6 +24,8 @@ from .study import Runs, Study
 if TYPE_CHECKING:
     import pandas as pd
 
+    from ..identify.structure import StructureProblem
+
 Show = Callable[[int], None]
 
 STAGES = 4
@@ -42,7 +44,8 @@ class Identified:
     `fit` in SI; `model` the study's model with the values; `table` the errors of the laws after
     the low-pass at `cutoff` [Hz]; `before`, `after` errors of the two models; `notes` what to
     know; `step` the history's new step, None where nothing was written; `train`, `holdout` the
-    runs as they were fitted and judged.
+    runs as they were fitted and judged, `drawn` the part of the model that predicts them where
+    that is not the whole of it.
     """
 
     fit: Fit
@@ -55,6 +58,7 @@ class Identified:
     step: Step | None
     train: Problem
     holdout: Problem | None
+    drawn: Model | None = None
 
     @property
     def unidentified(self) -> tuple[str, ...]:
@@ -163,10 +167,62 @@ def identify_bench(
     return _identify(runs, model, cutoff, starts, table, show, begin)
 
 
+def identify_building(
+    study: Study, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show,
+    begin: Mapping[str, float] | None = None,
+) -> Identified:  # fmt: skip
+    """Identify a damper in a building, and what the building's sites carry beside it."""
+    from .structure import Sites, building_of, errors_of_sites
+
+    runs = study.runs()
+    notes = [*runs.notes, *_doubts([run for run in runs.all if run.has("force")])]
+    model = _with_choices(model, begin or {})
+    sites = Sites(runs, building_of(study, model))
+    show(1)
+    start = as_model(model)
+    found = sites.fitted(start, starts, begin)
+    show(2)
+    fit = found.one(start)
+    after_model = _with_fit(model, fit)
+    held = sites.lines(as_model(after_model))
+    # An effect that was never fitted is being added: before, there was none.
+    fitted = {
+        name: values for name, values in model.effects.items()
+        if any(value.origin == "identified" for value in values.values())
+    }  # fmt: skip
+    before = sites.errors(as_model(replace(model, effects=fitted)), cutoff)
+    after = errors_of_sites(held, cutoff)
+    show(3)
+    rows: list[LawError] = []
+    site = "damper" if "damper" in held else next(iter(held))
+    drawn, (train, holdout) = held[site]
+    if table and site == "damper" and model.base_law == "lugre":
+        rows = error_table(train, holdout, cutoff, starts=min(starts, _TABLE_STARTS))
+    show(4)
+    notes += [*found.notes(), _by_site(held), *_weighing(rows, model, after)]
+    if train.reconstructed:
+        notes.append("The damper's force was not measured: it is what equilibrium asks for.")
+    return Identified(
+        fit, after_model, rows, cutoff, before, after, tuple(notes), None, train, holdout, drawn
+    )
+
+
+def _by_site(held: Mapping[str, tuple[Model, tuple[StructureProblem, StructureProblem]]]) -> str:
+    z = {site: robust_z(pair[1], own) for site, (own, pair) in held.items()}
+    told = ", ".join(f"{site} {z[site]:.3g}" for site in sorted(z, key=lambda site: -z[site]))
+    return f"z on held-out runs by site: {told}; the errors' z is the worst site's."
+
+
+def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
+    """Return the model with the choices of a form, such as a storey's number, that were found."""
+    chosen = {n: v for n, v in begin.items() if n.endswith(".which") and n in model.flat()}
+    return model.with_values(chosen, origin="assumed") if chosen else model
+
+
 IDENTIFIERS: dict[
     str,
     Callable[[Study, StudyModel, float, int, bool, Show, Mapping[str, float] | None], Identified],
-] = {"bench": identify_bench}
+] = {"bench": identify_bench, "structure": identify_building}
 """What identifies a study, by its rig."""
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..diagnose import Diagnosis, diagnose
+from ..diagnose.structure import StructureDiagnosis, diagnose_structure
 from ..physics.effect import EFFECTS
 from .errors import StudyError
 from .history import Step
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Say = Callable[[str], None]
+Verdict = Diagnosis | StructureDiagnosis
 
 MOST_EFFECTS = 4
 """Effects that `learn` adds at the most: a model that asks for more is the wrong model."""
@@ -27,7 +29,7 @@ def _silent(text: str) -> None:
     """Say nothing."""
 
 
-def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> Diagnosis:
+def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> Verdict:
     """Return what the present model of a study is missing; write verdict.json.
 
     Parameters
@@ -64,11 +66,22 @@ def _diagnose_bench(study: Study, model: StudyModel, say: Say) -> Diagnosis:
     )  # fmt: skip
 
 
-DIAGNOSERS: dict[str, Callable[[Study, StudyModel, Say], Diagnosis]] = {"bench": _diagnose_bench}
+def _diagnose_building(study: Study, model: StudyModel, say: Say) -> StructureDiagnosis:
+    from .structure import building_of
+
+    runs, present = study.runs(), as_model(model)
+    building = building_of(study, model)
+    return diagnose_structure(runs.train, runs.holdout, building, present=present, say=say)
+
+
+DIAGNOSERS: dict[str, Callable[[Study, StudyModel, Say], Verdict]] = {
+    "bench": _diagnose_bench,
+    "structure": _diagnose_building,
+}
 """What diagnoses a study, by its rig."""
 
 
-def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
+def verdict_of(study: Study, found: Verdict) -> dict[str, Any]:
     """Return the content of verdict.json, with what weakens the split of the runs."""
     verdict = found.as_dict()
     notes = study.runs().notes
@@ -89,7 +102,7 @@ class Added:
 
 
 def add_effects(
-    study: Study, names: Sequence[str], *, why: str = "", found: Diagnosis | None = None
+    study: Study, names: Sequence[str], *, why: str = "", found: Verdict | None = None
 ) -> Added:
     """Add effects to a study's model, refit it, and write the step.
 
@@ -108,9 +121,9 @@ def add_effects(
         _refuse(model, name)
         model = model.with_effect(name)
     start: Mapping[str, float] | None = None
-    if found is not None and found.after is not None:
+    if found is not None and found.values:
         known = set(model.flat())
-        start = {k: v for k, v in found.after.model.values.items() if k in known}
+        start = {k: v for k, v in found.values.items() if k in known}
     identified = identify_study(study, model=model, begin=start, table=False, write=False)
     verdict = study.verdict()
     if not why:
@@ -143,7 +156,7 @@ def _refuse(model: StudyModel, name: str) -> None:
 class Learned:
     """What `learn` came to: the last diagnosis, and the steps that it made."""
 
-    verdict: Diagnosis
+    verdict: Verdict
     steps: tuple[Step, ...]
 
     def as_dict(self) -> dict[str, Any]:

@@ -131,8 +131,10 @@ def new_model(law: str = "lugre", effects: tuple[str, ...] = (), building: str =
     return model
 
 
-def read_model(path: Path) -> StudyModel:
+def read_model(path: Path, study: Path | None = None) -> StudyModel:
     """Return the model in a model.toml; what is missing takes the law's values, free.
+
+    A building's file is looked for in the folder `study`, else beside the model.
 
     Raises
     ------
@@ -155,8 +157,9 @@ def read_model(path: Path) -> StudyModel:
             effects[name] = found
     _exclusions(toml, list(effects))
     building = toml.text((), data, "building")
-    if building and not (path.parent / building).is_file():
-        toml.error(("building",), f"there is no file {path.parent / building}.")
+    beside = study or path.parent
+    if building and not (beside / building).is_file():
+        toml.error(("building",), f"there is no file {beside / building}.")
     toml.check()
     return StudyModel(law, parameters, effects, building)
 

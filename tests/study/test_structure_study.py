@@ -1,0 +1,139 @@
+"""A building's study from its files to an effect added and taken back."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shaken import building, friction, shake
+
+from bristle.cli import diagnose as diagnose_command
+from bristle.diagnose.sites import Finding
+from bristle.diagnose.structure import DamperVerdict, combine
+from bristle.identify.model import Model
+from bristle.identify.placed import at_site, homeless
+from bristle.physics.effect import EFFECTS
+from bristle.records.channels import channel_unit
+from bristle.study.comparison import compare_study
+from bristle.study.errors import StudyError
+from bristle.study.identification import identify_study
+from bristle.study.learning import add_effects, diagnose_study
+from bristle.study.new import create_study
+from bristle.study.study import Study
+
+STIFF = 1.5e7  # N/m3, of the cubic spring that the files hide
+
+
+def stiffening(x, v):
+    return [STIFF * x[0] ** 3, 0.0]
+
+
+def study_of(folder: Path, damper=None) -> Study:
+    b = building(1, True, 6)
+    file = folder / "house.toml"
+    file.write_text(
+        'schema = 1\nname = "house"\nbase = "isolated"\ndamping_ratio = 0.02\n'
+        f"masses = {np.diag(b.M).tolist()}\nstiffnesses = {list(b.stiffnesses)}\n",
+        encoding="utf-8",
+    )
+    runs = []
+    for k, role in enumerate(("train", "train", "holdout")):
+        clean = shake(b, 20 + k, damper, stiffening, samples=2500)
+        random = np.random.default_rng(k)
+        named = {
+            f"{c} [{'s' if c == 'time' else channel_unit(c)}]": y
+            + (c != "time") * 0.01 * np.std(y) * random.standard_normal(len(y))
+            for c, y in clean.items()
+        }
+        runs.append(folder / f"{role}_{k}.csv")
+        np.savetxt(
+            runs[-1], np.column_stack(list(named.values())), "%.9g", ",", header=",".join(named),
+            comments="",
+        )  # fmt: skip
+    return create_study(folder / "rig", runs, rig="structure", building=file, law="bingham").study
+
+
+def test_hidden_spring_is_found_added_and_the_error_falls(tmp_path, capsys):
+    study = study_of(tmp_path)
+    first = identify_study(study, table=False)
+    assert first.after["z_holdout"] > 1.5
+    assert any(note.startswith("layer: k = ") for note in first.notes)
+    assert compare_study(study).quantity == "force of the isolation layer"
+    found = diagnose_study(study)
+    assert (found.kind, found.effects) == ("effect", ("duffing",))
+    assert found.before is not None
+    assert found.before.z == pytest.approx(found.z_before)
+    assert study.verdict()["sites"] == {"duffing": "layer"}
+    assert "with duffing" in diagnose_command.text(found, study.folder)
+    added = add_effects(study, found.effects, found=found)
+    assert added.step.before["z_holdout"] == pytest.approx(first.after["z_holdout"], rel=1e-6)
+    assert added.step.after["z_holdout"] == pytest.approx(1.0, abs=0.1)
+    value = study.model().effects["duffing"]
+    assert value["k_3"].origin == "identified"
+    assert value["shape"].value == pytest.approx(3.0, abs=0.3)
+    assert compare_study(study).z == pytest.approx(1.0, abs=0.1)
+    again = diagnose_study(study)
+    assert (again.kind, again.effects) == ("none", ())
+
+
+def test_damper_beside_a_hidden_spring_keeps_its_values(tmp_path):
+    study = study_of(tmp_path, friction)
+    model = study.model().with_effect("duffing")
+    found = identify_study(study, model=model, table=False, starts=1, write=False)
+    assert found.before["z_holdout"] > 1.5 * found.after["z_holdout"]
+    layer = next(note for note in found.notes if note.startswith("layer"))
+    k = float(layer.split("k = ")[1].split()[0])
+    assert k == pytest.approx(building(1, True, 6).stiffnesses[0], rel=0.03)
+    assert json.dumps(found.as_dict())
+
+
+def test_effect_without_a_site_is_refused(tmp_path):
+    study = study_of(tmp_path)
+    model = study.model().with_effect("gas_spring")
+    with pytest.raises(StudyError, match=r"gas_spring: acts at no site.*storey1, layer"):
+        identify_study(study, model=model, table=False)
+
+
+def test_each_effect_acts_at_its_own_site():
+    model = Model("lugre", ("stribeck", "duffing", "storey_softening"), {"sigma_a": 1.0})
+    sites = ("damper", "layer", "storey1", "storey2")
+    placed = {site: at_site(model, site, sites).effects for site in sites}
+    assert placed == {
+        "damper": ("stribeck",), "layer": ("duffing",), "storey1": ("storey_softening",),
+        "storey2": ("storey_softening",),
+    }  # fmt: skip
+    second = replace(model, values={"storey_softening.which": 2.0})
+    assert at_site(second, "storey1", sites).effects == ()
+    assert at_site(model, "damper", ("damper",)).effects == ("stribeck", "duffing")
+    assert homeless(model, ["damper", "layer"]) == ["storey_softening"]
+
+
+def test_wrong_load_cell_is_a_sensor_fault_and_no_effect():
+    cell = Finding("force", "effect", ("force_gain",), 3.0, 1.0, 1.0, 0.01, coordinate="1.15")
+    found = combine({"layer": cell}, None, None, {})
+    assert (found.kind, found.effects) == ("none", ())
+    assert [(f.channel, f.fault, f.value) for f in found.sensors] == [("force", "gain", 1.15)]
+    assert "1.15 times" in found.as_dict()["sensors"][0]["words"]
+
+
+def test_mass_of_the_base_is_a_rival_in_words_alone():
+    class Decision:
+        kind, effects = "effect", ("fluid_inertia",)
+
+        class best:  # noqa: N801
+            z = 1.0
+
+    class Trial:
+        z, effects = 2.0, ()
+
+    class Problem:
+        reconstructed = True
+
+    verdict = DamperVerdict(Decision, Trial, ())
+    found = combine({}, None, verdict, {"damper": (Problem, Problem)})
+    assert (found.kind, found.effects) == ("class", ("fluid_inertia",))
+    assert all(name in EFFECTS for name in found.effects)
+    assert "a mass of the base that the file does not know" in found.words
