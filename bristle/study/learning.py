@@ -11,7 +11,7 @@ from ..diagnose.structure import StructureDiagnosis, diagnose_structure
 from ..physics.effect import EFFECTS
 from .errors import StudyError
 from .history import Step
-from .identification import Identified, as_model, identify_study
+from .identification import Identified, as_model, errors_of, identify_study
 from .model import StudyModel
 from .study import Study, split_in_time
 
@@ -116,7 +116,7 @@ def add_effects(
     StudyError
         If an effect is not known, is there already, or cannot join the model.
     """
-    model = study.model()
+    model = present = study.model()
     for name in names:
         _refuse(model, name)
         model = model.with_effect(name)
@@ -125,14 +125,16 @@ def add_effects(
         known = set(model.flat())
         start = {k: v for k, v in found.values.items() if k in known}
     identified = identify_study(study, model=model, begin=start, table=False, write=False)
+    # Its own "before" has the new effects at their defaults, which is nobody's model.
+    before = errors_of(identified.train, identified.holdout, as_model(present), identified.cutoff)
     verdict = study.verdict()
     if not why:
         agreed = verdict is not None and set(names) <= set(verdict.get("effects", []))
         why = f"verdict: {verdict['kind']}" if agreed and verdict else "by hand"
     step = study.add_step(
-        "add " + ", ".join(names), why, identified.model, identified.before, identified.after
+        "add " + ", ".join(names), why, identified.model, before, identified.after
     )
-    return Added(tuple(names), replace(identified, step=step), step)
+    return Added(tuple(names), replace(identified, before=before, step=step), step)
 
 
 def _refuse(model: StudyModel, name: str) -> None:

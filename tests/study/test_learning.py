@@ -1,0 +1,161 @@
+"""A study learns the effect that somebody else's generator hid, and says so in its verdict."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+
+from bristle.cli import main
+from bristle.study import learning
+from bristle.study.errors import StudyError
+from bristle.study.identification import identify_study
+from bristle.study.learning import add_effects, diagnose_study, learn
+from bristle.study.new import create_study
+from bristle.study.study import Study
+from tests.independent.generate import make_case
+
+UNITS = {"time": "s", "displacement": "m", "velocity": "m/s", "voltage": "V", "force": "N"}
+
+
+def study_of(case, folder):
+    """Return a study of two training runs and one held out of a case."""
+    files = []
+    for run in case.runs:
+        if run["name"] not in ("train_1", "train_2", "holdout_1"):
+            continue
+        rows = ["time [s],displacement [m],velocity [m/s],voltage [V],force [N]"]
+        rows += [
+            ",".join(f"{v:.9g}" for v in row)
+            for row in zip(*(run[name] for name in UNITS), strict=True)
+        ]
+        path = folder / f"{run['name']}.csv"
+        path.write_text("\n".join(rows) + "\n")
+        files.append(path)
+    return create_study(folder / "study", files, law="bingham").study
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory):
+    """Return the folder of a study with a hidden gas spring, identified and diagnosed."""
+    case = make_case(1, "gas_spring", strength=0.15, duration=4.0)
+    study = study_of(case, tmp_path_factory.mktemp("learning"))
+    identify_study(study, table=False)
+    diagnose_study(Study(study.folder))
+    return study.folder
+
+
+@pytest.fixture
+def study(diagnosed, tmp_path):
+    """Return a copy of the diagnosed study that a test may change."""
+    return Study(shutil.copytree(diagnosed, tmp_path / "study"))
+
+
+def test_the_verdict_file_holds_what_a_program_needs(study):
+    verdict = json.loads((study.folder / "verdict.json").read_text())
+    assert verdict["schema"] == 1
+    assert verdict["kind"] == "effect"
+    assert verdict["effects"] == ["gas_spring"]
+    ranking = verdict["ranking"]
+    assert [row["z_holdout"] for row in ranking] == sorted(row["z_holdout"] for row in ranking)
+    assert ranking[0]["effect"] == "gas_spring"
+    assert ranking[0]["gain"] == pytest.approx(
+        1.0 - ranking[0]["z_holdout"] / verdict["z_holdout_before"], abs=0.02
+    )
+    assert verdict["z_holdout_before"] > 2.0
+    assert 0.0 < verdict["detectable"] < 0.05
+    assert "gas_spring" not in verdict["untestable"]
+    assert isinstance(verdict["noise_floor"], dict)
+    assert verdict["sensors"] == []
+    assert verdict["words"]
+
+
+def test_what_the_verdict_names_is_added_and_then_nothing_is_missing(study):
+    added = add_effects(study, ["gas_spring"])
+    assert added.step.why == "verdict: effect"
+    assert added.identified.after["z_holdout"] == pytest.approx(1.0, abs=0.1)
+    assert "gas_spring" in study.model().effects
+    found = diagnose_study(study)
+    assert found.kind == "none"
+    verdict = study.verdict()
+    assert verdict is not None
+    assert verdict["kind"] == "none"
+    assert 0.0 < verdict["detectable"] < 0.05
+    study.undo()
+    assert study.model().effects == {}
+
+
+def test_adding_tells_the_error_of_the_model_as_it_was(study):
+    last = study.steps()[-1]
+    added = add_effects(study, ["gas_spring"])
+    assert added.step.before["z_holdout"] == pytest.approx(last.after["z_holdout"], rel=1e-3)
+    assert added.step.before["z_holdout"] > 3.0 * added.step.after["z_holdout"]
+
+
+def test_an_effect_that_nobody_knows_is_refused(study, capsys):
+    with pytest.raises(StudyError, match="gas_spring"):
+        add_effects(study, ["gas_sprng"])
+    assert main(["add", str(study.folder), "gas_sprng"]) == 2
+    assert "gas_sprng" in capsys.readouterr().err
+    assert study.model().effects == {}
+
+
+def test_an_effect_that_is_there_already_is_refused(study):
+    with pytest.raises(StudyError, match="in the model already"):
+        add_effects(study, ["gas_spring", "gas_spring"])
+    assert study.model().effects == {}
+
+
+def test_an_effect_of_the_other_law_is_refused(study, tmp_path):
+    files = sorted((study.folder / "data").glob("*.csv"))
+    other = create_study(tmp_path / "other", files, law="lugre").study
+    with pytest.raises(StudyError, match="cannot join the law lugre; it joins bingham"):
+        add_effects(other, ["presliding"])
+    assert len(other.steps()) == 1
+
+
+def test_effects_that_exclude_each_other_are_refused(study):
+    with pytest.raises(StudyError, match="cannot be joined"):
+        add_effects(study, ["mount_compliance", "backlash"])
+
+
+@pytest.mark.parametrize("command", ["diagnose", "add", "study auto"])
+def test_a_folder_that_is_no_study_is_refused(tmp_path, capsys, command):
+    words = [*command.split(), str(tmp_path)] + (["gas_spring"] if command == "add" else [])
+    assert main(words) == 2
+    assert str(tmp_path) in capsys.readouterr().err
+
+
+class Killed(BaseException):
+    """Stands for a signal: nothing may catch it."""
+
+
+def test_what_was_learnt_before_a_kill_is_kept(study):
+    steps = len(study.steps())
+
+    def killed():
+        raise Killed
+
+    with pytest.raises(Killed):
+        learn(study, on_step=killed)
+    again = Study(study.folder)
+    assert list(again.model().effects) == ["gas_spring"]
+    assert len(again.steps()) == steps + 1
+    learnt = learn(again)
+    assert learnt.verdict.kind == "none"
+    assert learnt.steps == ()
+    assert len(again.steps()) == steps + 1
+
+
+def test_a_kill_within_a_diagnosis_leaves_the_study_as_it_was(study, monkeypatch):
+    before = (study.folder / "verdict.json").read_text()
+
+    def killed(*_arguments, **_choices):
+        raise Killed
+
+    monkeypatch.setattr(learning, "diagnose", killed)
+    with pytest.raises(Killed):
+        learn(study)
+    assert Study(study.folder).model().effects == {}
+    assert (study.folder / "verdict.json").read_text() == before
