@@ -277,14 +277,12 @@ def test_an_edited_component_lives_beside_the_other(write: Any, tmp_path: Path) 
 
 
 def test_an_edited_effect_lives_beside_the_other(write: Any, tmp_path: Path) -> None:
-    library = ROOT / "bristle" / "physics" / "effects" / "gas_spring.py"
-    source = library.read_text(encoding="utf-8")
-    edited = write(source.replace("return p.preload", "return 3.0 * p.preload"), "gas_spring.py")
-    assert edited.read_text(encoding="utf-8") != source
-    second = build(plan("LuGreDamper", effects=[edited]), tmp_path / "b")
-    values = {"gas_spring.on": True, "gas_spring.preload": 2.0}
-    paths = [str(built("LuGreDamper")), str(second), str(built("LuGreDamper"))]
-    assert two_builds(paths, [values] * 3, "force") == [2.0, 6.0, 2.0]
+    first = build(plan("LuGreDamper", effects=[write(OWN, "ripple.py")]), tmp_path / "a")
+    edited = OWN.replace("return p.height", "return 3.0 * p.height")
+    assert edited != OWN
+    second = build(plan("LuGreDamper", effects=[write(edited, "ripple.py")]), tmp_path / "b")
+    values = {"ripple.on": True, "ripple.height": 2.0}
+    assert two_builds([str(first), str(second), str(first)], [values] * 3, "force") == [2, 6, 2]
 
 
 OWN = '''

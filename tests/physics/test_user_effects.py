@@ -79,7 +79,7 @@ def test_stock_components_do_not_know_it_unless_they_are_told(tmp_path: Path) ->
     file = written(tmp_path)
     user.load_effects(tmp_path)
     assert "seal.on" not in catalogue.describe("LuGreDamper").variables
-    told = catalogue.describe("LuGreDamper", None, [file]).variables
+    told = catalogue.describe("LuGreDamper", effects=[file]).variables
     assert told["seal.f_s"].unit == "N"
 
 
