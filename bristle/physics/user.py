@@ -125,7 +125,8 @@ def leave_out(effect: type[Effect], why: str) -> None:
 
 def unload_effects() -> None:
     """Take every effect of a user's out of the library: it is as it came."""
-    if any([_forget(path) for path in list(_known)]):
+    gone = [_forget(path) for path in list(_known)]
+    if any(gone):
         _reweave()
 
 
