@@ -125,8 +125,12 @@ def add_effects(
         known = set(model.flat())
         start = {k: v for k, v in found.values.items() if k in known}
     identified = identify_study(study, model=model, begin=start, table=False, write=False)
-    # Its own "before" has the new effects at their defaults, which is nobody's model.
-    before = errors_of(identified.train, identified.holdout, as_model(present), identified.cutoff)
+    before = identified.before
+    if study.settings.rig == "bench":
+        # It has the new effects at their defaults, which is nobody's model.
+        before = errors_of(
+            identified.train, identified.holdout, as_model(present), identified.cutoff
+        )
     verdict = study.verdict()
     if not why:
         agreed = verdict is not None and set(names) <= set(verdict.get("effects", []))
