@@ -152,7 +152,7 @@ NOTED = [
     ("leak", "memory", "KiB per instance"),
     ("leave a file", "terminate and free", "left.txt"),
     ("strange category", "logging", "logStrange"),
-    ("need numpy", "bare interpreter", "needs something that is installed here"),
+    ("need a package", "bare interpreter", "needs something that is installed here"),
     ("one step size", "zero step", "refused"),
     ("end early", "legal run", "the FMU ended the run itself at t = 0.1 s"),
     ("end early", "state replay", "5 steps replayed bit by bit"),

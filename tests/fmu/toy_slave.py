@@ -96,8 +96,8 @@ class Toy(Fmi2Slave):
             os.kill(os.getpid(), signal.SIGSEGV)
         if TRAIT == "one step size" and abs(step - 0.01) > 1e-12:
             return False
-        if TRAIT == "need numpy":
-            import numpy  # noqa: F401
+        if TRAIT == "need a package":
+            import filelock  # noqa: F401
         self.steps += 1
         self.y += step / self.tau * (self.gain * self.u - self.y)
         self.twice = 2.0 * self.u
