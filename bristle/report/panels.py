@@ -111,8 +111,9 @@ def draw_place(
         axes.set_xticks([-1.0, 1.0], ["moving back", "moving outwards"])
     carried = percent(place.share, 0) if place.share >= 0.01 else "below 1 %"
     of = "what is left" if after else "the error's power"
-    share = f"{carried} of {of}" if place.significant else "as by chance"
+    share = f"{carried} of {of}" if place.significant else "no more than chance"
     axes.text(0.98, 0.97, share, transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
+              bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
               color=ERROR if place.significant else GREY)  # fmt: skip
 
 

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from .staircase import Tread
 
 _WIDTH = 9.2
+SMALL = 0.1
+"""Change of z below which a riser of the staircase carries no label."""
 
 
 def staircase_page(treads: Sequence[Tread], unit: str = "N") -> Page:
@@ -86,6 +88,8 @@ def _tread(axes: Axes, i: int, one: Tread, before: float | None, unit: str) -> N
     if before is None or before <= 0.0:
         return
     change = one.z / before - 1.0
+    if abs(change) < SMALL:
+        return  # its riser is too low for a label
     # In units of the noise: what there was above it, and what is left of that.
     text = f"{100.0 * change:+.0f} %".replace("-", MINUS)
     colour = GREEN if change < 0.0 else VERMILION

@@ -197,7 +197,7 @@ def _broken(text: str, width: float, per_inch: float) -> str:
 
 def percent(share: float, digits: int = 1) -> str:
     """Return a share as text: "8.6 %"."""
-    return f"{100.0 * share:.{digits}f} %"
+    return f"{round(100.0 * share, digits) + 0.0:.{digits}f} %"  # + 0.0: no minus before a zero
 
 
 def short_z(z: float) -> str:
