@@ -272,7 +272,6 @@ def try_all(
     base: Model,
     train: Problem,
     held_out: Problem,
-    progress: Callable[[str], None] | None = None,
     instruments: Sequence[str] = ("delay",),
     deep: bool = True,
 ) -> list[Trial]:
