@@ -8,11 +8,16 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 from toys import Maker, build_toys
 
 from bristle.physics.user import unload_effects
 
 _STATUS = pytest.StashKey[int]()
+
+# Whether the suite passes must not hang on the day's dice. HYPOTHESIS_PROFILE=default looks further.
+settings.register_profile("steady", derandomize=True)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
 
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:

@@ -15,6 +15,7 @@ from ..units import parse as parse_unit
 
 _TITLE_LINES = 10  # at most; four in the files of the database
 _SHORTEST = 1e-6  # s; times are rounded to a thousandth of it
+_LONGEST = 60.0  # s; what takes longer between two samples is no shaking
 _NUMBER = r"([-+]?[0-9]*\.?[0-9]+(?:[ED][-+]?[0-9]+)?)"
 _COUNT = re.compile(rf"NPTS\s*=?\s*{_NUMBER}", re.IGNORECASE)
 _STEP = re.compile(rf"\bDT\s*=?\s*{_NUMBER}", re.IGNORECASE)
@@ -91,10 +92,10 @@ def _count_and_step(row: str, name: str, line: int) -> tuple[int, float]:
             )
         fields = (count[1], step[1])
     points, spacing = (number(field.upper().replace("D", "E"), name, line) for field in fields)
-    if points != int(points) or points < 1 or spacing < _SHORTEST:
+    if points != int(points) or points < 1 or not _SHORTEST <= spacing <= _LONGEST:
         raise PhysicsError(
             f"{name}, line {line}: NPTS = {fields[0]} and DT = {fields[1]} s. NPTS is a count, "
-            f"and DT is {_SHORTEST:g} s at least."
+            f"and DT is from {_SHORTEST:g} to {_LONGEST:g} s."
         )
     return int(points), spacing
 
