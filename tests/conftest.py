@@ -15,7 +15,8 @@ from bristle.physics.user import unload_effects
 
 _STATUS = pytest.StashKey[int]()
 
-# Whether the suite passes must not hang on the day's dice. HYPOTHESIS_PROFILE=default looks further.
+# Whether the suite passes must not hang on the day's dice.
+# HYPOTHESIS_PROFILE=default looks further.
 settings.register_profile("steady", derandomize=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
 
