@@ -12,7 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, parameter
-from ..identify.search import Descent, descend, jacobian, loss, losses, z_of, z_scale
+from ..identify.search import (
+    HUBER,
+    Descent,
+    descend,
+    jacobian,
+    loss,
+    losses,
+    z_of,
+    z_scale,
+)
 from ..physics.effect import EFFECTS, effects_of
 
 Array = NDArray[np.float64]
@@ -42,6 +51,12 @@ KEPT = 2
 
 THIN = 6
 """Of what has no memory every so many samples suffice for a search."""
+
+SCREENED = 2
+"""How many starts of an effect are looked at where only the most promising effects are searched."""
+
+SECONDS = 4
+"""How many effects are searched as the second one of a pair."""
 
 FALL = {"bingham": ("c_0", "c_v"), "lugre": ("sigma_2", "sigma_b")}
 """The parts of the laws that fall with speed: a fit without an effect of speed inflates them."""
@@ -127,16 +142,21 @@ def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
     return np.concatenate(parts)
 
 
-def judge(model: Model, train: Problem, held_out: Problem, refined: bool = True) -> Trial:
-    """Return how a fitted model does on the runs that it was fitted to and on the others."""
-    expected = held_out.expectation(model)
+def judge(
+    model: Model, train: Problem, held_out: Problem, noise: tuple[Expected, Expected] | None = None
+) -> Trial:
+    """Return how a fitted model does on the runs that it was fitted to and on the others.
+
+    `noise` is what to expect there of a true model where that is not worth drawing for this one.
+    """
+    fitted, expected = noise or (train.expectation(model), held_out.expectation(model))
     z = residuals(held_out, model, expected)
-    own = residuals(train, model, train.expectation(model))
+    own = residuals(train, model, fitted)
     raw = np.concatenate(list(_raw(held_out, model, expected)))
     lost = losses(z)
     return Trial(
         model, z_scale(own), z_of(float(np.mean(lost))),
-        float(np.sqrt(np.mean(raw**2))), lost, z, refined,
+        float(np.sqrt(np.mean(raw**2))), lost, z, noise is None,
     )  # fmt: skip
 
 
@@ -273,29 +293,77 @@ def try_all(
     train: Problem,
     held_out: Problem,
     instruments: Sequence[str] = ("delay",),
-    deep: bool = True,
+    most: int | None = None,
 ) -> list[Trial]:
     """Try every effect that can join the model, on all cores; best on the held-out runs first.
 
     Every effect is searched shortly from several starts; those that gain a fair share of what the
-    best one gains on the training runs are refined. Not `deep`: fewer starts, for a second effect.
+    best one gains on the training runs are refined. With `most`, only so many are searched, those
+    that promise most, from fewer starts: for a second effect.
     """
-    expected = train.expectation(base)
+    expected, there = train.expectation(base), held_out.expectation(base)
     before = float(np.mean(loss(residuals(train, base, expected))))
     names = joinable(base, instruments)
     with ThreadPoolExecutor(cpu_count()) as pool:
+        if most is not None:
+            names = _most_promising(names, base, train, expected, most, pool)
+        deep = most is None
         begun = list(pool.map(lambda name: begin(name, base, train, expected, deep), names))
-        most = max(before - one.cost for one in begun)
-        least = max(PROMISING * most, WORTH * before)
+        gained = max(before - one.cost for one in begun)
+        least = max(PROMISING * gained, WORTH * before)
         worth = [before - one.cost >= least for one in begun]
 
         def finish(pair: tuple[Begun, bool]) -> Trial:
             one, fine = pair
-            model = refine(one.model, train) if fine else one.model
-            return judge(model, train, held_out, fine)
+            if fine:
+                return judge(refine(one.model, train), train, held_out)
+            return judge(one.model, train, held_out, (expected, there))
 
         trials = list(pool.map(finish, zip(begun, worth, strict=True)))
     return sorted(trials, key=lambda trial: trial.z)
+
+
+def _most_promising(
+    names: Sequence[str], base: Model, train: Problem, expected: Expected, most: int,
+    pool: ThreadPoolExecutor,
+) -> list[str]:  # fmt: skip
+    """Return the names of the effects that promise most, in the order given."""
+    light: dict[bool, tuple[Problem, Expected, Array]] = {}
+    for dear in {bool(EFFECTS[name].joint) for name in names}:
+        joint = ["backlash"] if dear else []
+        problem, there = lighter(train, expected, (*base.effects, *joint), base.law)
+        own = Search(problem, base, there, base.free())
+        light[dear] = problem, there, own.sensitivities()
+
+    def promised(name: str) -> float:
+        problem, there, known = light[bool(EFFECTS[name].joint)]
+        return min(
+            _promise(start, name, known, problem, there)
+            for start in starts(name, base, train)[:SCREENED]
+        )
+
+    found = dict(zip(names, pool.map(promised, names), strict=True))
+    best = sorted(names, key=lambda name: found[name])[:most]
+    return [name for name in names if name in best]
+
+
+def _promise(
+    start: Model, effect: str, known: Array, problem: Problem, expected: Expected
+) -> float:
+    """Return the mean loss after one linear step of an effect's and the base's parameters.
+
+    `known` (n, p) are the sensitivities of the base model's own parameters without the effect.
+    """
+    free = [name for name in start.free() if name.startswith(f"{effect}.")]
+    search = Search(problem, start, expected, free)
+    here = search.residuals(search.start)
+    J = np.hstack([known, search.sensitivities()]) if free else known
+    weight = np.minimum(1.0, HUBER / np.maximum(np.abs(here), 1e-12))
+    normal = (J * weight[:, None]).T @ J
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    gradient = (J * weight[:, None]).T @ here
+    step = np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=1e-8)[0] / size
+    return float(np.mean(loss(here - J @ step)))
 
 
 def try_members(pair: Trial, base: Model, train: Problem, held_out: Problem) -> list[Trial]:

@@ -14,7 +14,7 @@ from ..compare.where import Place, places
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.prepare import prepare
 from ..records.measurement import Measurement
-from .candidates import Trial, judge, refine, try_all, try_members
+from .candidates import SECONDS, Trial, judge, refine, try_all, try_members
 from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
@@ -181,7 +181,7 @@ def _judged(
 
     def grow(first: Trial) -> list[Trial]:
         say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
-        return try_all(first.model, problem, held_out, instruments=instruments, deep=False)
+        return try_all(first.model, problem, held_out, instruments=instruments, most=SECONDS)
 
     def reduce(pair: Trial) -> list[Trial]:
         return try_members(pair, before.model, problem, held_out)
