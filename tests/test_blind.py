@@ -13,6 +13,7 @@ import pytest
 from benchmarks import peers
 from benchmarks._blind import forms, inseparable, plan, record, score, table
 from benchmarks._blind.plan import Task
+from tests.independent import generate
 from tests.independent.effects import FORMS
 
 QUICK = (
@@ -202,6 +203,21 @@ def test_every_form_that_is_called_the_same_is_one_of_the_generators():
         assert form in FORMS[effect]
     other = {e for e, group in FORMS.items() if any(not forms.is_same(e, f) for f in group)}
     assert {"stribeck", "presliding", "backlash", "temperature", "saturation"} <= other
+
+
+def test_every_fault_of_the_plan_is_planted_on_its_channel():
+    for task in plan.make_plan(5, 30, "fault"):
+        made = generate.make_case(
+            task.seed,
+            task.effect,
+            task.form,
+            task.strength,
+            rig=task.rig,
+            law=task.law,
+            duration=1.0,
+        )
+        assert made.fault is not None
+        assert (made.fault.kind, made.fault.channel) == (task.effect, task.form)
 
 
 def test_plan_holds_its_promises():

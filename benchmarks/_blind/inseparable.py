@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.diagnose.candidates import begin, refine
+from bristle.diagnose.candidates import KEPT, begin
+from bristle.diagnose.search import refine
+from bristle.diagnose.starts import Ground, ranked
 from bristle.identify.fit import Model, Problem, Run, identify
 from bristle.identify.prepare import prepare
 
@@ -88,7 +90,8 @@ def resolve(case: Recorded, made: Any, rivals: list[str]) -> dict[str, float]:
 
 
 def _best(name: str, base: Model, train: Problem) -> Model:
-    begun = begin(name, base, train, train.expectation(base))
+    ground = Ground(base, train)
+    begun = begin(name, ground, ranked(name, ground)[:KEPT])
     return refine(begun.model, train, sweeps=24)
 
 

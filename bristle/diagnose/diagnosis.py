@@ -14,10 +14,11 @@ from ..compare.where import Place, places
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.prepare import prepare
 from ..records.measurement import Measurement
-from .candidates import SECONDS, Trial, judge, refine, try_all, try_members
+from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
+from .search import refine
 from .sensors import SensorFault, mended, sensor_faults
 
 Progress = Callable[[str], None]

@@ -17,8 +17,9 @@ from ..identify.line import fit_line
 from ..identify.model import Model, Problem
 from ..identify.structure import LinearLayer, LinearStorey, StructureProblem, thinned
 from ..physics.effect import EFFECTS, effects_of
-from .candidates import Trial, judge, starts
+from .candidates import Trial, judge
 from .evidence import paired
+from .starts import starts
 
 Array = NDArray[np.float64]
 

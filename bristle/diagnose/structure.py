@@ -21,10 +21,11 @@ from ..identify.structure import StructureProblem, problems_of
 from ..physics.building import Building
 from ..physics.effect import EFFECTS, effects_of
 from ..records.measurement import Measurement
-from .candidates import Trial, judge, refine, try_all, try_members
+from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .decision import Decision, decide
 from .experiments import Experiment
 from .load_cell import load_cell
+from .search import refine
 from .sensors import SensorFault, sensor_faults
 from .sites import Finding, coordinate_of, look_at, try_effect
 
@@ -233,7 +234,8 @@ def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem)
     instruments = () if train.reconstructed else ("delay",)
 
     def grow(first: Trial) -> list[Trial]:
-        trials = try_all(first.model, train, held_out, instruments=instruments)
+        most = None if first is before else SECONDS
+        trials = try_all(first.model, train, held_out, instruments, most)
         if train.reconstructed:
             taken = first.model.effects
             trials += [

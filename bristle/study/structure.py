@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..diagnose.candidates import refine
+from ..diagnose.search import refine
 from ..diagnose.sites import try_effect
 from ..diagnose.structure import fit_damper
 from ..identify.fit import Fit, Model, fit, identify
