@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.diagnose.candidates import KEPT, begin
+from bristle.diagnose.candidates import begin
 from bristle.diagnose.search import refine
 from bristle.diagnose.starts import Ground, ranked
 from bristle.identify.fit import Model, Problem, Run, identify
@@ -91,7 +91,7 @@ def resolve(case: Recorded, made: Any, rivals: list[str]) -> dict[str, float]:
 
 def _best(name: str, base: Model, train: Problem) -> Model:
     ground = Ground(base, train)
-    begun = begin(name, ground, ranked(name, ground)[:KEPT])
+    begun = begin(name, ground, ranked(name, ground))
     return refine(begun.model, train, sweeps=24)
 
 

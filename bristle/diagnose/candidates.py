@@ -21,11 +21,11 @@ Array = NDArray[np.float64]
 QUICK = 6
 """Jacobians of the first, short search from each start."""
 
+ROUGH = 12
+"""The same where impacts make the way rough."""
+
 LONG = 20
 """Jacobians of the second search, of those that promise enough."""
-
-KEPT = 2
-"""How many starts of an effect are searched from."""
 
 SECONDS = 4
 """How many effects are searched as the second one of a pair."""
@@ -103,15 +103,18 @@ def joinable(base: Model, instruments: Sequence[str] = ("delay",)) -> list[str]:
     return sorted(names, key=lambda name: not EFFECTS[name].joint)
 
 
-def begin(effect: str, ground: Ground, begun: Sequence[Begun]) -> Begun:
-    """Search shortly from each start; return the best, with its mean loss on the training runs.
+def begin(effect: str, ground: Ground, begun: Sequence[Begun], once: bool = False) -> Begun:
+    """Search shortly from the best starts, or the very best `once`; return the best of the ends.
+
+    Its loss is that on the training runs.
 
     All parameters move at once: with the law's held, an effect that the law has taken up vanishes.
     """
     light = ground.light(effect)
     found = []
-    for one in begun:
-        model, ended = Search(light.problem, one.model, light.expected, one.model.free()).run(QUICK)
+    for one in begun[: 1 if once else light.kept]:
+        search = Search(light.problem, one.model, light.expected, one.model.free())
+        model, ended = search.run(ROUGH if search.rough else QUICK)
         found.append(Begun(model, ended.cost))
     best = min(found, key=lambda one: one.cost).model
     return Begun(best, float(np.mean(loss(residuals(ground.train, best, ground.expected)))))
@@ -138,8 +141,8 @@ def try_all(
         if most is not None:
             best = sorted(names, key=lambda name: begun[name][0].cost)[:most]
             names = [name for name in names if name in best]
-        kept = KEPT if most is None else 1
-        found = list(pool.map(lambda name: begin(name, ground, begun[name][:kept]), names))
+        once = most is not None
+        found = list(pool.map(lambda name: begin(name, ground, begun[name], once), names))
         gained = max(ground.cost - one.cost for one in found)
         least = max(PROMISING * gained, WORTH * ground.cost)
 

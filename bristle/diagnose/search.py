@@ -10,9 +10,16 @@ from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, parameter
 from ..identify.search import Descent, descend, jacobian
+from ..physics.effect import EFFECTS
 
 Array = NDArray[np.float64]
 Expected = list[tuple[Array, Array, Array]]
+
+MOST_TURNS = 5
+"""How often a rough search begins again at most."""
+
+PAYS = 0.95
+"""What the loss must fall to, as a share, for another turn."""
 
 
 class Search:
@@ -21,6 +28,7 @@ class Search:
     def __init__(self, problem: Problem, model: Model, expected: Expected, names: Sequence[str]):
         self.problem, self.model, self.expected = problem, model, expected
         self.names = list(names)
+        self.rough = any(EFFECTS[name].joint for name in model.effects)
         declared = [parameter(model.law, name) for name in self.names]
         value = np.array([model.value(name) for name in self.names])
         bounds = np.array([model.bounds(name) for name in self.names], dtype=float).reshape(-1, 2)
@@ -49,11 +57,11 @@ class Search:
     def sensitivities(self) -> Array:
         """Return how the normalised residuals change with the parameters (n, p), there."""
         here = self.residuals(self.start)
-        return jacobian(self.residuals, self.start, here, self.low, self.high)
+        return jacobian(self.residuals, self.start, here, self.low, self.high, self.rough)
 
     def run(self, sweeps: int) -> tuple[Model, Descent]:
         """Search from the model's own values."""
-        found = descend(self.residuals, self.start, self.low, self.high, sweeps)
+        found = descend(self.residuals, self.start, self.low, self.high, sweeps, rough=self.rough)
         return self.at(found.theta), found
 
 
@@ -67,10 +75,15 @@ def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
 
 
 def refine(begun: Model, train: Problem, sweeps: int = 12) -> Model:
-    """Fit all free parameters, the noise expected of the model renewed on the way."""
-    model = begun
-    for share in (0.5, 1.0):
-        model, _ = Search(train, model, train.expectation(model), model.free()).run(
-            max(3, int(share * sweeps))
-        )
+    """Fit all free parameters, the noise expected of the model renewed on the way.
+
+    Where the way is rough a search ends early: it begins again as long as that pays.
+    """
+    model, cost = begun, float("inf")
+    for turn in range(MOST_TURNS):
+        search = Search(train, model, train.expectation(model), model.free())
+        model, ended = search.run(max(3, sweeps // 2) if turn == 0 else sweeps)
+        if turn and not (search.rough and ended.cost < PAYS * cost):
+            break
+        cost = ended.cost
     return model

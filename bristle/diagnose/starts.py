@@ -18,14 +18,14 @@ from .search import Expected, Search, residuals
 Array = NDArray[np.float64]
 
 NET: dict[str, dict[str, tuple[float, ...]]] = {
-    "stribeck": {"v_s": (0.3, 1.0, 3.0)},
+    "stribeck": {"rise": (1.0, 8.0), "v_s": (0.3, 1.0, 3.0)},
     "flattening": {"v_f": (0.1, 0.3, 1.0), "bend": (1.0, 2.0)},
     "saturation": {"V_s": (0.2, 0.4, 1.0)},
     "coil_lag": {"tau": (0.1, 0.5, 2.0)},
     "temperature": {"E_0": (1.0, 4.0, 15.0), "tau": (0.07, 0.3)},
     "presliding": {"x_s": (0.03, 0.1, 0.3, 1.0)},
     "mount_compliance": {"k": (0.3, 1.0, 3.0, 10.0)},
-    "backlash": {"gap": (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)},
+    "backlash": {"gap": (0.01, 0.017, 0.03, 0.05, 0.09, 0.15, 0.26, 0.45, 0.8, 1.3, 2.3, 4.0)},
     "quadratic_damping": {"shape": (0.875, 1.0, 1.25)},
     "remanence": {"width": (0.3, 1.0)},
     "delay": {"time": (0.2, 1.0)},
@@ -38,6 +38,9 @@ FALL = {"bingham": ("c_0", "c_v"), "lugre": ("sigma_2", "sigma_b")}
 
 THIN = 6
 """Of what has no memory every so many samples suffice for a search."""
+
+KEPT = {"none": 6, "memory": 2, "joint": 2}
+"""From how many starts a search is made, by what the model has that makes it dear."""
 
 STEPS = (1.0, 0.3)
 """Shares of the linear step that are looked at: a law far from linear overshoots."""
@@ -83,11 +86,15 @@ def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
 
 @dataclass(frozen=True)
 class Light:
-    """Data for a search: runs, what to expect there, and the base model's sensitivities (n, p)."""
+    """Data for a search: runs, what to expect there, and the base model's sensitivities (n, p).
+
+    `kept` says from how many starts a search is worth its cost.
+    """
 
     problem: Problem
     expected: Expected
     known: Array
+    kept: int
 
 
 class Ground:
@@ -107,7 +114,7 @@ class Ground:
             if kind not in self._light:
                 problem, expected = _lighter(self.train, self.expected, kind)
                 search = Search(problem, self.base, expected, self.base.free())
-                self._light[kind] = Light(problem, expected, search.sensitivities())
+                self._light[kind] = Light(problem, expected, search.sensitivities(), KEPT[kind])
         return self._light[kind]
 
 

@@ -34,6 +34,8 @@ FAITHFUL = 0.5
 """Share of the promised decrease that a step must reach for the Jacobian to be kept."""
 
 _NUDGE = 1e-5
+_ROUGH_NUDGE = 1e-4
+_SPIKE = 5.0
 
 
 @dataclass(frozen=True)
@@ -83,6 +85,7 @@ def descend(
     high: Array,
     sweeps: int = 20,
     tolerance: float = 1e-4,
+    rough: bool = False,
 ) -> Descent:
     """Minimise the mean robust loss of `residuals` from `theta` within bounds.
 
@@ -93,6 +96,7 @@ def descend(
     low, high : (p,) bounds
     sweeps : most Jacobians
     tolerance : relative decrease of the cost below which the search ends
+    rough : whether events such as impacts make the residuals jump; see `jacobian`
 
     Notes
     -----
@@ -107,7 +111,7 @@ def descend(
     if not len(theta):
         return Descent(theta, cost, np.zeros((0, 0)), 0)
     damping, small, sweep, secants = 1e-3, 0, 1, 0
-    J = jacobian(residuals, theta, r, low, high)
+    J = jacobian(residuals, theta, r, low, high, rough)
     while True:
         weight = np.minimum(1.0, HUBER / np.maximum(np.abs(r), 1e-12))
         weighted = J * weight[:, None]
@@ -127,7 +131,7 @@ def descend(
             theta, r, cost = tried.theta, tried.r, tried.cost
         if small == 2 or (not tried.moved and not secants) or sweep >= sweeps:
             return Descent(theta, cost, normal, sweep)
-        J, secants, sweep = jacobian(residuals, theta, r, low, high), 0, sweep + 1
+        J, secants, sweep = jacobian(residuals, theta, r, low, high, rough), 0, sweep + 1
 
 
 @dataclass(frozen=True)
@@ -161,17 +165,31 @@ def _try(
 
 
 def jacobian(
-    residuals: Callable[[Array], Array], theta: Array, r: Array, low: Array, high: Array
+    residuals: Callable[[Array], Array],
+    theta: Array,
+    r: Array,
+    low: Array,
+    high: Array,
+    rough: bool = False,
 ) -> Array:
-    """Return the derivatives of `residuals` at theta (n, p) by differences, inside the bounds."""
+    """Return the derivatives of `residuals` at theta (n, p) by differences, inside the bounds.
+
+    `rough`: an impact that a nudge moves to the next sample leaves a spike that says nothing about
+    the rest of the curve and outweighs it. Such entries are cut, at a multiple of what nine tenths
+    of a column stay below.
+    """
+    size = _ROUGH_NUDGE if rough else _NUDGE
     J = np.empty((len(r), len(theta)))
     for i in range(len(theta)):
-        nudge = _NUDGE * max(1.0, abs(theta[i]))
+        nudge = size * max(1.0, abs(theta[i]))
         if theta[i] + nudge > high[i]:
             nudge = -nudge
         other = theta.copy()
         other[i] += nudge
         J[:, i] = (residuals(other) - r) / nudge
+    if rough and len(J):
+        limit = _SPIKE * np.quantile(np.abs(J), 0.9, axis=0) + 1e-12
+        np.clip(J, -limit, limit, out=J)
     return J
 
 
