@@ -302,7 +302,7 @@ def make_case(
     plan, size = _plan(bed, streams[1], duration)
     names = [] if effect == "none" or effect in FAULTS else effect.split("+")
     shapes = [int(q) for q in streams[2].integers(0, 2**31, 4)]
-    chosen = _choose(names, form, bed, np.random.default_rng(shapes[3]))
+    chosen = _choose(names, form if names else None, bed, np.random.default_rng(shapes[3]))
     fields: dict[str, Any] = {}
     found = []
     train = [run for run in plan if run.role == "train"]
