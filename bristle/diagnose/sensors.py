@@ -9,13 +9,15 @@ zero of displacement) changes no force that the model predicts: refitting absorb
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ..records.measurement import Measurement
+from .faults import SensorFault, earlier, mended
+
+__all__ = ["SensorFault", "earlier", "mended", "sensor_faults"]
 
 Array = NDArray[np.float64]
 
@@ -31,31 +33,11 @@ SURE = 6.0
 SMALLEST = {"gain": 0.01, "bias": 0.01, "delay": 0.2}
 """Smallest fault that matters: of the channel, of the channel's RMS, of the sampling step."""
 
+RESISTS = 0.2
+"""Power of the force, as a share of its size, that tells the direction."""
+
 LONGEST = 5
 """Samples in a row at the very same extreme that no noisy signal shows."""
-
-
-@dataclass(frozen=True)
-class SensorFault:
-    """A fault of one channel.
-
-    `fault` is "gain" [1], "sign" (-1), "delay" [s], "bias" or "clipping" [the channel's unit], or
-    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; `std` the
-    uncertainty of `value`; `words` a sentence.
-    """
-
-    channel: str
-    fault: str
-    value: float
-    std: float
-    words: str
-
-    def as_dict(self) -> dict[str, object]:
-        """Return what verdict.json holds of it."""
-        return {
-            "channel": self.channel, "fault": self.fault, "value": self.value, "std": self.std,
-            "words": self.words,
-        }  # fmt: skip
 
 
 def sensor_faults(runs: Sequence[Measurement]) -> list[SensorFault]:
@@ -82,12 +64,7 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
     gain = 1.0 / theta[0]
     found = []
     if gain < 0.0:
-        found.append(
-            SensorFault(
-                "velocity", "sign", -1.0, 0.0,
-                "Displacement and velocity have opposite signs: one of the two is turned.",
-            )
-        )  # fmt: skip
+        found.append(_turned(runs))
         theta = -theta
         gain = -gain
     if abs(theta[4]) > max(SURE * std[4], 0.02):
@@ -107,7 +84,9 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
             SensorFault(
                 "velocity", "gain", gain, spread,
                 f"Velocity is {gain:.3f} times the rate of displacement: one of the two gains is "
-                "off, and motion alone cannot tell which.",
+                f"off, and neither motion nor force can tell which. If velocity is right, "
+                f"displacement shows {1.0 / gain:.3f} of what it should.",
+                either="displacement",
             )
         )  # fmt: skip
     found += _late(theta * gain, std * gain, runs[0].step)
@@ -122,6 +101,37 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
             )
         )  # fmt: skip
     return found
+
+
+def _turned(runs: Sequence[Measurement]) -> SensorFault:
+    """Return which of displacement and velocity is turned: the velocity if the force speeds it."""
+    power = _power(runs)
+    begin = "Displacement and velocity have opposite signs: "
+    if abs(power) < RESISTS:
+        return SensorFault(
+            "velocity", "sign", -1.0, 0.0, begin + "one of the two is turned.", "displacement"
+        )
+    channel = "velocity" if power < 0.0 else "displacement"
+    seen = "speed up" if power < 0.0 else "resist"
+    return SensorFault(
+        channel,
+        "sign",
+        -1.0,
+        0.0,
+        f"{begin}the force seems to {seen} the velocity, so {channel} is the one that is turned.",
+    )
+
+
+def _power(runs: Sequence[Measurement]) -> float:
+    """Return the mean of force times velocity over that of its size: 1 for a plain damper.
+
+    0 where no run has both.
+    """
+    able = [run for run in runs if run.has("force", "velocity")]
+    if not able:
+        return 0.0
+    power = np.concatenate([run["force"] * run["velocity"] for run in able])
+    return float(power.mean() / max(float(np.mean(np.abs(power))), 1e-300))
 
 
 def _late(theta: Array, std: Array, step: float) -> list[SensorFault]:
@@ -227,17 +237,14 @@ def signs(runs: Sequence[Measurement], known: Sequence[SensorFault]) -> list[Sen
     """Return force or motion that is turned: a damper that yields energy; a voltage below zero."""
     found = []
     turned = any(fault.fault == "sign" for fault in known)
-    able = [run for run in runs if run.has("force", "velocity")]
-    if able and not turned:
-        power = np.concatenate([run["force"] * run["velocity"] for run in able])
-        if power.mean() < -0.2 * np.mean(np.abs(power)):
-            found.append(
-                SensorFault(
-                    "force", "sign", -1.0, 0.0,
-                    "Force times velocity is negative on average: a damper would feed energy in. "
-                    "The force, or the motion, is turned.",
-                )
-            )  # fmt: skip
+    if not turned and _power(runs) < -RESISTS:
+        found.append(
+            SensorFault(
+                "force", "sign", -1.0, 0.0,
+                "Force times velocity is negative on average: a damper would feed energy in. "
+                "The force, or the motion, is turned.",
+            )
+        )  # fmt: skip
     drives = [run["voltage"] for run in runs if run.has("voltage")]
     if drives:
         V = np.concatenate(drives)
@@ -250,43 +257,3 @@ def signs(runs: Sequence[Measurement], known: Sequence[SensorFault]) -> list[Sen
                 )
             )  # fmt: skip
     return found
-
-
-def mended(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> list[Measurement]:
-    """Return the measurements as they would be without the faults, so that physics can be judged.
-
-    Displacement is the reference of velocity. Clipped samples count as not measured.
-    """
-    return [_mended(run, faults) for run in runs]
-
-
-def _mended(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
-    channels, measured = dict(run.channels), run.measured
-    noise = dict(run.noise)
-    for fault in faults:
-        if fault.channel not in channels:
-            continue
-        values = channels[fault.channel]
-        if fault.fault == "sign":
-            channels[fault.channel] = -values
-        elif fault.fault == "gain":
-            channels[fault.channel] = values / fault.value
-            noise[fault.channel] = noise.get(fault.channel, 0.0) / abs(fault.value)
-        elif fault.fault == "bias":
-            channels[fault.channel] = values - fault.value
-        elif fault.fault == "delay":
-            channels[fault.channel] = earlier(values, fault.value / run.step)
-        elif fault.fault in ("lag", "high-pass"):
-            del channels[fault.channel]  # displacement says the same, without it
-        elif fault.fault == "clipping":
-            measured = measured & (np.abs(values) < fault.value * (1.0 - 1e-9))
-    return replace(run, channels=channels, measured=measured, noise=noise)
-
-
-def earlier(values: Array, samples: float) -> Array:
-    """Return a signal moved ahead in time by a number of samples, its last value held."""
-    from scipy.interpolate import make_interp_spline
-
-    index = np.arange(len(values), dtype=float)
-    at = np.minimum(index + samples, len(values) - 1.0)
-    return np.asarray(make_interp_spline(index, values, k=1)(np.maximum(at, 0.0)))
