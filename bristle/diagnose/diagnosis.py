@@ -19,6 +19,7 @@ from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
 from .sensors import SensorFault, mended, sensor_faults
+from .unseen import unseen_fault
 
 Progress = Callable[[str], None]
 
@@ -161,6 +162,11 @@ def diagnose(
         base = Model(law, tuple(effects), dict(values), tuple(held), dict(limits or {}))
         base = refine(base, problem)
     before = judge(base, problem, held_out)
+    drive = "current" if train[0].has("current") and not train[0].has("voltage") else "voltage"
+    unseen = unseen_fault(before, problem, held_out, drive)
+    if unseen is not None:
+        faults.append(unseen.fault)
+        problem, held_out, before = unseen.train, unseen.held_out, unseen.trial
     redundant = any(run.has("displacement", "velocity") for run in train)
     instruments = ("delay",) if redundant else ("delay", "velocity_sensor")
     found = _judged(before, problem, held_out, faults, noise, instruments, say)
