@@ -19,6 +19,7 @@ from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
 from .sensors import SensorFault, mended, sensor_faults
+from .unlike import MISFIT, unlike
 from .unseen import unseen_fault
 
 Progress = Callable[[str], None]
@@ -205,6 +206,8 @@ def _judged(
             "The model fits the runs that it was fitted to: the others differ from them in "
             "something that no channel shows."
         )
+    if kind == "none" and decision.best.train > MISFIT:
+        kind, words = "insufficient", [unlike(decision.best.model, problem, held_out)]
     experiment = None
     if kind == "class":
         members = [t.model for t in trials if set(t.effects) & set(decision.effects)]
@@ -307,6 +310,7 @@ def _lacking(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> list
         able = [run[channel] for run in runs if run.has(channel)]
         if able and float(np.ptp(np.concatenate(able))) == 0.0:
             out.append(f"The {channel} does not change: without motion no damper shows anything.")
+    out += [fault.words for fault in faults if fault.fault == "unrelated"]
     cut = [fault for fault in faults if fault.channel == "force" and fault.fault == "clipping"]
     if cut:
         share = float(np.mean(np.abs(force) >= cut[0].value * (1.0 - 1e-9)))

@@ -21,7 +21,8 @@ class SensorFault:
     """A fault of one channel.
 
     `fault` is "gain" [1], "sign" (-1), "delay" [s], "bias" or "clipping" [the channel's unit], or
-    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; `std` the
+    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner], or
+    "unrelated" (0) for a velocity of another motion; `std` the
     uncertainty of `value`; `words` a sentence; `either` the channel that may have it instead, as
     far as the data tell.
     """
@@ -69,7 +70,9 @@ def _mended(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
         elif fault.fault in ("lag", "high-pass"):
             del channels[fault.channel]  # displacement says the same, without it
         elif fault.fault == "clipping":
-            measured = measured & (np.abs(values) < fault.value * (1.0 - 1e-9))
+            near = 1e-9 * float(np.max(np.abs(values)))
+            inside = (values < values.max() - near) & (values > values.min() + near)
+            measured = measured & inside
     return replace(run, channels=channels, measured=measured, noise=noise)
 
 

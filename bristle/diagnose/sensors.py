@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ..records.measurement import Measurement
+from .clipping import clipped
 from .faults import SensorFault, earlier, mended
 
 __all__ = ["SensorFault", "earlier", "mended", "sensor_faults"]
@@ -27,17 +28,20 @@ WINDOW = 2.0
 LOW_PASS = 20.0
 """Corner [Hz] of the filter on both: derivatives of the velocity's noise would drown the rest."""
 
+FEWEST = 3
+"""Pieces from which on their spread means anything."""
+
 SURE = 6.0
 """How many standard deviations a fault must be away from none."""
 
 SMALLEST = {"gain": 0.01, "bias": 0.01, "delay": 0.2}
 """Smallest fault that matters: of the channel, of the channel's RMS, of the sampling step."""
 
+UNRELATED = 0.3
+"""Share of the displacement's power that no fit of the velocity explains: they are two motions."""
+
 RESISTS = 0.2
 """Power of the force, as a share of its size, that tells the direction."""
-
-LONGEST = 5
-"""Samples in a row at the very same extreme that no noisy signal shows."""
 
 
 def sensor_faults(runs: Sequence[Measurement]) -> list[SensorFault]:
@@ -61,6 +65,17 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
     order F = 0; a geophone, which loses what is slow, has G. The spread over pieces gives the
     uncertainty.
     """
+    if sum(len(_begins(run)) for run in runs) < FEWEST:
+        return []  # the spread over pieces is what says how sure a fault is
+    if _unlike(runs) > UNRELATED:
+        return [
+            SensorFault(
+                "velocity", "unrelated", 0.0, 0.0,
+                "Velocity is not the rate of displacement, whatever gain and delay it is given: "
+                "one of the two belongs to another motion, or is not connected.",
+                either="displacement",
+            )
+        ]  # fmt: skip
     theta, std = _pooled(runs)
     gain = 1.0 / theta[0]
     found = []
@@ -172,7 +187,7 @@ def _order(theta: Array, std: Array) -> int:
         return 1
     # The series ends at F: of a long delay E is off by some hundredths.
     bent = abs(second - 0.5) > 0.06 + SURE * second_std and abs(third) < 1.0 / 12.0 + third_std
-    ends = 1.0 / 6.0 - third > SURE * third_std and abs(third) < 0.05
+    ends = 1.0 / 6.0 - third > 0.5 * SURE * third_std and abs(third) < 0.05
     return 2 if bent or ends else 0
 
 
@@ -191,6 +206,14 @@ def _pooled(runs: Sequence[Measurement], slow: bool = True) -> tuple[Array, Arra
     return full, full_std
 
 
+def _unlike(runs: Sequence[Measurement]) -> float:
+    """Return which share of the displacement's power no fit of the velocity explains."""
+    pieces = [piece for run in runs for piece in _pieces(run)]
+    theta, _ = _pooled(runs)
+    left = sum(float(np.sum((b - A @ theta) ** 2)) for A, b in pieces)
+    return left / max(sum(float(b @ b) for _, b in pieces), 1e-300)
+
+
 def _pieces(run: Measurement) -> list[tuple[Array, Array]]:
     """Return the columns (n, 6) and the displacement (n,) of each piece, means removed."""
     dt = run.step
@@ -199,9 +222,9 @@ def _pieces(run: Measurement) -> list[tuple[Array, Array]]:
     x, v = (sosfiltfilt(filtered, run[name]) for name in ("displacement", "velocity"))
     a = np.gradient(v, dt)
     whole = np.column_stack([_integral(v, dt), v, a, np.gradient(a, dt)])
-    size = max(40, round(WINDOW / dt))
+    size = _size(run)
     out = []
-    for begin in range(0, len(x) - size // 2, size):
+    for begin in _begins(run):
         part = slice(begin, begin + size)
         first = whole[part, 0] - whole[part, 0].mean()
         t = dt * np.arange(len(first))
@@ -210,44 +233,17 @@ def _pieces(run: Measurement) -> list[tuple[Array, Array]]:
     return out
 
 
+def _size(run: Measurement) -> int:
+    return max(40, round(WINDOW / run.step))
+
+
+def _begins(run: Measurement) -> range:
+    """Return the samples at which the pieces of a run begin."""
+    return range(0, len(run.time) - _size(run) // 2, _size(run))
+
+
 def _integral(values: Array, dt: float) -> Array:
     return np.concatenate([[0.0], np.cumsum(0.5 * dt * (values[1:] + values[:-1]))])
-
-
-def clipped(runs: Sequence[Measurement]) -> list[SensorFault]:
-    """Return the channels that repeat an extreme: their range ends before the motion does."""
-    found = []
-    for channel in ("force", "displacement", "velocity", "voltage", "current"):
-        limits = [
-            limit
-            for run in runs
-            if run.has(channel)
-            and (limit := _limit(run[channel], run.noise.get(channel, 0.0))) is not None
-        ]
-        if limits:
-            level = max(limits)
-            found.append(
-                SensorFault(
-                    channel, "clipping", level, 0.0,
-                    f"{channel.capitalize()} repeats the very same extreme in {len(limits)} "
-                    f"run{'s' * (len(limits) > 1)}: its range ended at {level:.4g} (SI).",
-                )
-            )  # fmt: skip
-    return found
-
-
-def _limit(values: Array, noise: float) -> float | None:
-    """Return the level at which a signal is cut off, None where it is not.
-
-    At a cut the very same number comes many times in a row; a noisy signal never does that.
-    """
-    top = float(np.max(np.abs(values)))
-    if not 1e-4 * top < noise < 0.2 * top:
-        return None  # without noise the extreme of a signal may well repeat
-    at_end = np.isclose(np.abs(values), top, rtol=0.0, atol=1e-9 * top)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(int), [0]])))
-    longest = int((edges[1::2] - edges[::2]).max())
-    return top if longest >= LONGEST and at_end.sum() >= 2 * LONGEST else None
 
 
 def signs(runs: Sequence[Measurement], known: Sequence[SensorFault]) -> list[SensorFault]:
