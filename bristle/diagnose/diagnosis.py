@@ -20,6 +20,8 @@ from .experiments import Experiment, separating
 from .limits import detectable, untestable
 from .search import refine
 from .sensors import SensorFault, mended, sensor_faults
+from .unlike import MISFIT, unlike
+from .unseen import unseen_fault
 
 Progress = Callable[[str], None]
 
@@ -162,6 +164,11 @@ def diagnose(
         base = Model(law, tuple(effects), dict(values), tuple(held), dict(limits or {}))
         base = refine(base, problem)
     before = judge(base, problem, held_out)
+    drive = "current" if train[0].has("current") and not train[0].has("voltage") else "voltage"
+    unseen = unseen_fault(before, problem, held_out, drive)
+    if unseen is not None:
+        faults.append(unseen.fault)
+        problem, held_out, before = unseen.train, unseen.held_out, unseen.trial
     redundant = any(run.has("displacement", "velocity") for run in train)
     instruments = ("delay",) if redundant else ("delay", "velocity_sensor")
     found = _judged(before, problem, held_out, faults, noise, instruments, say)
@@ -200,6 +207,8 @@ def _judged(
             "The model fits the runs that it was fitted to: the others differ from them in "
             "something that no channel shows."
         )
+    if kind == "none" and decision.best.train > MISFIT:
+        kind, words = "insufficient", [unlike(decision.best.model, problem, held_out)]
     experiment = None
     if kind == "class":
         members = [t.model for t in trials if set(t.effects) & set(decision.effects)]
@@ -302,6 +311,7 @@ def _lacking(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> list
         able = [run[channel] for run in runs if run.has(channel)]
         if able and float(np.ptp(np.concatenate(able))) == 0.0:
             out.append(f"The {channel} does not change: without motion no damper shows anything.")
+    out += [fault.words for fault in faults if fault.fault == "unrelated"]
     cut = [fault for fault in faults if fault.channel == "force" and fault.fault == "clipping"]
     if cut:
         share = float(np.mean(np.abs(force) >= cut[0].value * (1.0 - 1e-9)))

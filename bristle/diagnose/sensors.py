@@ -9,13 +9,16 @@ zero of displacement) changes no force that the model predicts: refitting absorb
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from ..records.measurement import Measurement
+from .clipping import clipped
+from .faults import SensorFault, earlier, mended
+
+__all__ = ["SensorFault", "earlier", "mended", "sensor_faults"]
 
 Array = NDArray[np.float64]
 
@@ -25,37 +28,20 @@ WINDOW = 2.0
 LOW_PASS = 20.0
 """Corner [Hz] of the filter on both: derivatives of the velocity's noise would drown the rest."""
 
+FEWEST = 3
+"""Pieces from which on their spread means anything."""
+
 SURE = 6.0
 """How many standard deviations a fault must be away from none."""
 
 SMALLEST = {"gain": 0.01, "bias": 0.01, "delay": 0.2}
 """Smallest fault that matters: of the channel, of the channel's RMS, of the sampling step."""
 
-LONGEST = 5
-"""Samples in a row at the very same extreme that no noisy signal shows."""
+UNRELATED = 0.3
+"""Share of the displacement's power that no fit of the velocity explains: they are two motions."""
 
-
-@dataclass(frozen=True)
-class SensorFault:
-    """A fault of one channel.
-
-    `fault` is "gain" [1], "sign" (-1), "delay" [s], "bias" or "clipping" [the channel's unit], or
-    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; `std` the
-    uncertainty of `value`; `words` a sentence.
-    """
-
-    channel: str
-    fault: str
-    value: float
-    std: float
-    words: str
-
-    def as_dict(self) -> dict[str, object]:
-        """Return what verdict.json holds of it."""
-        return {
-            "channel": self.channel, "fault": self.fault, "value": self.value, "std": self.std,
-            "words": self.words,
-        }  # fmt: skip
+RESISTS = 0.2
+"""Power of the force, as a share of its size, that tells the direction."""
 
 
 def sensor_faults(runs: Sequence[Measurement]) -> list[SensorFault]:
@@ -75,19 +61,26 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
 
         x = int v/gain + D v + E v' + F v'' + G int int v - bias t/gain + constant;
 
-    a late velocity has E = D^2/2, F = D^3/6; one that lags by first order E = F = 0; a geophone,
-    which loses what is slow, has G. The spread over pieces gives the uncertainty.
+    a late velocity has E = D^2/2, F = D^3/6; one that lags by first order E = F = 0, by second
+    order F = 0; a geophone, which loses what is slow, has G. The spread over pieces gives the
+    uncertainty.
     """
+    if sum(len(_begins(run)) for run in runs) < FEWEST:
+        return []  # the spread over pieces is what says how sure a fault is
+    if _unlike(runs) > UNRELATED:
+        return [
+            SensorFault(
+                "velocity", "unrelated", 0.0, 0.0,
+                "Velocity is not the rate of displacement, whatever gain and delay it is given: "
+                "one of the two belongs to another motion, or is not connected.",
+                either="displacement",
+            )
+        ]  # fmt: skip
     theta, std = _pooled(runs)
     gain = 1.0 / theta[0]
     found = []
     if gain < 0.0:
-        found.append(
-            SensorFault(
-                "velocity", "sign", -1.0, 0.0,
-                "Displacement and velocity have opposite signs: one of the two is turned.",
-            )
-        )  # fmt: skip
+        found.append(_turned(runs))
         theta = -theta
         gain = -gain
     if abs(theta[4]) > max(SURE * std[4], 0.02):
@@ -107,7 +100,9 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
             SensorFault(
                 "velocity", "gain", gain, spread,
                 f"Velocity is {gain:.3f} times the rate of displacement: one of the two gains is "
-                "off, and motion alone cannot tell which.",
+                f"off, and neither motion nor force can tell which. If velocity is right, "
+                f"displacement shows {1.0 / gain:.3f} of what it should.",
+                either="displacement",
             )
         )  # fmt: skip
     found += _late(theta * gain, std * gain, runs[0].step)
@@ -124,22 +119,51 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
     return found
 
 
+def _turned(runs: Sequence[Measurement]) -> SensorFault:
+    """Return which of displacement and velocity is turned: the velocity if the force speeds it."""
+    power = _power(runs)
+    begin = "Displacement and velocity have opposite signs: "
+    if abs(power) < RESISTS:
+        return SensorFault(
+            "velocity", "sign", -1.0, 0.0, begin + "one of the two is turned.", "displacement"
+        )
+    channel = "velocity" if power < 0.0 else "displacement"
+    seen = "speed up" if power < 0.0 else "resist"
+    return SensorFault(
+        channel,
+        "sign",
+        -1.0,
+        0.0,
+        f"{begin}the force seems to {seen} the velocity, so {channel} is the one that is turned.",
+    )
+
+
+def _power(runs: Sequence[Measurement]) -> float:
+    """Return the mean of force times velocity over that of its size: 1 for a plain damper.
+
+    0 where no run has both.
+    """
+    able = [run for run in runs if run.has("force", "velocity")]
+    if not able:
+        return 0.0
+    power = np.concatenate([run["force"] * run["velocity"] for run in able])
+    return float(power.mean() / max(float(np.mean(np.abs(power))), 1e-300))
+
+
 def _late(theta: Array, std: Array, step: float) -> list[SensorFault]:
     """Return a delay of one channel, or a lag of the velocity's instrument."""
     late, late_std = float(theta[1]), float(std[1])
     if abs(late) <= max(SURE * late_std, SMALLEST["delay"] * step):
         return []
-    if late > 0.0:
-        shift = abs(theta[2] - 0.5 * late**2) / std[2] + abs(theta[3] - late**3 / 6.0) / std[3]
-        lag = abs(theta[2]) / std[2] + abs(theta[3]) / std[3]
-        if lag < shift:
-            return [
-                SensorFault(
-                    "velocity", "lag", late, late_std,
-                    f"Velocity lags the rate of displacement by {1e3 * late:.2f} ms and rounds it, "
-                    "as an instrument of first order does.",
-                )
-            ]  # fmt: skip
+    order = _order(theta, std) if late > 0.0 else 0
+    if order:
+        return [
+            SensorFault(
+                "velocity", "lag", late, late_std,
+                f"Velocity lags the rate of displacement by {1e3 * late:.2f} ms and rounds it, "
+                f"as an instrument of {'first' if order == 1 else 'second'} order does.",
+            )
+        ]  # fmt: skip
     channel = "velocity" if late > 0.0 else "displacement"
     return [
         SensorFault(
@@ -147,6 +171,24 @@ def _late(theta: Array, std: Array, step: float) -> list[SensorFault]:
             f"{channel.capitalize()} comes {1e3 * abs(late):.2f} ms late against the other.",
         )
     ]  # fmt: skip
+
+
+def _order(theta: Array, std: Array) -> int:
+    """Return the order of an instrument that lags, 0 for a plain delay.
+
+    A delay D has E = D^2/2 and F = D^3/6; an instrument v + D v' + E v'' of what it shows has F = 0
+    and, of first order, E = 0.
+    """
+    late = float(theta[1])
+    second, third = theta[2] / late**2, theta[3] / late**3
+    second_std, third_std = std[2] / late**2, std[3] / late**3
+    shift = abs(second - 0.5) / second_std + abs(third - 1.0 / 6.0) / third_std
+    if abs(second) / second_std + abs(third) / third_std < shift:
+        return 1
+    # The series ends at F: of a long delay E is off by some hundredths.
+    bent = abs(second - 0.5) > 0.06 + SURE * second_std and abs(third) < 1.0 / 12.0 + third_std
+    ends = 1.0 / 6.0 - third > 0.5 * SURE * third_std and abs(third) < 0.05
+    return 2 if bent or ends else 0
 
 
 def _pooled(runs: Sequence[Measurement], slow: bool = True) -> tuple[Array, Array]:
@@ -164,6 +206,14 @@ def _pooled(runs: Sequence[Measurement], slow: bool = True) -> tuple[Array, Arra
     return full, full_std
 
 
+def _unlike(runs: Sequence[Measurement]) -> float:
+    """Return which share of the displacement's power no fit of the velocity explains."""
+    pieces = [piece for run in runs for piece in _pieces(run)]
+    theta, _ = _pooled(runs)
+    left = sum(float(np.sum((b - A @ theta) ** 2)) for A, b in pieces)
+    return left / max(sum(float(b @ b) for _, b in pieces), 1e-300)
+
+
 def _pieces(run: Measurement) -> list[tuple[Array, Array]]:
     """Return the columns (n, 6) and the displacement (n,) of each piece, means removed."""
     dt = run.step
@@ -172,9 +222,9 @@ def _pieces(run: Measurement) -> list[tuple[Array, Array]]:
     x, v = (sosfiltfilt(filtered, run[name]) for name in ("displacement", "velocity"))
     a = np.gradient(v, dt)
     whole = np.column_stack([_integral(v, dt), v, a, np.gradient(a, dt)])
-    size = max(40, round(WINDOW / dt))
+    size = _size(run)
     out = []
-    for begin in range(0, len(x) - size // 2, size):
+    for begin in _begins(run):
         part = slice(begin, begin + size)
         first = whole[part, 0] - whole[part, 0].mean()
         t = dt * np.arange(len(first))
@@ -183,61 +233,31 @@ def _pieces(run: Measurement) -> list[tuple[Array, Array]]:
     return out
 
 
+def _size(run: Measurement) -> int:
+    return max(40, round(WINDOW / run.step))
+
+
+def _begins(run: Measurement) -> range:
+    """Return the samples at which the pieces of a run begin."""
+    return range(0, len(run.time) - _size(run) // 2, _size(run))
+
+
 def _integral(values: Array, dt: float) -> Array:
     return np.concatenate([[0.0], np.cumsum(0.5 * dt * (values[1:] + values[:-1]))])
-
-
-def clipped(runs: Sequence[Measurement]) -> list[SensorFault]:
-    """Return the channels that repeat an extreme: their range ends before the motion does."""
-    found = []
-    for channel in ("force", "displacement", "velocity", "voltage", "current"):
-        limits = [
-            limit
-            for run in runs
-            if run.has(channel)
-            and (limit := _limit(run[channel], run.noise.get(channel, 0.0))) is not None
-        ]
-        if limits:
-            level = max(limits)
-            found.append(
-                SensorFault(
-                    channel, "clipping", level, 0.0,
-                    f"{channel.capitalize()} repeats the very same extreme in {len(limits)} "
-                    f"run{'s' * (len(limits) > 1)}: its range ended at {level:.4g} (SI).",
-                )
-            )  # fmt: skip
-    return found
-
-
-def _limit(values: Array, noise: float) -> float | None:
-    """Return the level at which a signal is cut off, None where it is not.
-
-    At a cut the very same number comes many times in a row; a noisy signal never does that.
-    """
-    top = float(np.max(np.abs(values)))
-    if not 1e-4 * top < noise < 0.2 * top:
-        return None  # without noise the extreme of a signal may well repeat
-    at_end = np.isclose(np.abs(values), top, rtol=0.0, atol=1e-9 * top)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(int), [0]])))
-    longest = int((edges[1::2] - edges[::2]).max())
-    return top if longest >= LONGEST and at_end.sum() >= 2 * LONGEST else None
 
 
 def signs(runs: Sequence[Measurement], known: Sequence[SensorFault]) -> list[SensorFault]:
     """Return force or motion that is turned: a damper that yields energy; a voltage below zero."""
     found = []
     turned = any(fault.fault == "sign" for fault in known)
-    able = [run for run in runs if run.has("force", "velocity")]
-    if able and not turned:
-        power = np.concatenate([run["force"] * run["velocity"] for run in able])
-        if power.mean() < -0.2 * np.mean(np.abs(power)):
-            found.append(
-                SensorFault(
-                    "force", "sign", -1.0, 0.0,
-                    "Force times velocity is negative on average: a damper would feed energy in. "
-                    "The force, or the motion, is turned.",
-                )
-            )  # fmt: skip
+    if not turned and _power(runs) < -RESISTS:
+        found.append(
+            SensorFault(
+                "force", "sign", -1.0, 0.0,
+                "Force times velocity is negative on average: a damper would feed energy in. "
+                "The force, or the motion, is turned.",
+            )
+        )  # fmt: skip
     drives = [run["voltage"] for run in runs if run.has("voltage")]
     if drives:
         V = np.concatenate(drives)
@@ -250,43 +270,3 @@ def signs(runs: Sequence[Measurement], known: Sequence[SensorFault]) -> list[Sen
                 )
             )  # fmt: skip
     return found
-
-
-def mended(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> list[Measurement]:
-    """Return the measurements as they would be without the faults, so that physics can be judged.
-
-    Displacement is the reference of velocity. Clipped samples count as not measured.
-    """
-    return [_mended(run, faults) for run in runs]
-
-
-def _mended(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
-    channels, measured = dict(run.channels), run.measured
-    noise = dict(run.noise)
-    for fault in faults:
-        if fault.channel not in channels:
-            continue
-        values = channels[fault.channel]
-        if fault.fault == "sign":
-            channels[fault.channel] = -values
-        elif fault.fault == "gain":
-            channels[fault.channel] = values / fault.value
-            noise[fault.channel] = noise.get(fault.channel, 0.0) / abs(fault.value)
-        elif fault.fault == "bias":
-            channels[fault.channel] = values - fault.value
-        elif fault.fault == "delay":
-            channels[fault.channel] = earlier(values, fault.value / run.step)
-        elif fault.fault in ("lag", "high-pass"):
-            del channels[fault.channel]  # displacement says the same, without it
-        elif fault.fault == "clipping":
-            measured = measured & (np.abs(values) < fault.value * (1.0 - 1e-9))
-    return replace(run, channels=channels, measured=measured, noise=noise)
-
-
-def earlier(values: Array, samples: float) -> Array:
-    """Return a signal moved ahead in time by a number of samples, its last value held."""
-    from scipy.interpolate import make_interp_spline
-
-    index = np.arange(len(values), dtype=float)
-    at = np.minimum(index + samples, len(values) - 1.0)
-    return np.asarray(make_interp_spline(index, values, k=1)(np.maximum(at, 0.0)))

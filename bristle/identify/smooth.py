@@ -13,11 +13,24 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 from scipy.optimize import minimize_scalar
 
 from ..compiled.kalman import kalman_smooth, random_walk
 
 Array = NDArray[np.float64]
+
+GROUP = 12
+"""Draws whose mean is zero together: any multiple of them may be used for an expectation."""
+
+EDGE = 25
+"""Samples at either end in which the smoother has not settled."""
+
+WINDOW = 51
+"""Samples over which the power of what was left out is averaged."""
+
+LUCK = 1.5
+"""How much more than on average noise gives in such a window without being motion."""
 
 
 @dataclass(frozen=True)
@@ -93,10 +106,10 @@ def posterior_draws(
 ) -> Array:  # fmt: skip
     """Return draws (draws, n, 3) of the smoother's error of x, v, a [m, m/s, m/s2].
 
-    The error of a linear smoother is that of smoothed noise and that of the motion which it takes
-    for noise. Both are drawn by smoothing a motion with simulated noise: the `motion` that was
-    found, where it is given, for what laboratories prescribe is far smoother than white jerk (with
-    which the errors of v would be drawn 15 % too large); else random motions of this jerk.
+    The error of a linear smoother S is noise that it lets pass, and motion that it takes for noise:
+    x - S y = (1 - S) x - S n. The first is drawn by smoothing simulated noise. The second is the
+    same in every draw: it is taken from the `motion` that was found, where it is given, for what
+    laboratories prescribe is far smoother than white jerk; else from random motions of this jerk.
     """
     generator = np.random.default_rng(seed)
     r = np.array([max(noise[0], 1e-15) ** 2, max(noise[1], 1e-15) ** 2])
@@ -105,13 +118,47 @@ def posterior_draws(
     lead = min(200, n) if motion is None else 0
     total = n + 2 * lead
     state = np.zeros((total, 3))
-    path = None if motion is None else np.column_stack([motion.x, motion.v, motion.a])
     for d in range(draws):
-        truth = _random_motion(generator, total, dt, jerk) if path is None else path
+        truth = np.zeros((total, 3))
+        if motion is None:
+            truth = _random_motion(generator, total, dt, jerk)
         y = truth[:, :2] + generator.standard_normal((total, 2)) * np.sqrt(r)
         kalman_smooth(y, r, np.array(have), dt, jerk, True, state, cov, loss)
         out[d] = (truth - state)[lead : lead + n]
+    _centre(out)
+    if motion is not None and draws:
+        out += _left_out(motion, out[0], r, np.array(have), dt)
     return out
+
+
+def _centre(draws: Array) -> None:
+    """Take the mean off groups of draws, in place, so that it is not read as a known error."""
+    for begin in range(0, len(draws), GROUP):
+        group = draws[begin : begin + GROUP]
+        if len(group) > 1:
+            group -= group.mean(axis=0)
+            group *= np.sqrt(len(group) / (len(group) - 1.0))
+
+
+def _left_out(motion: Motion, draw: Array, r: Array, have: NDArray[np.bool_], dt: float) -> Array:
+    """Return what the smoother takes off the motion (n, 3): what it would take off its own result.
+
+    That result holds noise, of which some is taken off as well; were it counted, an error would be
+    expected just where, and with the other sign than, one was made. How much of it there is says
+    the smoothed noise of a `draw` (n, 3); by the rest of the local power the difference counts
+    (Wiener).
+    """
+    path = np.column_stack([motion.x, motion.v, motion.a])
+    twice, noisy = np.zeros_like(path), np.zeros_like(path)
+    cov, loss = np.zeros(3), np.zeros(2)
+    for y, state in ((path, twice), (draw, noisy)):
+        kalman_smooth(y[:, :2].copy(), r, have, dt, motion.jerk, True, state, cov, loss)
+    left = path - twice
+    edge = min(EDGE, len(draw) // 4)
+    chance = np.mean((draw - noisy)[edge : len(draw) - edge] ** 2, axis=0)
+    power = uniform_filter1d(left**2, min(WINDOW, len(left)), axis=0)
+    count: Array = np.maximum(1.0 - LUCK * chance / np.maximum(power, 1e-300), 0.0)
+    return count * left
 
 
 def _random_motion(generator: np.random.Generator, n: int, dt: float, jerk: float) -> Array:

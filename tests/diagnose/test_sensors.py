@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
 from bristle.diagnose.sensors import mended, sensor_faults
 from bristle.records.measurement import ChannelSpec, measurements_of_frame
@@ -133,3 +135,86 @@ def test_mended_channels_show_no_fault():
     found = sensor_faults(spoilt)
     assert {one.fault for one in found} == {"gain", "delay"}
     assert sensor_faults(mended(spoilt, found)) == []
+
+
+def test_a_channel_that_stands_at_its_ends_nearly_always_is_clipped_too():
+    def clip(channels):
+        level = 0.15 * np.max(np.abs(channels["force"]))
+        channels["force"] = np.clip(channels["force"], -level, level)
+
+    fault = only(sensor_faults(runs(after=clip)))
+    assert (fault.channel, fault.fault) == ("force", "clipping")
+
+
+def test_a_channel_cut_on_one_side():
+    def clip(channels):
+        channels["force"] = np.minimum(channels["force"], 0.6 * np.max(channels["force"]))
+
+    spoilt = runs(after=clip)
+    fault = only(sensor_faults(spoilt))
+    assert (fault.channel, fault.fault) == ("force", "clipping")
+    for before, after in zip(spoilt, mended(spoilt, [fault]), strict=True):
+        cut = before["force"] == before["force"].max()
+        assert not after.measured[cut].any()
+        assert after.measured[~cut].sum() >= (~cut).sum() - 1  # the least value of all may go
+
+
+def test_a_coarse_instrument_is_not_clipped():
+    def coarse(channels):
+        for name in ("displacement", "velocity"):
+            step = np.max(np.abs(channels[name])) / 40.0
+            channels[name] = step * np.round(channels[name] / step)
+
+    assert [one for one in sensor_faults(runs(after=coarse)) if one.fault == "clipping"] == []
+
+
+def test_a_turned_displacement_is_told_by_the_force():
+    fault = only(sensor_faults(runs(spoil=lambda c: c.update(displacement=-c["displacement"]))))
+    assert (fault.channel, fault.fault) == ("displacement", "sign")
+    fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=-c["velocity"]))))
+    assert (fault.channel, fault.fault) == ("velocity", "sign")
+
+
+def test_a_turned_velocity_with_an_offset_is_mended():
+    whole = runs(spoil=lambda c: c.update(velocity=0.005 - c["velocity"]))
+    found = sensor_faults(whole)
+    assert {one.fault for one in found} == {"sign", "bias"}
+    assert sensor_faults(mended(whole, found)) == []
+
+
+def test_a_gain_names_the_other_channel_too():
+    fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=1.1 * c["velocity"]))))
+    assert fault.as_dict()["either"] == "displacement"
+
+
+@pytest.mark.parametrize("damping", [0.6, 0.7, 0.9])
+def test_a_velocity_behind_an_instrument_of_second_order(damping):
+    corner = 2.0 * np.pi * 16.0
+
+    def lag(channels):
+        # Exact for samples held linear: far inside the band of the motion.
+        system = cont2discrete(
+            ([corner**2], [1.0, 2.0 * damping * corner, corner**2]), STEP, method="bilinear"
+        )
+        b, a = np.ravel(system[0]), np.ravel(system[1])
+        v = channels["velocity"]
+        channels["velocity"] = lfilter(b, a, v, zi=lfilter_zi(b, a) * v[0])[0]
+
+    fault = only(sensor_faults(runs(spoil=lag)))
+    assert (fault.channel, fault.fault) == ("velocity", "lag")
+    assert fault.value == pytest.approx(2.0 * damping / corner, rel=0.1)
+
+
+def test_runs_too_short_for_a_spread_show_no_fault_of_the_motion():
+    short = [replace(one, time=one.time[:300], channels=cut(one.channels, 300),
+                     measured=one.measured[:300]) for one in runs()]  # fmt: skip
+    assert sensor_faults(short) == []
+
+
+def cut(channels, n):
+    return {name: values[:n] for name, values in channels.items()}
+
+
+def test_a_velocity_of_another_motion():
+    fault = only(sensor_faults(runs(spoil=lambda c: c.update(velocity=c["velocity"][::-1].copy()))))
+    assert fault.fault == "unrelated"

@@ -1,0 +1,87 @@
+"""Channels whose range ends before the motion does."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..records.measurement import Measurement
+from .faults import SensorFault
+
+Array = NDArray[np.float64]
+
+LONGEST = 5
+"""Samples in a row at the very same extreme that no noisy signal shows."""
+
+CROWDED = 8.0
+"""How many times more samples stand at a cut than at a step of a coarse instrument below it."""
+
+
+def clipped(runs: Sequence[Measurement]) -> list[SensorFault]:
+    """Return the channels that repeat an extreme: their range ends before the motion does."""
+    found = []
+    for channel in ("force", "displacement", "velocity", "voltage", "current"):
+        limits = [
+            limit
+            for run in runs
+            if run.has(channel)
+            and _may_be_clipped(run, channel)
+            and (limit := _limit(run[channel])) is not None
+        ]
+        if limits:
+            level = max(limits)
+            found.append(
+                SensorFault(
+                    channel, "clipping", level, 0.0,
+                    f"{channel.capitalize()} repeats the very same extreme in {len(limits)} "
+                    f"run{'s' * (len(limits) > 1)}: its range ended at {level:.4g} (SI).",
+                )
+            )  # fmt: skip
+    return found
+
+
+def _may_be_clipped(run: Measurement, channel: str) -> bool:
+    """Return whether an extreme that repeats would mean anything.
+
+    Without noise the extreme of a signal may well repeat, and a drive's level does. A channel that
+    stands at its ends nearly always shows no noise either, but the others of its run do.
+    """
+    motion = ("force", "displacement", "velocity")
+    noisy = _is_noisy(run, channel)
+    if channel in motion and not noisy:
+        return any(_is_noisy(run, other) for other in motion if other != channel)
+    return noisy
+
+
+def _is_noisy(run: Measurement, channel: str) -> bool:
+    if not run.has(channel):
+        return False
+    top = float(np.max(np.abs(run[channel])))
+    return 1e-4 * top < run.noise.get(channel, 0.0) < 0.2 * top
+
+
+def _limit(values: Array) -> float | None:
+    """Return the level at which a signal is cut off, on either side, None where it is not.
+
+    At a cut the very same number comes many times in a row; a noisy signal never does that. One in
+    coarse steps does at its turns, but not many times more often than one step below.
+    """
+    cut = [
+        abs(end)
+        for end, way in ((float(values.max()), 1.0), (float(values.min()), -1.0))
+        if _stands_at_top(way * values)
+    ]
+    return max(cut) if cut else None
+
+
+def _stands_at_top(values: Array) -> bool:
+    near = 1e-9 * float(np.max(np.abs(values)))
+    at_end = values >= values.max() - near
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(int), [0]])))
+    longest, often = int((edges[1::2] - edges[::2]).max()), int(at_end.sum())
+    if longest < LONGEST or often < 2 * LONGEST:
+        return False
+    _, below = np.unique(values[~at_end], return_counts=True)
+    return bool(len(below)) and often > CROWDED * float(np.mean(below[-LONGEST:]))
