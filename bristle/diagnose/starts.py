@@ -54,7 +54,17 @@ def _contact(own: dict[str, float], problem: Problem) -> None:
     )
 
 
-TIES: dict[str, Callable[[dict[str, float], Problem], None]] = {"backlash": _contact}
+def _share_of_yield(own: dict[str, float], _problem: Problem) -> None:
+    """Take an excess near rest out of the yield force, which holds part of it in its mean."""
+    for name in ("f_c", "f_v", "sigma_a", "sigma_0"):
+        if name in own:
+            own[name] /= 1.0 + 0.5 * own["stribeck.rise"]
+
+
+TIES: dict[str, Callable[[dict[str, float], Problem], None]] = {
+    "backlash": _contact,
+    "stribeck": _share_of_yield,
+}
 """Start values that follow from others."""
 
 
@@ -78,9 +88,10 @@ def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
             named = {f"{effect}.{name}": value for name, value in values.items()}
             for name, factor in zip(factors, combination, strict=True):
                 named[f"{effect}.{name}"] *= factor
+            values_there = {**own, **named}
             if effect in TIES:
-                TIES[effect](named, problem)
-            out.append(replace(base, effects=(*base.effects, effect), values={**own, **named}))
+                TIES[effect](values_there, problem)
+            out.append(replace(base, effects=(*base.effects, effect), values=values_there))
     return out
 
 
