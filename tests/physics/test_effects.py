@@ -218,10 +218,16 @@ def test_the_mount_does_not_chatter(law: str, dt: float, k: float, c: float) -> 
 )
 @pytest.mark.parametrize("dt", [0.0005, 0.002, 0.01])
 def test_no_mount_throws_the_joint_about(law: str, values: dict[str, float], dt: float) -> None:
-    # Without enough damping the joint jumps where the viscous part falls: that is physical.
+    # Without enough damping the joint jumps where the viscous part falls: that is physical, and
+    # then it swings beyond the fluid's largest force, in a tight integration by a tenth.
     bench = Bench(law, on("mount_compliance", **values), ["mount_compliance"])
-    force = bench.play(from_rest, 8.0, dt * np.arange(round(0.7 / dt)))
-    assert np.abs(force).max() < 1.01 * force_at("bingham", v=0.02, V=8.0)
+    times = dt * np.arange(round(0.7 / dt))
+    force = bench.play(from_rest, 8.0, times)
+    largest = force_at("bingham", v=0.02, V=8.0)
+    if "c" in values:
+        exact = mounted(law, times, **{"k": 2e4, "mass": 0.004, **values})
+        largest = max(largest, float(np.abs(exact).max()))
+    assert np.abs(force).max() < 1.01 * largest
 
 
 @both_laws
