@@ -37,6 +37,12 @@ CLOSE = 1e-6
 SLOW = 1e-4
 """Speed of a joint [m/s] below which it is found to that share of this one."""
 
+INSTANT = 1e-9
+"""Time [s] in which nothing moves; hooks may divide by it."""
+
+SETTLE = 5e-3
+"""Time [s] over which forces act on a joint that comes to its balance; its own is 0.1 ms."""
+
 _GAMMA = 1.0 - 0.5 * 2.0**0.5
 
 
@@ -104,7 +110,7 @@ def _evaluate_source(layout: Layout, name: str) -> str:
         f"        lugre = LuGreP({lugre})",
         "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
         "        friction = 0.0",
-        "        bristle = LuGre_bristle(z[0], v, V, lugre, reach) * yield_factor",
+        "        bristle = LuGre_bristle(z[0], v, V, lugre, reach, yield_factor)",
         "        rest = (bristle + viscous) * factor + added",
         "        dz[0] = LuGre_rate(z[0], v, lugre, reach)",
         "    else:",
@@ -169,7 +175,7 @@ def _pull_source(layout: Layout) -> str:
         f"        lugre = LuGreP({lugre})",
         "        bristle = LuGre_advance(z[0], middle, dt, lugre.a_0 / half_reach)",
         "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
-        "        bent = LuGre_bristle(bristle, v, V, lugre, reach) * yield_factor",
+        "        bent = LuGre_bristle(bristle, v, V, lugre, reach, yield_factor)",
         "        force = (bent + viscous) * factor + added",
         "    else:",
         f"        bingham = BinghamP({bingham})",
@@ -323,11 +329,9 @@ def advance_joint(
         x, v = x0 + e * (x1 - x0), v0 + e * (v1 - v0)
         a, V = a0 + e * (a1 - a0), V0 + e * (V1 - V0)
         apart, was = z[travel], z[joint]
-        speed, slope = joint_by_secants(
-            law, x, v, a, V, begin, h, energy, was + gain, slope, apart, was, z, p, on
+        speed, slope = joint_speed(
+            law, x, v, a, V, begin, h, h, energy, was + gain, slope, apart, was, z, p, on
         )
-        if slope <= 0.0:
-            speed = joint_by_brackets(law, x, v, a, V, begin, h, energy, apart, was, z, p, on)
         gain = speed - was
         z[joint] = speed
         z[travel] = apart + 0.5 * h * (begin - was + v - speed)
@@ -337,9 +341,25 @@ def advance_joint(
             z[0] = lugre_advance(z[0], middle, h, slip)
 
 
+def joint_speed(
+    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, push: float,
+    energy: float, guess: float, slope: float, apart: float, was: float, z: Row, p: Row, on: Row,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the joint's speed [m/s] and the slope of its excess there, 0 if it is not known.
+
+    For the arguments see `joint_excess`; `guess` is a first speed, `slope` one from before or 0.
+    """
+    speed, slope = joint_by_secants(
+        law, x, v, a, V, begin, h, push, energy, guess, slope, apart, was, z, p, on
+    )
+    if slope <= 0.0:
+        speed = joint_by_brackets(law, x, v, a, V, begin, h, push, energy, apart, was, z, p, on)
+    return speed, slope
+
+
 def joint_by_secants(
-    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, energy: float,
-    speed: float, slope: float, apart: float, was: float, z: Row, p: Row, on: Row,
+    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, push: float,
+    energy: float, speed: float, slope: float, apart: float, was: float, z: Row, p: Row, on: Row,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the joint's speed [m/s] and the slope of its excess there, 0 if it was not found.
 
@@ -349,12 +369,12 @@ def joint_by_secants(
     way = 1.0 if speed > 0.0 else -1.0
     if law == 0 and was * speed <= 0.0:
         return speed, 0.0
-    excess = joint_excess(law, x, v, a, V, begin, h, energy, speed, way, apart, was, z, p, on)
+    excess = joint_excess(law, x, v, a, V, begin, h, push, energy, speed, way, apart, was, z, p, on)
     fresh = slope <= 0.0
     if fresh:
         nudge = way * 1e-4 * max(abs(speed), SLOW)
         slope = joint_excess(
-            law, x, v, a, V, begin, h, energy, speed + nudge, way, apart, was, z, p, on
+            law, x, v, a, V, begin, h, push, energy, speed + nudge, way, apart, was, z, p, on
         )
         slope = (slope - excess) / nudge
     for _ in range(MOST_SECANTS):
@@ -367,32 +387,36 @@ def joint_by_secants(
         if abs(change) <= (CLOSE if fresh else CLOSE * CLOSE) * max(abs(speed), SLOW):
             return speed, slope
         before = excess
-        excess = joint_excess(law, x, v, a, V, begin, h, energy, speed, way, apart, was, z, p, on)
+        excess = joint_excess(
+            law, x, v, a, V, begin, h, push, energy, speed, way, apart, was, z, p, on
+        )
         slope = (excess - before) / change
         fresh = True
     return speed, 0.0
 
 
 def joint_by_brackets(
-    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, energy: float,
-    apart: float, was: float, z: Row, p: Row, on: Row,
+    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, push: float,
+    energy: float, apart: float, was: float, z: Row, p: Row, on: Row,
 ) -> float:  # fmt: skip
     """Return the joint's speed [m/s]: regula falsi with the Illinois rule, from rest upwards.
 
     Friction that can stop the joint does.
     """
     way = 1.0
-    at_low = joint_excess(law, x, v, a, V, begin, h, energy, 0.0, 1.0, apart, was, z, p, on)
+    at_low = joint_excess(law, x, v, a, V, begin, h, push, energy, 0.0, 1.0, apart, was, z, p, on)
     if at_low >= 0.0:
         way = -1.0
-        at_low = -joint_excess(law, x, v, a, V, begin, h, energy, 0.0, -1.0, apart, was, z, p, on)
+        at_low = -joint_excess(
+            law, x, v, a, V, begin, h, push, energy, 0.0, -1.0, apart, was, z, p, on
+        )
         if at_low >= 0.0:
             return 0.0  # it stands still
     low, high, at_high, last = 0.0, 0.0, 0.0, 0
     speed = max(way * was, way * v, 1e-6)
     for _ in range(MOST_TRIALS):
         excess = way * joint_excess(
-            law, x, v, a, V, begin, h, energy, way * speed, way, apart, was, z, p, on
+            law, x, v, a, V, begin, h, push, energy, way * speed, way, apart, was, z, p, on
         )
         if abs(excess) <= 1e-10 + 1e-9 * speed:
             break
@@ -410,17 +434,18 @@ def joint_by_brackets(
 
 
 def joint_excess(
-    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, energy: float,
-    speed: float, way: float, apart: float, was: float, z: Row, p: Row, on: Row,
+    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, push: float,
+    energy: float, speed: float, way: float, apart: float, was: float, z: Row, p: Row, on: Row,
 ) -> float:  # fmt: skip
-    """Return by how much `speed` [m/s] exceeds what the forces over h [s] give the joint.
+    """Return by how much `speed` [m/s] exceeds what the forces over `push` [s] give the joint.
 
+    h [s] is the time that goes by, the same unless the joint is to come to its balance at once.
     x, v, a, V belong to the rod at the end, `begin` is its velocity at the begin, `way` the
     direction of the friction, `apart` and `was` the travel and the joint's speed at the begin.
     """
     travel = apart + 0.5 * h * (begin - was + v - speed)
     pull = joint_pull(law, x, v, a, V, h, energy, way, 0.5 * (was + speed), travel, speed, z, p, on)
-    return speed - was - h * pull  # type: ignore[no-any-return]
+    return speed - was - push * pull  # type: ignore[no-any-return]
 
 
 def step(
@@ -488,6 +513,42 @@ def step(
     return evaluate(  # type: ignore[no-any-return]
         law, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, work[0:size], work[size : 2 * size]
     )
+
+
+def jump(
+    law: int, x: float, v: float, a: float, V: float, dt: float, energy: float, z: Row, p: Row,
+    on: Row, work: Row,
+) -> float:  # fmt: skip
+    """Bring the state, in place, to a voltage that has jumped to V [V]; return the force [N].
+
+    No time goes by: states that depend on the voltage alone follow it, and a joint, whose mass is
+    too small to be felt between samples, comes to rest in its new balance. dt [s] is what `Q.dt`
+    tells the forces.
+    """
+    size = len(z)
+    rates, after = work[0:size], work[size : 2 * size]
+    evaluate(law, x, v, a, V, 0.0, energy, 0.0, False, z, p, on, rates, z)
+    travel, joint = series_element(on)
+    if joint >= 0:
+        z[joint] = joint_speed(
+            law,
+            x,
+            v,
+            a,
+            V,
+            v,
+            INSTANT,
+            SETTLE,
+            energy,
+            z[joint],
+            0.0,
+            z[travel],
+            z[joint],
+            z,
+            p,
+            on,
+        )[0]
+    return evaluate(law, x, v, a, V, dt, energy, 0.0, False, z, p, on, rates, after)[0]  # type: ignore[no-any-return]
 
 
 lugre_advance = LuGre.advance
