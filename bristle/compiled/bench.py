@@ -14,14 +14,35 @@ from ..physics import damper
 Array = NDArray[np.float64]
 
 damper_step = damper.step
+damper_jump = damper.jump
 damper_evaluate = damper.evaluate
+
+
+JUMP = 8.0
+"""How many times the changes beside it a change of voltage exceeds that is a jump."""
+
+
+def before_jump(V: Any, k: int) -> float:
+    """Return the voltage [V] just before sample k, to which it goes from sample k - 1.
+
+    A step of a voltage falls on a sample, so what jumps there was held before; what is smooth is
+    linear between samples. A jump stands out against the changes before and after it.
+    """
+    change = JUMP * max(
+        abs(V[k - 1] - V[k - 2]) if k > 1 else 0.0,
+        abs(V[k + 1] - V[k]) if k + 1 < len(V) else 0.0,
+    )
+    return V[k - 1] if abs(V[k] - V[k - 1]) > change else V[k]  # type: ignore[no-any-return]
 
 
 def force_history(
     law: int, x: Any, v: Any, a: Any, V: Any, dt: float, z: Any, p: Any, on: Any, moving: Any,
     n_moving: int, advances: bool, z1: Any, work: Any, out: Any,
 ) -> None:  # fmt: skip
-    """Fill `out` (n,) with the force at each sample of a motion that is linear between them."""
+    """Fill `out` (n,) with the force at each sample of a motion that is linear between them.
+
+    So is the voltage, but where it jumps: see `before_jump`.
+    """
     size = len(z)
     energy = 0.0
     out[0] = damper_evaluate(
@@ -29,10 +50,13 @@ def force_history(
         work[size : 2 * size],
     )[0]  # fmt: skip
     for k in range(1, len(x)):
+        V1 = before_jump(V, k)
         out[k] = damper_step(
-            law, x[k - 1], v[k - 1], a[k - 1], V[k - 1], x[k], v[k], a[k], V[k], dt, energy, 0.0,
+            law, x[k - 1], v[k - 1], a[k - 1], V[k - 1], x[k], v[k], a[k], V1, dt, energy, 0.0,
             False, z, p, on, moving, n_moving, advances, z1, work,
         )[0]  # fmt: skip
+        if V[k] != V1:
+            out[k] = damper_jump(law, x[k], v[k], a[k], V[k], dt, energy, z1, p, on, work)
         energy += 0.5 * dt * (out[k - 1] * v[k - 1] + out[k] * v[k])
         for i in range(size):
             z[i] = z1[i]

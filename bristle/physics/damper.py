@@ -26,10 +26,22 @@ IMPLICIT_STEP = 5e-4
 """Longest substep [s] of states that move by `rate`."""
 
 MOST_TRIALS = 60
-"""How many speeds of a joint are tried in a substep; about six are the rule."""
+"""How many speeds of a joint are tried in a substep; two or three are the rule."""
 
-DIRECTED = 2.0
-"""Stands for `halts` where `halt` is not a force but the direction of the friction, -1 to 1."""
+MOST_SECANTS = 8
+"""How many of them secants try before they are bracketed."""
+
+CLOSE = 1e-6
+"""Last change of a joint's speed by a secant, relative; what is left is its square."""
+
+SLOW = 1e-4
+"""Speed of a joint [m/s] below which it is found to that share of this one."""
+
+INSTANT = 1e-9
+"""Time [s] in which nothing moves; hooks may divide by it."""
+
+SETTLE = 5e-3
+"""Time [s] over which forces act on a joint that comes to its balance; its own is 0.1 ms."""
 
 _GAMMA = 1.0 - 0.5 * 2.0**0.5
 
@@ -98,7 +110,7 @@ def _evaluate_source(layout: Layout, name: str) -> str:
         f"        lugre = LuGreP({lugre})",
         "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
         "        friction = 0.0",
-        "        bristle = LuGre_bristle(z[0], v, V, lugre, reach) * yield_factor",
+        "        bristle = LuGre_bristle(z[0], v, V, lugre, reach, yield_factor)",
         "        rest = (bristle + viscous) * factor + added",
         "        dz[0] = LuGre_rate(z[0], v, lugre, reach)",
         "    else:",
@@ -107,8 +119,6 @@ def _evaluate_source(layout: Layout, name: str) -> str:
         "        limit = Bingham_yielding(V, bingham) * yield_factor * reach * factor",
         "        if directed:",
         "            friction = limit * direction",
-        f"        elif halts == {DIRECTED}:",
-        "            friction = limit * halt",
         "        elif halts:",
         "            friction = min(max(halt - rest, -limit), limit)",
         "        elif v > 0.0:",
@@ -126,9 +136,64 @@ def _evaluate_source(layout: Layout, name: str) -> str:
     return "\n".join(lines)
 
 
+def _pull_source(layout: Layout) -> str:
+    """Return the source of what accelerates a joint: `evaluate` without all that it can lack.
+
+    The speed of a joint is found by trials, so nothing is called more often.
+    """
+    joints = [effect for effect in layout.effects if effect.joint]
+    names = [f"{effect.name}.{state}" for effect in joints for state in effect.joint]
+    layout = layout.reading({name: ("travel", "joint")[i % 2] for i, name in enumerate(names)})
+    signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v")
+    q = {name: name for name in signals}
+    lugre = ", ".join(f"p[{i}]" for i in range(len(LuGre.parameters)))
+    bingham = ", ".join(f"p[{i}]" for i in range(len(Bingham.parameters)))
+    lines = [
+        "def joint_pull(",
+        "    law, x, v, a, V, dt, energy, way, middle, travel, joint, z, p, on",
+        "):",
+        "    rod_x = x",
+        "    rod_v = v",
+        "    force = 0.0",
+        *switched(layout, "voltage", "V = {call}", **q),
+        *switched(layout, "motion", "x, v = {call}", **q),
+        "    yield_factor = 1.0",
+        "    viscous_factor = 1.0",
+        "    reach = 1.0",
+        "    half_reach = 1.0",
+        "    added = 0.0",
+        "    direction = way",
+        *switched(layout, "yield_factor", "yield_factor *= {call}", **q),
+        *switched(layout, "viscous_factor", "viscous_factor *= {call}", **q),
+        *switched(layout, "reach", "reach *= {call}", **q),
+        *switched(layout, "reach", "half_reach *= {call}", **{**q, "v": "middle"}),
+        *switched(layout, "yield_force", "direction = {call}", **q),
+        *switched(layout, "force", "added += {call}", **q),
+        "    factor = 1.0",
+        *switched(layout, "factor", "factor *= {call}", **q),
+        "    if law == 1:",
+        f"        lugre = LuGreP({lugre})",
+        "        bristle = LuGre_advance(z[0], middle, dt, lugre.a_0 / half_reach)",
+        "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
+        "        bent = LuGre_bristle(bristle, v, V, lugre, reach, yield_factor)",
+        "        force = (bent + viscous) * factor + added",
+        "    else:",
+        f"        bingham = BinghamP({bingham})",
+        "        viscous = Bingham_viscous(v, V, bingham) * viscous_factor",
+        "        limit = Bingham_yielding(V, bingham) * yield_factor * reach",
+        "        force = (limit * direction + viscous) * factor + added",
+        "    pull = 0.0",
+    ]
+    for effect in joints:
+        place = list(effect.states).index(effect.joint[1])
+        only = layout.only(lambda one, wanted=effect: one is wanted)  # type: ignore[misc]
+        lines += switched(only, "rate", f"pull = {{call}}[{place}]", **q)
+    return "\n".join([*lines, "    return pull"])
+
+
 def reweave() -> None:
     """Weave the damper's functions anew; call it after effects were registered late."""
-    global LAYOUT, evaluate, evaluate_law, inner_motion, series_element, slip_reach
+    global LAYOUT, evaluate, evaluate_law, inner_motion, joint_pull, series_element, slip_reach
     LAYOUT = Layout("damper", LAW_PARAMETERS, LAW_STATES)
     inner_motion = weave("inner_motion", _motion_source(LAYOUT), LAYOUT)
     slip_reach = weave("slip_reach", _reach_source(LAYOUT), LAYOUT)
@@ -139,9 +204,11 @@ def reweave() -> None:
         "LuGre_viscous": LuGre.viscous,
         "LuGre_bristle": LuGre.bristle,
         "LuGre_rate": LuGre.rate,
+        "LuGre_advance": LuGre.advance,
         "Bingham_viscous": Bingham.viscous,
         "Bingham_yielding": Bingham.yielding,
     }
+    joint_pull = weave("joint_pull", _pull_source(LAYOUT), LAYOUT, **laws)
     evaluate = weave("evaluate", _evaluate_source(LAYOUT, "evaluate"), LAYOUT, **laws)
     # The same without any effect, for dampers that have none: it does not pay for the others.
     none = Layout("", LAW_PARAMETERS, LAW_STATES)
@@ -160,6 +227,7 @@ LAYOUT: Layout
 evaluate: Any
 evaluate_law: Any
 inner_motion: Any
+joint_pull: Any
 series_element: Any
 slip_reach: Any
 reweave()
@@ -241,78 +309,143 @@ def advance_implicit(
 def advance_joint(
     law: int, x0: float, v0: float, a0: float, V0: float, x1: float, v1: float, a1: float,
     V1: float, dt: float, energy: float, z: Row, p: Row, on: Row, travel: int, joint: int,
-    work: Row,
 ) -> None:  # fmt: skip
     """Advance a series element and the bristle over dt [s], in place, rod and voltage linear.
 
     The joint is so light that its force balance decides. On the falling branch of the viscous part,
     and where the motion turns, a linearised step would throw it about. So in each substep its
-    velocity at the end is found by bracketing (regula falsi with the Illinois rule): implicit Euler
-    for the joint, the trapezoidal rule for the travel between rod and fluid, the bristle exactly.
-    Friction that can stop the joint does.
+    velocity at the end is found by trials: implicit Euler for the joint, the trapezoidal rule for
+    the travel between rod and fluid, the bristle exactly. Secants, begun with the gain and the
+    slope of the substep before, need two or three; what they do not find is bracketed.
 
     `travel`, `joint` are the slots of the series element in `z`.
     """
-    size = len(z)
-    y, dz, unused = work[0:size], work[size : 2 * size], work[2 * size : 3 * size]
     count = max(1, int(dt / IMPLICIT_STEP + 0.999999))
     h = dt / count
+    gain = (v1 - v0) / count
+    slope = 0.0
     for k in range(count):
         begin, e = v0 + k / count * (v1 - v0), (k + 1.0) / count
         x, v = x0 + e * (x1 - x0), v0 + e * (v1 - v0)
         a, V = a0 + e * (a1 - a0), V0 + e * (V1 - V0)
-        direction = 1.0
-        at_low = joint_excess(
-            law, x, v, a, V, begin, h, energy, 0.0, 1.0, z, p, on, travel, joint, y, dz, unused
+        apart, was = z[travel], z[joint]
+        speed, slope = joint_speed(
+            law, x, v, a, V, begin, h, h, energy, was + gain, slope, apart, was, z, p, on
+        )
+        gain = speed - was
+        z[joint] = speed
+        z[travel] = apart + 0.5 * h * (begin - was + v - speed)
+        if law == 1:
+            middle = 0.5 * (was + speed)
+            slip = p[6] / slip_reach(x - z[travel], middle, h, energy, z, p, on)
+            z[0] = lugre_advance(z[0], middle, h, slip)
+
+
+def joint_speed(
+    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, push: float,
+    energy: float, guess: float, slope: float, apart: float, was: float, z: Row, p: Row, on: Row,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the joint's speed [m/s] and the slope of its excess there, 0 if it is not known.
+
+    For the arguments see `joint_excess`; `guess` is a first speed, `slope` one from before or 0.
+    """
+    speed, slope = joint_by_secants(
+        law, x, v, a, V, begin, h, push, energy, guess, slope, apart, was, z, p, on
+    )
+    if slope <= 0.0:
+        speed = joint_by_brackets(law, x, v, a, V, begin, h, push, energy, apart, was, z, p, on)
+    return speed, slope
+
+
+def joint_by_secants(
+    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, push: float,
+    energy: float, speed: float, slope: float, apart: float, was: float, z: Row, p: Row, on: Row,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the joint's speed [m/s] and the slope of its excess there, 0 if it was not found.
+
+    `speed` is a first guess and `slope` that of a guess before, 0 if there is none. Not found is
+    what may stand still: friction that is a jump leaves nothing to a secant there.
+    """
+    way = 1.0 if speed > 0.0 else -1.0
+    if law == 0 and was * speed <= 0.0:
+        return speed, 0.0
+    excess = joint_excess(law, x, v, a, V, begin, h, push, energy, speed, way, apart, was, z, p, on)
+    fresh = slope <= 0.0
+    if fresh:
+        nudge = way * 1e-4 * max(abs(speed), SLOW)
+        slope = joint_excess(
+            law, x, v, a, V, begin, h, push, energy, speed + nudge, way, apart, was, z, p, on
+        )
+        slope = (slope - excess) / nudge
+    for _ in range(MOST_SECANTS):
+        if slope <= 0.0:
+            break
+        change = -excess / slope
+        speed += change
+        if law == 0 and speed * way <= 0.0:
+            break
+        if abs(change) <= (CLOSE if fresh else CLOSE * CLOSE) * max(abs(speed), SLOW):
+            return speed, slope
+        before = excess
+        excess = joint_excess(
+            law, x, v, a, V, begin, h, push, energy, speed, way, apart, was, z, p, on
+        )
+        slope = (excess - before) / change
+        fresh = True
+    return speed, 0.0
+
+
+def joint_by_brackets(
+    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, push: float,
+    energy: float, apart: float, was: float, z: Row, p: Row, on: Row,
+) -> float:  # fmt: skip
+    """Return the joint's speed [m/s]: regula falsi with the Illinois rule, from rest upwards.
+
+    Friction that can stop the joint does.
+    """
+    way = 1.0
+    at_low = joint_excess(law, x, v, a, V, begin, h, push, energy, 0.0, 1.0, apart, was, z, p, on)
+    if at_low >= 0.0:
+        way = -1.0
+        at_low = -joint_excess(
+            law, x, v, a, V, begin, h, push, energy, 0.0, -1.0, apart, was, z, p, on
         )
         if at_low >= 0.0:
-            direction = -1.0
-            at_low = -joint_excess(
-                law, x, v, a, V, begin, h, energy, 0.0, -1.0, z, p, on, travel, joint, y, dz, unused
-            )
-        low, high, at_high, last = 0.0, 0.0, 0.0, 0
-        speed = max(direction * z[joint], direction * v, 1e-6)
-        for _ in range(MOST_TRIALS if at_low < 0.0 else 0):  # else the joint stands still
-            excess = direction * joint_excess(
-                law, x, v, a, V, begin, h, energy, direction * speed, direction, z, p, on, travel,
-                joint, y, dz, unused,
-            )  # fmt: skip
-            if abs(excess) <= 1e-10 + 1e-9 * speed:
-                break
-            if excess < 0.0:
-                at_high *= 0.5 if last < 0 else 1.0
-                low, at_low, last = speed, excess, -1
-            else:
-                at_low *= 0.5 if last > 0 else 1.0
-                high, at_high, last = speed, excess, 1
-            if at_high > 0.0:
-                speed = (low * at_high - high * at_low) / (at_high - at_low)
-            else:
-                speed *= 2.0
-        for i in range(size):
-            z[i] = y[i]
+            return 0.0  # it stands still
+    low, high, at_high, last = 0.0, 0.0, 0.0, 0
+    speed = max(way * was, way * v, 1e-6)
+    for _ in range(MOST_TRIALS):
+        excess = way * joint_excess(
+            law, x, v, a, V, begin, h, push, energy, way * speed, way, apart, was, z, p, on
+        )
+        if abs(excess) <= 1e-10 + 1e-9 * speed:
+            break
+        if excess < 0.0:
+            at_high *= 0.5 if last < 0 else 1.0
+            low, at_low, last = speed, excess, -1
+        else:
+            at_low *= 0.5 if last > 0 else 1.0
+            high, at_high, last = speed, excess, 1
+        if at_high > 0.0:
+            speed = (low * at_high - high * at_low) / (at_high - at_low)
+        else:
+            speed *= 2.0
+    return way * speed
 
 
 def joint_excess(
-    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, energy: float,
-    inner: float, direction: float, z: Row, p: Row, on: Row, travel: int, joint: int, y: Row,
-    dz: Row, unused: Row,
+    law: int, x: float, v: float, a: float, V: float, begin: float, h: float, push: float,
+    energy: float, speed: float, way: float, apart: float, was: float, z: Row, p: Row, on: Row,
 ) -> float:  # fmt: skip
-    """Return by how much `inner` [m/s] exceeds what the forces over h [s] give the joint.
+    """Return by how much `speed` [m/s] exceeds what the forces over `push` [s] give the joint.
 
-    x, v, a, V belong to the rod at the end, `begin` is its velocity at the begin, `direction` that
-    of the friction; y is filled with the state at the end that goes with `inner`.
+    h [s] is the time that goes by, the same unless the joint is to come to its balance at once.
+    x, v, a, V belong to the rod at the end, `begin` is its velocity at the begin, `way` the
+    direction of the friction, `apart` and `was` the travel and the joint's speed at the begin.
     """
-    for i in range(len(z)):
-        y[i] = z[i]
-    y[joint] = inner
-    y[travel] = z[travel] + 0.5 * h * (begin - z[joint] + v - inner)
-    if law == 1:
-        middle = 0.5 * (z[joint] + inner)
-        slip = p[6] / slip_reach(x - y[travel], middle, h, energy, z, p, on)
-        y[0] = lugre_advance(z[0], middle, h, slip)
-    evaluate(law, x, v, a, V, h, energy, direction, DIRECTED, y, p, on, dz, unused)
-    return inner - z[joint] - h * dz[joint]  # type: ignore[no-any-return]
+    travel = apart + 0.5 * h * (begin - was + v - speed)
+    pull = joint_pull(law, x, v, a, V, h, energy, way, 0.5 * (was + speed), travel, speed, z, p, on)
+    return speed - was - push * pull  # type: ignore[no-any-return]
 
 
 def step(
@@ -371,9 +504,7 @@ def step(
         evaluate(law, x1, v1, a1, V1, 0.0, energy, halt, halts, z1, p, on, work[0:size], z1)
     z1[0] = deflection
     if joint >= 0:
-        advance_joint(
-            law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, z1, p, on, travel, joint, work
-        )
+        advance_joint(law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, z1, p, on, travel, joint)
     if n_moving > 0:
         advance_implicit(
             law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, moving,
@@ -382,6 +513,42 @@ def step(
     return evaluate(  # type: ignore[no-any-return]
         law, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, work[0:size], work[size : 2 * size]
     )
+
+
+def jump(
+    law: int, x: float, v: float, a: float, V: float, dt: float, energy: float, z: Row, p: Row,
+    on: Row, work: Row,
+) -> float:  # fmt: skip
+    """Bring the state, in place, to a voltage that has jumped to V [V]; return the force [N].
+
+    No time goes by: states that depend on the voltage alone follow it, and a joint, whose mass is
+    too small to be felt between samples, comes to rest in its new balance. dt [s] is what `Q.dt`
+    tells the forces.
+    """
+    size = len(z)
+    rates, after = work[0:size], work[size : 2 * size]
+    evaluate(law, x, v, a, V, 0.0, energy, 0.0, False, z, p, on, rates, z)
+    travel, joint = series_element(on)
+    if joint >= 0:
+        z[joint] = joint_speed(
+            law,
+            x,
+            v,
+            a,
+            V,
+            v,
+            INSTANT,
+            SETTLE,
+            energy,
+            z[joint],
+            0.0,
+            z[travel],
+            z[joint],
+            z,
+            p,
+            on,
+        )[0]
+    return evaluate(law, x, v, a, V, dt, energy, 0.0, False, z, p, on, rates, after)[0]  # type: ignore[no-any-return]
 
 
 lugre_advance = LuGre.advance

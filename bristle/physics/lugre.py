@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import exp, expm1
+from math import expm1
 from typing import Any, ClassVar
 
 from .bingham import EXPONENT, falling
@@ -34,13 +34,18 @@ class LuGre:
     }
 
     @staticmethod
-    def bristle(z: float, v: float, V: float, p: Any, reach: float = 1.0) -> float:
+    def bristle(
+        z: float, v: float, V: float, p: Any, reach: float = 1.0, yield_factor: float = 1.0
+    ) -> float:
         """Return the bristles' force [N] at deflection z [m], velocity v [m/s], voltage V [V].
 
-        `reach` is the factor by which an effect moves the deflection at which they slip.
+        `reach` is the factor by which an effect moves the deflection at which they slip,
+        `yield_factor` that of the yield force: of what bends, for in steady sliding the bristles'
+        damping is no part of it.
         """
         rate = v - p.a_0 / reach * abs(v) * z
-        return (p.sigma_a + p.sigma_0 * V) * z + p.sigma_1 * rate  # type: ignore[no-any-return]
+        bent = (p.sigma_a + p.sigma_0 * V) * z * yield_factor
+        return bent + p.sigma_1 * rate  # type: ignore[no-any-return]
 
     @staticmethod
     def viscous(v: float, V: float, p: Any) -> float:
@@ -58,4 +63,5 @@ class LuGre:
         slip = a_0 * abs(v) * dt
         if slip < 1e-9:
             return z + (v - a_0 * abs(v) * z) * dt
-        return z * exp(-slip) - v / (a_0 * abs(v)) * expm1(-slip)
+        side = 1.0 if v > 0.0 else -1.0
+        return z + (z - side / a_0) * expm1(-slip)

@@ -31,6 +31,8 @@ class Layout:
         Name, such as "gas_spring.k", to its index in `p` or `z`.
     switches : dict
         Effect name to its index in `on`.
+    elsewhere : dict
+        State name to the variable that holds it in woven source, for those not read from `z`.
     """
 
     def __init__(self, site: str, parameters_first: int, states_first: int) -> None:
@@ -38,6 +40,7 @@ class Layout:
         self.parameters: dict[str, int] = {}
         self.states: dict[str, int] = {}
         self.switches: dict[str, int] = {}
+        self.elsewhere: dict[str, str] = {}
         self.p_size = parameters_first
         self.z_size = states_first
         for effect in self.effects:
@@ -55,23 +58,22 @@ class Layout:
         part.effects = tuple(effect for effect in self.effects if keep(effect))
         return part
 
+    def reading(self, elsewhere: dict[str, str]) -> Layout:
+        """Return the same layout with states that are read from variables: name to variable."""
+        part = copy(self)
+        part.elsewhere = elsewhere
+        return part
+
     def values(self, effect: type[Effect]) -> str:
         """Return the source that makes the effect's parameter tuple from `p`."""
-        return _tuple(
-            effect.name + "_P",
-            "p",
-            [self.parameters[effect.name + "." + n] for n in effect.parameters],
-        )
+        slots = [self.parameters[effect.name + "." + name] for name in effect.parameters]
+        return "{}_P({})".format(effect.name, ", ".join(f"p[{slot}]" for slot in slots))
 
     def state(self, effect: type[Effect]) -> str:
-        """Return the source that makes the effect's state tuple from `z`."""
-        return _tuple(
-            effect.name + "_Z", "z", [self.states[effect.name + "." + n] for n in effect.states]
-        )
-
-
-def _tuple(name: str, sequence: str, slots: list[int]) -> str:
-    return "{}({})".format(name, ", ".join(f"{sequence}[{slot}]" for slot in slots))
+        """Return the source that makes the effect's state tuple, from `z` where nothing else is."""
+        names = [effect.name + "." + name for name in effect.states]
+        sources = [self.elsewhere.get(name, f"z[{self.states[name]}]") for name in names]
+        return "{}_Z({})".format(effect.name, ", ".join(sources))
 
 
 def call(effect: type[Effect], hook: str, layout: Layout, q: str) -> str:

@@ -3,6 +3,11 @@
 from ..effect import Effect, Parameter
 
 
+def play(at, V, width):
+    """Return where a play of this half width rests once the voltage has come to V [V]."""
+    return min(max(at, V - width), V + width)
+
+
 class Remanence(Effect):
     """Remanence: the field lags behind the voltage by a fixed width, however slowly it moves.
 
@@ -33,16 +38,21 @@ class Remanence(Effect):
 
     @staticmethod
     def voltage(q, z, p):
-        return max(0.25 * (z.voltage + z.second + z.third + z.fourth), 0.0)
+        # A play follows at once: a voltage that has just jumped is felt before time goes on.
+        small = max(p.width * (1.0 - 0.75 * p.spread), 0.0)
+        middle, large = p.width * (1.0 - 0.25 * p.spread), p.width * (1.0 + 0.25 * p.spread)
+        felt = play(z.voltage, q.V, small) + play(z.second, q.V, middle)
+        felt += play(z.third, q.V, large)
+        felt += play(z.fourth, q.V, p.width * (1.0 + 0.75 * p.spread))
+        return max(0.25 * felt, 0.0)
 
     @staticmethod
     def advance(q, z, p):
         small = max(p.width * (1.0 - 0.75 * p.spread), 0.0)
         middle, large = p.width * (1.0 - 0.25 * p.spread), p.width * (1.0 + 0.25 * p.spread)
-        largest = p.width * (1.0 + 0.75 * p.spread)
         return (
-            min(max(z.voltage, q.V - small), q.V + small),
-            min(max(z.second, q.V - middle), q.V + middle),
-            min(max(z.third, q.V - large), q.V + large),
-            min(max(z.fourth, q.V - largest), q.V + largest),
+            play(z.voltage, q.V, small),
+            play(z.second, q.V, middle),
+            play(z.third, q.V, large),
+            play(z.fourth, q.V, p.width * (1.0 + 0.75 * p.spread)),
         )
