@@ -18,10 +18,10 @@ from .starts import Begun, Ground, ranked
 
 Array = NDArray[np.float64]
 
-QUICK = 6
+QUICK = 8
 """Jacobians of the first, short search from each start."""
 
-ROUGH = 12
+ROUGH = 24
 """The same where impacts make the way rough."""
 
 LONG = 20
@@ -103,16 +103,16 @@ def joinable(base: Model, instruments: Sequence[str] = ("delay",)) -> list[str]:
     return sorted(names, key=lambda name: not EFFECTS[name].joint)
 
 
-def begin(effect: str, ground: Ground, begun: Sequence[Begun], once: bool = False) -> Begun:
-    """Search shortly from the best starts, or the very best `once`; return the best of the ends.
+def begin(effect: str, ground: Ground, begun: Sequence[Begun], fewer: bool = False) -> Begun:
+    """Search shortly from the best starts, from half as many `fewer`; return the best of the ends.
 
     Its loss is that on the training runs.
 
-    All parameters move at once: with the law's held, an effect that the law has taken up vanishes.
+    All parameters move at fewer: with the law's held, an effect that the law has taken up vanishes.
     """
     light = ground.light(effect)
     found = []
-    for one in begun[: 1 if once else light.kept]:
+    for one in begun[: max(1, light.kept // 2) if fewer else light.kept]:
         search = Search(light.problem, one.model, light.expected, one.model.free())
         model, ended = search.run(ROUGH if search.rough else QUICK)
         found.append(Begun(model, ended.cost))
@@ -141,8 +141,8 @@ def try_all(
         if most is not None:
             best = sorted(names, key=lambda name: begun[name][0].cost)[:most]
             names = [name for name in names if name in best]
-        once = most is not None
-        found = list(pool.map(lambda name: begin(name, ground, begun[name], once), names))
+        fewer = most is not None
+        found = list(pool.map(lambda name: begin(name, ground, begun[name], fewer), names))
         gained = max(ground.cost - one.cost for one in found)
         least = max(PROMISING * gained, WORTH * ground.cost)
 

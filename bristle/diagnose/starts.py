@@ -36,10 +36,13 @@ NET: dict[str, dict[str, tuple[float, ...]]] = {
 FALL = {"bingham": ("c_0", "c_v"), "lugre": ("sigma_2", "sigma_b")}
 """The parts of the laws that fall with speed: a fit without an effect of speed inflates them."""
 
+RELAXED = ((0.3, 2.0), (0.05, 10.0))
+"""Size and width of that part, as factors, where a start makes room for an effect of speed."""
+
 THIN = 6
 """Of what has no memory every so many samples suffice for a search."""
 
-KEPT = {"none": 6, "memory": 2, "joint": 2}
+KEPT = {"none": 24, "memory": 2, "joint": 2}
 """From how many starts a search is made, by what the model has that makes it dear."""
 
 STEPS = (1.0, 0.3)
@@ -72,15 +75,16 @@ def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
     """Return the models from which the search for an effect's parameters begins.
 
     An effect of speed alone competes with the law's own fall with speed, which has taken up what it
-    could: so half of its starts have that part small and wide.
+    could: so some of its starts have that part small and wide.
     """
     values = {
         name: problem.scaled(base.law, f"{effect}.{name}") for name in EFFECTS[effect].parameters
     }
     bases = [dict(base.values)]
     if EFFECTS[effect].needs == ("v",) and not {*FALL[base.law], "v_n"} & set(base.held):
-        relaxed = {name: 0.3 * base.value(name) for name in FALL[base.law]}
-        bases.append({**base.values, **relaxed, "v_n": 2.0 * base.value("v_n")})
+        for size, width in RELAXED:
+            relaxed = {name: size * base.value(name) for name in FALL[base.law]}
+            bases.append({**base.values, **relaxed, "v_n": width * base.value("v_n")})
     factors = NET.get(effect, {})
     out = []
     for own in bases:
