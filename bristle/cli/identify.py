@@ -139,7 +139,7 @@ def _laws(found: Identified) -> list[str]:
 
 
 def _next(found: Identified, folder: Path) -> list[str]:
-    z = found.after.get("z_holdout", found.after["z_train"])
+    z = max(found.after.get("z_holdout", 0.0), found.after["z_train"])
     if z > 1.15:
         return [
             f"The error is {z:.3g} times what noise explains. Next: where it lives,  bristle "

@@ -108,7 +108,7 @@ def begin(effect: str, ground: Ground, begun: Sequence[Begun], fewer: bool = Fal
 
     Its loss is that on the training runs.
 
-    All parameters move at fewer: with the law's held, an effect that the law has taken up vanishes.
+    All parameters move at once: with the law's held, an effect that the law has taken up vanishes.
     """
     light = ground.light(effect)
     found = []

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from ..identify.fit import Model, Problem
 from ..identify.search import z_scale
-from .candidates import residuals
+from .search import residuals
 
 MISFIT = 1.15
 """z of training runs above which a model that explains the held-out ones still has not fitted."""

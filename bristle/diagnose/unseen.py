@@ -18,8 +18,10 @@ from numpy.typing import NDArray
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import steady
 from ..identify.search import HUBER_AT_ONE, losses
-from .candidates import Trial, begin, joinable, judge, refine, residuals
+from .candidates import Trial, begin, joinable, judge
 from .faults import SensorFault, earlier
+from .search import refine, residuals
+from .starts import Ground, ranked
 
 Array = NDArray[np.float64]
 
@@ -101,10 +103,10 @@ def _rival(found: Unseen, before: Trial, train: Problem, names: tuple[str, ...])
     model = before.model
     own = found.trial.model
     cost = _loss(own, found.train)
-    expected = train.expectation(model)
+    ground = Ground(model, train)
     rivals = [name for name in joinable(model) if name in names]
     with ThreadPoolExecutor(cpu_count()) as pool:
-        begun = pool.map(lambda name: begin(name, model, train, expected), rivals)
+        begun = pool.map(lambda name: begin(name, ground, ranked(name, ground)), rivals)
         return any(_loss(one.model, train) < cost * (1.0 - MARGIN) for one in begun)
 
 
