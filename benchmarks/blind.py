@@ -24,6 +24,7 @@ from benchmarks._blind import plan, record, table, work
 from benchmarks._rows import Row
 
 CASES = 480
+BUILDINGS = 40
 MARK = "<!-- measured -->"
 
 
@@ -31,6 +32,10 @@ def options() -> argparse.ArgumentParser:
     """Return the command line."""
     parser = argparse.ArgumentParser(prog="python benchmarks/blind.py", description=__doc__)
     parser.add_argument("--cases", type=int, default=CASES, help=f"how many ({CASES}; 40 is quick)")
+    parser.add_argument(
+        "--structure", type=int, metavar="N", default=BUILDINGS,
+        help=f"how many on buildings, on top ({BUILDINGS}; every second without a load cell)",
+    )  # fmt: skip
     parser.add_argument("--seed", type=int, help="of the plan; else that of the last run")
     parser.add_argument("--fresh", action="store_true", help="draw a seed that nobody has seen")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1, help="processes")
@@ -52,11 +57,17 @@ def seed_of(arguments: argparse.Namespace) -> int:
     return secrets.randbelow(2**31) if last is None else last
 
 
+def chosen(seed: int, cases: int, buildings: int, only: str = "") -> list[plan.Task]:
+    """Return the tasks of the bench's plan and, on top, those of the buildings' plan."""
+    bench = [] if only == "structure" else plan.make_plan(seed, cases, only)
+    return bench + (plan.make_structure_plan(seed, buildings) if only in ("", "structure") else [])
+
+
 def main(given: Sequence[str] | None = None) -> int:
     """Run what is not finished and print the table; 130 if interrupted, with all that is kept."""
     arguments = options().parse_args(given)
     seed = seed_of(arguments)
-    tasks = plan.make_plan(seed, arguments.cases, arguments.only)
+    tasks = chosen(seed, arguments.cases, arguments.structure, arguments.only)
     path = record.path_of(seed)
     print(f"seed {seed}, {len(tasks)} cases, record {path}", file=sys.stderr)
     code = 0
@@ -93,7 +104,7 @@ def advance(tasks: list[plan.Task], path: Path, arguments: argparse.Namespace) -
         (part, task, digest)
         for task in tasks
         for part, digest in digests.items()
-        if task.key not in done[part]
+        if task.key not in done[part] and part in work.parts_of(task)
     ]
     begun = time.monotonic()
     for number, line in enumerate(work.runner(arguments.workers, arguments.cluster)(jobs), 1):
@@ -133,7 +144,7 @@ def run() -> list[Row]:
     seed = record.newest()
     if seed is None:
         return [Row("hidden effects found", "not run yet: python benchmarks/blind.py")]
-    tasks = plan.make_plan(seed, CASES)
+    tasks = chosen(seed, CASES, BUILDINGS)
     path = record.path_of(seed)
     lines = _lines(path, tasks, "diagnosis")
     rows = table.figures(lines, _times(path, measure=False))

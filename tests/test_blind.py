@@ -4,14 +4,26 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from benchmarks import peers
-from benchmarks._blind import forms, inseparable, plan, record, score, table
+from benchmarks import blind, peers
+from benchmarks._blind import (
+    building,
+    cases,
+    forms,
+    inseparable,
+    plan,
+    record,
+    score,
+    subject,
+    table,
+    work,
+)
 from benchmarks._blind.plan import Task
 from tests.independent import generate
 from tests.independent.effects import FORMS
@@ -234,6 +246,109 @@ def test_plan_holds_its_promises():
     assert {task.kind for task in plan.make_plan(3, 5, "pair")} == {"pair"}
     with pytest.raises(ValueError, match="none, effect"):
         plan.make_plan(3, 5, "nothing")
+
+
+def test_plan_of_buildings_is_its_own():
+    tasks = plan.make_structure_plan(3, 200)
+    assert tasks[:40] == plan.make_plan(3, 40, "structure"), "a longer plan begins with the shorter"
+    assert len({task.key for task in tasks}) == 200
+    assert [task.reconstructed for task in tasks[:4]] == [False, True, False, True]
+    for half in (tasks[:200:2], tasks[1:200:2]):
+        assert sum(task.effect == "none" for task in half) == 20
+        strong = [task for task in half if task.effect != "none"]
+        assert sum(task.effect in plan.SITES for task in strong) == 40
+        assert Counter(task.strength for task in strong) == {0.15: 40, 0.4: 40}
+        assert {task.effect for task in strong} >= {*plan.SITES, "gas_spring", "backlash"}
+        assert {(task.rig, task.law) for task in half} == {
+            (rig, law) for rig in plan.BUILDINGS for law in ("bingham", "lugre")
+        }
+    assert not any(task.reconstructed and task.effect == "delay" for task in tasks)
+    assert blind.chosen(3, 50, 8) == [*plan.make_plan(3, 50), *tasks[:8]]
+    assert blind.chosen(3, 50, 8, "structure") == tasks[:8]
+    assert blind.chosen(3, 50, 8, "pair") == plan.make_plan(3, 50, "pair")
+
+
+def test_a_bench_case_keeps_its_name_and_a_missing_force_changes_it():
+    task = Task("pair", "gas_spring+asymmetry", "linear+step", 0.15, 0.01, "bench_10N", "lugre", 7)
+    assert task.key == "5757e53fa262fa9f"
+    assert Task.of({n: v for n, v in vars(task).items() if n != "reconstructed"}) == task
+    assert replace(task, reconstructed=True).key != task.key
+
+
+def on_building(answer: dict[str, Any], effect: str, late: bool = False, **more: Any) -> Any:
+    """Return a finished line of a building; "none" hides nothing."""
+    made = line(answer, effect, kind="none" if effect == "none" else "effect", **more)
+    made["task"] = {**made["task"], "kind": "structure", "reconstructed": late}
+    return made
+
+
+def test_twins_of_a_reconstructed_force_need_no_test():
+    both = {"kind": "class", "effects": ["gas_spring", "duffing"]}
+    assert score.names_in_building(on_building(both, "duffing", late=True))
+    assert not score.names_in_building(on_building(both, "duffing")), "a load cell parts them"
+    rubs = {"kind": "class", "effects": ["base_friction"]}
+    assert score.names_in_building(on_building(rubs, "base_friction", late=True))
+    other = {"kind": "class", "effects": ["duffing", "gas_spring", "end_stop"]}
+    assert not score.names_in_building(on_building(other, "duffing", late=True))
+    shown = other | {"resolved": {"end_stop": 1.0, "gas_spring": 9.0}}
+    assert score.names_in_building(on_building(shown, "duffing", late=True))
+    sure = {"kind": "effect", "effects": ["gas_spring"]}
+    assert not score.names_in_building(on_building(sure, "duffing", late=True))
+    assert score.tells_twin(on_building(sure, "duffing", late=True))
+    assert not score.tells_twin(on_building(both, "duffing", late=True))
+
+
+def test_rows_of_buildings_are_counted_apart_from_the_bench():
+    right = {"kind": "effect", "effects": ["duffing"], "cpu": 12.0}
+    lines = [on_building(right, "duffing") for _ in range(9)]
+    lines.append(on_building({"kind": "unknown", "cpu": 40.0}, "end_stop"))
+    lines.append(on_building(right, "duffing", share=0.04))  # too weak to count
+    lines.append(on_building({"kind": "none"}, "none"))
+    lines.append(on_building(right, "none", late=True))
+    rows = {(row.group, row.name): row for row in table.figures(lines)}
+    name = "structure rig, force measured"
+    first = rows["main", f"{name}: right, 15 and 40 %"]
+    assert (first.counts, first.ratio) == ("9/10", pytest.approx(1.0))
+    assert first.interval == pytest.approx((59.58, 98.21), abs=0.01)
+    assert rows["main", f"{name}: false alarms on none"].counts == "0/1"
+    other = rows["main", "structure rig, force reconstructed: false alarms on none"]
+    assert other.counts == "1/1"
+    assert other.ratio == float("inf")
+    assert rows["main", "single effect right, 15 and 40 %"].counts == "0/0"
+    assert rows["main", "false alarms on none"].counts == "0/0"
+    assert rows["buildings", "force measured: below 15 %, set aside"].counts == "1/11"
+    assert rows["buildings", "one diagnosis, processor, longest, s"].value == 40.0
+    assert not any(row.group == "buildings" for row in table.figures([]))
+
+
+def test_a_building_is_recorded_as_its_task_says_and_its_file_is_the_drawing(monkeypatch, tmp_path):
+    monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path))
+    for late in (False, True):
+        task = Task("structure", "none", "", 0.0, 0.01, "structure_10N", "bingham", 7, late)
+        case = cases.load(task)
+        assert ("force" in case.channels) is not late
+        told = building.file_of(case)
+        assert [told.M[i][i] for i in range(3)] == case.truth["building"]["masses"]
+        assert told.isolated
+        runs = subject.measurements(case.part("holdout"), case.channels)
+        assert runs[0].has("base_acceleration_absolute", "floor2_velocity", "ground_acceleration")
+        # Equal to single precision: kept on disk, and in SI already.
+        assert np.allclose(runs[0]["voltage"], case.part("holdout")[0]["voltage"])
+        assert work.parts_of(task) == ("diagnosis",)
+
+
+def test_a_site_is_sought_where_all_rivals_can_act():
+    class Found:
+        problems = dict.fromkeys(("storey1", "layer", "damper"))
+        reconstructed = False
+
+    found: Any = Found()
+    assert building._site("duffing", ["base_friction"], found) == "layer"
+    assert building._site("storey_softening", [], found) == "storey1"
+    assert building._site("stribeck", ["coil_lag"], found) == "damper"
+    assert building._site("duffing", ["gas_spring"], found) == "", "at different sites"
+    found.problems, found.reconstructed = dict.fromkeys(("storey1", "damper")), True
+    assert building._site("duffing", ["gas_spring"], found) == "damper"
 
 
 def test_resolution_is_that_of_the_likelihood_ratio():

@@ -61,7 +61,7 @@ def make(task: Task) -> generate.Case:
     """Return the generator's case, with the specimen for further runs."""
     return generate.make_case(
         task.seed, task.effect, task.form or None, task.strength or 0.15, task.noise, task.rig,
-        task.law,
+        task.law, measured_force=not task.reconstructed,
     )  # fmt: skip
 
 

@@ -75,7 +75,7 @@ def resolve(case: Recorded, made: Any, rivals: list[str]) -> dict[str, float]:
         for role in ("train", "holdout")
     )
     base = identify(train, case.task.law, starts=2).model
-    fits = {name: _best(name, base, train) for name in (true, *rivals)}
+    fits = {name: best_of(name, base, train) for name in (true, *rivals)}
     expected = noisy.expectation(fits[true])
     left = {name: _left(one, held) for name, one in fits.items()}
     skip = [run.skip for run in held.runs]
@@ -89,7 +89,8 @@ def resolve(case: Recorded, made: Any, rivals: list[str]) -> dict[str, float]:
     }
 
 
-def _best(name: str, base: Model, train: Problem) -> Model:
+def best_of(name: str, base: Model, train: Problem) -> Model:
+    """Return a model with one more effect, searched as a diagnosis does and refined."""
     ground = Ground(base, train)
     begun = begin(name, ground, ranked(name, ground))
     return refine(begun.model, train, sweeps=24)

@@ -30,7 +30,15 @@ INVISIBLE = (
 )  # fmt: skip
 """Faults that the parameters of the base laws absorb without a trace: no method can report them."""
 
-KINDS = ("none", "effect", "outside", "fault", "pair")
+KINDS = ("none", "effect", "outside", "fault", "pair", "structure")
+"""What `--only` takes; "structure" is the building, whose cases have a plan of their own."""
+
+BUILDINGS = ("structure_10N", "structure_2kN")
+SITES = ("base_friction", "duffing", "storey_softening", "end_stop")
+"""Effects of the structure; in the plan they take turns with those of the damper."""
+
+EVERY = 5
+"""One building in so many hides nothing."""
 
 
 @dataclass(frozen=True)
@@ -45,17 +53,20 @@ class Task:
     rig: str
     law: str
     seed: int
+    reconstructed: bool = False
+    """Whether a building's damper force is left out of the record."""
 
     @property
     def key(self) -> str:
         """Return 16 hex digits that name the case."""
-        return hashlib.sha256(repr(sorted(asdict(self).items())).encode()).hexdigest()[:16]
+        told = {n: v for n, v in asdict(self).items() if n != "reconstructed" or v}
+        return hashlib.sha256(repr(sorted(told.items())).encode()).hexdigest()[:16]
 
     @property
     def same_form(self) -> bool:
         """Return whether every hidden effect has a form that bristle has."""
         pairs = zip(self.effect.split("+"), self.form.split("+"), strict=False)
-        return self.kind == "none" or all(is_same(*pair) for pair in pairs)
+        return self.effect == "none" or all(is_same(*pair) for pair in pairs)
 
     @staticmethod
     def of(record: dict[str, Any]) -> Task:
@@ -75,6 +86,8 @@ def make_plan(seed: int, cases: int, only: str = "") -> list[Task]:
     """
     if only and only not in KINDS:
         raise ValueError(f"kind {only!r}: there are {', '.join(KINDS)}")
+    if only == "structure":
+        return make_structure_plan(seed, cases)
     tasks: list[Task] = []
     for task in _endless(seed):
         if not only or task.kind == only:
@@ -82,6 +95,46 @@ def make_plan(seed: int, cases: int, only: str = "") -> list[Task]:
         if len(tasks) == cases:
             break
     return tasks
+
+
+def make_structure_plan(seed: int, cases: int) -> list[Task]:
+    """Return the first `cases` tasks on buildings: every second one without a measured force.
+
+    A longer plan begins with the shorter one. It draws nothing from the bench's plan.
+    """
+    rng = np.random.default_rng([seed, 25])
+    hidden = {late: _in_buildings(seed, late) for late in (False, True)}
+    tasks = []
+    for turn in range(cases):
+        late = bool(turn % 2)
+        what = next(hidden[late])
+        case = int(rng.integers(2**31))
+        tasks.append(Task("structure", noise=0.01, seed=case, reconstructed=late, **what))
+    return tasks
+
+
+def _in_buildings(seed: int, reconstructed: bool) -> Iterator[dict[str, Any]]:
+    """Yield what buildings hide: effects of damper and structure in turn, some nothing.
+
+    A force that no load cell shows cannot be late.
+    """
+    rng = np.random.default_rng([seed, 26, int(reconstructed)])
+    beds = _shuffled([(rig, law) for rig in BUILDINGS for law in LAWS], rng)
+    own = [n for n in LIBRARY if n not in SITES and not (reconstructed and n == "delay")]
+    groups = (_shuffled(list(SITES), rng), _shuffled(own, rng))
+    turn, begins = 0, int(rng.integers(2))
+    while True:
+        for place in range(EVERY):
+            rig, law = next(beds)
+            if place == EVERY - 1:
+                yield {"effect": "none", "form": "", "strength": 0.0, "rig": rig, "law": law}
+                continue
+            name = next(n for n in groups[turn % 2] if forms(n, _bed(rig, law)))
+            able = [form.name for form in forms(name, _bed(rig, law))]
+            strength = STRENGTHS[(begins + turn // 2) % 2]  # 15 and 40 %
+            form = able[int(rng.integers(len(able)))]
+            yield {"effect": name, "form": form, "strength": strength, "rig": rig, "law": law}
+            turn += 1
 
 
 def _endless(seed: int) -> Iterator[Task]:

@@ -25,6 +25,10 @@ BINS = {"5 %": (0.025, 0.0866), "15 %": (0.0866, 0.245), "40 %": (0.245, float("
 FAMILY = ("presliding", "mount_compliance", "backlash")
 """Effects that count as one where the row says so."""
 
+TWINS = {"gas_spring", "duffing"}
+"""Effects that add up to one force where it is reconstructed. (The other such rivals, f_c beside
+`base_friction` and a mass of the base beside `fluid_inertia`, are no effects: words name them.)"""
+
 RESOLVED = 3.0
 """Standard deviations from which on the data tell two effects apart (see `inseparable`)."""
 
@@ -151,6 +155,31 @@ def inseparable(line: Line) -> bool:
     resolved = said.get("resolved", {})
     rivals = [r for r in said["effects"] if r != true and not {r, true} <= set(FAMILY)]
     return all(r in resolved and resolved[r] < RESOLVED for r in rivals)
+
+
+def names_in_building(line: Line) -> bool:
+    """Return whether a building's effect is the verdict, or in a class that cannot be told apart.
+
+    Where the force was reconstructed, rivals that add up to one force with the hidden effect need
+    no test: equilibrium itself cannot part them. Other rivals must be shown inseparable.
+    """
+    said, (true,) = answer(line), hidden(line)
+    if names_effect(line):
+        return True
+    if not in_class(line) or not line["task"].get("reconstructed"):
+        return False
+    resolved = said.get("resolved", {})
+    rivals = [r for r in said["effects"] if not ({r, true} <= TWINS or {r, true} <= set(FAMILY))]
+    return all(r == true or resolved.get(r, RESOLVED) < RESOLVED for r in rivals)
+
+
+def tells_twin(line: Line) -> bool:
+    """Return whether the verdict names something else that adds up to one force with the effect.
+
+    Equilibrium without a load cell cannot part them; but then the verdict ought to name both.
+    """
+    said, (true,) = answer(line), hidden(line)
+    return true in TWINS and bool(set(said["effects"]) & TWINS) and true not in said["effects"]
 
 
 def names_it_alone(line: Line) -> bool:

@@ -21,8 +21,10 @@ from .forms import true_values
 
 UNITS = {
     "displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "voltage": "V", "force": "N",
-    "ground_acceleration": "m/s2",
+    "ground_acceleration": "m/s2", "absolute": "m/s2",
 }  # fmt: skip
+"""By channel, or by the last word of its name."""
+
 KEPT = 8  # rows of the ranking that a record keeps
 
 
@@ -34,10 +36,15 @@ def digest() -> str:
     return digest_of(files)
 
 
+def unit_of(channel: str) -> str:
+    """Return the unit of a recorded channel."""
+    return UNITS.get(channel) or UNITS[channel.rsplit("_", 1)[1]]
+
+
 def measurements(runs: list[dict[str, Any]], channels: tuple[str, ...]) -> list[Measurement]:
     """Return runs as measurements; the noise is not given, so it is estimated."""
     specs = {"time": ChannelSpec("time", "s")}
-    specs |= {name: ChannelSpec(name, UNITS[name]) for name in channels}
+    specs |= {name: ChannelSpec(name, unit_of(name)) for name in channels}
     out = []
     for run in runs:
         frame = pd.DataFrame({name: run[name] for name in ("time", *channels)})

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import score
+from .plan import SITES
 from .score import Count, Line, count
 
 NOT_YET = "-"
@@ -82,12 +83,13 @@ def of_kind(lines: Iterable[Line], kind: str, noise: float) -> list[Line]:
 
 def figures(lines: list[Line], times: dict[str, float] | None = None) -> list[Figure]:
     """Return the rows of the table at 1 % noise, then the same by parts, then at 3 %."""
-    rows = main_rows(lines, 0.01, "main") + parameter_rows(lines, 0.01, "main")
-    rows += time_rows(lines, times or {}) + structure_rows()
-    rows += part_rows(lines)
-    if any(abs(line["task"]["noise"] - 0.03) < 1e-9 for line in lines):
-        rows += main_rows(lines, 0.03, "3 % noise") + parameter_rows(lines, 0.03, "3 % noise")
-    return rows
+    bench = [line for line in lines if line["task"]["kind"] != "structure"]
+    rows = main_rows(bench, 0.01, "main") + parameter_rows(bench, 0.01, "main")
+    rows += time_rows(bench, times or {}) + structure_rows(lines)
+    rows += part_rows(bench)
+    if any(abs(line["task"]["noise"] - 0.03) < 1e-9 for line in bench):
+        rows += main_rows(bench, 0.03, "3 % noise") + parameter_rows(bench, 0.03, "3 % noise")
+    return rows + building_rows(lines)
 
 
 def main_rows(lines: list[Line], noise: float, group: str) -> list[Figure]:
@@ -220,14 +222,62 @@ def time_rows(lines: list[Line], times: dict[str, float]) -> list[Figure]:
     ]
 
 
-def structure_rows() -> list[Figure]:
-    """Return the rows of the building rig, which the plan does not make cases for yet."""
-    name = "structure rig, 15 and 40 %, force"
-    note = "not run: the diagnosis takes bench runs only"
+def structure_rows(lines: list[Line]) -> list[Figure]:
+    """Return the rows of the building rig."""
+    rows = []
+    for force, late, goal in (("measured", False, 90.0), ("reconstructed", True, None)):
+        found = on_building(lines, late)
+        strong = binned([x for x in found if score.hidden(x)], "15 %", "40 %")
+        alarms = count([x for x in found if not score.hidden(x)], score.false_alarm)
+        name = f"structure rig, force {force}"
+        rows += [
+            share(f"{name}: right, 15 and 40 %", count(strong, score.names_in_building), goal),
+            share(f"{name}: false alarms on none", alarms, 0.0, most=True),
+        ]
+    return rows
+
+
+def on_building(lines: Iterable[Line], reconstructed: bool) -> list[Line]:
+    """Return the lines of buildings whose damper's force was measured or reconstructed."""
     return [
-        Figure(f"{name} measured", None, note, None, ">= 90 %", None),
-        Figure(f"{name} reconstructed", None, note, None, "", None),
+        line
+        for line in of_kind(lines, "structure", 0.01)
+        if bool(line["task"].get("reconstructed")) == reconstructed
     ]
+
+
+def building_rows(lines: list[Line]) -> list[Figure]:
+    """Return the parts of the building's rows, what was set aside, and how long it took."""
+    group, rows = "buildings", []
+    for late, force in ((False, "measured"), (True, "reconstructed")):
+        found = on_building(lines, late)
+        hidden = [line for line in found if score.hidden(line)]
+        strong = binned(hidden, "15 %", "40 %")
+        weak = count(hidden, lambda x: score.bin_of(x) not in ("15 %", "40 %"))
+        unknown = count(strong, score.calls_unknown)
+        rows += [
+            share(f"force {force}: below 15 %, set aside", weak, group=group),
+            share(f"force {force}: called unknown", unknown, group=group),
+        ]
+        if late:
+            twin = count(strong, score.tells_twin)
+            rows.append(share("force reconstructed: only a twin is named", twin, group=group))
+        for place, own in (("structure", True), ("damper", False)):
+            part = [x for x in strong if (x["task"]["effect"] in SITES) == own]
+            right = count(part, score.names_in_building)
+            rows.append(share(f"force {force}: right, effects of the {place}", right, group=group))
+    every = [line for line in lines if line["task"]["kind"] == "structure"]
+    if not every:
+        return []
+    took = [score.answer(line)["cpu"] for line in every if score.answer(line).get("cpu")]
+    broken = count(every, lambda x: "error" in x)
+    return [
+        *rows, share("errors", broken, group=group),
+        number("one diagnosis, processor, median, s", score.quantile(took, 0.5), len(took),
+               group=group),
+        number("one diagnosis, processor, longest, s", score.quantile(took, 1.0), len(took),
+               group=group),
+    ]  # fmt: skip
 
 
 def part_rows(lines: list[Line]) -> list[Figure]:

@@ -24,6 +24,11 @@ def digests() -> dict[str, str]:
     return {"diagnosis": f"{made}-{under_test}", "peers": f"{made}-{own}"}
 
 
+def parts_of(task: Task) -> tuple[str, ...]:
+    """Return who is asked of a case: on buildings the package alone, for no peer takes one."""
+    return ("diagnosis",) if task.kind == "structure" else PARTS
+
+
 def do(part: str, task: Task, digest: str) -> dict[str, Any]:
     """Return one finished line: the answer of `part` on a case, its truth, the time it took.
 
@@ -54,6 +59,10 @@ def _answer(part: str, case: Any) -> dict[str, Any]:
         return peers.ask(case)
     from . import inseparable, subject
 
+    if case.task.kind == "structure":
+        from . import building
+
+        return building.ask(case)
     answer, found = subject.ask(case)
     return answer | inseparable.follow_up(case, answer, found.experiment)
 

@@ -1,0 +1,142 @@
+"""The package under test on a building: asked with its building file and the recorded channels."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bristle.diagnose.search import refine
+from bristle.diagnose.sites import try_effect
+from bristle.diagnose.structure import StructureDiagnosis, diagnose_structure
+from bristle.identify.fit import Model, identify
+from bristle.identify.line import fit_line
+from bristle.identify.structure import LinearLayer, LinearStorey, StructureProblem
+from bristle.identify.structure import structure_problems as problems
+from bristle.physics.building import Building, from_data
+from bristle.physics.effect import EFFECTS
+from bristle.records.measurement import Measurement
+
+from . import cases, inseparable
+from .cases import Recorded
+from .subject import KEPT, measurements
+
+Array = NDArray[np.float64]
+Pair = tuple[StructureProblem, StructureProblem]
+
+
+def file_of(case: Recorded) -> Building:
+    """Return the building as its file tells it: the drawing's masses, stiffnesses and damping."""
+    told = case.truth["building"]
+    return from_data(
+        {
+            "schema": 1, "name": case.task.rig, "base": "isolated",
+            "masses": told["masses"], "stiffnesses": told["stiffnesses"],
+            "rayleigh": {"ratio": told["ratio"], "modes": told["modes"]},
+        }
+    )  # fmt: skip
+
+
+def ask(case: Recorded) -> dict[str, Any]:
+    """Return what the diagnoser says of a building's case, and whether its class can be parted."""
+    train = measurements(case.part("train"), case.channels)
+    holdout = measurements(case.part("holdout"), case.channels)
+    building = file_of(case)
+    begun, spent = time.perf_counter(), time.process_time()
+    found = diagnose_structure(train, holdout, building, law=case.task.law)
+    answer = packed(found) | {
+        "seconds": time.perf_counter() - begun, "cpu": time.process_time() - spent,
+    }  # fmt: skip
+    return answer | follow_up(case, answer, found)
+
+
+def packed(found: StructureDiagnosis) -> dict[str, Any]:
+    """Return what scoring needs of a diagnosis, as plain data."""
+    said = found.as_dict()
+    return {
+        "kind": said["kind"],
+        "effects": list(said["effects"]),
+        "ranking": said["ranking"][:KEPT],
+        "coordinate": said.get("coordinate", ""),
+        "sensors": said["sensors"],
+        "untestable": said["untestable"],
+        "detectable": said.get("detectable"),
+        "sites": said["sites"],
+        "force": said["force"],
+        "words": said["words"],
+        "z_before": said["z_holdout_before"],
+        "z_after": said["z_holdout_after"],
+    }
+
+
+def follow_up(case: Recorded, answer: dict[str, Any], found: StructureDiagnosis) -> dict[str, Any]:
+    """Return how well noise-free runs part the rivals of a class from the hidden effect."""
+    hidden = [one["effect"] for one in case.truth["effects"]]
+    if answer["kind"] != "class" or len(hidden) != 1 or hidden[0] not in answer["effects"]:
+        return {}
+    rivals = [name for name in answer["effects"] if name != hidden[0]]
+    site = _site(hidden[0], rivals, found)
+    return {"resolved": resolve(case, hidden[0], rivals, site) if rivals and site else {}}
+
+
+def _site(true: str, rivals: list[str], found: StructureDiagnosis) -> str:
+    """Return the site at which all of a class can act, "" where they act at different ones."""
+    for site in found.problems:
+        if all(_acts(name, site, found.reconstructed) for name in (true, *rivals)):
+            return site
+    return ""
+
+
+def _acts(name: str, site: str, reconstructed: bool) -> bool:
+    effect = EFFECTS[name]
+    if effect.site != "structure":
+        return site == "damper"
+    if site.startswith("storey"):
+        return "spring" in effect.hooks()
+    return "force" in effect.hooks() and site == ("damper" if reconstructed else "layer")
+
+
+def resolve(case: Recorded, true: str, rivals: list[str], site: str) -> dict[str, float]:
+    """Return for each rival by how many standard deviations the data prefer the hidden effect.
+
+    As `inseparable.resolve`, at one site: the noise-free runs are weighed with the noise of the
+    recorded ones.
+    """
+    made = cases.make(case.task)
+    parts = [
+        [with_noise(m, made.spread) for m in measurements(made.clean(role), case.channels)]
+        for role in ("train", "holdout")
+    ]
+    train, held = problems(parts[0], parts[1], file_of(case), case.task.law)[site]
+    fits = {name: fitted(name, case.task.law, site, (train, held)) for name in (true, *rivals)}
+    expected = held.expectation(fits[true])
+    left = {
+        name: [(r.force - held.predict(one, r))[r.skip :] for r in held.runs]
+        for name, one in fits.items()
+    }
+    noise = [e[1][r.skip :] for e, r in zip(expected, held.runs, strict=True)]
+    draws = [e[2][:, r.skip :] for e, r in zip(expected, held.runs, strict=True)]
+    own = [run.noise for run in held.runs]
+    return {
+        name: inseparable.resolution(left[true], left[name], noise, draws, own) for name in rivals
+    }
+
+
+def with_noise(measurement: Measurement, spread: dict[str, float]) -> Measurement:
+    """Return a noise-free measurement that is smoothed and weighed as the recorded one."""
+    return replace(measurement, noise={name: float(value) for name, value in spread.items()})
+
+
+def fitted(name: str, law: str, site: str, pair: Pair) -> Model:
+    """Return a site's model with one effect, fitted to its training runs."""
+    train, held = pair
+    if site == "damper":
+        base = identify(train, law, starts=2).model
+        if EFFECTS[name].site != "structure":
+            return inseparable.best_of(name, base, train)
+        return refine(try_effect(name, base, train, held).model, train)
+    line = LinearLayer.name if site == "layer" else LinearStorey.name
+    return try_effect(name, fit_line(train, line).model, train, held).model
