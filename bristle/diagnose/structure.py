@@ -22,12 +22,12 @@ from ..physics.building import Building
 from ..physics.effect import EFFECTS, effects_of
 from ..records.measurement import Measurement
 from .candidates import SECONDS, Trial, judge, try_all, try_members
-from .decision import Decision, decide
+from .decision import GAIN, Decision, decide, excess
 from .experiments import Experiment
 from .load_cell import load_cell
 from .search import refine
-from .sensors import SensorFault, sensor_faults
-from .sites import Finding, coordinate_of, look_at, try_effect
+from .sensors import SensorFault, mended, sensor_faults
+from .sites import CLEAN, NEARLY, Finding, better, coordinate_of, look_at, try_effect
 
 LOOKALIKE = {
     "gas_spring": ("duffing",),
@@ -46,6 +46,20 @@ WHY = {
 
 NAMES = {"base_mass": "a mass of the base that the file does not know", "f_c": "f_c of the damper"}
 """Rivals that are no effects, as words name them."""
+
+INSTRUMENT = ("lag", "high-pass")
+"""Faults of a velocity that are an instrument's own, which the library knows as an effect."""
+
+BLURRED = (*INSTRUMENT, "delay")
+"""Faults for which a building's velocity is left out: displacement and accelerometer say the same
+without them, and what is left of a delay would be held against the law at each reversal."""
+
+QUIET = 1.0 + 0.5 * GAIN
+"""z of the damper's law up to which no effect can lower it by `GAIN`: noise is all there is."""
+
+BLIND = 1.25
+"""z that a true Bingham law may read where the base's velocity had to be left out: its jumps come
+when the velocity changes sign, which then is told by displacement and accelerometer alone."""
 
 _NOTHING = Finding("", "none", (), 1.0, 1.0, 0.0, 0.0)
 
@@ -183,6 +197,9 @@ def diagnose_structure(
     say = say or (lambda text: None)
     present = present or Model(law)
     law = present.law
+    say("looking for sensor faults")
+    sensors = tuple(sensor_faults([_as_bench(one, building) for one in (*train, *holdout)]))
+    train, holdout = (_mended(runs, sensors, building) for runs in (train, holdout))
     say("smoothing the motion of each level")
     found, present = on_time(responses([*train, *holdout], building), present)
     ours, theirs = found[: len(train)], found[len(train) :]
@@ -207,7 +224,8 @@ def diagnose_structure(
         say("damper: its law, then effects")
         base = fit_damper(problems["damper"][0], at_site(present, "damper", problems))
         verdict = damper_verdict(base, *problems["damper"])
-    sensors = tuple(sensor_faults([_as_bench(one, building) for one in train]))
+        if _blurred(sensors):
+            verdict = _forgiven(verdict)
     return combine(findings, base, verdict, problems, sensors)
 
 
@@ -248,9 +266,53 @@ def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem)
     def reduce(pair: Trial) -> list[Trial]:
         return try_members(pair, before.model, train, held_out)
 
+    if max(before.z, before.train) <= QUIET:
+        return DamperVerdict(decide(before, [], grow), before, ())
     trials = grow(before)
     decision = decide(before, trials, grow, reduce=reduce)
+    if decision.kind in ("none", "unknown"):
+        decision = _seldom(before, trials) or decision
     return DamperVerdict(decision, before, tuple(trials))
+
+
+def _forgiven(verdict: DamperVerdict) -> DamperVerdict:
+    """Return a verdict that does not call unknown what a velocity that was left out explains."""
+    made, before = verdict.decision, verdict.before
+    gains = any(1.0 - trial.z / before.z >= GAIN for trial in verdict.trials)
+    if made.kind != "unknown" or gains or max(before.z, before.train) > BLIND:
+        return verdict
+    reason = (
+        f"Without its velocity the base's reversals are uncertain: z = {before.z:.2f} is no more "
+        "than that."
+    )
+    return replace(verdict, decision=replace(made, kind="none", reasons=(reason,)))
+
+
+def _blurred(faults: tuple[SensorFault, ...]) -> bool:
+    return any(f.channel == "velocity" and f.fault in BLURRED for f in faults)
+
+
+def _seldom(before: Trial, trials: list[Trial]) -> Decision | None:
+    """Return the decision for an effect of the layer that acts in a few samples only, if any.
+
+    A stop that is met once or twice is seen in no resampling of blocks; its likelihood tells, where
+    the model with it is adequate.
+    """
+    best = trials[0]
+    name = best.effects[-1]
+    if EFFECTS[name].site != "structure" or best.z > CLEAN:
+        return None
+    if 1.0 - best.z / before.z < GAIN or not better(before, best):
+        return None
+    rivals = [
+        other.effects[-1]
+        for other in trials[1:]
+        if other.z / best.z - 1.0 < NEARLY or not better(other, best)
+    ]
+    explained = 1.0 - excess(best) / excess(before)
+    reason = f"With {name} the error on runs not seen falls from {before.z:.2f} to {best.z:.2f}."
+    kind = "class" if rivals else "effect"
+    return Decision(kind, (name, *rivals)[:3], best, explained, (reason,))
 
 
 def combine(
@@ -282,6 +344,9 @@ def combine(
         known = [one for one in (*effects, *twins) if one in EFFECTS]
         (named if sure else rivals).extend(known if kind != "unknown" else [])
         sites.update({effect: sites.get(effect, _site_of(effect, site)) for effect in effects})
+    if any(fault.fault in INSTRUMENT for fault in sensors):
+        named.append("velocity_sensor")
+        sites["velocity_sensor"] = "sensor"
     effects = tuple(dict.fromkeys([*named, *rivals]))
     unknown = [part for part in parts if part[1] == "unknown"]
     kind = "unknown" if unknown else "class" if rivals else "effect" if named else "none"
@@ -353,6 +418,25 @@ def words(
         reason = WHY.get(twin, "both add up to one force")
         told.append(f"Without a measured force {reason}: a load cell at the damper would tell.")
     return " ".join(told)
+
+
+def _mended(
+    runs: list[Measurement], faults: tuple[SensorFault, ...], building: Building
+) -> list[Measurement]:
+    """Return measurements without the faults of the damper's channels.
+
+    Of velocities that are late or rounded the displacement says the same.
+    """
+    first = building.levels()[0]
+    names = {"displacement": f"{first}_displacement", "velocity": f"{first}_velocity"}
+    theirs = [replace(f, channel=names.get(f.channel, f.channel)) for f in faults]
+    late = names["velocity"]
+    out = mended(runs, [f for f in theirs if not (f.channel == late and f.fault in BLURRED)])
+    if not _blurred(faults):
+        return out
+    return [
+        replace(one, channels={n: v for n, v in one.channels.items() if n != late}) for one in out
+    ]
 
 
 def _as_bench(measurement: Measurement, building: Building) -> Measurement:

@@ -6,10 +6,21 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
+from bristle.diagnose import structure
+from bristle.diagnose.candidates import Trial
+from bristle.diagnose.decision import Decision
+from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.load_cell import load_cell
 from bristle.diagnose.sites import Finding, look_at
-from bristle.diagnose.structure import diagnose_structure, lookalikes
+from bristle.diagnose.structure import (
+    QUIET,
+    DamperVerdict,
+    combine,
+    diagnose_structure,
+    lookalikes,
+)
 from bristle.errors import RecordError
+from bristle.identify.fit import Model
 from bristle.identify.response import responses
 from bristle.identify.structure import problems_of
 
@@ -118,7 +129,8 @@ def test_bare_building_diagnosed_from_start_to_end():
     assert found.sites == {"duffing": "layer"}
     assert not found.reconstructed
     assert "duffing (layer)" in found.words
-    assert said[0].startswith("smoothing")
+    assert said[0].startswith("looking for sensor faults")
+    assert said[1].startswith("smoothing")
     answer = found.as_dict()
     assert answer["ranking"][0]["effect"] == "duffing"
     assert answer["z_holdout_after"] == pytest.approx(1.0, abs=0.1)
@@ -134,8 +146,6 @@ def test_what_a_reconstructed_force_cannot_tell_is_named():
 
 
 def test_findings_of_sites_become_one_verdict():
-    from bristle.diagnose.structure import combine
-
     def at(site, kind, *effects):
         return Finding(site, kind, effects, 3.0, 1.0, 1.0, 0.01, coordinate="velocity")
 
@@ -156,3 +166,87 @@ def test_missing_channels_are_named():
     bad = measured(clean, 0, without=("ground_acceleration", "base_displacement", "base_velocity"))
     with pytest.raises(RecordError, match="ground_acceleration, base_displacement missing"):
         diagnose_structure([bad], runs, b)
+
+
+def test_late_velocity_of_the_base_is_a_sensor_fault_and_not_physics():
+    b = building(2, True, 6)
+    runs = []
+    for i in range(3):
+        clean = shake(b, 20 + i)
+        late = 4
+        clean["base_velocity"] = np.concatenate([np.zeros(late), clean["base_velocity"][:-late]])
+        runs.append(measured(clean, i))
+    found = diagnose_structure(runs[:2], runs[2:], b)
+    (fault,) = found.sensors
+    assert (fault.channel, fault.fault) == ("velocity", "delay")
+    assert fault.value == pytest.approx(4 * 0.002, rel=0.05)
+    assert (found.kind, found.effects) == ("none", ())
+    assert found.z_before == pytest.approx(1.0, abs=0.1)
+
+
+def test_lag_of_a_velocity_is_its_instrument():
+    lag = SensorFault("velocity", "lag", 0.004, 1e-4, "Velocity lags.")
+    found = combine({"layer": structure._NOTHING}, None, None, {}, (lag,))
+    assert (found.kind, found.effects) == ("effect", ("velocity_sensor",))
+    assert found.sites == {"velocity_sensor": "sensor"}
+    assert "velocity_sensor (sensor)" in found.words
+
+
+def trial(effects=(), z=1.0, train=1.0, losses=None):
+    lost = np.full(4000, 0.5 * z * z) if losses is None else losses
+    return Trial(Model("lugre", effects), train, z, 1.0, lost, np.sqrt(2.0 * lost))
+
+
+class Seen:
+    """What `_decided` asks of a problem."""
+
+    reconstructed = False
+
+
+@pytest.mark.parametrize(
+    ("z", "train", "searched"), [(1.0, 1.0, 0), (1.04, 1.0, 1), (1.0, 1.04, 1)]
+)
+def test_effects_of_the_damper_are_searched_only_where_one_could_matter(
+    monkeypatch, z, train, searched
+):
+    asked = []
+
+    def search(*given):
+        asked.append(given)
+        return [trial(("gas_spring",), z)]
+
+    monkeypatch.setattr(structure, "try_all", search)
+    found = structure._decided(trial((), z, train), Seen(), Seen())
+    assert len(asked) == searched
+    assert found.decision.kind == "none"
+    assert QUIET < 1.02, "above that an effect could lower z by its smallest share to that of noise"
+
+
+def test_a_stop_that_is_met_once_is_told_by_its_likelihood():
+    quiet = np.full(40000, 0.45)
+    hit = quiet.copy()
+    hit[5000:5040] = 60.0  # one contact in one held-out run
+    before = trial((), 1.3, losses=hit)
+    stop = trial(("end_stop",), 0.99, losses=quiet)
+    spring = trial(("duffing",), 1.29, losses=hit * 0.999)
+    decision = structure._seldom(before, [stop, spring])
+    assert decision is not None
+    assert (decision.kind, decision.effects) == ("effect", ("end_stop",))
+    assert decision.explained > 0.95
+    close = trial(("duffing",), 0.991, losses=quiet * 1.0001)
+    assert structure._seldom(before, [stop, close]).effects == ("end_stop", "duffing")
+    assert structure._seldom(before, [trial(("gas_spring",), 0.99, losses=quiet)]) is None
+    poor = trial(("end_stop",), 1.25, losses=hit * 0.99)
+    assert structure._seldom(before, [poor]) is None
+
+
+def test_only_reversals_that_no_velocity_shows_are_forgiven():
+    def judged(z, gain):
+        before = trial((), z)
+        unknown = Decision("unknown", (), before, 0.0, ("z.",))
+        verdict = DamperVerdict(unknown, before, (trial(("stribeck",), z * (1.0 - gain)),))
+        return structure._forgiven(verdict).decision.kind
+
+    assert judged(1.19, 0.001) == "none"
+    assert judged(1.19, 0.1) == "unknown", "an effect explains it in part"
+    assert judged(1.6, 0.001) == "unknown", "more than reversals account for"
