@@ -54,9 +54,9 @@ class StructureFit:
     """A building as identified.
 
     `stiffnesses` (n,) N/m below each level, `damping_ratios` (n,) [1] of each mode, `frequencies`
-    (n,) Hz, each with its standard deviation in `std_...`; `z` (n,) by level: RMS of what
-    equilibrium leaves over the noise expected, `share` (n,) the same over the shear there; not a
-    number where the damper's force is unknown.
+    (n,) Hz, each with its standard deviation in `std_...`, infinite where the data cannot tell.
+    `z` (n,) by level: RMS of what equilibrium leaves over the noise expected, `share` (n,) the same
+    over the shear there; not a number where the damper's force is unknown.
     `building` carries the values; those in `unidentified` keep what was given.
     """
 
@@ -325,7 +325,7 @@ def _finish(
     for i in range(n):
         if std_k[i] > LOST * stiffness[i]:
             lost.append(f"stiffness below {levels[i]}")
-            stiffness[i] = given[i]
+            stiffness[i], std_k[i] = given[i], np.inf
     before = _ratios(building)
     for r in range(n):
         if not told[r]:
@@ -343,10 +343,10 @@ def _finish(
     modes = _modes(building, stiffness)
     # d(omega^2)/dk_i = (shape_i - shape_{i-1})^2 (Nelson 1976, AIAA J. 14(9)).
     part = np.diff(modes.shapes, axis=0, prepend=np.zeros((1, n))) ** 2
-    known = np.where(np.isfinite(std_k), std_k, 0.0)
+    known = np.isfinite(std_k)
     cov = np.zeros((n, n))
     cov[first:, first:] = covariance[:m, :m]
-    cov[np.ix_(known == 0.0, known == 0.0)] = 0.0
+    cov *= np.outer(known, known)
     slope = part.T / (2.0 * modes.omega[:, None])
     std_omega = np.sqrt(np.maximum(np.einsum("ri,ij,rj->r", slope, cov, slope), 0.0))
     weighted = np.array(building.M) @ modes.shapes
