@@ -8,13 +8,14 @@ zero of displacement) changes no force that the model predicts: refitting absorb
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from ..records.derived import LATE, derived_velocity
 from ..records.measurement import Measurement
 
 Array = NDArray[np.float64]
@@ -40,8 +41,9 @@ class SensorFault:
     """A fault of one channel.
 
     `fault` is "gain" [1], "sign" (-1), "delay" [s], "bias" or "clipping" [the channel's unit], or
-    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; `std` the
-    uncertainty of `value`; `words` a sentence.
+    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; "derived" [s,
+    how late] is a velocity that was computed from the displacement. `std` is the uncertainty of
+    `value`; `words` a sentence.
     """
 
     channel: str
@@ -63,9 +65,29 @@ def sensor_faults(runs: Sequence[Measurement]) -> list[SensorFault]:
     found = clipped(runs)
     cut = {fault.channel for fault in found}
     pairs = [run for run in runs if run.has("displacement", "velocity")]
+    computed = {run.name: how for run in pairs if (how := derived_velocity(run))}
+    found += _computed(pairs, computed)
+    pairs = [run for run in pairs if run.name not in computed]
     if pairs and not cut & {"displacement", "velocity"}:
         found += kinematic(pairs)
     return found + signs(runs, found)
+
+
+def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[SensorFault]:
+    """Return a velocity that was computed from the displacement, where that made it late."""
+    late = [run for run in runs if LATE[how.get(run.name, "central")]]
+    if not late:
+        return []
+    first = late[0]
+    value = LATE[how[first.name]] * first.step
+    return [
+        SensorFault(
+            "velocity", "derived", value, 0.0,
+            f"Velocity is the {how[first.name]} difference of displacement, half a sample "
+            f"({1e3 * abs(value):.3g} ms) {'late' if value > 0.0 else 'early'}: it was computed, "
+            "not measured, and is left out.",
+        )
+    ]  # fmt: skip
 
 
 def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
@@ -276,7 +298,7 @@ def _mended(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
             channels[fault.channel] = values - fault.value
         elif fault.fault == "delay":
             channels[fault.channel] = earlier(values, fault.value / run.step)
-        elif fault.fault in ("lag", "high-pass"):
+        elif fault.fault in ("lag", "high-pass", "derived"):
             del channels[fault.channel]  # displacement says the same, without it
         elif fault.fault == "clipping":
             measured = measured & (np.abs(values) < fault.value * (1.0 - 1e-9))

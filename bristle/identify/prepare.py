@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
+from ..records.derived import derived_velocity
 from ..records.measurement import Measurement
 from .drive import smooth_drive, smooth_steps
 from .fit import Run
@@ -25,7 +26,8 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     Parameters
     ----------
     measurement : Measurement
-        With the force, and displacement or velocity or both. Voltage may be missing (taken as 0),
+        With the force, and displacement or velocity or both; a velocity that was computed from the
+        displacement is left out. Voltage may be missing (taken as 0),
         or stand in as current; both are smoothed, steps kept.
     draws : int
         How many draws of the motion's and the voltage's error to keep.
@@ -40,6 +42,8 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     n, dt = len(measurement.time), measurement.step
     noise = (measurement.noise.get("displacement", 0.0), measurement.noise.get("velocity", 0.0))
     x, v = _seen(measurement, "displacement"), _seen(measurement, "velocity")
+    if derived_velocity(measurement):
+        v = None  # it holds nothing that the displacement does not, and may be half a sample late
     have = (x is not None, v is not None)
     motion = smooth(x, v, dt, noise)
     error = np.zeros((draws, n, 4))
