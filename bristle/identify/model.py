@@ -28,6 +28,12 @@ _AROUND = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
 
 _STEADY = 1e-2  # of its level: what a voltage varies by without telling anything
 
+BENT = "bristle_deflection_0"
+"""The start value of the LuGre law's state, by its name among a model's values."""
+
+RESTS = 2e-3
+"""Share of a run's stroke that a damper at rest moves by at most: noise."""
+
 LOST = 1e4
 """Noise of a sample that was not measured, in noises of the force: it has no say."""
 
@@ -150,8 +156,29 @@ class Problem:
             e = run.draws[draw]
             x, v, a, V = x + e[:, 0], v + e[:, 1], a + e[:, 2], V + e[:, 3]
         v, a = true_motion(model.effects, model.values, v, a, run.dt)
-        force = self.bench(model).force(x, v, a, V, run.dt, model.values)
+        bent = self._bent(model, run)
+        values = {**model.values, BENT: bent} if bent else model.values
+        force = self.bench(model).force(x, v, a, V, run.dt, values)
         return shown_force(model.effects, model.values, force, run.dt)
+
+    def _bent(self, model: Model, run: Run) -> float:
+        """Return the bristles' deflection [m] with which a run begins that was cut out at rest.
+
+        Held still, bent bristles keep their force until the motion begins: taken as straight, the
+        model would miss all of it. The samples that are skipped anyway say how far they are bent.
+        """
+        if model.law != "lugre" or BENT in model.values or not rests(run):
+            return 0.0
+        part = slice(0, run.skip)
+        straight = self.bench(model).force(
+            run.x[part], run.v[part], run.a[part], run.V[part], run.dt, model.values
+        )
+        left = float(np.mean(run.force[part] - straight))
+        if abs(left) < 3.0 * run.noise:
+            return 0.0
+        stiffness = model.value("sigma_a") + model.value("sigma_0") * float(run.V[0])
+        most = 1.0 / model.value("a_0")
+        return float(np.clip(left / max(stiffness, 1e-12), -most, most))
 
     def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:
         """Return per run: bias (n,) [N] of the prediction, noise (n,) [N], draws (d, n) [N].
@@ -177,6 +204,13 @@ class Problem:
         if run.measured is not None:
             noise = np.where(run.measured, noise, LOST * noise)
         return bias, noise, spread - bias
+
+
+def rests(run: Run) -> bool:
+    """Return whether a run stands still in the samples at its begin that are skipped."""
+    if run.skip < 2 or len(run.x) <= run.skip:
+        return False
+    return float(np.ptp(run.x[: run.skip])) < RESTS * float(np.ptp(run.x))
 
 
 def sizes(runs: list[Run]) -> dict[str, float]:
