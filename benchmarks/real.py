@@ -114,8 +114,8 @@ def bench_row(
     row.reference = told(after)
     if row.after > BEYOND:
         row.worth = (
-            f"Nothing by itself: {row.after:.0%} of the force stays unexplained, so that the law is "
-            f"not this rig's and what is named beside it means little. {row.worth}"
+            f"Nothing by itself: {row.after:.0%} of the force stays unexplained, so that the law "
+            f"is not this rig's and what is named beside it means little. {row.worth}"
         )
 
 

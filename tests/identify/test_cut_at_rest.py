@@ -67,3 +67,11 @@ def test_the_deflection_is_no_larger_than_sliding_has_it():
     predicted = Problem([offset]).predict(Model("lugre", (), dict(VALUES)), offset)
     slides = (VALUES["sigma_a"] + 2.0 * VALUES["sigma_0"]) / VALUES["a_0"]
     assert predicted[0] == pytest.approx(slides, rel=1e-6)
+
+
+def test_bristles_that_never_slip_are_no_offset_of_each_run():
+    run = stop_and_go(750)
+    offset = Run("offset", DT, run.x, run.v, run.a, run.V, run.force + 1000.0, NOISE, run.draws)
+    stiff = {**VALUES, "a_0": 1.0 / float(np.ptp(run.x))}
+    problem = Problem([offset])
+    assert problem.predict(Model("lugre", (), stiff), offset)[0] == pytest.approx(0.0, abs=1.0)
