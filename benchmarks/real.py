@@ -196,9 +196,9 @@ def velocity_force(folder: Path, law: str) -> Row:
     row.worth = (
         "One run at one unknown current, in two parts: nothing can be said of the voltage. The "
         "noise of the velocity cannot be told from the velocity itself, so z has no firm unit here "
-        "and the share decides. Beside a Bingham law mount_compliance, presliding and backlash leave "
-        "nearly the same: "
-        "that the force lags behind a sign law is certain, which of them does it is not."
+        "and the share decides. Beside a Bingham law mount_compliance, presliding and backlash "
+        "leave nearly the same: that the force lags behind a sign law is certain, which of them "
+        "does it is not."
     )
     viscous, best_tanh = (fit_of(run, tanh) for tanh in (False, True))
 
