@@ -375,6 +375,11 @@ def markdown(found: Sequence[Row]) -> str:
                 f"as estimated: {row.noise}."
             )
         lines += ["", f"- **Said**: {row.words}", f"- **Reference**: {row.reference}."]
+        if row.after > row.before:
+            lines.append(
+                "- **Doubt**: z falls and the plain error rises: what is named fits the many quiet "
+                "samples and misses the others. Not to be believed."
+            )
         lines.append(f"- **Worth**: {row.worth}")
     return "\n".join([*lines, ""])
 
