@@ -32,11 +32,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dry-run", action="store_true", help="show what would be found; leave the study as it is"
     )
+    parser.add_argument(
+        "--structure",
+        action="store_true",
+        help="of a building's study: the building alone, its stiffnesses, frequencies and damping "
+        "ratios from its response, as a building file",
+    )
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Identify, write the step and the picture, print the tables."""
+    if arguments.structure:
+        from . import _building
+
+        return _building.main(arguments)
     from ..progress import Progress
     from ..study.identification import STAGES, identify_study
     from ..study.identify_picture import identify_png

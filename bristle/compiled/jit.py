@@ -71,6 +71,8 @@ def digest(function: Callable[..., Any]) -> str:
     for text in (numba.__version__, np.__version__, sys.version):
         content.update(text.encode())
     for reached in _reached(function, set()):
+        # numba's files name the modules of their functions and cannot be read without them.
+        content.update(reached.__module__.encode())
         for part in _parts(reached.__code__):
             content.update(part)
         for name in sorted(_names(reached.__code__)):

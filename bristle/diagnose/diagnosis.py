@@ -15,7 +15,7 @@ from ..identify.fit import Model, Problem, fit, identify
 from ..identify.prepare import prepare
 from ..records.measurement import Measurement
 from .candidates import SECONDS, Trial, judge, try_all, try_members
-from .decision import decide
+from .decision import decide, missing
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
 from .search import refine
@@ -219,7 +219,13 @@ def _judged(
     say("intervals")
     fitted = fit(problem, decision.best.model, max_evaluations=4)
     told = {name: s for name, s in fitted.std.items() if name not in fitted.unidentified}
-    coordinate = _coordinate(rest, before, held_out) if kind == "unknown" else ""
+    coordinate = ""
+    if kind == "unknown":
+        # What an effect can mimic hides what no effect can.
+        nearest = min(trials, key=lambda trial: trial.z, default=before)
+        left = nearest if missing(before, nearest) else before
+        rest = where(left, held_out)
+        coordinate = _coordinate(rest, left, held_out)
     if coordinate:
         words.append(f"What is unexplained is organised by {coordinate.replace('_', ' ')}.")
     return Diagnosis(
@@ -253,11 +259,12 @@ def where(trial: Trial, held_out: Problem) -> list[Place]:
 
 def _coordinate(rest: Sequence[Place], trial: Trial, held_out: Problem) -> str:
     """Return the coordinate of a residual: "frequency" where it rings and nothing else tells."""
-    if rest and rest[0].significant and rest[0].share > CLEAR:
-        return rest[0].coordinate
+    telling = [place for place in rest if place.significant] or list(rest)
+    if telling and telling[0].significant and telling[0].share > CLEAR:
+        return telling[0].coordinate
     if ringing(trial, held_out) > RINGS:
         return "frequency"
-    return rest[0].coordinate if rest else ""
+    return telling[0].coordinate if telling else ""
 
 
 def ringing(trial: Trial, held_out: Problem) -> float:

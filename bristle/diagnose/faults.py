@@ -21,10 +21,10 @@ class SensorFault:
     """A fault of one channel.
 
     `fault` is "gain" [1], "sign" (-1), "delay" [s], "bias" or "clipping" [the channel's unit], or
-    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner], or
-    "unrelated" (0) for a velocity of another motion; `std` the
-    uncertainty of `value`; `words` a sentence; `either` the channel that may have it instead, as
-    far as the data tell.
+    what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; "derived" [s,
+    how late] is a velocity that was computed from the displacement, "unrelated" (0) one of another
+    motion. `std` is the uncertainty of `value`; `words` a sentence; `either` the channel that may
+    have it instead, as far as the data tell.
     """
 
     channel: str
@@ -67,7 +67,7 @@ def _mended(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
             channels[fault.channel] = values - fault.value
         elif fault.fault == "delay":
             channels[fault.channel] = earlier(values, fault.value / run.step)
-        elif fault.fault in ("lag", "high-pass"):
+        elif fault.fault in ("lag", "high-pass", "derived"):
             del channels[fault.channel]  # displacement says the same, without it
         elif fault.fault == "clipping":
             near = 1e-9 * float(np.max(np.abs(values)))

@@ -8,12 +8,13 @@ zero of displacement) changes no force that the model predicts: refitting absorb
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from ..records.derived import LATE, derived_velocity
 from ..records.measurement import Measurement
 from .clipping import clipped
 from .faults import SensorFault, earlier, mended
@@ -49,9 +50,29 @@ def sensor_faults(runs: Sequence[Measurement]) -> list[SensorFault]:
     found = clipped(runs)
     cut = {fault.channel for fault in found}
     pairs = [run for run in runs if run.has("displacement", "velocity")]
+    computed = {run.name: how for run in pairs if (how := derived_velocity(run))}
+    found += _computed(pairs, computed)
+    pairs = [run for run in pairs if run.name not in computed]
     if pairs and not cut & {"displacement", "velocity"}:
         found += kinematic(pairs)
     return found + signs(runs, found)
+
+
+def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[SensorFault]:
+    """Return a velocity that was computed from the displacement, where that made it late."""
+    late = [run for run in runs if LATE[how.get(run.name, "central")]]
+    if not late:
+        return []
+    first = late[0]
+    value = LATE[how[first.name]] * first.step
+    return [
+        SensorFault(
+            "velocity", "derived", value, 0.0,
+            f"Velocity is the {how[first.name]} difference of displacement, half a sample "
+            f"({1e3 * abs(value):.3g} ms) {'late' if value > 0.0 else 'early'}: it was computed, "
+            "not measured, and is left out.",
+        )
+    ]  # fmt: skip
 
 
 def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:

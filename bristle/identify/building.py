@@ -21,6 +21,7 @@ from ..errors import RecordError
 from ..physics.building import Building
 from ..records.measurement import Measurement
 from .response import Response, responses
+from .search import z_scale
 from .simulated import simulated, stiffness_matrix
 
 Array = NDArray[np.float64]
@@ -35,6 +36,13 @@ thousandth off the drifts at the highest mode, as much as their standard deviati
 BLOCK = 0.5
 """Length [s] of the blocks whose sums are taken as independent, longer than a smoother's memory."""
 
+BLOCKS = 20
+"""Blocks that a run has at least: they are as long as the slowest period, where it is longer, for
+what a linear building leaves of a rig that is not linear is correlated over that."""
+
+MISFIT = 1.5
+"""z above which what equilibrium leaves is not noise, and the answer says so."""
+
 LOST = 0.5
 """Relative standard deviation above which a parameter is not told by the data."""
 
@@ -46,8 +54,9 @@ class StructureFit:
     """A building as identified.
 
     `stiffnesses` (n,) N/m below each level, `damping_ratios` (n,) [1] of each mode, `frequencies`
-    (n,) Hz, each with its standard deviation in `std_...`; `z` (n,) by level: RMS of what
-    equilibrium leaves over the noise expected; not a number where the damper's force is unknown.
+    (n,) Hz, each with its standard deviation in `std_...`, infinite where the data cannot tell.
+    `z` (n,) by level: RMS of what equilibrium leaves over the noise expected, `share` (n,) the same
+    over the shear there; not a number where the damper's force is unknown.
     `building` carries the values; those in `unidentified` keep what was given.
     """
 
@@ -59,8 +68,16 @@ class StructureFit:
     frequencies: Array
     std_frequencies: Array
     z: Array
+    share: Array
     unidentified: tuple[str, ...]
     notes: tuple[str, ...] = ()
+
+
+class Equilibrium(NamedTuple):
+    """What equilibrium leaves by level (n,): robustly in units of the noise, RMS over the shear."""
+
+    z: Array
+    share: Array
 
 
 class Modes(NamedTuple):
@@ -89,31 +106,71 @@ def identify_structure(
         comes out negative.
     """
     runs = responses(measurements, building, draws=0, looser=LOOSER)
-    if damper is None:
-        damper = any(run.driven or run.force is not None for run in runs)
-    unknown = damper and not all(run.force is not None for run in runs)
-    first = 1 if unknown else 0
+    first = _first(runs, damper)
     if first == building.size:
         raise RecordError(
             f"{measurements[0].name}: force was not measured, and {building.name!r} has no storey "
             "above the damper. Measure the damper's force."
         )
-    stiffness, zeta = np.array(building.stiffnesses), _ratios(building)
-    system, sums = None, None
+    free = np.ones(building.size, dtype=np.bool_)
+    while True:
+        ended = _rounds(runs, building, first, free)
+        lost = _untold(ended, free)
+        if not ended.positive and not lost.any() and ended.round > 0:
+            lost[np.flatnonzero(free)[-1:]] = True  # the highest mode's ratio tells least
+        if not lost.any():
+            break
+        free &= ~lost
+    if not ended.positive:
+        i = int(np.argmin(ended.stiffness))
+        raise RecordError(
+            f"{measurements[0].name}: the stiffness below {building.levels()[i]} comes out as "
+            f"{ended.stiffness[i]:.4g} N/m. Check signs and units of its displacement and "
+            "acceleration, and the masses of the building."
+        )
+    return _finish(runs, building, ended, first, free)
+
+
+class _Ended(NamedTuple):
+    """Where the rounds ended: `positive` False where a stiffness came out negative in `round`.
+
+    `std_zeta` (n,) is zero for ratios that were held.
+    """
+
+    stiffness: Array
+    zeta: Array
+    covariance: Array
+    std_zeta: Array
+    system: _System
+    positive: bool
+    round: int
+
+
+def _rounds(
+    runs: list[Response], building: Building, first: int, free: NDArray[np.bool_]
+) -> _Ended:
+    """Return the stiffnesses and the ratios of the modes in `free`; the others stay as given."""
+    stiffness, given = np.array(building.stiffnesses), _ratios(building)
+    zeta = given
     for round_ in range(1 + ROUNDS):
         sums = _sums(runs, building, stiffness, zeta, first, plain=round_ == 0)
         system = _System(building, runs, stiffness, first)
-        theta, covariance = system.solve(sums)
+        theta, covariance = system.solve(sums, given, free)
         stiffness, zeta = system.split(theta, stiffness)
-        if np.any(stiffness <= 0.0):
-            i = int(np.argmin(stiffness))
-            raise RecordError(
-                f"{measurements[0].name}: the stiffness below {building.levels()[i]} comes out as "
-                f"{stiffness[i]:.4g} N/m. Check signs and units of its displacement and "
-                "acceleration, and the masses of the building."
-            )
-    assert system is not None
-    return _finish(runs, building, stiffness, zeta, covariance, first, system)
+        positive = bool(np.all(stiffness > 0.0))
+        if not positive:
+            break
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))[system.rows : system.rows + system.n]
+    return _Ended(stiffness, zeta, covariance, std, system, positive, round_)
+
+
+def _untold(ended: _Ended, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which of the free ratios the data do not tell, (n,).
+
+    Free, they would take whatever the others leave, and the instruments would follow them.
+    """
+    size = np.maximum(np.abs(ended.zeta), 1e-3)
+    return free & ((ended.std_zeta > LOST * size) | (np.abs(ended.zeta) >= 1.0))
 
 
 def _ratios(building: Building) -> Array:
@@ -185,10 +242,12 @@ class _System:
         rows = self.regressors(i)
         return np.hstack([rows[:, : 2 * n], rows[:, 3 * n + 1 :]])
 
-    def solve(self, sums: Array) -> tuple[Array, Array]:
-        """Return the unknowns (p,) and their covariance, from blocks taken as independent."""
+    def solve(self, sums: Array, given: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
+        """Return the unknowns (p,) and their covariance, from blocks taken as independent.
+
+        The damping ratios that are not `free` (n,) stay as `given`, with a variance of zero.
+        """
         p = 2 * self.rows + self.n
-        A, b = np.zeros((p, p)), np.zeros(p)
         per_block_A = np.zeros((len(sums), p, p))
         per_block_b = np.zeros((len(sums), p))
         target = self.target()
@@ -196,14 +255,22 @@ class _System:
             W, R = self.instruments(i) / self.noise[i] ** 2, self.regressors(i)
             per_block_A += W @ sums @ R.T
             per_block_b += W @ sums @ target[i]
+        m = self.rows
+        theta, covariance = np.zeros(p), np.zeros((p, p))
+        theta[m : m + self.n] = np.where(free, 0.0, given)
+        kept = np.concatenate([np.ones(m, bool), free, np.ones(m, bool)])
+        per_block_b = (per_block_b - per_block_A @ theta)[:, kept]
+        per_block_A = per_block_A[:, kept][:, :, kept]
         A, b = per_block_A.sum(axis=0), per_block_b.sum(axis=0)
         scale = 1.0 / np.sqrt(np.maximum(np.abs(np.diag(A)), 1e-300))
         inverse = scale[:, None] * np.linalg.pinv(A * scale[:, None] * scale, rcond=1e-12) * scale
-        theta = inverse @ b
-        scores = per_block_b - per_block_A @ theta
+        found = inverse @ b
+        scores = per_block_b - per_block_A @ found
         blocks = len(scores)
         meat = scores.T @ scores * blocks / max(blocks - 1, 1)
-        return theta, inverse @ meat @ inverse.T
+        theta[kept] = found
+        covariance[np.ix_(kept, kept)] = inverse @ meat @ inverse.T
+        return theta, covariance
 
     def split(self, theta: Array, stiffness: Array) -> tuple[Array, Array]:
         """Return stiffnesses (those below `first` as given) and damping ratios."""
@@ -227,7 +294,9 @@ def _sums(
         else:
             x, v = simulated(run, building, stiffness, zeta, first)
             shown = np.vstack([np.diff(x, axis=0, prepend=np.zeros((1, x.shape[1]))), v, one])
+        slowest = round(2.0 * np.pi / _modes(building, stiffness).omega[0] / run.dt)
         size = max(10, round(BLOCK / run.dt))
+        size = max(size, min(slowest, (signals.shape[1] - _SKIP) // BLOCKS))
         whole = (signals.shape[1] - _SKIP) // size
         if whole < 2:
             raise RecordError(
@@ -242,23 +311,24 @@ def _sums(
 
 
 def _finish(
-    runs: list[Response], building: Building, stiffness: Array, zeta: Array, covariance: Array,
-    first: int, system: _System,
-) -> StructureFit:  # fmt: skip
+    runs: list[Response], building: Building, ended: _Ended, first: int, free: NDArray[np.bool_]
+) -> StructureFit:
     """Return the fit with what is not identified put back and named."""
-    n, m = building.size, system.rows
+    stiffness, zeta, system = ended.stiffness.copy(), ended.zeta.copy(), ended.system
+    n, m, covariance = building.size, ended.system.rows, ended.covariance
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     std_k = np.concatenate([np.full(first, np.inf), std[:m]])
-    std_zeta = std[m : m + n]
+    told = free & (np.arange(n) >= first)
+    std_zeta = np.where(told, ended.std_zeta, np.inf)
     given = np.array(building.stiffnesses)
     levels, lost, notes = building.levels(), [], []
     for i in range(n):
         if std_k[i] > LOST * stiffness[i]:
             lost.append(f"stiffness below {levels[i]}")
-            stiffness[i] = given[i]
+            stiffness[i], std_k[i] = given[i], np.inf
     before = _ratios(building)
     for r in range(n):
-        if std_zeta[r] > LOST * max(abs(zeta[r]), 1e-3) or (first and r == 0):
+        if not told[r]:
             lost.append(f"damping ratio of mode {r + 1}")
             zeta[r] = before[r]
         elif zeta[r] < 0.0:
@@ -273,10 +343,10 @@ def _finish(
     modes = _modes(building, stiffness)
     # d(omega^2)/dk_i = (shape_i - shape_{i-1})^2 (Nelson 1976, AIAA J. 14(9)).
     part = np.diff(modes.shapes, axis=0, prepend=np.zeros((1, n))) ** 2
-    known = np.where(np.isfinite(std_k), std_k, 0.0)
+    known = np.isfinite(std_k)
     cov = np.zeros((n, n))
     cov[first:, first:] = covariance[:m, :m]
-    cov[np.ix_(known == 0.0, known == 0.0)] = 0.0
+    cov *= np.outer(known, known)
     slope = part.T / (2.0 * modes.omega[:, None])
     std_omega = np.sqrt(np.maximum(np.einsum("ri,ij,rj->r", slope, cov, slope), 0.0))
     weighted = np.array(building.M) @ modes.shapes
@@ -284,25 +354,62 @@ def _finish(
     freeze = [tuple(tuple(float(v) for v in row) for row in matrix) for matrix in (C,)]
     K = tuple(tuple(float(v) for v in row) for row in stiffness_matrix(building, stiffness))
     found = building._replace(C=freeze[0], K=K, stiffnesses=tuple(float(k) for k in stiffness))
+    z, share = _left(runs, found, system)
+    worst = int(np.nanargmax(z))
+    if z[worst] > MISFIT:
+        notes.append(
+            f"equilibrium at {levels[worst]} leaves {z[worst]:.3g} times the noise: the building "
+            "is not linear there, or its masses are not as given, or the displacements are not "
+            "what the accelerations say. The values are those of the linear building that comes "
+            "nearest, and the intervals hold for it alone"
+        )
     return StructureFit(
         found, stiffness, std_k, zeta, std_zeta, modes.omega / (2.0 * np.pi),
-        std_omega / (2.0 * np.pi), _left(runs, found, first, system), tuple(lost), tuple(notes),
+        std_omega / (2.0 * np.pi), z, share, tuple(lost), tuple(notes),
     )  # fmt: skip
 
 
-def _left(runs: list[Response], found: Building, first: int, system: _System) -> Array:
-    """Return z by level: what equilibrium leaves over its noise, robustly, offsets apart."""
+def equilibrium(
+    measurements: list[Measurement], building: Building, *, damper: bool | None = None
+) -> Equilibrium:
+    """Return what equilibrium leaves of runs, such as those that a building was not fitted to.
+
+    Raises
+    ------
+    RecordError
+        If a channel is missing, or the building has other levels than were measured.
+    """
+    runs = responses(measurements, building, draws=0, looser=LOOSER)
+    first = _first(runs, damper)
+    return _left(runs, building, _System(building, runs, np.array(building.stiffnesses), first))
+
+
+def _first(runs: list[Response], damper: bool | None) -> int:
+    """Return the first level whose equilibrium is known: 1 under an unknown damper's force."""
+    if damper is None:
+        damper = any(run.driven or run.force is not None for run in runs)
+    return 1 if damper and not all(run.force is not None for run in runs) else 0
+
+
+def _left(runs: list[Response], found: Building, system: _System) -> Equilibrium:
+    """Return what equilibrium leaves by level, offsets apart."""
     C, K, M = (np.array(matrix) for matrix in (found.C, found.K, found.M))
-    z = np.full(found.size, np.nan)
-    squares: list[list[Array]] = [[] for _ in z]
+    rest: list[list[Array]] = [[] for _ in range(found.size)]
+    whole: list[list[Array]] = [[] for _ in range(found.size)]
     for run in runs:
-        level = M @ run.a + C @ run.v + K @ run.x
+        inertia = M @ run.a
         if run.force is not None:
-            level[0] += run.force
-        above = np.cumsum(level[::-1], axis=0)[::-1][:, _SKIP:]
-        for i in range(first, found.size):
-            rest = above[i] - np.median(above[i])
-            squares[i].append(np.minimum(np.abs(rest) / system.noise[i], 8.0) ** 2)
-    for i in range(first, found.size):
-        z[i] = float(np.sqrt(np.mean(np.concatenate(squares[i]))))
-    return z
+            inertia[0] += run.force
+        above, carried = (
+            np.cumsum(level[::-1], axis=0)[::-1][:, _SKIP:]
+            for level in (inertia + C @ run.v + K @ run.x, inertia)
+        )
+        for i in range(system.first, found.size):
+            rest[i].append(above[i] - np.median(above[i]))
+            whole[i].append(carried[i] - np.median(carried[i]))
+    z, share = np.full(found.size, np.nan), np.full(found.size, np.nan)
+    for i in range(system.first, found.size):
+        left = np.concatenate(rest[i])
+        z[i] = z_scale(left / system.noise[i])
+        share[i] = np.sqrt(np.mean(left**2) / np.mean(np.concatenate(whole[i]) ** 2))
+    return Equilibrium(z, share)

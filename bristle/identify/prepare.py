@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
+from ..records.derived import derived_velocity
 from ..records.measurement import Measurement
 from .drive import smooth_drive, smooth_steps
 from .fit import Run
@@ -18,6 +19,15 @@ Array = NDArray[np.float64]
 SHORTEST = 200
 """Fewest samples of a run that a fit makes sense of."""
 
+SETTLING = 25
+"""Samples at the begin of a run that are not judged."""
+
+LOADED = 0.2
+"""Share of its RMS that the force has at the begin of a run that was cut out under load."""
+
+FORGOTTEN = 0.3
+"""Share of the stroke after which the damper forgets how such a run began."""
+
 
 def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     """Return a bench measurement as a run: one smoothed motion, its uncertainty, the force.
@@ -25,7 +35,8 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     Parameters
     ----------
     measurement : Measurement
-        With the force, and displacement or velocity or both. Voltage may be missing (taken as 0),
+        With the force, and displacement or velocity or both; a velocity that was computed from the
+        displacement is left out. Voltage may be missing (taken as 0),
         or stand in as current; both are smoothed, steps kept.
     draws : int
         How many draws of the motion's and the voltage's error to keep.
@@ -40,6 +51,8 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     n, dt = len(measurement.time), measurement.step
     noise = (measurement.noise.get("displacement", 0.0), measurement.noise.get("velocity", 0.0))
     x, v = _seen(measurement, "displacement"), _seen(measurement, "velocity")
+    if derived_velocity(measurement):
+        v = None  # it holds nothing that the displacement does not, and may be half a sample late
     have = (x is not None, v is not None)
     motion = smooth(x, v, dt, noise)
     error = np.zeros((draws, n, 4))
@@ -51,10 +64,25 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
             measurement[drive], measurement.noise.get(drive, 0.0), dt, draws, seed + 1
         )
     measured = None if measurement.measured.all() else measurement.measured
+    force = measurement["force"]
     return Run(
-        measurement.name, dt, motion.x, motion.v, motion.a, V, measurement["force"],
-        _noise_of_force(measurement), error, measured=measured,
+        measurement.name, dt, motion.x, motion.v, motion.a, V, force,
+        _noise_of_force(measurement), error, _begin(motion.x, force), measured,
     )  # fmt: skip
+
+
+def _begin(x: Array, force: Array) -> int:
+    """Return the first sample that is judged.
+
+    A run that begins under load was cut out of a longer one: what elastic parts held is not known,
+    until the motion has passed them.
+    """
+    rms = float(np.sqrt(np.mean(force**2)))
+    if abs(float(np.mean(force[:SETTLING]))) <= LOADED * rms:
+        return SETTLING
+    away = np.abs(x - x[0]) > FORGOTTEN * float(np.ptp(x))
+    first = int(np.argmax(away)) if away.any() else len(x)
+    return min(max(SETTLING, first), len(x) // 2)
 
 
 def _seen(measurement: Measurement, channel: str) -> Array | None:

@@ -9,8 +9,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from filelock import FileLock, Timeout
 
+from ..identify.prepare import SHORTEST
 from ..physics.user import Loaded, load_effects
 from ..records.measurement import Measurement, read_measurements
 from .errors import StudyError
@@ -140,9 +142,11 @@ class Study:
         RecordError
             If a file cannot be read.
         """
-        train, holdout = (self.read(role) for role in ROLES)
+        (train, idle), (holdout, other) = (usable(self.read(role)) for role in ROLES)
+        idle = (*idle, *other)
         if len(self.settings.runs) == 1:
-            return split_in_time([*train, *holdout])
+            split = split_in_time([*train, *holdout])
+            return replace(split, notes=(*split.notes, *idle))
         if not train or not holdout:
             lacking = ROLES[0] if not train else ROLES[1]
             raise StudyError(
@@ -150,7 +154,8 @@ class Study:
                 "model is judged on runs that it was not fitted to."
             )
         _refuse_twins(train, holdout)
-        return Runs(train, holdout, tuple(_twins_within(train) + _twins_within(holdout)))
+        twins = _twins_within(train) + _twins_within(holdout)
+        return Runs(train, holdout, (*idle, *twins))
 
     def model(self) -> StudyModel:
         """Return the present model; StudyError with every mistake of model.toml."""
@@ -270,6 +275,34 @@ class Study:
                 f"{self.folder}: the model has been changed meanwhile ({what}{how}), so that this "
                 "result is not of the present one. Nothing is written; run this again."
             )
+
+
+def usable(pieces: list[Measurement]) -> tuple[list[Measurement], tuple[str, ...]]:
+    """Return the pieces that a model can be held against, and which ones are left out, and why.
+
+    Missing values cut a file into pieces, and one may be short or hold a rest only: that is no
+    reason to refuse the file. A file in one piece, or with no piece that is of use, stays whole,
+    to be refused by what needs more of it.
+    """
+    kept, left = [], []
+    for piece in pieces:
+        of_file = [one for one in pieces if one.source == piece.source]
+        reason = _idle(piece)
+        if not reason or len(of_file) == 1 or all(_idle(one) for one in of_file):
+            kept.append(piece)
+        else:
+            left.append(f"{piece.name} is left out: {reason}.")
+    return kept, tuple(left)
+
+
+def _idle(piece: Measurement) -> str:
+    """Return why nothing can be learnt from a piece of a run, "" where something can."""
+    if len(piece.time) < SHORTEST:
+        return f"it has {len(piece.time)} samples, and a fit needs {SHORTEST}"
+    for channel in ("force", "displacement", "velocity"):
+        if piece.has(channel) and float(np.ptp(piece[channel])) == 0.0:
+            return f"its {channel} does not change"
+    return ""
 
 
 def split_in_time(pieces: list[Measurement]) -> Runs:

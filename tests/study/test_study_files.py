@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from made import write_runs
 
 from bristle.records.measurement import ChannelSpec
-from bristle.study import StudyError, new_model, read_model, write_model
+from bristle.study import StudyError, create_study, new_model, read_model, write_model
 from bristle.study.files import read_json, write_json, write_whole
 from bristle.study.settings import RunFile, Settings, read_settings, write_settings
 
@@ -223,3 +224,27 @@ def test_json_that_is_none(tmp_path: Path) -> None:
     path.write_text("[1]", encoding="utf-8")
     with pytest.raises(StudyError, match="an object"):
         read_json(path)
+
+
+def test_a_piece_at_rest_or_too_short_is_left_out_and_said(tmp_path):
+    from bristle.study.study import usable
+
+    t = np.arange(6000) * 0.005
+    moving = (t > 4.0) & (t < 29.0)
+    x = np.where(moving, 0.01 * np.sin(3.0 * (t - 4.0)), 0.0)
+    force = 5.0 * np.tanh(np.gradient(x, 0.005) / 0.001)
+    force += 0.01 * np.random.default_rng(0).standard_normal(len(t))
+    there = ~(((t > 3.0) & (t < 3.9)) | ((t > 29.1) & (t < 29.5)))
+    path = tmp_path / "run.csv"
+    rows = np.column_stack([t, x, force])[there]
+    np.savetxt(path, rows, "%.9g", ",", header="time [s],displacement [m],force [N]", comments="")
+    study = create_study(tmp_path / "rig", [path]).study
+    pieces = study.read()
+    assert len(pieces) == 3
+    runs = study.runs()
+    assert len(runs.all) == 2  # the long piece, split in time
+    told = " ".join(runs.notes)
+    assert "run (1 of 3) is left out: its displacement does not change" in told
+    assert "run (3 of 3) is left out: it has" in told
+    # A file that holds nothing else is not left out in silence.
+    assert usable(pieces[:1]) == (pieces[:1], ())

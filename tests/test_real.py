@@ -1,0 +1,62 @@
+"""The benchmark on published measurements, without them and, where they are, with them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks import real
+
+DATA = Path(__file__).resolve().parent.parent / "../shared/data"
+
+
+def test_what_is_not_there_is_said(tmp_path, capsys):
+    page, kept = tmp_path / "page.md", tmp_path / "rows.json"
+    page.write_text(f"# Before\n\n{real.MARK}\n\nold figures\n", encoding="utf-8")
+    arguments = ["--data", str(tmp_path), "--markdown", str(page), "--json", str(kept)]
+    assert real.main(arguments) == 0
+    assert capsys.readouterr().out.count("not run: there is no") == 7
+    text = page.read_text(encoding="utf-8")
+    assert text.startswith(f"# Before\n\n{real.MARK}\n")
+    assert "old figures" not in text
+    assert {row["skipped"] for row in json.loads(kept.read_text())} >= {
+        "not run: there is no mr_damper_utfpr"
+    }
+
+
+def test_fit_and_loop_area():
+    t = np.linspace(0.0, 20.0 * np.pi, 4001)
+    assert real.fit(np.sin(t), np.sin(t)) == pytest.approx(1.0)
+    assert real.fit(np.sin(t), np.zeros_like(t)) == pytest.approx(0.0, abs=1e-6)
+
+    class Run:
+        """A run that slides against a friction of 3 N."""
+
+        def __getitem__(self, channel):
+            return np.sin(t)
+
+    # Whole periods: the area is 3 N times the path, an offset adds nothing.
+    force = 3.0 * np.sign(np.cos(t)) + 100.0
+    assert real.dissipative(Run(), force) == pytest.approx(3.0, rel=1e-2)
+
+
+@pytest.mark.skipif(not (DATA / "mr_damper_mathworks").is_dir(), reason="the data are not there")
+def test_the_published_reference_comes_out():
+    run = real.read_measurement(DATA / "mr_damper_mathworks" / "mrdamper.csv")
+    assert real.fit_of(run, tanh=False) == pytest.approx(0.368, abs=5e-4)
+    assert real.fit_of(run, tanh=True) == pytest.approx(0.453, abs=0.01)
+
+
+@pytest.mark.skipif(not (DATA / "shake_table_base_isolated").is_dir(), reason="no such data")
+def test_the_building_is_the_same_in_two_earthquakes():
+    folder = DATA / "shake_table_base_isolated"
+    found = []
+    for name in ("bi_bncs_cnp100.csv", "bi_bncs_lac100.csv"):
+        fit = real.identify_structure(real.shaken(folder, [name]), real.unknown_masses())
+        found.append((fit.frequencies[:2], fit.std_frequencies[:2]))
+    (one, s_1), (other, s_2) = found
+    assert np.all(np.abs(one - other) < 3.0 * np.hypot(s_1, s_2))
+    assert one == pytest.approx(other, rel=0.02)
