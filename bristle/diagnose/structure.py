@@ -22,7 +22,7 @@ from ..physics.building import Building
 from ..physics.effect import EFFECTS, effects_of
 from ..records.measurement import Measurement
 from .candidates import SECONDS, Trial, judge, try_all, try_members
-from .decision import GAIN, Decision, decide, excess
+from .decision import GAIN, SHARE, Decision, decide, excess
 from .experiments import Experiment
 from .load_cell import load_cell
 from .search import refine
@@ -50,7 +50,7 @@ NAMES = {"base_mass": "a mass of the base that the file does not know", "f_c": "
 INSTRUMENT = ("lag", "high-pass")
 """Faults of a velocity that are an instrument's own, which the library knows as an effect."""
 
-BLURRED = (*INSTRUMENT, "delay")
+BLURRED = (*INSTRUMENT, "delay", "derived")
 """Faults for which a building's velocity is left out: displacement and accelerometer say the same
 without them, and what is left of a delay would be held against the law at each reversal."""
 
@@ -215,7 +215,10 @@ def diagnose_structure(
         late = load_cell(findings["layer"], ours, theirs, building, law)
         if late is not None:
             findings["layer"], (ours, theirs) = late
+            shown = problems["damper"]
             problems = problems_of(ours, theirs, building, law)
+            if _rounded(findings["layer"]):
+                problems["damper"], present = shown, _late(present, findings["layer"])
     softer = any(f.kind != "none" for s, f in findings.items() if s.startswith("storey"))
     if softer and "damper" in problems and problems["damper"][0].reconstructed:
         problems = problems_of(ours, theirs, building, law, linear_storeys=False)
@@ -225,8 +228,26 @@ def diagnose_structure(
         base = fit_damper(problems["damper"][0], at_site(present, "damper", problems))
         verdict = damper_verdict(base, *problems["damper"])
         if _blurred(sensors):
-            verdict = _forgiven(verdict)
+            verdict = _forgiven(verdict, BLIND, "Without its velocity the base's reversals blur.")
+        if _rounded(findings.get("layer", _NOTHING)):
+            most = _left_by_filter(law, *problems["damper"])
+            verdict = _forgiven(verdict, most, "The load cell's filter has another form than ours.")
     return combine(findings, base, verdict, problems, sensors)
+
+
+def _rounded(layer: Finding) -> bool:
+    """Return whether a load cell is late in a way that moving its record ahead does not undo.
+
+    A filter rounds the force besides. That cannot be taken back, but it can be put on the model.
+    """
+    return layer.effects == ("delay",) and layer.z_after > CLEAN
+
+
+def _late(present: Model, layer: Finding) -> Model:
+    """Return the model whose damper's force is shown as late as equilibrium says."""
+    time = float(layer.coordinate.split()[0])
+    effects = (*present.effects, "delay")
+    return replace(present, effects=effects, values={**present.values, "delay.time": time})
 
 
 def fit_damper(problem: StructureProblem, present: Model) -> Fit:
@@ -275,17 +296,26 @@ def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem)
     return DamperVerdict(decision, before, tuple(trials))
 
 
-def _forgiven(verdict: DamperVerdict) -> DamperVerdict:
-    """Return a verdict that does not call unknown what a velocity that was left out explains."""
+def _forgiven(verdict: DamperVerdict, most: float, reason: str) -> DamperVerdict:
+    """Return a verdict that does not call unknown what an instrument already known explains.
+
+    `most` is the z that it accounts for; what an effect of the library lowers is not forgiven.
+    """
     made, before = verdict.decision, verdict.before
     gains = any(1.0 - trial.z / before.z >= GAIN for trial in verdict.trials)
-    if made.kind != "unknown" or gains or max(before.z, before.train) > BLIND:
+    if made.kind != "unknown" or gains or max(before.z, before.train) > most:
         return verdict
-    reason = (
-        f"Without its velocity the base's reversals are uncertain: z = {before.z:.2f} is no more "
-        "than that."
-    )
-    return replace(verdict, decision=replace(made, kind="none", reasons=(reason,)))
+    words = f"{reason} z = {before.z:.2f} is no more than that."
+    return replace(verdict, decision=replace(made, kind="none", reasons=(words,)))
+
+
+def _left_by_filter(law: str, train: StructureProblem, held_out: StructureProblem) -> float:
+    """Return the z that a late and rounded force may leave once our delay is in the model.
+
+    As for any effect of another form: it must explain `SHARE` of the excess that is there without.
+    """
+    bare = judge(fit_damper(train, Model(law)).model, train, held_out)
+    return float(np.sqrt(1.0 + (1.0 - SHARE) * excess(bare)))
 
 
 def _blurred(faults: tuple[SensorFault, ...]) -> bool:

@@ -240,13 +240,25 @@ def test_a_stop_that_is_met_once_is_told_by_its_likelihood():
     assert structure._seldom(before, [poor]) is None
 
 
-def test_only_reversals_that_no_velocity_shows_are_forgiven():
+def test_only_what_an_instrument_accounts_for_is_forgiven():
     def judged(z, gain):
         before = trial((), z)
         unknown = Decision("unknown", (), before, 0.0, ("z.",))
         verdict = DamperVerdict(unknown, before, (trial(("stribeck",), z * (1.0 - gain)),))
-        return structure._forgiven(verdict).decision.kind
+        return structure._forgiven(verdict, 1.25, "Blurred.").decision.kind
 
     assert judged(1.19, 0.001) == "none"
     assert judged(1.19, 0.1) == "unknown", "an effect explains it in part"
-    assert judged(1.6, 0.001) == "unknown", "more than reversals account for"
+    assert judged(1.6, 0.001) == "unknown", "more than the instrument accounts for"
+
+
+def test_a_load_cell_that_rounds_is_put_on_the_model_and_not_taken_back():
+    def told(effect, z):
+        return Finding("force", "effect", (effect,), 4.0, z, 0.9, 0.01, coordinate="0.0125 s")
+
+    assert structure._rounded(told("delay", 1.9))
+    assert not structure._rounded(told("delay", 1.02)), "moved ahead it fits: a plain delay"
+    assert not structure._rounded(told("force_gain", 1.9))
+    model = structure._late(Model("lugre", ("gas_spring",)), told("delay", 1.9))
+    assert model.effects == ("gas_spring", "delay")
+    assert model.value("delay.time") == 0.0125
