@@ -14,8 +14,14 @@ from numpy.typing import NDArray
 
 from ..identify.fit import Fit, fit
 from ..identify.line import fit_line
-from ..identify.model import Model, Problem
-from ..identify.structure import LinearLayer, LinearStorey, StructureProblem, thinned
+from ..identify.model import Model, Problem, Run
+from ..identify.structure import (
+    LinearLayer,
+    LinearStorey,
+    StructureProblem,
+    StructureRun,
+    thinned,
+)
 from ..physics.effect import EFFECTS, effects_of
 from .candidates import Trial, judge
 from .evidence import paired
@@ -111,6 +117,35 @@ def try_effect(
     expected = train.expectation(base)
     best = fit(train, best, expectation=expected, max_evaluations=25, with_std=False).model
     return judge(best, train, held_out)
+
+
+def shortened(problem: StructureProblem, seconds: float) -> StructureProblem:
+    """Return the problem with the first so many seconds of each run, itself if none is longer."""
+    if all(len(_whole(run).x) * run.dt <= seconds for run in problem.runs):
+        return problem
+    return problem.of([_begin_of(run, round(seconds / run.dt)) for run in problem.runs])
+
+
+def _whole(run: Run) -> Run:
+    assert isinstance(run, StructureRun)
+    assert run.whole is not None
+    return run.whole
+
+
+def _begin_of(run: Run, samples: int) -> StructureRun:
+    """Return the first samples of a run, from rest: what a law remembers begins there."""
+    assert isinstance(run, StructureRun)
+    keep = run.keep[run.keep < samples]
+    first, own = slice(samples), slice(len(keep))
+    old = _whole(run)
+    whole = replace(
+        old, x=old.x[first], v=old.v[first], a=old.a[first], V=old.V[first],
+        force=old.force[first], draws=old.draws[:, first],
+    )  # fmt: skip
+    return replace(
+        run, x=run.x[own], v=run.v[own], a=run.a[own], V=run.V[own], force=run.force[own],
+        draws=run.draws[:, own], whole=whole, keep=keep,
+    )  # fmt: skip
 
 
 def structure_starts(effect: str, base: Model, train: Problem) -> list[Model]:

@@ -27,7 +27,7 @@ from .experiments import Experiment
 from .load_cell import load_cell
 from .search import refine
 from .sensors import SensorFault, mended, sensor_faults
-from .sites import CLEAN, NEARLY, Finding, better, coordinate_of, look_at, try_effect
+from .sites import CLEAN, NEARLY, Finding, better, coordinate_of, look_at, shortened, try_effect
 
 LOOKALIKE = {
     "gas_spring": ("duffing",),
@@ -56,6 +56,14 @@ without them, and what is left of a delay would be held against the law at each 
 
 QUIET = 1.0 + 0.5 * GAIN
 """z of the damper's law up to which no effect can lower it by `GAIN`: noise is all there is."""
+
+SEARCHED = 12.0
+"""Seconds of each run, from its begin, on which the damper's effects are searched: the strongest
+shaking is over. The best are then fitted to all that was recorded; held-out runs stay whole."""
+
+CONTENDERS, NEAR = 3, 1.03
+"""How many trials at most are fitted to all that was recorded, and up to which z as a multiple of
+the best one's: rivals are told apart on equal terms."""
 
 BLIND = 1.25
 """z that a true Bingham law may read where the base's velocity had to be left out: its jumps come
@@ -272,9 +280,11 @@ def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem)
     # A force that no load cell shows cannot be late.
     instruments = () if train.reconstructed else ("delay",)
 
+    brief = shortened(train, SEARCHED)
+
     def grow(first: Trial) -> list[Trial]:
         most = None if first is before else SECONDS
-        trials = try_all(first.model, train, held_out, instruments, most)
+        trials = try_all(first.model, brief, held_out, instruments, most)
         if train.reconstructed:
             taken = first.model.effects
             trials += [
@@ -282,6 +292,12 @@ def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem)
                 for effect in effects_of("structure")
                 if "force" in effect.hooks() and effect.name not in taken
             ]
+        trials.sort(key=lambda trial: trial.z)
+        if brief is not train:
+            best = trials[0].z
+            for k, one in enumerate(trials[:CONTENDERS]):
+                if one.refined and one.z <= NEAR * best:
+                    trials[k] = judge(refine(one.model, train), train, held_out)
         return sorted(trials, key=lambda trial: trial.z)
 
     def reduce(pair: Trial) -> list[Trial]:

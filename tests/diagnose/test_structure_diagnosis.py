@@ -11,7 +11,7 @@ from bristle.diagnose.candidates import Trial
 from bristle.diagnose.decision import Decision
 from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.load_cell import load_cell
-from bristle.diagnose.sites import Finding, look_at
+from bristle.diagnose.sites import Finding, look_at, shortened
 from bristle.diagnose.structure import (
     QUIET,
     DamperVerdict,
@@ -201,6 +201,7 @@ class Seen:
     """What `_decided` asks of a problem."""
 
     reconstructed = False
+    runs = ()
 
 
 @pytest.mark.parametrize(
@@ -262,3 +263,22 @@ def test_a_load_cell_that_rounds_is_put_on_the_model_and_not_taken_back():
     model = structure._late(Model("lugre", ("gas_spring",)), told("delay", 1.9))
     assert model.effects == ("gas_spring", "delay")
     assert model.value("delay.time") == 0.0125
+
+
+@pytest.mark.parametrize("law", ["bingham", "lugre"])
+def test_shortened_runs_are_the_begin_of_the_whole_ones(law):
+    b, runs = runs_of(None, count=2)
+    found = responses(runs, b)
+    problem = problems_of(found[:1], found[1:], b, law)["damper"][0]
+    assert shortened(problem, 10.0) is problem
+    brief = shortened(problem, 4.0)
+    (run,), (long,) = brief.runs, problem.runs
+    count = len(run.x)
+    assert len(run.whole.x) == 2000
+    assert 0 < count <= 2000
+    assert run.keep[-1] < 2000
+    assert np.array_equal(run.force, long.force[:count])
+    values = {"sigma_a": 900.0, "a_0": 600.0, "f_c": 1.5}
+    model = Model(law, (), {n: v for n, v in values.items() if (n == "f_c") == (law == "bingham")})
+    assert np.array_equal(brief.predict(model, run), problem.predict(model, long)[:count])
+    assert brief.predict(model, run, 0).shape == (count,)
