@@ -16,6 +16,9 @@ from .evidence import paired
 GAIN = 0.02
 """Smallest share by which an effect must lower z to be missing."""
 
+MOST_RMS = 1.1
+"""What an effect may leave of the plain error, for its weights are not those of z."""
+
 CLEAN = 1.15
 """z of a base model above which something is missing, whether an effect explains it or not."""
 
@@ -118,8 +121,13 @@ def decide(
 
 
 def missing(before: Trial, after: Trial) -> bool:
-    """Return whether an effect lowers the held-out error by enough, and beyond chance."""
-    return 1.0 - after.z / before.z >= GAIN and paired(before.losses, after.losses).low > 0.0
+    """Return whether an effect lowers the held-out error by enough, and beyond chance.
+
+    An effect that serves the many samples near rest at the cost of all others is none.
+    """
+    if 1.0 - after.z / before.z < GAIN or after.rms > MOST_RMS * before.rms:
+        return False
+    return paired(before.losses, after.losses).low > 0.0
 
 
 def _without_effect(before: Trial, ranked: Sequence[Trial], organised: bool) -> Decision:

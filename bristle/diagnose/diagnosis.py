@@ -13,6 +13,7 @@ from ..compare.coordinates import coordinates_of
 from ..compare.where import Place, places
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.prepare import prepare
+from ..records.derived import derived_velocity
 from ..records.measurement import Measurement
 from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .decision import decide, missing
@@ -169,7 +170,9 @@ def diagnose(
     if unseen is not None:
         faults.append(unseen.fault)
         problem, held_out, before = unseen.train, unseen.held_out, unseen.trial
-    redundant = any(run.has("displacement", "velocity") for run in train)
+    redundant = any(
+        run.has("displacement", "velocity") and not derived_velocity(run) for run in train
+    )
     instruments = ("delay",) if redundant else ("delay", "velocity_sensor")
     found = _judged(before, problem, held_out, faults, noise, instruments, say)
     return _with_instrument(found)
@@ -227,7 +230,11 @@ def _judged(
         rest = where(left, held_out)
         coordinate = _coordinate(rest, left, held_out)
     if coordinate:
-        words.append(f"What is unexplained is organised by {coordinate.replace('_', ' ')}.")
+        sure = coordinate == "frequency" or any(
+            place.significant for place in rest if place.coordinate == coordinate
+        )
+        how = "is organised by" if sure else "follows no coordinate beyond chance; nearest is"
+        words.append(f"What is unexplained {how} {coordinate.replace('_', ' ')}.")
     return Diagnosis(
         kind, decision.effects, " ".join(words), before, decision.best, tuple(trials),
         tuple(faults), tuple(hidden), visible, coordinate, tuple(rest), experiment, noise,

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from .model import (
     DRIVEN,
-    FIXED,
     OTHER_LAWS,
     Model,
     Problem,
@@ -26,11 +25,11 @@ from .model import (
     steady,
     without,
 )  # fmt: skip
-from .search import descend
+from .search import HUBER_AT_ONE, descend, jacobian, loss
 from .starts import start_model, start_models
 
 __all__ = [
-    "FIXED", "OTHER_LAWS", "Expected", "Fit", "Model", "Problem", "Run", "Scaled", "fit", "huber",
+    "OTHER_LAWS", "Expected", "Fit", "Model", "Problem", "Run", "Scaled", "fit",
     "identify", "law_parameters", "parameter", "sizes", "start_model",
 ]  # fmt: skip
 
@@ -40,7 +39,6 @@ Expected = list[tuple[Array, Array, Array]]
 _ALIKE = 1e-3  # relative difference of costs below which two starts have come to the same end
 _WEAK = 1e-6  # a singular value of the scaled Jacobian below this share of the largest is none
 _MISFIT = 1.15  # z above which a residual is more than noise
-_HUBER_AT_ONE = 0.494231  # mean Huber loss (k = 2) of a standard normal variable
 _BLOCK = 250  # samples, longer than a residual's correlation
 _FINAL_DRAWS = 24  # draws of the motion for bias and intervals of what is reported
 
@@ -61,12 +59,6 @@ class Fit:
     evaluations: int = 0
     starts: int = 1
     agreed: int = 1
-
-
-def huber(z: Array, k: float = 2.0) -> Array:
-    """Return Huber's loss of z, quadratic up to k."""
-    size = np.abs(z)
-    return np.where(size <= k, 0.5 * z * z, k * size - 0.5 * k * k)
 
 
 class Scaled:
@@ -98,14 +90,7 @@ class Scaled:
 
     def jacobian(self, theta: Array, r: Array) -> Array:
         """Return the derivatives (n, p) of the residuals at theta."""
-        J = np.empty((len(r), len(theta)))
-        for i in range(len(theta)):
-            nudge = 1e-5 * max(1.0, abs(theta[i]))
-            nudge = -nudge if theta[i] + nudge > self.high[i] else nudge
-            other = theta.copy()
-            other[i] += nudge
-            J[:, i] = (self.residuals(other) - r) / nudge
-        return J
+        return jacobian(self.residuals, theta, r, self.low, self.high)
 
 
 def fit(
@@ -127,7 +112,7 @@ def fit(
     expected = expectation or problem.expectation(model)
     scaled = Scaled(problem, model, expected)
     if not scaled.names:
-        cost = float(np.mean(huber(scaled.residuals(np.zeros(0)))))
+        cost = float(np.mean(loss(scaled.residuals(np.zeros(0)))))
         return Fit(model, {}, cost)
     found = descend(
         scaled.residuals, scaled.start, scaled.low, scaled.high, max_evaluations, tolerance=1e-5
@@ -170,7 +155,7 @@ def _intervals(scaled: Scaled, theta: Array) -> tuple[dict[str, float], tuple[st
         scores = np.array([J.T @ np.clip(e, -2.0, 2.0) for e in drawn])
         scores -= scores.mean(axis=0)
         B = B + scores.T @ scores / (count - 1)
-    if float(np.mean(huber(r))) > _MISFIT**2 * _HUBER_AT_ONE:
+    if float(np.mean(loss(r))) > _MISFIT**2 * HUBER_AT_ONE:
         B = _scores_of_blocks(J, r)
     covariance = inverse @ B @ inverse
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / safe * scaled.scale

@@ -10,16 +10,13 @@ from numpy.typing import NDArray
 
 from ..compiled.bench import Bench
 from ..physics.damper import LAWS
-from ..physics.effect import EFFECTS, Parameter
+from ..physics.effect import CHOICES, EFFECTS, Parameter
 from .instruments import shown_force, true_motion
 
 Array = NDArray[np.float64]
 
 OTHER_LAWS: dict[str, Any] = {}
 """Laws that no damper has, by name: those of a building's parts join here."""
-
-FIXED = ("exponent", "mass", "which")
-"""Parameters that a fit leaves alone: choices and regularisations, not measurements."""
 
 DRIVEN = {"bingham": ("f_v", "c_v"), "lugre": ("sigma_0", "sigma_b")}
 """Parameters that act through the voltage alone."""
@@ -76,9 +73,9 @@ class Model:
 
     def free(self) -> list[str]:
         """Return the names of the parameters that a fit moves."""
-        names = [name for name in law_parameters(self.law) if name not in FIXED]
+        names = [name for name in law_parameters(self.law) if name not in CHOICES]
         for effect in self.effects:
-            fixed = FIXED if self.law == "lugre" else (*FIXED, *EFFECTS[effect].bristles)
+            fixed = CHOICES if self.law == "lugre" else (*CHOICES, *EFFECTS[effect].bristles)
             names += [
                 f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in fixed
             ]

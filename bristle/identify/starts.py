@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from ..physics.damper import LAWS
-from .model import FIXED, Array, Model, Problem, Run
+from ..physics.effect import CHOICES
+from .model import Array, Model, Problem, Run
 
 SHAPES = ("v_n", "a_0")
 """Parameters in which the laws are not linear."""
@@ -56,7 +57,7 @@ class _Net:
 
     def __init__(self, problem: Problem, model: Model) -> None:
         self.problem, self.model_0 = problem, model
-        names = [name for name in LAWS[model.law].parameters if name not in FIXED]
+        names = [name for name in LAWS[model.law].parameters if name not in CHOICES]
         self.linear = [name for name in names if name not in SHAPES]
         standard = model.value("exponent") == 0.0
         self.v_n = self._nodes("v_n", _V_N * problem.size("m/s"))

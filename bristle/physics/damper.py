@@ -12,10 +12,17 @@ from typing import Any
 from ..errors import PhysicsError
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .bingham import Bingham
+from .damper_source import (
+    evaluate_source,
+    motion_source,
+    pull_source,
+    reach_source,
+    series_source,
+)
 from .effect import effects_of
 from .linear import Row, solve_in_place
 from .lugre import LuGre
-from .weave import LAW_PARAMETERS, LAW_STATES, Layout, switched, weave
+from .weave import LAW_PARAMETERS, LAW_STATES, Layout, weave
 
 BINGHAM = 0
 LUGRE = 1
@@ -46,158 +53,13 @@ SETTLE = 5e-3
 _GAMMA = 1.0 - 0.5 * 2.0**0.5
 
 
-def _motion_source(layout: Layout) -> str:
-    q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
-    lines = [
-        "def inner_motion(x, v, a, V, dt, energy, z, p, on):",
-        "    rod_x = x",
-        "    rod_v = v",
-        *switched(layout, "motion", "x, v = {call}", **q),
-        "    return x, v",
-    ]
-    return "\n".join(lines)
-
-
-def _reach_source(layout: Layout) -> str:
-    q = {name: name for name in ("x", "v", "dt", "energy", "rod_x", "rod_v")}
-    lines = [
-        "def slip_reach(x, v, dt, energy, z, p, on):",
-        "    rod_x = x",
-        "    rod_v = v",
-        "    reach = 1.0",
-        *switched(layout, "reach", "reach *= {call}", **q),
-        "    return reach",
-    ]
-    return "\n".join(lines)
-
-
-def _series_source(layout: Layout) -> str:
-    lines = ["def series_element(on):"]
-    for effect in layout.effects:
-        if effect.joint:
-            slots = [str(layout.states[effect.name + "." + name]) for name in effect.joint]
-            lines.append(f"    if on[{layout.switches[effect.name]}]:  # {effect.name}")
-            lines.append(f"        return {', '.join(slots)}")
-    return "\n".join([*lines, "    return -1, -1"])
-
-
-def _evaluate_source(layout: Layout, name: str) -> str:
-    signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v", "halt")
-    q = {name: name for name in signals}
-    lugre = ", ".join(f"p[{i}]" for i in range(len(LuGre.parameters)))
-    bingham = ", ".join(f"p[{i}]" for i in range(len(Bingham.parameters)))
-    lines = [
-        f"def {name}(law, x, v, a, V, dt, energy, halt, halts, z, p, on, dz, z_next):",
-        "    rod_x = x",
-        "    rod_v = v",
-        "    force = 0.0",
-        *switched(layout, "voltage", "V = {call}", **q),
-        *switched(layout, "motion", "x, v = {call}", **q),
-        "    yield_factor = 1.0",
-        "    viscous_factor = 1.0",
-        "    reach = 1.0",
-        "    added = 0.0",
-        "    direction = 0.0",
-        "    directed = False",
-        *switched(layout, "yield_factor", "yield_factor *= {call}", **q),
-        *switched(layout, "viscous_factor", "viscous_factor *= {call}", **q),
-        *switched(layout, "reach", "reach *= {call}", **q),
-        *switched(layout, "yield_force", "direction = {call}; directed = True", **q),
-        *switched(layout, "force", "added += {call}", **q),
-        "    factor = 1.0",
-        *switched(layout, "factor", "factor *= {call}", **q),
-        "    if law == 1:",
-        f"        lugre = LuGreP({lugre})",
-        "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
-        "        friction = 0.0",
-        "        bristle = LuGre_bristle(z[0], v, V, lugre, reach, yield_factor)",
-        "        rest = (bristle + viscous) * factor + added",
-        "        dz[0] = LuGre_rate(z[0], v, lugre, reach)",
-        "    else:",
-        f"        bingham = BinghamP({bingham})",
-        "        rest = Bingham_viscous(v, V, bingham) * viscous_factor * factor + added",
-        "        limit = Bingham_yielding(V, bingham) * yield_factor * reach * factor",
-        "        if directed:",
-        "            friction = limit * direction",
-        "        elif halts:",
-        "            friction = min(max(halt - rest, -limit), limit)",
-        "        elif v > 0.0:",
-        "            friction = limit",
-        "        elif v < 0.0:",
-        "            friction = -limit",
-        "        else:",
-        "            friction = 0.0",
-        "    force = friction + rest",
-        *switched(layout, "rate", "{dz}= {call}", **q),
-        *switched(layout, "advance", "{z_next}= {call}", **q),
-        *switched(layout, "reaction", "force = {call}; friction = 0.0", **q),
-        "    return force, friction",
-    ]
-    return "\n".join(lines)
-
-
-def _pull_source(layout: Layout) -> str:
-    """Return the source of what accelerates a joint: `evaluate` without all that it can lack.
-
-    The speed of a joint is found by trials, so nothing is called more often.
-    """
-    joints = [effect for effect in layout.effects if effect.joint]
-    names = [f"{effect.name}.{state}" for effect in joints for state in effect.joint]
-    layout = layout.reading({name: ("travel", "joint")[i % 2] for i, name in enumerate(names)})
-    signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v")
-    q = {name: name for name in signals}
-    lugre = ", ".join(f"p[{i}]" for i in range(len(LuGre.parameters)))
-    bingham = ", ".join(f"p[{i}]" for i in range(len(Bingham.parameters)))
-    lines = [
-        "def joint_pull(",
-        "    law, x, v, a, V, dt, energy, way, middle, travel, joint, z, p, on",
-        "):",
-        "    rod_x = x",
-        "    rod_v = v",
-        "    force = 0.0",
-        *switched(layout, "voltage", "V = {call}", **q),
-        *switched(layout, "motion", "x, v = {call}", **q),
-        "    yield_factor = 1.0",
-        "    viscous_factor = 1.0",
-        "    reach = 1.0",
-        "    half_reach = 1.0",
-        "    added = 0.0",
-        "    direction = way",
-        *switched(layout, "yield_factor", "yield_factor *= {call}", **q),
-        *switched(layout, "viscous_factor", "viscous_factor *= {call}", **q),
-        *switched(layout, "reach", "reach *= {call}", **q),
-        *switched(layout, "reach", "half_reach *= {call}", **{**q, "v": "middle"}),
-        *switched(layout, "yield_force", "direction = {call}", **q),
-        *switched(layout, "force", "added += {call}", **q),
-        "    factor = 1.0",
-        *switched(layout, "factor", "factor *= {call}", **q),
-        "    if law == 1:",
-        f"        lugre = LuGreP({lugre})",
-        "        bristle = LuGre_advance(z[0], middle, dt, lugre.a_0 / half_reach)",
-        "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
-        "        bent = LuGre_bristle(bristle, v, V, lugre, reach, yield_factor)",
-        "        force = (bent + viscous) * factor + added",
-        "    else:",
-        f"        bingham = BinghamP({bingham})",
-        "        viscous = Bingham_viscous(v, V, bingham) * viscous_factor",
-        "        limit = Bingham_yielding(V, bingham) * yield_factor * reach",
-        "        force = (limit * direction + viscous) * factor + added",
-        "    pull = 0.0",
-    ]
-    for effect in joints:
-        place = list(effect.states).index(effect.joint[1])
-        only = layout.only(lambda one, wanted=effect: one is wanted)  # type: ignore[misc]
-        lines += switched(only, "rate", f"pull = {{call}}[{place}]", **q)
-    return "\n".join([*lines, "    return pull"])
-
-
 def reweave() -> None:
     """Weave the damper's functions anew; call it after effects were registered late."""
     global LAYOUT, evaluate, evaluate_law, inner_motion, joint_pull, series_element, slip_reach
     LAYOUT = Layout("damper", LAW_PARAMETERS, LAW_STATES)
-    inner_motion = weave("inner_motion", _motion_source(LAYOUT), LAYOUT)
-    slip_reach = weave("slip_reach", _reach_source(LAYOUT), LAYOUT)
-    series_element = weave("series_element", _series_source(LAYOUT), LAYOUT)
+    inner_motion = weave("inner_motion", motion_source(LAYOUT), LAYOUT)
+    slip_reach = weave("slip_reach", reach_source(LAYOUT), LAYOUT)
+    series_element = weave("series_element", series_source(LAYOUT), LAYOUT)
     laws = {
         "LuGreP": LUGRE_VALUES,
         "BinghamP": BINGHAM_VALUES,
@@ -208,11 +70,11 @@ def reweave() -> None:
         "Bingham_viscous": Bingham.viscous,
         "Bingham_yielding": Bingham.yielding,
     }
-    joint_pull = weave("joint_pull", _pull_source(LAYOUT), LAYOUT, **laws)
-    evaluate = weave("evaluate", _evaluate_source(LAYOUT, "evaluate"), LAYOUT, **laws)
+    joint_pull = weave("joint_pull", pull_source(LAYOUT), LAYOUT, **laws)
+    evaluate = weave("evaluate", evaluate_source(LAYOUT, "evaluate"), LAYOUT, **laws)
     # The same without any effect, for dampers that have none: it does not pay for the others.
     none = Layout("", LAW_PARAMETERS, LAW_STATES)
-    evaluate_law = weave("evaluate_law", _evaluate_source(none, "evaluate_law"), none, **laws)
+    evaluate_law = weave("evaluate_law", evaluate_source(none, "evaluate_law"), none, **laws)
 
 
 def _values(law: Any) -> Any:

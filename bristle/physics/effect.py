@@ -15,6 +15,9 @@ from ..errors import PhysicsError
 
 SITES = ("damper", "structure", "sensor")
 
+CHOICES = ("exponent", "mass", "which")
+"""Parameters that choose a form or regularise: no fit moves them unless it is told to."""
+
 CHANNELS = ("force", "velocity")
 """Channels whose instrument a sensor's effect may be."""
 

@@ -8,9 +8,8 @@ from itertools import product
 from math import copysign, inf, isfinite
 from typing import Any, Callable
 
-from .effect import Effect, Q
+from .effect import CHOICES, Effect, Q
 
-CHOICES = ("exponent", "mass", "which")
 """Parameters that are choices of a form: they may make a hook jump."""
 
 RANGES = {

@@ -24,7 +24,7 @@ from ..cosim.findings import unknown, written
 from ..cosim.lines import KeyPath
 from ..errors import UnitError
 from ..physics.damper import LAWS
-from ..physics.effect import EFFECTS, Parameter
+from ..physics.effect import CHOICES, EFFECTS, Parameter
 from ..physics.user import why_left_out
 from ..units import convert
 from .files import Toml, write_whole
@@ -32,8 +32,6 @@ from .files import Toml, write_whole
 STANDARD = {"bingham_standard": "bingham", "lugre_standard": "lugre"}
 """Laws without the exponential, with the law whose exponent is then 0."""
 LAW_NAMES = (*LAWS, *STANDARD)
-CHOICES = ("exponent", "mass", "which")
-"""Parameters that are choices of a form or regularisations: fixed unless model.toml frees them."""
 ORIGINS = ("reconstructed", "measured", "assumed", "identified")
 _KEYS = ("schema", "law", "building", "parameters", "effects")
 _VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")

@@ -8,11 +8,13 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 
 import bristle
+from bristle.compiled.jit import digest
 
 PACKAGE = Path(bristle.__file__).resolve().parent
 OLD = "return p.preload + q.x * (p.k + q.x * (p.k_2 + q.x * p.k_3))"
@@ -83,3 +85,13 @@ def test_an_edited_effect_gives_its_new_force(edited: Any) -> None:
     assert first["march"] == again["march"] == back["march"] != other["march"]
     # And what was compiled once is not compiled again.
     assert [told["hits"] for told in (first, again, other, back)] == [0, 1, 0, 1]
+
+
+def test_the_same_code_in_another_module_has_machine_code_of_its_own() -> None:
+    text = "def twice(x):\n    return 2.0 * x\n"
+    found = []
+    for name in ("of_one_folder.effect", "of_another.effect", "of_one_folder.effect"):
+        module = ModuleType(name)
+        exec(text, module.__dict__)
+        found.append(digest(module.twice))
+    assert found[0] == found[2] != found[1]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,12 @@ def test_a_gain_within_chance_is_none_missing():
     before, after = trial(1.1), trial(1.05, "drift", spread=1.0)
     assert 1.0 - after.z / before.z > GAIN
     assert not missing(before, after)
+
+
+def test_a_gain_at_the_cost_of_the_plain_error_is_none_missing():
+    before, after = trial(3.0), trial(1.5, "drift")
+    assert missing(before, after)
+    assert not missing(before, replace(after, rms=1.2 * before.rms))
 
 
 def test_one_effect_that_explains_it():

@@ -1,0 +1,71 @@
+"""Where searches begin: one linear step ranks the starts, and a light look at the data suffices."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bristle.diagnose.candidates import begin, joinable
+from bristle.diagnose.search import refine
+from bristle.diagnose.starts import NET, Ground, ranked, starts
+from bristle.identify.fit import Model, Problem, identify
+from bristle.identify.prepare import prepare
+from bristle.records.measurement import measurements_of_frame
+
+DT, RATE = 0.002, 500.0
+LAW = {"f_c": 1.3, "f_v": 0.83, "c_0": 40.0, "c_v": 15.0, "v_n": 0.05, "exponent": 1.0}
+
+
+def rig(effects, values, count=3):
+    """Return a problem of runs of a Bingham damper with effects, with noise of 1 %."""
+    rng = np.random.default_rng(3)
+    runs = []
+    for number in range(count):
+        t = np.arange(3000) * DT
+        x = sum(
+            0.004 * np.sin(2.0 * np.pi * f * t + p) / f
+            for f, p in zip((0.7, 1.9, 3.3), rng.uniform(0.0, 6.3, 3), strict=True)
+        )
+        v = np.gradient(x, DT)
+        V = 4.0 * (np.floor(t / 1.5 + number) % 2)
+        clean = (
+            Problem([])
+            .bench(Model("bingham", effects))
+            .force(x, v, np.gradient(v, DT), V, DT, {**LAW, **values})
+        )
+        noisy = [c + 0.01 * c.std() * rng.standard_normal(len(t)) for c in (x, v, V, clean)]
+        names = ("displacement [m]", "velocity [m/s]", "voltage [V]", "force [N]")
+        frame = pd.DataFrame({"time [s]": t, **dict(zip(names, noisy, strict=True))})
+        runs += measurements_of_frame(frame)
+    return Problem([prepare(run, seed=k) for k, run in enumerate(runs)])
+
+
+@pytest.fixture(scope="module")
+def springy():
+    problem = rig(("gas_spring",), {"gas_spring.k": 200.0, "gas_spring.preload": 0.4})
+    return Ground(identify(problem, "bingham", starts=2).model, problem)
+
+
+def test_a_linear_effect_is_found_by_the_first_step(springy):
+    (best,) = ranked("gas_spring", springy)
+    others = [ranked(name, springy)[0].cost for name in ("stribeck", "saturation", "asymmetry")]
+    assert best.cost < 0.3 * min(others)
+    assert best.model.value("gas_spring.k") == pytest.approx(200.0, rel=0.05)
+
+
+def test_a_short_search_ends_where_a_long_one_does(springy):
+    begun = begin("gas_spring", springy, ranked("gas_spring", springy))
+    fitted = refine(begun.model, springy.train, 20)
+    assert begun.cost < 0.3 * springy.cost
+    assert fitted.value("gas_spring.k") == pytest.approx(200.0, rel=0.05)
+    assert fitted.value("gas_spring.preload") == pytest.approx(0.4, rel=0.1)
+
+
+@pytest.mark.parametrize("effect", joinable(Model("bingham")))
+def test_starts_cover_the_net_and_differ(springy, effect):
+    found = starts(effect, springy.base, springy.train)
+    nets = int(np.prod([len(values) for values in NET.get(effect, {}).values()]))
+    assert len(found) % nets == 0
+    values = {tuple(sorted(model.values.items())) for model in found}
+    assert len(values) == len(found)
