@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from bristle.diagnose.search import refine
 from bristle.diagnose.sites import try_effect
-from bristle.diagnose.structure import StructureDiagnosis, diagnose_structure
+from bristle.diagnose.structure import diagnose_structure
+from bristle.diagnose.structure_verdict import StructureDiagnosis
 from bristle.identify.fit import Model, identify
 from bristle.identify.line import fit_line
 from bristle.identify.structure import LinearLayer, LinearStorey, StructureProblem

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..diagnose import Diagnosis, diagnose
-from ..diagnose.structure import StructureDiagnosis, diagnose_structure
+from ..diagnose.structure import diagnose_structure
+from ..diagnose.structure_verdict import StructureDiagnosis
 from ..physics.effect import EFFECTS
 from .errors import StudyError
 from .history import Step

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..diagnose.search import refine
 from ..diagnose.sites import try_effect
-from ..diagnose.structure import fit_damper
+from ..diagnose.structure_damper import fit_damper
 from ..identify.fit import Fit, Model, fit, identify
 from ..identify.line import fit_line
 from ..identify.placed import at_site, homeless, on_time

@@ -6,19 +6,15 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
-from bristle.diagnose import structure
+from bristle.diagnose import structure, structure_damper
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.decision import Decision
 from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.load_cell import load_cell
 from bristle.diagnose.sites import Finding, look_at, shortened
-from bristle.diagnose.structure import (
-    QUIET,
-    DamperVerdict,
-    combine,
-    diagnose_structure,
-    lookalikes,
-)
+from bristle.diagnose.structure import diagnose_structure
+from bristle.diagnose.structure_damper import QUIET, DamperVerdict
+from bristle.diagnose.structure_verdict import combine, lookalikes
 from bristle.errors import RecordError
 from bristle.identify.fit import Model
 from bristle.identify.response import responses
@@ -216,8 +212,8 @@ def test_effects_of_the_damper_are_searched_only_where_one_could_matter(
         asked.append(given)
         return [trial(("gas_spring",), z)]
 
-    monkeypatch.setattr(structure, "try_all", search)
-    found = structure._decided(trial((), z, train), Seen(), Seen())
+    monkeypatch.setattr(structure_damper, "try_all", search)
+    found = structure_damper._decided(trial((), z, train), Seen(), Seen())
     assert len(asked) == searched
     assert found.decision.kind == "none"
     assert QUIET < 1.02, "above that an effect could lower z by its smallest share to that of noise"
@@ -230,15 +226,15 @@ def test_a_stop_that_is_met_once_is_told_by_its_likelihood():
     before = trial((), 1.3, losses=hit)
     stop = trial(("end_stop",), 0.99, losses=quiet)
     spring = trial(("duffing",), 1.29, losses=hit * 0.999)
-    decision = structure._seldom(before, [stop, spring])
+    decision = structure_damper._seldom(before, [stop, spring])
     assert decision is not None
     assert (decision.kind, decision.effects) == ("effect", ("end_stop",))
     assert decision.explained > 0.95
     close = trial(("duffing",), 0.991, losses=quiet * 1.0001)
-    assert structure._seldom(before, [stop, close]).effects == ("end_stop", "duffing")
-    assert structure._seldom(before, [trial(("gas_spring",), 0.99, losses=quiet)]) is None
+    assert structure_damper._seldom(before, [stop, close]).effects == ("end_stop", "duffing")
+    assert structure_damper._seldom(before, [trial(("gas_spring",), 0.99, losses=quiet)]) is None
     poor = trial(("end_stop",), 1.25, losses=hit * 0.99)
-    assert structure._seldom(before, [poor]) is None
+    assert structure_damper._seldom(before, [poor]) is None
 
 
 def test_only_what_an_instrument_accounts_for_is_forgiven():
@@ -246,7 +242,7 @@ def test_only_what_an_instrument_accounts_for_is_forgiven():
         before = trial((), z)
         unknown = Decision("unknown", (), before, 0.0, ("z.",))
         verdict = DamperVerdict(unknown, before, (trial(("stribeck",), z * (1.0 - gain)),))
-        return structure._forgiven(verdict, 1.25, "Blurred.").decision.kind
+        return structure_damper.forgiven(verdict, 1.25, "Blurred.").decision.kind
 
     assert judged(1.19, 0.001) == "none"
     assert judged(1.19, 0.1) == "unknown", "an effect explains it in part"

@@ -12,7 +12,8 @@ from shaken import building, friction, shake
 
 from bristle.cli import diagnose as diagnose_command
 from bristle.diagnose.sites import Finding
-from bristle.diagnose.structure import DamperVerdict, combine
+from bristle.diagnose.structure_damper import DamperVerdict
+from bristle.diagnose.structure_verdict import combine
 from bristle.identify.model import Model
 from bristle.identify.placed import at_site, homeless
 from bristle.physics.effect import EFFECTS
