@@ -35,6 +35,14 @@ def before_jump(V: Any, k: int) -> float:
     return V[k - 1] if abs(V[k] - V[k - 1]) > change else V[k]  # type: ignore[no-any-return]
 
 
+def jumps(V: Array) -> NDArray[np.bool_]:
+    """Return at which samples of a voltage (n,) `before_jump` sees a jump."""
+    change = np.abs(np.diff(V, prepend=V[:1]))
+    beside = np.maximum(np.append(0.0, change[:-1]), np.append(change[1:], 0.0))
+    found: NDArray[np.bool_] = change > JUMP * beside
+    return found
+
+
 def force_history(
     law: int, x: Any, v: Any, a: Any, V: Any, dt: float, z: Any, p: Any, on: Any, moving: Any,
     n_moving: int, advances: bool, z1: Any, work: Any, out: Any,

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compiled.bench import jumps
 from ..compiled.channel import shown
 from ..physics.effect import EFFECTS, Effect
 from ..records.measurement import Measurement
@@ -46,6 +47,49 @@ def shown_force(
     for effect in sensors(effects, "force"):
         force = shown(effect, own(effect, values), force, dt)
     return force
+
+
+def pure_delay(
+    effects: tuple[str, ...], values: dict[str, float]
+) -> tuple[float, dict[str, float]]:
+    """Return by what time [s] the force is merely late, and the values without that part."""
+    total, left = 0.0, values
+    for effect in sensors(effects, "force"):
+        if effect.late:
+            time, share = (f"{effect.name}.{name}" for name in effect.late)
+            known = {f"{effect.name}.{n}": p.value for n, p in effect.parameters.items()} | values
+            total += (1.0 - known[share]) * known[time]
+            left = {**left, time: known[share] * known[time], share: 1.0}
+    return total, left
+
+
+def earlier(
+    motion: tuple[Array, Array, Array, Array], late: float, dt: float
+) -> tuple[Array, Array, Array, Array]:
+    """Return x, v, a, V (n,) as they were a time `late` [s] before each sample.
+
+    The force at that moment has the jumps of a sign law and of a stepped voltage in full, where the
+    force between two samples would smear them. Before the record all is as at its begin.
+    """
+    whole = int(late / dt)
+    rest = late - whole * dt
+    x, v, a, V = (_held(signal, whole) for signal in motion)
+    V_before, a_before = _held(V, 1), _held(a, 1)
+    between = V - (V - V_before) * rest / dt
+    V = np.where(jumps(V), V_before, between) if rest > 0.0 else V
+    return (
+        x - v * rest + 0.5 * a * rest**2,
+        v - a * rest,
+        a - (a - a_before) * rest / dt,
+        V,
+    )
+
+
+def _held(signal: Array, count: int) -> Array:
+    """Return a signal (n,) shifted by a number of samples, its first value held."""
+    if count == 0:
+        return signal
+    return np.concatenate([np.full(min(count, len(signal)), signal[0]), signal[:-count]])
 
 
 def true_motion(

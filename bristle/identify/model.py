@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..compiled.bench import Bench
 from ..physics.damper import LAWS
 from ..physics.effect import CHOICES, EFFECTS, Parameter
-from .instruments import shown_force, true_motion
+from .instruments import earlier, pure_delay, shown_force, true_motion
 
 Array = NDArray[np.float64]
 
@@ -147,8 +147,11 @@ class Problem:
             e = run.draws[draw]
             x, v, a, V = x + e[:, 0], v + e[:, 1], a + e[:, 2], V + e[:, 3]
         v, a = true_motion(model.effects, model.values, v, a, run.dt)
-        force = self.bench(model).force(x, v, a, V, run.dt, model.values)
-        return shown_force(model.effects, model.values, force, run.dt)
+        late, values = pure_delay(model.effects, model.values)
+        if late > 0.0:
+            x, v, a, V = earlier((x, v, a, V), late, run.dt)
+        force = self.bench(model).force(x, v, a, V, run.dt, values)
+        return shown_force(model.effects, values, force, run.dt)
 
     def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:
         """Return per run: bias (n,) [N] of the prediction, noise (n,) [N], draws (d, n) [N].

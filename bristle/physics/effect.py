@@ -100,6 +100,9 @@ class Effect:
         stiffness, and held over a step; other forces are linear over it.
     shows
         Of a sensor's effect: the channel whose instrument it is, "force" or "velocity".
+    late
+        Of a sensor's effect: the parameter that says how late [s] it shows its signal, and the one
+        with the share of that time which a filter takes; the rest is a pure delay.
     joint
         Of a series element: the names of two states, the travel between rod and fluid [m] and the
         velocity across the fluid [m/s]; the integrator finds both, from the second one's `rate`.
@@ -121,6 +124,7 @@ class Effect:
     shows: ClassVar[str] = "force"
     own: ClassVar[bool] = False
     joint: ClassVar[tuple[str, ...]] = ()
+    late: ClassVar[tuple[str, ...]] = ()
     passive: ClassVar[bool] = False
     zero_at_rest: ClassVar[bool] = True
     excludes: ClassVar[tuple[str, ...]] = ()

@@ -20,6 +20,7 @@ class Delay(Effect):
     name = "delay"
     site = "sensor"
     shows = "force"
+    late = ("time", "filtered")
     needs = ("value", "dt")
     passive = False
     zero_at_rest = True
