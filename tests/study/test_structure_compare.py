@@ -10,6 +10,7 @@ import pytest
 from house_made import STIFF, study_of
 
 from bristle.cli import main
+from bristle.report.study_page import study_report
 from bristle.study.comparison import compare_study, holder
 from bristle.study.identification import identify_study
 from bristle.study.study import Study
@@ -114,3 +115,10 @@ def test_the_command_tells_of_every_site(stiff, capsys):
     assert lines[begin + 2].split()[:2] == ["isolation", "layer"]
     assert lines[begin + 2].split()[-1] == "displacement"
     assert {lines[begin + i].split()[-1] for i in (3, 4)} == {"-"}
+
+
+def test_the_report_tells_of_every_site(stiff):
+    page = study_report(stiff)
+    assert "Of the building&#x27;s sites the isolation layer is worst: z = " in page
+    for name in ("isolation layer", "storey 1", "damper"):
+        assert f">{name}</td>" in page
