@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+CLOSE = 1.1
+"""z up to which an error is what noise explains."""
 FEWEST = 100
 """Samples that a run of a comparison has at the least, beside those that are skipped."""
 
@@ -89,6 +91,13 @@ class Comparison:
     def z(self) -> float:
         """RMS(residual)/noise expected of a true model, over all runs."""
         return self.total.z
+
+    @property
+    def right(self) -> bool:
+        """Whether noise explains the error; of a building's site, with all sites looked at."""
+        if self.sites:
+            return not next(one.fails for one in self.sites if one.site == self.site)
+        return self.z <= CLOSE
 
     @property
     def first(self) -> Place | None:
@@ -162,7 +171,7 @@ def compare_held(
 
     `others` are the errors at the other sites of a building.
     """
-    from .sites import ordered, site_of
+    from .sites import judged, site_of
     from .words import sentences
 
     refuse(held)
@@ -183,7 +192,7 @@ def compare_held(
         tuple(regimes(normalised, along)), tuple(held), seen=seen,
     )  # fmt: skip
     if others:
-        comparison = replace(comparison, sites=ordered([site_of(comparison), *others]))
+        comparison = replace(comparison, sites=judged([site_of(comparison), *others]))
     return replace(comparison, sentences=sentences(comparison, finder))
 
 

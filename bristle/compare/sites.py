@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from statistics import NormalDist
 from typing import Any
 
 from .comparison import (
+    CLOSE,
     FEWEST,
     Comparison,
     RunError,
@@ -18,8 +20,7 @@ from .comparison import (
     run_error,
 )
 from .held import Held
-from .where import Finder, Place
-from .words import CLOSE
+from .where import LEVEL, Finder, Place
 
 FLIPS = 299
 """Patterns of signs at a site that is not compared at length: enough for a chance of 1 %."""
@@ -31,7 +32,8 @@ class SiteError:
 
     `site` is "damper", "layer", "storey1" ...; `quantity`, `unit` what is compared there; `runs`
     the error of each run, `total` over all; `z_interval` the 95 % interval of the total z; `place`
-    the coordinate that organises the error most, None where chance explains all.
+    the coordinate that organises the error most, None where chance explains all. `fails`: the
+    error is more than noise, and chance is no fair explanation of that, all sites together.
     """
 
     site: str
@@ -41,6 +43,7 @@ class SiteError:
     total: RunError
     z_interval: tuple[float, float]
     place: Place | None
+    fails: bool = False
 
     @property
     def z(self) -> float:
@@ -51,11 +54,6 @@ class SiteError:
     def told(self) -> bool:
         """Whether there are samples to tell it by: a base that hardly slides leaves too few."""
         return self.z == self.z
-
-    @property
-    def fails(self) -> bool:
-        """Whether the error is more than noise."""
-        return self.z > CLOSE
 
     def as_dict(self) -> dict[str, Any]:
         """Return the error as JSON has it."""
@@ -93,10 +91,32 @@ def compare_sites(
     RecordError
         As `compare_held`.
     """
-    errors = {name: site_error(runs, seed) for name, runs in held.items() if name != site}
-    site = site or ordered(errors.values())[0].site
-    others = [error for name, error in errors.items() if name != site]
+    errors = site_errors(held, seed)
+    site = site or errors[0].site
+    others = [one for one in errors if one.site != site]
     return compare_held(usable(held[site]), seen=seen, seed=seed, others=others)
+
+
+def site_errors(held: Mapping[str, Sequence[Held]], seed: int = 0) -> tuple[SiteError, ...]:
+    """Return how wrong a model is at every site, the worst one first."""
+    return judged([site_error(runs, seed) for runs in held.values()])
+
+
+def judged(sites: Iterable[SiteError]) -> tuple[SiteError, ...]:
+    """Return sites of which it is known which ones fail, those first, then by z.
+
+    Of twenty storeys one has a large z by chance: a site fails if the chance of its z is small for
+    the largest of all of them (Bonferroni), by the scatter that its interval states.
+    """
+    sites = list(sites)
+    far = NormalDist().inv_cdf(1.0 - LEVEL / max(len(sites), 1)) / 1.96
+
+    def fails(one: SiteError) -> bool:
+        high = one.z_interval[1]
+        return one.z > CLOSE and one.z**2 - far * (high**2 - one.z**2) > 1.0
+
+    found = [replace(one, fails=fails(one)) for one in sites]
+    return tuple(sorted(found, key=lambda one: (not one.fails, -one.z if one.told else 0.0)))
 
 
 def usable(held: Sequence[Held]) -> list[Held]:
@@ -128,8 +148,3 @@ def site_of(comparison: Comparison) -> SiteError:
         comparison.site, comparison.quantity, comparison.unit, comparison.runs, comparison.total,
         comparison.z_interval, comparison.first,
     )  # fmt: skip
-
-
-def ordered(sites: Iterable[SiteError]) -> tuple[SiteError, ...]:
-    """Return sites with the worst one first, those that cannot be told last."""
-    return tuple(sorted(sites, key=lambda one: -one.z if one.told else float("inf")))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-CLOSE = 1.1
-"""z up to which an error is what noise explains."""
 NAMES = {
     "voltage_rate": "recent changes of the voltage",
     "dissipated_energy": "the energy dissipated so far",
@@ -66,7 +65,7 @@ def _how_wrong(comparison: Comparison) -> str:
         step = f"; the step of the calculation alone makes {total.numerical_z:.2g} times the noise"
     if total.rms > _SPIKY * total.z * total.noise:
         size += ", much of it in short spikes"
-    if total.z > CLOSE:
+    if not comparison.right:
         times = f"{total.z:.3g}" if total.z < 100.0 else f"{total.z:.0f}"
         text = f"{where} the {what} by {size}, {times} times what its noise would explain{step}"
     else:
@@ -84,7 +83,7 @@ def _elsewhere(comparison: Comparison) -> str:
         listed = [f"{place_name(one.site)} (z = {one.z:.3g})" for one in fail[:_NAMED]]
         if len(fail) > _NAMED:
             listed.append(f"{len(fail) - _NAMED} more sites")
-        text += f"; it fails too at {joined(listed)}"
+        text += f"; it fails {'' if comparison.right else 'too '}at {joined(listed)}"
     if right:
         span = f"z {min(one.z for one in right):.2f} to {max(one.z for one in right):.2f}"
         span = f"z = {right[0].z:.2f}" if len(right) == 1 else span
@@ -107,12 +106,12 @@ def place_names(sites: Sequence[str]) -> str:
         int(site.removeprefix("storey")) for site in sites if site.startswith("storey")
     )
     names = sorted(place_name(site) for site in sites if not site.startswith("storey"))
-    if len(numbers) == 1:
-        names.append(f"storey {numbers[0]}")
-    elif len(numbers) > 2 and numbers[-1] - numbers[0] == len(numbers) - 1:
-        names.append(f"storeys {numbers[0]} to {numbers[-1]}")
-    elif numbers:
-        names.append(f"storeys {joined([str(number) for number in numbers])}")
+    spans: list[str] = []
+    for _, group in itertools.groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
+        row = [number for _, number in group]
+        spans += [f"{row[0]} to {row[-1]}"] if len(row) > 2 else [str(number) for number in row]
+    if spans:
+        names.append(f"storey{'s' * (len(numbers) > 1)} {joined(spans)}")
     return joined(names)
 
 
@@ -124,7 +123,7 @@ def joined(names: Sequence[str]) -> str:
 def _where(comparison: Comparison, finder: Finder) -> str:
     first = comparison.first
     if first is None or first.share < FAINT:
-        if comparison.z <= CLOSE:
+        if comparison.right:
             return "What is left looks like noise along every coordinate."
         loud = _loudest(comparison)
         most = (
@@ -133,7 +132,7 @@ def _where(comparison: Comparison, finder: Finder) -> str:
             else f"more than {_percent(first.share)} of it"
         )
         return f"No coordinate organises {most}{f'; {loud}' if loud else ''}."
-    if comparison.z <= CLOSE:
+    if comparison.right:
         return (
             f"A pattern is left with {name_of(first.coordinate, comparison.site)}, "
             f"{_percent(first.share)} of the error's power: {_pattern(first, comparison.held[0])}."
@@ -170,7 +169,7 @@ def _where_right(comparison: Comparison) -> str:
     if not every:
         return f"{begin(loud)}." if loud else "There is no speed to tell regimes by."
     best = min(every, key=lambda one: one.z)
-    if comparison.z <= CLOSE:
+    if comparison.right:
         return f"It does best {best.words} (z = {best.z:.2f})."
     text = f"Nowhere is it right within its noise: it does best {best.words} (z = {best.z:.3g})"
     return text + (f"; {loud}." if loud else ".")

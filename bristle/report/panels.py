@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compare.comparison import CLOSE
 from ..compare.coordinates import SHOWN
-from ..compare.words import CLOSE, FAINT, name_of, place_name
+from ..compare.words import FAINT, name_of, place_name
 from .style import BLUE, FLOOR, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
 
 if TYPE_CHECKING:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..compare.words import CLOSE, name_of
+from ..compare.words import name_of
 from .panels import (
     draw_error,
     draw_history,
@@ -94,7 +94,7 @@ def telling_places(comparison: Comparison) -> list[Place]:
 def headline(comparison: Comparison) -> str:
     """Return the finding in one line."""
     what, z = comparison.quantity.replace("_", " "), comparison.z
-    if z <= CLOSE:
+    if comparison.right:
         if comparison.sites and not any(one.fails for one in comparison.sites):
             return "The model is right within its noise at every site"
         return f"The model's {what} is right within its noise (z = {z:.2f})"

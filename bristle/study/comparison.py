@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from ..compare.comparison import Comparison, compare_held
 from ..compare.held import Held, held_runs
-from ..compare.sites import compare_sites
-from ..compare.words import CLOSE, place_name
+from ..compare.sites import compare_sites, site_errors
+from ..compare.words import place_name
 from ..identify.fit import Problem
 from ..identify.model import Model
 from ..identify.prepare import prepare
@@ -16,7 +16,6 @@ from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
 from .errors import StudyError
 from .identification import as_model
-from .judged import robust_z
 from .model import StudyModel
 from .structure import Pair, Sites, building_of
 from .study import Study
@@ -93,8 +92,10 @@ class BuildingHolder(Holder):
 
     def compare(self, model: StudyModel) -> Comparison:
         """Compare a model at the site, and tell how it stands at the others."""
-        held = {name: self._held(name, *one) for name, one in self._lines(model).items()}
-        return compare_sites(held, self.site, seen=self.seen)
+        return compare_sites(self._everywhere(model), self.site, seen=self.seen)
+
+    def _everywhere(self, model: StudyModel) -> dict[str, list[Held]]:
+        return {name: self._held(name, *one) for name, one in self._lines(model).items()}
 
     def _at_site(self, model: StudyModel) -> list[Held]:
         return self._held(self.site, *self._lines(model)[self.site])
@@ -112,21 +113,12 @@ class BuildingHolder(Holder):
         return [replace(one, quantity=name, site=site) for one in held_runs(problem, model)]
 
     def _chosen(self, present: StudyModel) -> str:
-        site, z = self._worst(present)
-        if z <= CLOSE and present.effects:
-            site, z = self._worst(replace(present, effects={}))
-        if z <= CLOSE:  # nothing fails anywhere: the damper is what a study is about
-            site = "damper" if "damper" in self._lines(present) else site
-        return site
-
-    def _worst(self, model: StudyModel) -> tuple[str, float]:
-        """Return the site where a model errs the most, and z there."""
-        z = {
-            site: robust_z(pair[self._index], own)
-            for site, (own, pair) in self._lines(model).items()
-        }
-        site = max(z, key=lambda name: z[name] if z[name] == z[name] else 0.0)
-        return site, z[site]
+        worst = site_errors(self._everywhere(present))[0]
+        if not worst.fails and present.effects:
+            worst = site_errors(self._everywhere(replace(present, effects={})))[0]
+        if not worst.fails and "damper" in self._lines(present):
+            return "damper"  # nothing fails anywhere: it is what a study is about
+        return worst.site
 
 
 def _quantity(site: str, problem: StructureProblem) -> str:
