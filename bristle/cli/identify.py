@@ -11,6 +11,9 @@ if TYPE_CHECKING:
 
 HELP = "fit a study's model: parameters with intervals, what the data cannot tell, errors of laws"
 
+BETTER = 0.9
+"""What part of the error another law must leave to be worth a word."""
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle identify`."""
@@ -87,7 +90,7 @@ def text(found: Identified, folder: Path) -> str:
         lines += ["", f"These data cannot tell: {', '.join(found.unidentified)}."]
     lines += ["", *_errors(found)]
     if found.table:
-        lines += ["", *_laws(found)]
+        lines += ["", *_laws(found, folder)]
     for note in found.notes:
         lines += ["", f"Note: {note}"]
     return "\n".join([*lines, "", *_next(found, folder)])
@@ -126,8 +129,8 @@ def _errors(found: Identified) -> list[str]:
     return [*lines, "  z: error over the noise that a true model would show; a true model has 1."]
 
 
-def _laws(found: Identified) -> list[str]:
-    """Return the table of laws: a section as in the paper."""
+def _laws(found: Identified, folder: Path) -> list[str]:
+    """Return the table of laws, as a section of the paper has it, and which one would do better."""
     lines = [
         f"  {'law':18} {'training':>11} {'held out':>11} {'of force':>9} {'|v| > 1 mm/s':>13} "
         f"{'starts':>8}"
@@ -145,6 +148,12 @@ def _laws(found: Identified) -> list[str]:
             lines.append(
                 f"  {law}: the exponential lowers the error by {1.0 - own[law] / standard:.1%}."
             )
+    mine, best = found.model.law, min(own, key=lambda law: own[law])
+    if mine in own and own[best] < BETTER * own[mine]:
+        lines.append(
+            f"  {best} errs {1.0 - own[best] / own[mine]:.0%} less than the model's law, {mine}. "
+            f"To change it:  bristle identify {folder} --law {best}"
+        )
     return [*lines, "  Each law fitted by least squares of the low-passed force, without effects."]
 
 

@@ -12,7 +12,7 @@ from scipy.signal import welch
 from ..compare.coordinates import coordinates_of
 from ..compare.where import Place, places
 from ..identify.fit import Model, Problem, fit, identify
-from ..identify.prepare import prepare
+from ..identify.prepare import SHORTEST, prepare
 from ..records.derived import derived_velocity
 from ..records.measurement import Measurement
 from .candidates import SECONDS, Trial, judge, try_all, try_members
@@ -152,9 +152,13 @@ def diagnose(
     if lacking:
         return Diagnosis("insufficient", (), " ".join(lacking), sensors=tuple(faults), noise=noise)
     say("smoothing the motion")
+    left = [_left(mended(runs, faults)) for runs in (train, holdout)]
+    if not all(left):
+        told = " ".join(["No run has enough samples that are not clipped.", *_words(faults)])
+        return Diagnosis("insufficient", (), told, sensors=tuple(faults), noise=noise)
     problem, held_out = (
-        Problem([prepare(one, seed=seed + i) for i, one in enumerate(mended(runs, faults))])
-        for runs, seed in ((train, 0), (holdout, 1000))
+        Problem([prepare(one, seed=seed + i) for i, one in enumerate(runs)])
+        for runs, seed in zip(left, (0, 1000), strict=True)
     )
     say("fitting the present model")
     if values is None:
@@ -216,7 +220,7 @@ def _judged(
     if kind == "class":
         members = [t.model for t in trials if set(t.effects) & set(decision.effects)]
         experiment = separating(members, problem)
-    words += [fault.words for fault in faults]
+    words += _words(faults)
     if kind == "none":
         words.append(f"An effect that leaves {visible:.2%} of the force would have been seen.")
     say("intervals")
@@ -297,6 +301,19 @@ def ringing(trial: Trial, held_out: Problem) -> float:
         inside = (f >= centre / 2 ** (1 / 6)) & (f <= centre * 2 ** (1 / 6))
         largest = max(largest, float(power[inside].sum()) / total)
     return largest
+
+
+def _left(runs: Sequence[Measurement]) -> list[Measurement]:
+    """Return the runs without those of which a fault has left too few samples."""
+    return [
+        run
+        for run in runs
+        if len(run.time) < SHORTEST or np.count_nonzero(run.measured) >= SHORTEST
+    ]
+
+
+def _words(faults: Sequence[SensorFault]) -> list[str]:
+    return [fault.words for fault in faults]
 
 
 def _noise(runs: Sequence[Measurement]) -> dict[str, float]:

@@ -17,8 +17,8 @@ DT, RATE = 0.002, 500.0
 LAW = {"f_c": 1.3, "f_v": 0.83, "c_0": 40.0, "c_v": 15.0, "v_n": 0.05, "exponent": 1.0}
 
 
-def rig(effects, values, count=3):
-    """Return a problem of runs of a Bingham damper with effects, with noise of 1 %."""
+def recorded_rig(effects, values, count=3):
+    """Return measurements of a Bingham damper with effects, with noise of 1 %."""
     rng = np.random.default_rng(3)
     runs = []
     for number in range(count):
@@ -37,7 +37,14 @@ def rig(effects, values, count=3):
         noisy = [c + 0.01 * c.std() * rng.standard_normal(len(t)) for c in (x, v, V, clean)]
         names = ("displacement [m]", "velocity [m/s]", "voltage [V]", "force [N]")
         frame = pd.DataFrame({"time [s]": t, **dict(zip(names, noisy, strict=True))})
+        frame.attrs["name"] = f"run_{number + 1}"
         runs += measurements_of_frame(frame)
+    return runs
+
+
+def rig(effects, values):
+    """Return the problem of fitting to such a rig."""
+    runs = recorded_rig(effects, values)
     return Problem([prepare(run, seed=k) for k, run in enumerate(runs)])
 
 

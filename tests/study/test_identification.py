@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from bristle.cli import identify as command
 from bristle.cli import main
 from bristle.compiled.bench import Bench
 from bristle.errors import RecordError
@@ -203,3 +206,14 @@ def test_wrong_choices_are_refused(tmp_path):
         identify_study(study, starts=0)
     with pytest.raises(StudyError, match="there are"):
         identify_study(study, law="coulomb")
+
+
+@pytest.mark.parametrize(("errors", "told"), [((3.0, 5.0), True), ((4.8, 5.0), False)])
+def test_a_law_that_errs_less_is_named(errors, told):
+    rows = [
+        SimpleNamespace(law=law, train=e, holdout=e, share=0.1, moving=e, agreed=3, starts=3)
+        for law, e in zip(("bingham", "lugre"), errors, strict=True)
+    ]
+    found = SimpleNamespace(model=SimpleNamespace(law="lugre"), table=rows)
+    said = "\n".join(command._laws(found, Path("rig")))
+    assert ("bristle identify rig --law bingham" in said) is told
