@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .coordinates import SHOWN
+from .names import joined, name_of, place_name, place_names
 from .regimes import Regime
 from .where import Finder, Place
 
@@ -19,14 +19,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-NAMES = {
-    "voltage_rate": "recent changes of the voltage",
-    "dissipated_energy": "the energy dissipated so far",
-    "time_since_reversal": "the time since the motion turned",
-    "time": "time",
-    "direction": "the direction of motion",
-}
-_OF_STOREY = {"displacement": "drift", "velocity": "drift rate", "speed": "drift speed"}
 FAINT = 0.02
 """Share of an error's power below which its pattern is not worth a sentence."""
 _STEP = 0.3  # numerical error, in units of the noise, that is worth a word
@@ -39,13 +31,6 @@ _WHICH = {
 _NAMED = 3  # sites that fail beside the worst one, by name
 _RIPPLES = 4  # changes of sign along a coordinate from which it goes up and down
 _ALIKE = 0.25  # parts of a pattern's size by which it may differ between voltages
-
-
-def name_of(coordinate: str, site: str = "") -> str:
-    """Return a coordinate as it is named in a sentence, at a site of a building if one is given."""
-    if site.startswith("storey"):
-        coordinate = _OF_STOREY.get(coordinate, coordinate)
-    return NAMES.get(coordinate, coordinate.replace("_", " "))
 
 
 def sentences(comparison: Comparison, finder: Finder) -> tuple[str, ...]:
@@ -91,33 +76,6 @@ def _elsewhere(comparison: Comparison) -> str:
         text += f"; {place_names([one.site for one in right])} {are} ({span})"
     hidden = [one.site for one in others if not one.told]
     return text + (f"; {place_names(hidden)}: too few samples to tell" if hidden else "")
-
-
-def place_name(site: str) -> str:
-    """Return a site as it is named in a sentence: "the isolation layer", "storey 2"."""
-    if site.startswith("storey"):
-        return f"storey {site.removeprefix('storey')}"
-    return {"layer": "the isolation layer"}.get(site, f"the {site}")
-
-
-def place_names(sites: Sequence[str]) -> str:
-    """Return sites as they are named together: "the damper and storeys 1 to 9"."""
-    numbers = sorted(
-        int(site.removeprefix("storey")) for site in sites if site.startswith("storey")
-    )
-    names = sorted(place_name(site) for site in sites if not site.startswith("storey"))
-    spans: list[str] = []
-    for _, group in itertools.groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
-        row = [number for _, number in group]
-        spans += [f"{row[0]} to {row[-1]}"] if len(row) > 2 else [str(number) for number in row]
-    if spans:
-        names.append(f"storey{'s' * (len(numbers) > 1)} {joined(spans)}")
-    return joined(names)
-
-
-def joined(names: Sequence[str]) -> str:
-    """Return names as a list in words: "a, b and c"."""
-    return " and ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
 
 def _where(comparison: Comparison, finder: Finder) -> str:

@@ -7,26 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compare.comparison import CLOSE
 from ..compare.coordinates import SHOWN
-from ..compare.words import FAINT, name_of, place_name
-from .style import BLUE, FLOOR, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
+from ..compare.names import name_of
+from .style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from matplotlib.axes import Axes
 
     from ..compare.comparison import Comparison
     from ..compare.held import Held
-    from ..compare.sites import SiteError
     from ..compare.where import Place
 
 Array = NDArray[np.float64]
 
 MEASURED, PREDICTED, ERROR = INK, BLUE, VERMILION
 _DOTS = 3000
-_TICKS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
 _WINDOW = 600  # samples of a history that are told apart on paper
 
 
@@ -133,54 +128,6 @@ def _means_along(comparison: Comparison, place: Place) -> Array:
     bins = np.clip(np.searchsorted(place.low, x, side="right") - 1, 0, len(place.mean) - 1)
     means = place.mean[bins]
     return np.asarray(means * _direction(comparison) if place.turned else means)
-
-
-def sites_height(count: int) -> float:
-    """Return the height [in] of a panel of so many sites, with its title and axis."""
-    return 0.95 + 0.25 * count
-
-
-def draw_sites(axes: Axes, sites: Sequence[SiteError], before: Sequence[SiteError] = ()) -> None:
-    """Draw z at every site of a building, the top storey above, over the band of noise.
-
-    Small dots are runs, the large one all of them with the 95 % interval; `before` are the sites of
-    an earlier model, drawn as rings.
-    """
-    shown = sorted((one for one in sites if one.told), key=lambda one: _floor(one.site))
-    earlier = {one.site: one.z for one in before if one.told}
-    axes.set_xscale("log")
-    axes.axvspan(1.0 / CLOSE, CLOSE, color=FLOOR, lw=0.0)
-    for y, one in enumerate(shown):
-        colour = VERMILION if one.fails else BLUE
-        axes.plot(one.z_interval, [y, y], color=colour, lw=1.6)
-        axes.plot([run.z for run in one.runs], [y] * len(one.runs), ".", ms=4, color=GREY)
-        axes.plot([one.z], [y], "o", ms=5.5, color=colour)
-        if one.site in earlier:
-            axes.plot([earlier[one.site]], [y], "o", ms=6.5, mfc="none", mec=GREY, mew=1.1)
-        place = one.place if one.fails and one.place and one.place.share >= FAINT else None
-        turns = f", along {_axis(place.coordinate, one.site)}" if place else ""
-        axes.text(1.02, y, f"z = {short_z(one.z)}{turns}", transform=axes.get_yaxis_transform(),
-                  va="center", fontsize=8.5, color=colour if one.fails else INK)  # fmt: skip
-    names = [place_name(one.site).removeprefix("the ") for one in shown]
-    axes.set_yticks(range(len(shown)), names, fontsize=9, color=INK)
-    axes.tick_params(axis="y", length=0)
-    axes.set_ylim(-0.6, len(shown) - 0.4)
-    every = [z for one in shown for z in (one.z, *one.z_interval, *(r.z for r in one.runs))]
-    every += list(earlier.values())
-    low, high = min([*every, 0.7]), max([*every, 2.0])
-    axes.set_xlim(0.9 * max(low, 0.1), 1.15 * high)
-    steps = [z for z in _TICKS if axes.get_xlim()[0] <= z <= axes.get_xlim()[1]]
-    axes.set_xticks(steps, [f"{z:g}" for z in steps])
-    axes.xaxis.set_minor_formatter(lambda value, _: "")
-    axes.grid(visible=False, axis="y")
-    axes.set_title("z at every site: error over what noise explains (green)")
-
-
-def _floor(site: str) -> int:
-    """Return where a site is drawn, from below: damper, layer, storeys."""
-    if site.startswith("storey"):
-        return int(site.removeprefix("storey"))
-    return {"damper": -1}.get(site, 0)
 
 
 def draw_spectrum(axes: Axes, comparison: Comparison) -> None:
@@ -302,9 +249,7 @@ __all__ = [
     "draw_map",
     "draw_place",
     "draw_regimes",
-    "draw_sites",
     "draw_spectrum",
     "residual_map",
-    "sites_height",
     "worst_window",
 ]

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..compare.words import name_of
+from ..compare.names import name_of
 from .panels import (
     draw_error,
     draw_history,
     draw_loop,
     draw_place,
     draw_regimes,
-    draw_sites,
     draw_spectrum,
-    sites_height,
     worst_window,
 )
+from .site_pictures import draw_sites, sites_height
 from .style import Page, look
 
 if TYPE_CHECKING:

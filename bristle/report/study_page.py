@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..compare.words import place_name
+from ..compare.names import place_name
 from ..errors import BristleError
 from . import html
 from .residuals import headline
@@ -219,7 +219,7 @@ def _sites(content: Content) -> list[str]:
     now = content.now
     if now is None or not now.sites:
         return []
-    from .study_pictures import sites_page
+    from .site_pictures import sites_page
     from .style import png
     from .tables import site_table
 
@@ -236,7 +236,7 @@ def _sites(content: Content) -> list[str]:
         + rings
     )
     return [
-        html.figure(png(sites_page(now, content.before)), title, caption),
+        html.figure(png(sites_page(now, content.before, 9.2)), title, caption),
         html.table(header, rows, numbers=range(1, 6)),
     ]
 

@@ -8,16 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..compare.words import name_of
+from ..compare.names import name_of
 from .panels import (
     draw_loop,
     draw_map,
     draw_place,
     draw_regimes,
-    draw_sites,
     draw_spectrum,
     residual_map,
-    sites_height,
 )
 from .residuals import telling_places
 from .style import BLUE, FLOOR, GREEN, GREY, INK, MINUS, PALE, VERMILION, Page, label, look, short_z
@@ -158,15 +156,6 @@ def maps_page(before: Comparison | None, now: Comparison, names: tuple[str, str]
         bar = page.figure.colorbar(image, cax=room)
         bar.set_label("mean error over noise", fontsize=8.5)
         bar.outline.set_visible(False)
-    return page
-
-
-def sites_page(now: Comparison, before: Comparison | None) -> Page:
-    """Return z at every site of a building, and of the model before the last added effect."""
-    with look():
-        page = Page(_WIDTH, sites_height(len(now.sites)), "")
-        grid = page.grid(1, 1, top=0.35, bottom=0.35, left=1.2, right=2.9)
-        draw_sites(page.figure.add_subplot(grid[0, 0]), now.sites, before.sites if before else ())
     return page
 
 

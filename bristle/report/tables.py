@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..compare.words import FAINT, begin, name_of, place_name
+from ..compare.names import name_of, place_name
+from ..compare.words import FAINT, begin
 from .style import percent, short_z
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 from ..compare.comparison import Comparison, compare_held
 from ..compare.held import Held, held_runs
+from ..compare.names import place_name
 from ..compare.sites import compare_sites, site_errors
-from ..compare.words import place_name
 from ..identify.fit import Problem
 from ..identify.model import Model
 from ..identify.prepare import prepare

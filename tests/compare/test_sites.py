@@ -9,8 +9,8 @@ import pytest
 from held_made import held_runs_with
 
 from bristle.compare import compare_sites
+from bristle.compare.names import place_names
 from bristle.compare.sites import site_errors
-from bristle.compare.words import place_names
 
 
 def spring(along):
