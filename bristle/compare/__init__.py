@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .comparison import Comparison, RunError, compare, compare_held
 from .held import Held, held_runs
+from .sites import SiteError, compare_sites
 from .where import Place, organised
 
 __all__ = [
@@ -11,8 +12,10 @@ __all__ = [
     "Held",
     "Place",
     "RunError",
+    "SiteError",
     "compare",
     "compare_held",
+    "compare_sites",
     "held_runs",
     "organised",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,15 @@ from .regimes import Regime, regimes
 from .scale import rms
 from .where import FLIPS, Finder, Place
 
+if TYPE_CHECKING:
+    from .sites import SiteError
+
 Array = NDArray[np.float64]
+
+CLOSE = 1.1
+"""z up to which an error is what noise explains."""
+FEWEST = 100
+"""Samples that a run of a comparison has at the least, beside those that are skipped."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +64,8 @@ class Comparison:
     telling one of what is left after that, None where chance explains the rest; `spectrum` the
     residual's against the noise's; `regimes` classes of speed and voltage; `held` the runs
     themselves; `sentences` what an engineer would say; `seen` whether the runs were those of the
-    fit, None where nobody knows.
+    fit, None where nobody knows; `sites` the errors of a building's sites, the worst first, of
+    which this is the comparison of one, `site`.
     """
 
     quantity: str
@@ -71,11 +80,24 @@ class Comparison:
     held: tuple[Held, ...] = field(repr=False)
     sentences: tuple[str, ...] = ()
     seen: bool | None = False
+    sites: tuple[SiteError, ...] = ()
+
+    @property
+    def site(self) -> str:
+        """The site of a building that is compared, "" on a bench."""
+        return self.held[0].site
 
     @property
     def z(self) -> float:
         """RMS(residual)/noise expected of a true model, over all runs."""
         return self.total.z
+
+    @property
+    def right(self) -> bool:
+        """Whether noise explains the error; of a building's site, with all sites looked at."""
+        if self.sites:
+            return not next(one.fails for one in self.sites if one.site == self.site)
+        return self.z <= CLOSE
 
     @property
     def first(self) -> Place | None:
@@ -90,17 +112,19 @@ class Comparison:
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as JSON has it, without the samples."""
+        of_building = {"site": self.site, "sites": [one.as_dict() for one in self.sites]}
         return {
+            **(of_building if self.sites else {}),
             "quantity": self.quantity,
             "unit": self.unit,
             "held_out": None if self.seen is None else not self.seen,
             "sentences": list(self.sentences),
             "z": self.z,
             "z_interval": list(self.z_interval),
-            "total": _run_dict(self.total),
-            "runs": [_run_dict(run) for run in self.runs],
-            "places": [_place_dict(one) for one in self.places],
-            "second": _place_dict(self.second) if self.second else None,
+            "total": run_dict(self.total),
+            "runs": [run_dict(run) for run in self.runs],
+            "places": [place_dict(one) for one in self.places],
+            "second": place_dict(self.second) if self.second else None,
             "bands": [asdict(band) for band in self.spectrum.bands],
             "regimes": [{**asdict(one), "right": one.right} for one in self.regimes],
         }
@@ -136,15 +160,24 @@ def compare(
 
 
 def compare_held(
-    held: Sequence[Held], *, seen: bool | None = False, seed: int = 0, flips: int = FLIPS
+    held: Sequence[Held],
+    *,
+    seen: bool | None = False,
+    seed: int = 0,
+    flips: int = FLIPS,
+    others: Sequence[SiteError] = (),
 ) -> Comparison:
-    """Compare one output, measured and predicted, whatever predicted it; see `compare`."""
+    """Compare one output, measured and predicted, whatever predicted it; see `compare`.
+
+    `others` are the errors at the other sites of a building.
+    """
+    from .sites import judged, site_of
     from .words import sentences
 
-    _refuse(held)
+    refuse(held)
     normalised = [one.normalised for one in held]
     along = [one.along() for one in held]
-    runs = tuple(_run_error(one.name, [one]) for one in held)
+    runs = tuple(run_error(one.name, [one]) for one in held)
     finder = Finder(normalised, [one.residual for one in held], along, flips, seed)
     found = finder.ranked(finder.normalised)
     second = None
@@ -154,20 +187,23 @@ def compare_held(
         rest = finder.ranked(left, raw, [found[0].coordinate])
         second = rest[0] if rest and rest[0].significant else None
     comparison = Comparison(
-        held[0].quantity, held[0].unit, runs, _run_error("all runs", held),
-        _interval(normalised, finder), tuple(found), second, spectrum(held),
+        held[0].quantity, held[0].unit, runs, run_error("all runs", held),
+        interval_of_z(normalised, finder), tuple(found), second, spectrum(held),
         tuple(regimes(normalised, along)), tuple(held), seen=seen,
     )  # fmt: skip
+    if others:
+        comparison = replace(comparison, sites=judged([site_of(comparison), *others]))
     return replace(comparison, sentences=sentences(comparison, finder))
 
 
-def _refuse(held: Sequence[Held]) -> None:
+def refuse(held: Sequence[Held]) -> None:
+    """Raise RecordError where runs are too few, too short, not finite or without noise."""
     if not held:
         raise RecordError("there is no run to compare with.")
     for one in held:
-        if len(one.measured) <= one.skip + 100:
+        if len(one.measured) <= one.skip + FEWEST:
             raise RecordError(
-                f"{one.name}: {len(one.measured)} samples; a comparison needs {one.skip + 100}."
+                f"{one.name}: {len(one.measured)} samples; a comparison needs {one.skip + FEWEST}."
             )
         for what, values in (("predicted", one.predicted), ("measured", one.measured)):
             bad = np.flatnonzero(~np.isfinite(values))
@@ -183,7 +219,7 @@ def _refuse(held: Sequence[Held]) -> None:
             )
 
 
-def _run_error(name: str, held: Sequence[Held]) -> RunError:
+def run_error(name: str, held: Sequence[Held]) -> RunError:
     """Return the error over some runs."""
     residual = np.concatenate([one.residual for one in held])
     sigma = np.concatenate([one.sigma[one.skip :] for one in held])
@@ -197,7 +233,7 @@ def _run_error(name: str, held: Sequence[Held]) -> RunError:
     )  # fmt: skip
 
 
-def _interval(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
+def interval_of_z(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
     """Return the 95 % interval of z over all runs, by the scatter of the loss over blocks."""
     loss = losses(np.concatenate(list(normalised)))
     blocks = finder.blocks
@@ -209,11 +245,13 @@ def _interval(normalised: Sequence[Array], finder: Finder) -> tuple[float, float
     return float(np.sqrt(low / HUBER_AT_ONE)), float(np.sqrt(high / HUBER_AT_ONE))
 
 
-def _run_dict(run: RunError) -> dict[str, Any]:
+def run_dict(run: RunError) -> dict[str, Any]:
+    """Return an error as JSON has it."""
     return {**asdict(run), "share": run.share}
 
 
-def _place_dict(place: Place) -> dict[str, Any]:
+def place_dict(place: Place) -> dict[str, Any]:
+    """Return a place as JSON has it."""
     found = asdict(place)
     for key in ("centre", "low", "high", "mean", "std"):
         found[key] = [float(value) for value in found[key]]

@@ -25,7 +25,8 @@ class Held:
     `spread` (d, n) are draws. `coordinates` name to (n,). `numerical` (n,) is how far the
     prediction moves at half the step, None where that was not tried. The first `skip` samples do
     not count, for the model's states begin somewhere, nor do those where `known` (n,) is False:
-    they were not measured but filled in.
+    they were not measured but filled in. `site` of a building is "damper", "layer", "storey1" ...,
+    "" on a bench. `index` (n,) numbers the samples where some were left out, None where none were.
     """
 
     name: str
@@ -41,11 +42,14 @@ class Held:
     unit: str = "N"
     skip: int = 25
     known: NDArray[np.bool_] | None = None
+    site: str = ""
+    index: NDArray[np.int64] | None = None
 
     @property
     def time(self) -> Array:
         """Time (n,) [s] from the run's begin."""
-        return np.asarray(np.arange(len(self.measured)) * self.dt, dtype=float)
+        index = np.arange(len(self.measured)) if self.index is None else self.index
+        return np.asarray(index * self.dt, dtype=float)
 
     @property
     def residual(self) -> Array:
@@ -89,11 +93,18 @@ def held_runs(problem: Problem, model: Model, draws: int = 12) -> list[Held]:
         out.append(
             Held(
                 run.name, run.dt, run.force, predicted + bias, sigma, run.noise, spread,
-                coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force),
-                finer - predicted, skip=run.skip, known=run.measured,
+                coordinates_of_run(run), finer - predicted, skip=run.skip, known=run.measured,
+                index=run.keep if isinstance(run, StructureRun) else None,
             )
         )  # fmt: skip
     return out
+
+
+def coordinates_of_run(run: Run) -> dict[str, Array]:
+    """Return the coordinates (n,) of a run; time and history go on where samples are left out."""
+    if isinstance(run, StructureRun) and run.whole is not None:
+        return {name: y[run.keep] for name, y in coordinates_of_run(run.whole).items()}
+    return coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force)
 
 
 def halved(run: Run) -> Run:
@@ -101,7 +112,9 @@ def halved(run: Run) -> Run:
     x, v, a = run.x, run.v, run.a
     whole: dict[str, Any] = {}
     if isinstance(run, StructureRun) and run.whole is not None:
-        whole = {"whole": halved(run.whole), "keep": np.arange(2 * len(x) - 1)}
+        keep = np.empty(2 * len(x) - 1, dtype=np.int64)
+        keep[::2], keep[1::2] = 2 * run.keep, 2 * run.keep[:-1] + 1
+        whole = {"whole": halved(run.whole), "keep": keep}
     return replace(
         run,
         **whole,

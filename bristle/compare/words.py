@@ -9,23 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .coordinates import SHOWN
+from .names import joined, name_of, place_name, place_names
 from .regimes import Regime
 from .where import Finder, Place
 
 if TYPE_CHECKING:
     from .comparison import Comparison
+    from .held import Held
 
 Array = NDArray[np.float64]
 
-CLOSE = 1.1
-"""z up to which an error is what noise explains."""
-NAMES = {
-    "voltage_rate": "recent changes of the voltage",
-    "dissipated_energy": "the energy dissipated so far",
-    "time_since_reversal": "the time since the motion turned",
-    "time": "time",
-    "direction": "the direction of motion",
-}
 FAINT = 0.02
 """Share of an error's power below which its pattern is not worth a sentence."""
 _STEP = 0.3  # numerical error, in units of the noise, that is worth a word
@@ -35,13 +28,9 @@ _WHICH = {
     False: "On runs it has not seen",
     True: "On the runs that it was fitted to",
 }
+_NAMED = 3  # sites that fail beside the worst one, by name
 _RIPPLES = 4  # changes of sign along a coordinate from which it goes up and down
 _ALIKE = 0.25  # parts of a pattern's size by which it may differ between voltages
-
-
-def name_of(coordinate: str) -> str:
-    """Return a coordinate as it is named in a sentence."""
-    return NAMES.get(coordinate, coordinate.replace("_", " "))
 
 
 def sentences(comparison: Comparison, finder: Finder) -> tuple[str, ...]:
@@ -61,16 +50,38 @@ def _how_wrong(comparison: Comparison) -> str:
         step = f"; the step of the calculation alone makes {total.numerical_z:.2g} times the noise"
     if total.rms > _SPIKY * total.z * total.noise:
         size += ", much of it in short spikes"
-    if total.z > CLOSE:
+    if not comparison.right:
         times = f"{total.z:.3g}" if total.z < 100.0 else f"{total.z:.0f}"
-        return f"{where} the {what} by {size}, {times} times what its noise would explain{step}."
-    return f"{where} the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}."
+        text = f"{where} the {what} by {size}, {times} times what its noise would explain{step}"
+    else:
+        text = f"{where} the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}"
+    return f"{text}{_elsewhere(comparison)}."
+
+
+def _elsewhere(comparison: Comparison) -> str:
+    """Return how wrong the model is at the other sites of a building; "" on a bench."""
+    others = [one for one in comparison.sites if one.site != comparison.site]
+    fail = [one for one in others if one.fails]
+    right = [one for one in others if one.told and not one.fails]
+    text = ""
+    if fail:
+        listed = [f"{place_name(one.site)} (z = {one.z:.3g})" for one in fail[:_NAMED]]
+        if len(fail) > _NAMED:
+            listed.append(f"{len(fail) - _NAMED} more sites")
+        text += f"; it fails {'' if comparison.right else 'too '}at {joined(listed)}"
+    if right:
+        span = f"z {min(one.z for one in right):.2f} to {max(one.z for one in right):.2f}"
+        span = f"z = {right[0].z:.2f}" if len(right) == 1 else span
+        are = "is right within its noise" if len(right) == 1 else "are right within their noise"
+        text += f"; {place_names([one.site for one in right])} {are} ({span})"
+    hidden = [one.site for one in others if not one.told]
+    return text + (f"; {place_names(hidden)}: too few samples to tell" if hidden else "")
 
 
 def _where(comparison: Comparison, finder: Finder) -> str:
     first = comparison.first
     if first is None or first.share < FAINT:
-        if comparison.z <= CLOSE:
+        if comparison.right:
             return "What is left looks like noise along every coordinate."
         loud = _loudest(comparison)
         most = (
@@ -79,20 +90,20 @@ def _where(comparison: Comparison, finder: Finder) -> str:
             else f"more than {_percent(first.share)} of it"
         )
         return f"No coordinate organises {most}{f'; {loud}' if loud else ''}."
-    if comparison.z <= CLOSE:
+    if comparison.right:
         return (
-            f"A pattern is left with {name_of(first.coordinate)}, {_percent(first.share)} of the "
-            f"error's power: {_pattern(first, comparison.unit)}."
+            f"A pattern is left with {name_of(first.coordinate, comparison.site)}, "
+            f"{_percent(first.share)} of the error's power: {_pattern(first, comparison.held[0])}."
         )
     also = ""
     if first.alike:
-        names = " and ".join(name_of(name) for name in first.alike[:2])
+        names = " and ".join(name_of(name, comparison.site) for name in first.alike[:2])
         also = f" (in these runs {names} tell{'s' * (len(first.alike) == 1)} the same)"
-    text = f"The error turns with {name_of(first.coordinate)}{also}: "
-    text += _pattern(first, comparison.unit) + _at_voltages(first, comparison, finder)
+    text = f"The error turns with {name_of(first.coordinate, comparison.site)}{also}: "
+    text += _pattern(first, comparison.held[0]) + _at_voltages(first, comparison, finder)
     second = comparison.second
     if second is not None and second.share > 0.03:
-        text += f"; what is left then turns with {name_of(second.coordinate)}"
+        text += f"; what is left then turns with {name_of(second.coordinate, comparison.site)}"
     return text + "."
 
 
@@ -108,15 +119,15 @@ def _where_right(comparison: Comparison) -> str:
     if right:
         best = max(right, key=lambda one: (not (one.speed and one.voltage), one.samples))
         others = [one for one in right if _beside(one, best)]
-        text = f"{_begin(best.words)} it is right within its noise (z = {best.z:.2f})"
+        text = f"{begin(best.words)} it is right within its noise (z = {best.z:.2f})"
         if others:
             text += f", and so it is {max(others, key=lambda one: one.samples).words}"
         return text + "."
     loud = _loudest(comparison)
     if not every:
-        return f"{loud[:1].upper()}{loud[1:]}." if loud else "There is no speed to tell regimes by."
+        return f"{begin(loud)}." if loud else "There is no speed to tell regimes by."
     best = min(every, key=lambda one: one.z)
-    if comparison.z <= CLOSE:
+    if comparison.right:
         return f"It does best {best.words} (z = {best.z:.2f})."
     text = f"Nowhere is it right within its noise: it does best {best.words} (z = {best.z:.3g})"
     return text + (f"; {loud}." if loud else ".")
@@ -146,9 +157,9 @@ def _loudest(comparison: Comparison) -> str:
     return f"{_percent(share)} of what exceeds the noise lies {span}"
 
 
-def _pattern(place: Place, unit: str) -> str:
+def _pattern(place: Place, held: Held) -> str:
     """Return how a residual goes along a coordinate: "beyond 8 mm it pushes back 0.4 N more"."""
-    hot = _hot(place)
+    hot, unit = _hot(place), held.unit
     peak = float(np.max(np.abs(place.mean)))
     if not hot:
         return f"by up to {peak:.2g} {unit}"
@@ -156,10 +167,10 @@ def _pattern(place: Place, unit: str) -> str:
     changes = int(np.count_nonzero(np.diff(np.sign(clear))))
     if changes >= _RIPPLES and place.coordinate in ("displacement", "velocity", "acceleration"):
         return f"it goes up and down {changes + 1} times along it, by up to {peak:.2g} {unit}"
-    mirrored = _mirrored(place, hot, unit)
+    mirrored = _mirrored(place, hot, held)
     if mirrored:
         return mirrored
-    return "; ".join(_one(place, begin, end, unit) for begin, end in hot[:2])
+    return "; ".join(_one(place, begin, end, held) for begin, end in hot[:2])
 
 
 def _hot(place: Place) -> list[tuple[int, int]]:
@@ -178,7 +189,7 @@ def _hot(place: Place) -> list[tuple[int, int]]:
     return sorted(out, key=lambda pair: -float(np.sum(np.abs(mean[pair[0] : pair[1] + 1]))))
 
 
-def _mirrored(place: Place, hot: list[tuple[int, int]], unit: str) -> str:
+def _mirrored(place: Place, hot: list[tuple[int, int]], held: Held) -> str:
     """Return the words for a pattern that is alike, or opposite, on both sides of zero."""
     if len(hot) < 2 or place.coordinate not in ("displacement", "velocity", "acceleration"):
         return ""
@@ -194,8 +205,8 @@ def _mirrored(place: Place, hot: list[tuple[int, int]], unit: str) -> str:
     size = 0.5 * (abs(left) + abs(right))
     where = f"beyond {edge:.2g} {shown} to either side"
     if left * right > 0.0:
-        return f"{where} {_acts(place, right, 0.0, size, unit)}"
-    return f"{where} {_acts(place, right, 1.0, size, unit)}"
+        return f"{where} {_acts(place, right, 0.0, size, held)}"
+    return f"{where} {_acts(place, right, 1.0, size, held)}"
 
 
 def _largest(mean: Array, begin: int, end: int) -> float:
@@ -203,24 +214,25 @@ def _largest(mean: Array, begin: int, end: int) -> float:
     return float(part[int(np.argmax(np.abs(part)))])
 
 
-def _one(place: Place, begin: int, end: int, unit: str) -> str:
+def _one(place: Place, begin: int, end: int, held: Held) -> str:
     size = _largest(place.mean, begin, end)
     centre = float(place.centre[begin : end + 1].mean())
-    acts = _acts(place, size, centre, abs(size), unit)
+    acts = _acts(place, size, centre, abs(size), held)
     return f"{_location(place, begin, end)} {acts}"
 
 
-def _acts(place: Place, size: float, side: float, amount: float, unit: str) -> str:
+def _acts(place: Place, size: float, side: float, amount: float, held: Held) -> str:
     """Return what the measured force does that the model's does not.
 
     `side` is where along the coordinate; 0 for a pattern alike on both sides.
     """
+    unit = held.unit
     up_to = f"up to {amount:.2g} {unit}"
     more = "more" if size > 0.0 else "less"
     if unit != "N":
         return f"it is {up_to} {'higher' if size > 0.0 else 'lower'} than the model's"
     if place.turned:
-        return f"the damper resists {up_to} {more} than the model"
+        return f"{place_name(held.site or 'damper')} resists {up_to} {more} than the model"
     if side and place.coordinate in ("displacement", "velocity", "acceleration"):
         more = "more" if size * side > 0.0 else "less"
         verb = {"displacement": "pushes back", "velocity": "resists"}.get(
@@ -263,6 +275,8 @@ def _at_voltages(place: Place, comparison: Comparison, finder: Finder) -> str:
     """Return whether a pattern is alike at low and high voltage; "" where that cannot be asked."""
     if "voltage" in place.coordinate or "voltage" not in finder.bins:
         return ""
+    if comparison.site not in ("", "damper"):
+        return ""  # it tells how far the damper let a spring move, and nothing of the spring
     V = np.concatenate([one.along()["voltage"] for one in comparison.held])
     middle = 0.5 * float(np.quantile(V, 0.98))
     sizes = [size_of(place, finder, chosen) for chosen in (middle > V, middle <= V)]
@@ -295,5 +309,6 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
 
 
-def _begin(text: str) -> str:
+def begin(text: str) -> str:
+    """Return a text with a capital at its begin."""
     return text[:1].upper() + text[1:]

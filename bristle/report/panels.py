@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..compare.coordinates import SHOWN
-from ..compare.words import name_of
+from ..compare.names import name_of
 from .style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
 
 if TYPE_CHECKING:
@@ -70,8 +70,8 @@ def draw_loop(axes: Axes, held: Held, over: str, *, window: slice | None = None)
     zero_lines(axes)
     axes.plot(x, held.measured[part], color=MEASURED, lw=1.3, alpha=0.75)
     axes.plot(x, held.predicted[part], color=PREDICTED, lw=1.0)
-    axes.set_title(f"{_named(held)} [{held.unit}] over {name_of(over)}")
-    axes.set_xlabel(f"{_axis(over)} [{unit}]")
+    axes.set_title(f"{_named(held)} [{held.unit}] over {name_of(over, held.site)}")
+    axes.set_xlabel(f"{_axis(over, held.site)} [{unit}]")
     axes.margins(0.05)
 
 
@@ -105,7 +105,8 @@ def draw_place(
     if after:
         what = f"what is left: {what}"
     axes.set_title(f"{what} [{comparison.unit}]")
-    axes.set_xlabel(_axis(place.coordinate) + (f" [{unit}]" if unit else ""))
+    axis = _axis(place.coordinate, comparison.site)
+    axes.set_xlabel(axis + (f" [{unit}]" if unit else ""))
     if place.coordinate == "direction":
         axes.set_xlim(-1.8, 1.8)
         axes.set_xticks([-1.0, 1.0], ["moving back", "moving outwards"])
@@ -203,8 +204,8 @@ def draw_map(axes: Axes, comparison: Comparison, limit: float) -> Any:
     x, v, mean = found
     axes.set_facecolor("#dedede")  # no samples
     image = axes.pcolormesh(1e3 * x, 1e3 * v, mean.T, cmap="RdBu_r", vmin=-limit, vmax=limit)
-    axes.set_xlabel("displacement [mm]")
-    axes.set_ylabel("velocity [mm/s]")
+    axes.set_xlabel(f"{_axis('displacement', comparison.site)} [mm]")
+    axes.set_ylabel(f"{_axis('velocity', comparison.site)} [mm/s]")
     axes.grid(visible=False)
     return image
 
@@ -223,8 +224,8 @@ def _legend(axes: Axes, *names: tuple[str, str]) -> None:
     )  # fmt: skip
 
 
-def _axis(coordinate: str) -> str:
-    return name_of(coordinate).removeprefix("the ")
+def _axis(coordinate: str, site: str) -> str:
+    return name_of(coordinate, site).removeprefix("the ")
 
 
 def _named(held: Held) -> str:

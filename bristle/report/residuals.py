@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..compare.words import name_of
+from ..compare.names import name_of
 from .panels import (
     draw_error,
     draw_history,
@@ -14,6 +14,7 @@ from .panels import (
     draw_spectrum,
     worst_window,
 )
+from .site_pictures import draw_sites, sites_height
 from .style import Page, look
 
 if TYPE_CHECKING:
@@ -27,9 +28,9 @@ _HISTORY, _PANELS = 3.1, 3.2
 def draw_comparison(comparison: Comparison, title: str = "") -> Page:
     """Return the figure of a comparison, drawn and not yet written.
 
-    Panels: the worst stretch of the worst run, measured and predicted, with the error under it; the
-    loops of that run; the error along the two most telling coordinates; its spectrum against that
-    of the noise; z in classes of speed and voltage.
+    Panels: z at every site of a building; the worst stretch of the worst run, measured and
+    predicted, with the error under it; the loops of that run; the error along the two most telling
+    coordinates; its spectrum against that of the noise; z in classes of speed and voltage.
     """
     held = comparison.worst
     window = worst_window(held)
@@ -38,17 +39,23 @@ def draw_comparison(comparison: Comparison, title: str = "") -> Page:
     first = telling[0] if comparison.second else None
     rows = [bool(loops), bool(telling), True]
     with look():
-        height = _HISTORY + _PANELS * sum(rows)
+        sites = comparison.sites
+        begin = sites_height(len(sites)) if sites else 0.0
+        height = begin + _HISTORY + _PANELS * sum(rows)
         page = Page(9.6, height, title or headline(comparison), " ".join(comparison.sentences))
+        if sites:
+            above = page.grid(1, 1, top=0.35, bottom=height - begin + 0.5, left=1.35, right=2.9)
+            draw_sites(page.figure.add_subplot(above[0, 0]), sites)
         grid = page.grid(
-            2, 1, top=0.35, bottom=height - _HISTORY + 0.45, row_gap=0.4, height_ratios=[1.6, 1.0]
-        )
+            2, 1, top=begin + 0.35, bottom=height - begin - _HISTORY + 0.45, row_gap=0.4,
+            height_ratios=[1.6, 1.0],
+        )  # fmt: skip
         upper = page.figure.add_subplot(grid[0, 0])
         draw_history(upper, held, window)
         lower = page.figure.add_subplot(grid[1, 0], sharex=upper)
         upper.tick_params(labelbottom=False)
         draw_error(lower, held, window)
-        at = _HISTORY
+        at = begin + _HISTORY
         if loops:
             _row(page, at, [lambda axes, o=one: draw_loop(axes, held, o) for one in loops])
             at += _PANELS
@@ -86,10 +93,13 @@ def telling_places(comparison: Comparison) -> list[Place]:
 def headline(comparison: Comparison) -> str:
     """Return the finding in one line."""
     what, z = comparison.quantity.replace("_", " "), comparison.z
-    if z <= 1.1:
+    if comparison.right:
+        if comparison.sites and not any(one.fails for one in comparison.sites):
+            return "The model is right within its noise at every site"
         return f"The model's {what} is right within its noise (z = {z:.2f})"
     times = f"{z:.2g}" if z < 100.0 else f"{z:.0f}"
     text = f"The model's {what} is wrong by {times} times what noise explains"
     if comparison.first:
-        text += f"; the error turns with {name_of(comparison.first.coordinate)}"
+        along = name_of(comparison.first.coordinate, comparison.site)
+        text += f"; the error turns with {along}"
     return text

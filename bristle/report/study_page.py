@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
+from ..compare.names import place_name
 from ..errors import BristleError
 from . import html
 from .residuals import headline
@@ -58,7 +59,6 @@ def study_report(study: Study) -> str:
 
 def gather(study: Study) -> Content:
     """Return what the report of a study tells; it compares the models before and after."""
-    from ..compare.comparison import compare_held
     from ..study.comparison import holder
     from ..study.model import read_model
 
@@ -69,7 +69,7 @@ def gather(study: Study) -> Content:
     found = treads(steps)
     try:
         hold = holder(study)
-        now = compare_held(hold(model))
+        now = hold.compare(model)
         for step in reversed(steps):
             gone = set(read_model(study.history.model_file(step.number), study.folder).effects)
             if step.number == 0 or not gone <= set(model.effects):
@@ -77,7 +77,7 @@ def gather(study: Study) -> Content:
             earlier = read_model(study.history.model_file(step.number - 1), study.folder)
             new = [name for name in model.effects if name not in earlier.effects]
             if new:
-                before, added = compare_held(hold(earlier)), " and ".join(new)
+                before, added = hold.compare(earlier), " and ".join(new)
                 break
         found = [_judged(one, hold, study) for one in found]
     except BristleError as error:
@@ -203,6 +203,7 @@ def _where(content: Content) -> str:
     return html.section(
         "Where the model stands now",
         html.paragraphs(*say, kind="lead"),
+        *_sites(content),
         html.figure(png(error_page(now)), title, caption),
         html.table(*run_errors(now), numbers=range(1, 6)),
         html.table(header, rows, numbers=range(1, 4)),
@@ -211,6 +212,33 @@ def _where(content: Content) -> str:
             "one, all coordinates together.", kind="soft",
         ),
     )  # fmt: skip
+
+
+def _sites(content: Content) -> list[str]:
+    """Return the picture and table of a building's sites; nothing on a bench."""
+    now = content.now
+    if now is None or not now.sites:
+        return []
+    from .site_pictures import sites_page
+    from .style import png
+    from .tables import site_table
+
+    _, header, rows = site_table(now)
+    rings = f" Rings: without {content.added}." if content.before else ""
+    worst = now.sites[0]
+    name = place_name(worst.site)
+    title = f"The model is right within its noise at every site; {name} is worst"
+    if worst.fails:
+        title = f"Of the building's sites {name} is worst: z = {short_z(worst.z)}"
+    caption = (
+        "z at every site, from the top storey down, each held against equilibrium on runs that no "
+        "fit has seen: small dots are runs, the large one all of them with its 95 % interval."
+        + rings
+    )
+    return [
+        html.figure(png(sites_page(now, content.before, 9.2)), title, caption),
+        html.table(header, rows, numbers=range(1, 6)),
+    ]
 
 
 def _history(content: Content) -> str:

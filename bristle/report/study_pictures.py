@@ -8,9 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .panels import draw_loop, draw_map, draw_place, draw_regimes, draw_spectrum, residual_map
+from ..compare.names import name_of
+from .panels import (
+    draw_loop,
+    draw_map,
+    draw_place,
+    draw_regimes,
+    draw_spectrum,
+    residual_map,
+)
 from .residuals import telling_places
-from .style import BLUE, GREEN, GREY, INK, MINUS, PALE, VERMILION, Page, label, look, short_z
+from .style import BLUE, FLOOR, GREEN, GREY, INK, MINUS, PALE, VERMILION, Page, label, look, short_z
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +40,7 @@ def staircase_page(treads: Sequence[Tread], unit: str = "N") -> Page:
         axes = page.figure.add_subplot(grid[0, 0])
         top = max([one.z or 1.0 for one in judged] + [one.z_train or 1.0 for one in judged] + [2.0])
         axes.set_yscale("log")
-        axes.axhspan(0.9, 1.1, color="#d9efe6", lw=0.0)
+        axes.axhspan(0.9, 1.1, color=FLOOR, lw=0.0)
         _stairs(axes, [one.z_train for one in judged], PALE, 1.6)
         _stairs(axes, [one.z for one in judged], BLUE, 2.6)
         for i, one in enumerate(judged):
@@ -116,9 +124,11 @@ def loops_page(before: Comparison | None, now: Comparison, names: tuple[str, str
                 axes = page.figure.add_subplot(grid[row, column])
                 draw_loop(axes, held, over)
                 if column == 0:
-                    axes.set_title(f"{name}: force [{held.unit}] over displacement")
+                    along = name_of(over, held.site)
+                    axes.set_title(f"{name}: force [{held.unit}] over {along}")
                 else:
-                    axes.set_title(f"over velocity; z = {short_z(z)} on {held.name}")
+                    along = name_of(over, held.site)
+                    axes.set_title(f"over {along}; z = {short_z(z)} on {held.name}")
         return page
 
 

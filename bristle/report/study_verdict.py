@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..compare.words import name_of
+from ..compare.names import name_of
 from ..physics.effect import EFFECTS
 from ..records.channels import PLAIN
 from .study_tables import in_lab_unit, number, share

@@ -20,6 +20,8 @@ FORMATS = ("png", "svg", "pdf")
 
 # Okabe & Ito (2008), Color Universal Design.
 BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
+FLOOR = "#d9efe6"
+"""The band of z that noise explains."""
 INK, GREY, PALE = "#222222", "#666666", "#b8b8b8"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..compare.words import name_of
+from ..compare.names import name_of, place_name
+from ..compare.words import FAINT, begin
 from .style import percent, short_z
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison, RunError
+    from ..compare.sites import SiteError
     from ..compare.where import Place
 
 Table = tuple[str, list[str], list[list[str]]]
@@ -17,8 +19,33 @@ _SHOWN = 6  # coordinates in a table
 
 
 def comparison_tables(comparison: Comparison) -> list[Table]:
-    """Return (title, header, rows) of the error per run, along coordinates, and in frequency."""
-    return [run_table(comparison), place_table(comparison), band_table(comparison)]
+    """Return (title, header, rows) of the error per site, run, coordinate and frequency.
+
+    There are sites of a building only.
+    """
+    sites = [site_table(comparison)] if comparison.sites else []
+    return [*sites, run_table(comparison), place_table(comparison), band_table(comparison)]
+
+
+def site_table(comparison: Comparison) -> Table:
+    """Return the error at each site of a building, the worst first."""
+    header = ["site", "z", "95 %", "error [N]", "of RMS", "noise [N]", "turns with"]
+    return "Error at every site, each over its own noise (z)", header, [
+        _site(one) for one in comparison.sites
+    ]  # fmt: skip
+
+
+def _site(one: SiteError) -> list[str]:
+    name = place_name(one.site).removeprefix("the ")
+    if not one.told:
+        return [name, "-", "too few samples", "-", "-", "-", "-"]
+    (low, high), total, place = one.z_interval, one.total, one.place
+    told = place is not None and place.share >= FAINT
+    return [
+        name, short_z(one.z), f"{short_z(low)} - {short_z(high)}", f"{total.rms:.3g}",
+        percent(total.share), f"{total.noise:.3g}",
+        name_of(place.coordinate, one.site) if place is not None and told else "-",
+    ]  # fmt: skip
 
 
 def run_table(comparison: Comparison) -> Table:
@@ -27,11 +54,10 @@ def run_table(comparison: Comparison) -> Table:
     header = ["run", "z", f"error [{unit}]", "of RMS", f"noise [{unit}]", "half step [z]"]
     runs = [*comparison.runs]
     rows = [_run(one) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
-    return (
-        "Error over the noise that a true model would show (z), and what half the step changes",
-        header,
-        rows,
-    )
+    title = "Error over the noise that a true model would show (z), and what half the step changes"
+    if comparison.sites:
+        title = f"{begin(place_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
+    return title, header, rows
 
 
 def _run(run: RunError) -> list[str]:
@@ -45,12 +71,13 @@ def _run(run: RunError) -> list[str]:
 def place_table(comparison: Comparison) -> Table:
     """Return the coordinates by how much of the error's power each carries."""
     header = ["coordinate", "of the error", "of what exceeds noise", "chance"]
-    rows = [_place(one) for one in comparison.places[:_SHOWN]]
+    rows = [_place(one, comparison.site) for one in comparison.places[:_SHOWN]]
     return "Where the error lives: the part of its power that a coordinate carries", header, rows
 
 
-def _place(place: Place) -> list[str]:
-    name = name_of(place.coordinate) + (", with the direction of motion" if place.turned else "")
+def _place(place: Place, site: str) -> list[str]:
+    name = name_of(place.coordinate, site)
+    name += ", with the direction of motion" if place.turned else ""
     excess = percent(place.of_excess, 0) if place.of_excess == place.of_excess else "-"
     chance = f"{place.p:.1g}" if place.p >= 0.001 else "< 0.001"
     return [name, percent(place.share), excess, chance]

@@ -7,22 +7,39 @@ from dataclasses import replace
 
 from ..compare.comparison import Comparison, compare_held
 from ..compare.held import Held, held_runs
+from ..compare.names import place_name
+from ..compare.sites import compare_sites, site_errors
 from ..identify.fit import Problem
+from ..identify.model import Model
 from ..identify.prepare import prepare
+from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
 from .errors import StudyError
 from .identification import as_model
-from .judged import robust_z
 from .model import StudyModel
-from .structure import Sites, building_of
+from .structure import Pair, Sites, building_of
 from .study import Study
-
-Holder = Callable[[StudyModel], list[Held]]
 
 QUANTITIES = {"damper": "force", "layer": "force of the isolation layer"}
 """What is compared at a site of a building."""
 
-_MISFIT = 1.15  # z above which an error is more than noise
+
+class Holder:
+    """What holds models against the runs of one role, always at the same site.
+
+    Called with a model it returns the runs held against it there.
+    """
+
+    def __init__(self, hold: Callable[[StudyModel], list[Held]], seen: bool) -> None:
+        self._hold = hold
+        self.seen = seen
+
+    def __call__(self, model: StudyModel) -> list[Held]:
+        return self._hold(model)
+
+    def compare(self, model: StudyModel) -> Comparison:
+        """Compare a model; of a building it knows how the other sites stand."""
+        return compare_held(self(model), seen=self.seen)
 
 
 def holder(study: Study, role: str = "holdout") -> Holder:
@@ -55,46 +72,65 @@ def hold_bench(study: Study, role: str) -> Holder:
             raise StudyError(f"{', '.join(foreign)}: of a structure, and on a bench there is none.")
         return held_runs(problem, as_model(model))
 
-    return hold
+    return Holder(hold, role == "train")
 
 
-def hold_structure(study: Study, role: str) -> Holder:
-    """Return what holds models against a building's runs at one site, the same for all models.
+class BuildingHolder(Holder):
+    """What holds models against a building's runs, at one site at length and at all in short.
 
-    It is the site where the present model errs the most; where it errs nowhere, the one where the
+    The site is that where the present model errs the most; where it errs nowhere, the one where the
     law without any effect does. A force that was not measured is reconstructed from equilibrium,
     and carries its noise.
     """
-    present = study.model()
-    sites = Sites(study.runs(), building_of(study, present))
-    index = 0 if role == "train" else 1
-    site, z = _worst(sites, present, index)
-    if z <= _MISFIT and present.effects:
-        site, z = _worst(sites, replace(present, effects={}), index)
-    if z <= _MISFIT:  # nothing fails anywhere: the damper is what a study is about
-        site = "damper" if "damper" in sites.problems(as_model(present)) else site
 
-    def hold(model: StudyModel) -> list[Held]:
-        own, pair = sites.lines(as_model(model), only=site)[site]
-        held = held_runs(pair[index], own)
-        name = "reconstructed force" if pair[index].reconstructed else QUANTITIES.get(site, "force")
-        name = f"shear of {site}" if site.startswith("storey") else name
-        return [replace(one, quantity=name) for one in held]
+    def __init__(self, study: Study, role: str) -> None:
+        super().__init__(self._at_site, role == "train")
+        self._sites = Sites(study.runs(), building_of(study, study.model()))
+        self._index = 0 if role == "train" else 1
+        self._known: tuple[Model, dict[str, tuple[Model, Pair]]] | None = None
+        self.site = self._chosen(study.model())
 
-    return hold
+    def compare(self, model: StudyModel) -> Comparison:
+        """Compare a model at the site, and tell how it stands at the others."""
+        return compare_sites(self._everywhere(model), self.site, seen=self.seen)
+
+    def _everywhere(self, model: StudyModel) -> dict[str, list[Held]]:
+        return {name: self._held(name, *one) for name, one in self._lines(model).items()}
+
+    def _at_site(self, model: StudyModel) -> list[Held]:
+        return self._held(self.site, *self._lines(model)[self.site])
+
+    def _lines(self, model: StudyModel) -> dict[str, tuple[Model, Pair]]:
+        """Return the models by site; those of the last model are kept, for an effect takes long."""
+        wanted = as_model(model)
+        if self._known is None or self._known[0] != wanted:
+            self._known = wanted, self._sites.lines(wanted)
+        return self._known[1]
+
+    def _held(self, site: str, model: Model, pair: Pair) -> list[Held]:
+        problem = pair[self._index]
+        name = _quantity(site, problem)
+        return [replace(one, quantity=name, site=site) for one in held_runs(problem, model)]
+
+    def _chosen(self, present: StudyModel) -> str:
+        worst = site_errors(self._everywhere(present))[0]
+        if not worst.fails and present.effects:
+            worst = site_errors(self._everywhere(replace(present, effects={})))[0]
+        if not worst.fails and "damper" in self._lines(present):
+            return "damper"  # nothing fails anywhere: it is what a study is about
+        return worst.site
 
 
-def _worst(sites: Sites, model: StudyModel, index: int) -> tuple[str, float]:
-    """Return the site where a model errs the most, and z there."""
-    held = sites.lines(as_model(model))
-    z = {site: robust_z(pair[index], own) for site, (own, pair) in held.items()}
-    site = max(z, key=lambda name: z[name])
-    return site, z[site]
+def _quantity(site: str, problem: StructureProblem) -> str:
+    """Return what is compared at a site, in words."""
+    if problem.reconstructed:
+        return "reconstructed force"
+    return QUANTITIES.get(site, f"shear of {place_name(site)}")
 
 
 HOLDERS: dict[str, Callable[[Study, str], Holder]] = {
     "bench": hold_bench,
-    "structure": hold_structure,
+    "structure": BuildingHolder,
 }
 """What holds models against measured runs, by the rig."""
 
@@ -104,10 +140,11 @@ def compare_study(
 ) -> Comparison:
     """Hold a study's model, the present one by default, against its runs of one role.
 
+    Of a building it tells all sites, and at length the one where the present model fails the most.
+
     Raises
     ------
     StudyError, RecordError
         As `holder`, and if nothing tells what error is large.
     """
-    held = holder(study, role)(model or study.model())
-    return compare_held(held, seen=role == "train")
+    return holder(study, role).compare(model or study.model())

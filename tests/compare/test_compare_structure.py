@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 from bristle import run
+from bristle.compare.held import held_runs
+from bristle.identify.model import Model
+from bristle.identify.structure import StructureProblem, structure_run
 from bristle.study import create_study
 from bristle.study.comparison import compare_study
 
@@ -50,3 +53,25 @@ def test_the_true_damper_is_right_within_its_noise(tmp_path, force):
     assert 0.7 < truth.z < 1.35
     wrong = study.model().with_values({"sigma_a": 1300.0})
     assert compare_study(study, wrong).z > 1.5 * truth.z
+
+
+def test_samples_that_are_left_out_leave_time_and_history_alone():
+    n, dt = 4000, 0.002
+    t = np.arange(n) * dt
+    w = 2.0 * np.pi * 1.5
+    x, v, a = 0.01 * np.sin(w * t), 0.01 * w * np.cos(w * t), -0.01 * w**2 * np.sin(w * t)
+    model = Model("bingham", ("presliding",))
+    draws = np.zeros((2, n, 4))
+    every = structure_run("r", dt, (x, v, a, np.zeros(n)), np.zeros(n), 0.01, draws)
+    whole = held_runs(StructureProblem([every]), model)[0]
+    keep = np.abs(v) > 0.03
+    some = structure_run("r", dt, (x, v, a, np.zeros(n)), np.zeros(n), 0.01, draws, keep)
+    part = held_runs(StructureProblem([some]), model)[0]
+    index = some.keep
+    assert 0.3 < len(index) / n < 0.9
+    assert part.time == pytest.approx(t[index])
+    for name, values in part.coordinates.items():
+        assert values == pytest.approx(whole.coordinates[name][index]), name
+    assert part.predicted == pytest.approx(whole.predicted[index])
+    assert part.numerical == pytest.approx(whole.numerical[index])
+    assert np.std(part.numerical) > 0.0

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
 import pytest
-from shaken import building, friction, shake
+from house_made import study_of
+from shaken import building, friction
 
 from bristle.cli import diagnose as diagnose_command
 from bristle.diagnose.sites import Finding
@@ -17,44 +16,10 @@ from bristle.diagnose.structure_verdict import combine
 from bristle.identify.model import Model
 from bristle.identify.placed import at_site, homeless
 from bristle.physics.effect import EFFECTS
-from bristle.records.channels import channel_unit
 from bristle.study.comparison import compare_study
 from bristle.study.errors import StudyError
 from bristle.study.identification import identify_study
 from bristle.study.learning import add_effects, diagnose_study
-from bristle.study.new import create_study
-from bristle.study.study import Study
-
-STIFF = 1.5e7  # N/m3, of the cubic spring that the files hide
-
-
-def stiffening(x, v):
-    return [STIFF * x[0] ** 3, 0.0]
-
-
-def study_of(folder: Path, damper=None) -> Study:
-    b = building(1, True, 6)
-    file = folder / "house.toml"
-    file.write_text(
-        'schema = 1\nname = "house"\nbase = "isolated"\ndamping_ratio = 0.02\n'
-        f"masses = {np.diag(b.M).tolist()}\nstiffnesses = {list(b.stiffnesses)}\n",
-        encoding="utf-8",
-    )
-    runs = []
-    for k, role in enumerate(("train", "train", "holdout")):
-        clean = shake(b, 20 + k, damper, stiffening, samples=2500)
-        random = np.random.default_rng(k)
-        named = {
-            f"{c} [{'s' if c == 'time' else channel_unit(c)}]": y
-            + (c != "time") * 0.01 * np.std(y) * random.standard_normal(len(y))
-            for c, y in clean.items()
-        }
-        runs.append(folder / f"{role}_{k}.csv")
-        np.savetxt(
-            runs[-1], np.column_stack(list(named.values())), "%.9g", ",", header=",".join(named),
-            comments="",
-        )  # fmt: skip
-    return create_study(folder / "rig", runs, rig="structure", building=file, law="bingham").study
 
 
 def test_hidden_spring_is_found_added_and_the_error_falls(tmp_path, capsys):
