@@ -22,8 +22,17 @@ SHORTEST = 200
 SETTLING = 25
 """Samples at the begin of a run that are not judged."""
 
+RESTS = 2e-3
+"""Share of the stroke that a damper at rest moves by at most: noise."""
+
+STANDS = 0.2
+"""Time [s] for which it does: a motion that begins gently is faster."""
+
 LOADED = 0.2
 """Share of its RMS that the force has at the begin of a run that was cut out under load."""
+
+MOST = 5
+"""What part of a run this may cost at most: one in so many samples."""
 
 FORGOTTEN = 0.3
 """Share of the stroke after which the damper forgets how such a run began."""
@@ -67,22 +76,24 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     force = measurement["force"]
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
-        _noise_of_force(measurement), error, _begin(motion.x, force), measured,
+        _noise_of_force(measurement), error, _begin(motion.x, force, dt), measured,
     )  # fmt: skip
 
 
-def _begin(x: Array, force: Array) -> int:
+def _begin(x: Array, force: Array, dt: float) -> int:
     """Return the first sample that is judged.
 
-    A run that begins under load was cut out of a longer one: what elastic parts held is not known,
-    until the motion has passed them.
+    A run that begins at rest under load was cut out of a longer one: what elastic parts hold is not
+    known, until the motion has passed them.
     """
     rms = float(np.sqrt(np.mean(force**2)))
-    if abs(float(np.mean(force[:SETTLING]))) <= LOADED * rms:
+    begin = x[: max(SETTLING, round(STANDS / dt))]
+    moves = float(np.ptp(begin)) > RESTS * float(np.ptp(x))
+    if moves or abs(float(np.mean(force[:SETTLING]))) <= LOADED * rms:
         return SETTLING
     away = np.abs(x - x[0]) > FORGOTTEN * float(np.ptp(x))
     first = int(np.argmax(away)) if away.any() else len(x)
-    return min(max(SETTLING, first), len(x) // 2)
+    return min(max(SETTLING, first), max(SETTLING, len(x) // MOST))
 
 
 def _seen(measurement: Measurement, channel: str) -> Array | None:
