@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..physics.effect import EFFECTS
 from .model import (
     DRIVEN,
     OTHER_LAWS,
@@ -67,6 +68,8 @@ class Scaled:
     def __init__(self, problem: Problem, model: Model, expected: Expected) -> None:
         self.problem, self.model, self.expected = problem, model, expected
         self.names = model.free()
+        # An impact's spike would tell a gap far more sharply than its fit can find it.
+        self.rough = any(EFFECTS[name].joint for name in model.effects)
         start = np.array([model.value(name) for name in self.names])
         units = [parameter(model.law, name).unit for name in self.names]
         self.scale = np.maximum(np.abs(start), 1e-2 * np.array([problem.size(u) for u in units]))
@@ -90,7 +93,7 @@ class Scaled:
 
     def jacobian(self, theta: Array, r: Array) -> Array:
         """Return the derivatives (n, p) of the residuals at theta."""
-        return jacobian(self.residuals, theta, r, self.low, self.high)
+        return jacobian(self.residuals, theta, r, self.low, self.high, self.rough)
 
 
 def fit(
@@ -115,7 +118,13 @@ def fit(
         cost = float(np.mean(loss(scaled.residuals(np.zeros(0)))))
         return Fit(model, {}, cost)
     found = descend(
-        scaled.residuals, scaled.start, scaled.low, scaled.high, max_evaluations, tolerance=1e-5
+        scaled.residuals,
+        scaled.start,
+        scaled.low,
+        scaled.high,
+        max_evaluations,
+        tolerance=1e-5,
+        rough=scaled.rough,
     )
     best = scaled.at(found.theta)
     std: dict[str, float] = {}
@@ -235,6 +244,4 @@ def identify(
 
 
 def _parameters(effect: str) -> list[str]:
-    from ..physics.effect import EFFECTS
-
     return list(EFFECTS[effect].parameters)
