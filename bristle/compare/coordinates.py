@@ -7,12 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 RECENT = 0.05
 """Time over which a change of the voltage counts as its rate [s]."""
+RESTED = 0.3
+"""Time over which a motion counts as one of late [s]."""
 BINS = 16
 FINE = {"displacement": 40}
 """Bins of coordinates along which a force may ripple."""
@@ -68,6 +71,18 @@ def coordinates_of(
     given = next((y for y in (x, v, a, V, force) if y is not None), np.zeros(0))
     found["time"] = np.arange(len(given), dtype=np.float64) * np.float64(dt)
     return found
+
+
+def late_speed(v: Array, dt: float, over: float = RESTED) -> Array:
+    """Return the mean speed (n,) of late of a velocity (n,), with the sign of the motion now [m/s].
+
+    What builds up at rest and is worn down by motion has a memory of this kind, where the speed of
+    the moment has none.
+    """
+    fade = np.exp(-dt / over)
+    size = np.abs(v)
+    mean = lfilter([1.0 - fade], [1.0, -fade], size, zi=[fade * size[0]])[0]
+    return np.asarray(np.where(v < 0.0, -mean, mean), dtype=float)
 
 
 def since_reversal(v: Array, dt: float) -> Array:

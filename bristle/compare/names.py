@@ -9,6 +9,7 @@ NAMES = {
     "voltage_rate": "recent changes of the voltage",
     "dissipated_energy": "the energy dissipated so far",
     "time_since_reversal": "the time since the motion turned",
+    "rest": "how long it has rested of late",
     "time": "time",
     "direction": "the direction of motion",
 }

@@ -42,6 +42,7 @@ PREFERENCE = (
     "velocity",
     "voltage_rate",
     "time_since_reversal",
+    "rest",
     "acceleration",
     "dissipated_energy",
     "time",

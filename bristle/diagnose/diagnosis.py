@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.signal import welch
 
-from ..compare.coordinates import coordinates_of
+from ..compare.coordinates import coordinates_of, late_speed
+from ..compare.names import name_of
 from ..compare.where import Place, places
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.prepare import SHORTEST, prepare
@@ -228,9 +229,10 @@ def _judged(
     told = {name: s for name, s in fitted.std.items() if name not in fitted.unidentified}
     coordinate = ""
     if kind == "unknown":
-        # What an effect can mimic hides what no effect can.
         nearest = min(trials, key=lambda trial: trial.z, default=before)
-        left = nearest if missing(before, nearest) else before
+        clear = bool(rest) and rest[0].significant and rest[0].share > CLEAR
+        # What an effect can mimic may hide what no effect can.
+        left = before if clear or not missing(before, nearest) else nearest
         rest = where(left, held_out)
         coordinate = _coordinate(rest, left, held_out)
     if coordinate:
@@ -238,7 +240,7 @@ def _judged(
             place.significant for place in rest if place.coordinate == coordinate
         )
         how = "is organised by" if sure else "follows no coordinate beyond chance; nearest is"
-        words.append(f"What is unexplained {how} {coordinate.replace('_', ' ')}.")
+        words.append(f"What is unexplained {how} {name_of(coordinate)}.")
     return Diagnosis(
         kind, decision.effects, " ".join(words), before, decision.best, tuple(trials),
         tuple(faults), tuple(hidden), visible, coordinate, tuple(rest), experiment, noise,
@@ -263,6 +265,7 @@ def where(trial: Trial, held_out: Problem) -> list[Place]:
         normalised.append(trial.residual[begin : begin + size])
         raw.append(normalised[-1] * run.noise)
         along = coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force)
+        along["rest"] = late_speed(run.v, run.dt)
         coordinates.append({name: values[run.skip :] for name, values in along.items()})
         begin += size
     return places(normalised, raw, coordinates, flips=FLIPS)

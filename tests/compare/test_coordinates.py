@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.compare.coordinates import coordinates_of, cut, recent_rate, since_reversal
+from bristle.compare.coordinates import (
+    coordinates_of,
+    cut,
+    late_speed,
+    recent_rate,
+    since_reversal,
+)
 
 
 def test_time_since_reversal_counts_from_each_change_of_sign():
@@ -68,3 +74,12 @@ def test_only_what_was_measured_is_a_coordinate():
     along = coordinates_of(0.1, x, np.gradient(x, 0.1), None, None, np.ones(50))
     assert {"velocity", "speed", "direction", "dissipated_energy"} <= set(along)
     assert along["dissipated_energy"][-1] == pytest.approx(50 * 0.1 * 1.0 / 4.9, rel=1e-9)
+
+
+def test_late_speed_forgets_and_takes_the_sign_of_now():
+    dt = 0.002
+    v = np.concatenate([np.full(1000, 0.2), np.full(1000, -0.1)])
+    late = late_speed(v, dt, 0.3)
+    np.testing.assert_allclose(late[:1000], 0.2)
+    t = dt * np.arange(1, 1001)
+    np.testing.assert_allclose(late[1000:], -(0.1 + 0.1 * np.exp(-t / 0.3)), rtol=1e-12)
