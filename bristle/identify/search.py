@@ -33,6 +33,7 @@ SECANTS = 3
 FAITHFUL = 0.5
 """Share of the promised decrease that a step must reach for the Jacobian to be kept."""
 
+_HUGE = 1e100  # its square is a number still
 _NUDGE = 1e-5
 _ROUGH_NUDGE = 1e-4
 _SPIKE = 5.0
@@ -54,7 +55,7 @@ class Descent:
 
 def loss(z: Array) -> Array:
     """Return Huber's loss of normalised residuals: quadratic up to `HUBER`, linear beyond."""
-    size = np.abs(z)
+    size = np.minimum(np.abs(z), _HUGE)
     return np.where(size <= HUBER, 0.5 * size * size, HUBER * size - 0.5 * HUBER * HUBER)
 
 
