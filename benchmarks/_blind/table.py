@@ -327,6 +327,12 @@ def part_rows(lines: list[Line]) -> list[Figure]:
     for name in sorted({line["task"]["effect"] for line in of_kind(lines, "fault", 0.01)}):
         group = [line for line in of_kind(lines, "fault", 0.01) if line["task"]["effect"] == name]
         rows.append(share(f"reported, {name}", count(group, score.reports_fault), group="parts"))
+    clean = of_kind(lines, "none", 0.01)
+    for name in ["none", *sorted({line["task"]["effect"] for line in counted})]:
+        group = clean if name == "none" else [x for x in counted if x["task"]["effect"] == name]
+        found = [covers for line in group for _, covers, _ in score.intervals(line)]
+        covered = Count(sum(found), len(found))
+        rows.append(share(f"intervals cover, effect {name}", covered, group="parts"))
     strong = binned(single, "15 %", "40 %")
     rows.append(
         share(

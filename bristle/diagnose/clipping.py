@@ -80,8 +80,9 @@ def _stands_at_top(values: Array) -> bool:
     near = 1e-9 * float(np.max(np.abs(values)))
     at_end = values >= values.max() - near
     edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(int), [0]])))
-    longest, often = int((edges[1::2] - edges[::2]).max()), int(at_end.sum())
-    if longest < LONGEST or often < 2 * LONGEST:
+    stays, often = edges[1::2] - edges[::2], int(at_end.sum())
+    # Once may be a rest before or after the test, at that end of the stroke.
+    if np.count_nonzero(stays >= LONGEST) < 2 or often < 2 * LONGEST:
         return False
     _, below = np.unique(values[~at_end], return_counts=True)
     return bool(len(below)) and often > CROWDED * float(np.mean(below[-LONGEST:]))

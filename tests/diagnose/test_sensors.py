@@ -168,6 +168,14 @@ def test_a_coarse_instrument_is_not_clipped():
     assert [one for one in sensor_faults(runs(after=coarse)) if one.fault == "clipping"] == []
 
 
+def test_a_rest_at_the_end_of_the_stroke_is_not_clipped():
+    def parked(channels):
+        channels["displacement"] = channels["displacement"] - channels["displacement"].min()
+        channels["displacement"][:150] = 0.0  # read without noise: the instrument's steps are wider
+
+    assert [one for one in sensor_faults(runs(after=parked)) if one.fault == "clipping"] == []
+
+
 def test_a_turned_displacement_is_told_by_the_force():
     fault = only(sensor_faults(runs(spoil=lambda c: c.update(displacement=-c["displacement"]))))
     assert (fault.channel, fault.fault) == ("displacement", "sign")
