@@ -170,6 +170,8 @@ def _python(
     if not code:
         return
     body = "".join(f"{block.body}\nprint({_CUT!r})\n" for _, block in code)
+    # The binary that PythonFMU builds may abort a process that ends with it loaded.
+    body += "import os, sys\nsys.stdout.flush()\nos._exit(0)\n"
     done = _call([sys.executable, "-c", body], folder, environment)
     if done.returncode:
         raise SnippetError(f"{page}: a python block fails:\n{done.stdout}{done.stderr}")
