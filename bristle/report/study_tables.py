@@ -73,7 +73,11 @@ def with_interval(value: float, std: float | None) -> tuple[str, str]:
 
 
 def _at_bound(value: Value) -> bool:
-    room = 1e-6 * max(abs(value.high - value.low), 1e-300)
+    """Return whether a value stands at a bound, as far as its own size and interval can tell.
+
+    The range tells nothing: that of a stiffness spans nine orders of magnitude.
+    """
+    room = max(1e-6 * abs(value.value), 1e-2 * (value.std or 0.0))
     return value.value <= value.low + room or value.value >= value.high - room
 
 

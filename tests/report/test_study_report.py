@@ -15,8 +15,9 @@ from made import write_runs
 
 from bristle.cli import main
 from bristle.report.study_page import gather, render, study_report
-from bristle.report.study_tables import with_interval
+from bristle.report.study_tables import parameter_table, with_interval
 from bristle.study import Study, create_study
+from bristle.study.model import StudyModel, Value
 
 VALUES = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 0.01, "v_n": 5.0, "exponent": 0.0}
 VOID = {"meta", "img", "br", "hr", "link", "input"}
@@ -229,3 +230,13 @@ def test_the_comparison_of_a_study_by_the_command(folder, capsys):
 )
 def test_values_have_the_digits_that_their_intervals_leave(value, std, told):
     assert with_interval(value, std) == told
+
+
+@pytest.mark.parametrize(
+    ("value", "low", "told"),
+    [(721.0, 0.0, False), (0.0, 0.0, True), (1e9, 0.0, True), (1e-4, 0.0, True)],
+)
+def test_a_value_is_at_the_edge_only_where_it_stands_at_a_bound(value, low, told):
+    known = Value(value, "N/m", low, 1e9, std=0.9)
+    _, _, notes = parameter_table(StudyModel("lugre", parameters={"sigma_a": known}))
+    assert any("at the edge" in note for note in notes) is told
