@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +26,11 @@ def first_look_png(runs: list[Measurement], level: str = "") -> bytes:
     channels = _rows(longest)
     forced = [run for run in runs if "force" in run.channels]
     figure = Figure(figsize=(12.0, 1.6 * max(len(channels), 3) + 0.6), layout="constrained")
-    grid = figure.add_gridspec(len(channels), 3 if forced else 2)
+    # Parts of their own: the loops' titles would open gaps between the channels.
+    parts: Any = figure.subfigures(1, 2, width_ratios=[2, 1]) if forced else [figure]
     first = None
     for row, channel in enumerate(channels):
-        axes = figure.add_subplot(grid[row, :2], sharex=first)
+        axes = parts[0].add_subplot(len(channels), 1, row + 1, sharex=first)
         first = first or axes
         _line(axes, longest, channel)
         last = row == len(channels) - 1
@@ -37,10 +39,9 @@ def first_look_png(runs: list[Measurement], level: str = "") -> bytes:
     assert first is not None
     first.set_title(f"{longest.name}: {longest.sampling.rate:.4g} Hz, {longest.duration:.4g} s")
     if forced:
-        half = max(1, len(channels) // 2)
-        _loops(figure.add_subplot(grid[:half, 2]), forced, level, "velocity")
-        if half < len(channels):
-            _loops(figure.add_subplot(grid[half:, 2]), forced, level, "displacement")
+        over = ("velocity", "displacement")[: len(channels)]
+        for row, one in enumerate(over):
+            _loops(parts[1].add_subplot(len(over), 1, row + 1), forced, level, one)
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=110)
     return file.getvalue()
@@ -82,13 +83,20 @@ def _loops(axes, runs: list[Measurement], level: str, over: str) -> None:  # typ
     dots = {"s": 1.5, "alpha": 0.6, "lw": 0}
     if len(drive) == len(x) and np.ptp(drive) > 0.0:
         points = axes.scatter(1e3 * x, force, c=drive, cmap="viridis", **dots)
-        axes.figure.colorbar(points, ax=axes, label="voltage [V] or current [A]")
+        axes.figure.colorbar(points, ax=axes, label=_drive_label(runs))
     else:
         axes.scatter(1e3 * x, force, **dots)
     axes.set_xlabel(f"{over} [{unit}]")
     axes.set_ylabel("force [N]")
     axes.set_title(f"force over {over}, {len(runs)} run{'s' * (len(runs) > 1)}", fontsize=9)
     axes.grid(alpha=0.3)
+
+
+def _drive_label(runs: list[Measurement]) -> str:
+    """Return what colours the loops: the drive's name and unit, all of them where runs differ."""
+    found = [next((d for d in DRIVE if d in run.channels), "") for run in runs]
+    units = {d: run.units[d] for d, run in zip(found, runs, strict=True) if d}
+    return " or ".join(f"{name} [{unit}]" for name, unit in units.items())
 
 
 def _gathered(runs: list[Measurement], level: str, over: str) -> tuple[Array, Array, Array]:
