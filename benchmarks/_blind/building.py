@@ -23,7 +23,7 @@ from bristle.records.measurement import Measurement
 
 from . import cases, inseparable
 from .cases import Recorded
-from .subject import KEPT, measurements
+from .subject import measurements, packed
 
 Array = NDArray[np.float64]
 Pair = tuple[StructureProblem, StructureProblem]
@@ -48,29 +48,12 @@ def ask(case: Recorded) -> dict[str, Any]:
     building = file_of(case)
     begun, spent = time.perf_counter(), time.process_time()
     found = diagnose_structure(train, holdout, building, law=case.task.law)
-    answer = packed(found) | {
+    said = found.as_dict()
+    answer = packed(said) | {
+        "sites": said["sites"], "force": said["force"],
         "seconds": time.perf_counter() - begun, "cpu": time.process_time() - spent,
     }  # fmt: skip
     return answer | follow_up(case, answer, found)
-
-
-def packed(found: StructureDiagnosis) -> dict[str, Any]:
-    """Return what scoring needs of a diagnosis, as plain data."""
-    said = found.as_dict()
-    return {
-        "kind": said["kind"],
-        "effects": list(said["effects"]),
-        "ranking": said["ranking"][:KEPT],
-        "coordinate": said.get("coordinate", ""),
-        "sensors": said["sensors"],
-        "untestable": said["untestable"],
-        "detectable": said.get("detectable"),
-        "sites": said["sites"],
-        "force": said["force"],
-        "words": said["words"],
-        "z_before": said["z_holdout_before"],
-        "z_after": said["z_holdout_after"],
-    }
 
 
 def follow_up(case: Recorded, answer: dict[str, Any], found: StructureDiagnosis) -> dict[str, Any]:

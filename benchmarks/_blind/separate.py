@@ -32,5 +32,5 @@ def perform(case: Recorded, made: Any, experiment: Any) -> dict[str, Any]:
         run = proposed(rig, (sign * x, volts), role, asdict(experiment))
         parts[role] = [*parts[role], made.perform(run, case.task.seed, f"{role}_extra")]
     train, holdout = (subject.measurements(parts[role], case.channels) for role in ROLES)
-    answer = subject.packed(subject.diagnosed(train, holdout, case.task.law))
+    answer = subject.packed(subject.diagnosed(train, holdout, case.task.law).as_dict())
     return {name: answer[name] for name in ("kind", "effects", "z_after")}

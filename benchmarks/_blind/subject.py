@@ -65,12 +65,12 @@ def ask(case: Recorded) -> tuple[dict[str, Any], Diagnosis]:
     found = diagnosed(train, holdout, case.task.law)
     seconds = time.perf_counter() - before
     z_true = z_of_truth(case, holdout)
-    return packed(found) | {"seconds": seconds, "z_true": z_true}, found
+    answer = packed(found.as_dict()) | {"best": intervals(found)}
+    return answer | {"seconds": seconds, "z_true": z_true}, found
 
 
-def packed(found: Diagnosis) -> dict[str, Any]:
-    """Return what scoring needs of a diagnosis, as plain data."""
-    said = found.as_dict()
+def packed(said: dict[str, Any]) -> dict[str, Any]:
+    """Return what scoring needs of a verdict, of a bench or of a building, as plain data."""
     return {
         "kind": said["kind"],
         "effects": list(said["effects"]),
@@ -84,7 +84,6 @@ def packed(found: Diagnosis) -> dict[str, Any]:
         "words": said["words"],
         "z_before": said.get("z_holdout_before"),
         "z_after": said.get("z_holdout_after"),
-        "best": intervals(found),
     }
 
 
