@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import shutil
 
+import pandas as pd
 import pytest
 
 from bristle.cli import main
 from bristle.study import learning
 from bristle.study.errors import StudyError
 from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects, diagnose_study, learn
+from bristle.study.learning import add_effects, diagnose_frames, diagnose_study, learn
 from bristle.study.new import create_study
 from bristle.study.study import Study
 from tests.independent.generate import make_case
@@ -159,3 +160,22 @@ def test_a_kill_within_a_diagnosis_leaves_the_study_as_it_was(study, monkeypatch
         learn(study)
     assert Study(study.folder).model().effects == {}
     assert (study.folder / "verdict.json").read_text() == before
+
+
+def test_frames_are_diagnosed_without_a_study():
+    case = make_case(1, "gas_spring", strength=0.15, duration=4.0)
+    frames = {
+        run["name"]: pd.DataFrame({f"{name} [{UNITS[name]}]": run[name] for name in UNITS})
+        for run in case.runs
+        if run["name"] in ("train_1", "train_2", "holdout_1")
+    }
+    held = {"holdout_1": frames.pop("holdout_1")}
+    found = diagnose_frames(frames, "bingham", holdout=held)
+    assert (found.kind, found.effects) == ("effect", ("gas_spring",))
+    again = diagnose_frames([*frames.values(), *held.values()], "bingham")  # the last third is held
+    assert again.after.z == pytest.approx(found.after.z)
+
+
+def test_no_frame_is_no_diagnosis():
+    with pytest.raises(StudyError, match="one run or more"):
+        diagnose_frames([])
