@@ -229,18 +229,8 @@ def _judged(
     told = {name: s for name, s in fitted.std.items() if name not in fitted.unidentified}
     coordinate = ""
     if kind == "unknown":
-        nearest = min(trials, key=lambda trial: trial.z, default=before)
-        clear = bool(rest) and rest[0].significant and rest[0].share > CLEAR
-        # What an effect can mimic may hide what no effect can.
-        left = before if clear or not missing(before, nearest) else nearest
-        rest = where(left, held_out)
-        coordinate = _coordinate(rest, left, held_out)
-    if coordinate:
-        sure = coordinate == "frequency" or any(
-            place.significant for place in rest if place.coordinate == coordinate
-        )
-        how = "is organised by" if sure else "follows no coordinate beyond chance; nearest is"
-        words.append(f"What is unexplained {how} {name_of(coordinate)}.")
+        coordinate, rest = _unexplained(before, trials, rest, held_out)
+        words += _told(coordinate, rest)
     return Diagnosis(
         kind, decision.effects, " ".join(words), before, decision.best, tuple(trials),
         tuple(faults), tuple(hidden), visible, coordinate, tuple(rest), experiment, noise,
@@ -271,10 +261,40 @@ def where(trial: Trial, held_out: Problem) -> list[Place]:
     return places(normalised, raw, coordinates, flips=FLIPS)
 
 
+def _unexplained(
+    before: Trial, trials: Sequence[Trial], rest: list[Place], held_out: Problem
+) -> tuple[str, list[Place]]:
+    """Return the coordinate that organises what no effect explains, and all places of it.
+
+    What an effect can mimic may hide what no effect can: where `rest`, the places of the residual
+    of `before`, is not clear, what the nearest effect leaves is looked at.
+    """
+    nearest = min(trials, key=lambda trial: trial.z, default=before)
+    if _clear(rest) or not missing(before, nearest):
+        return _coordinate(rest, before, held_out), rest
+    rest = where(nearest, held_out)
+    return _coordinate(rest, nearest, held_out), rest
+
+
+def _told(coordinate: str, rest: Sequence[Place]) -> list[str]:
+    """Return the sentence about the coordinate of what is unexplained, if there is one."""
+    if not coordinate:
+        return []
+    sure = coordinate == "frequency" or any(
+        place.significant for place in rest if place.coordinate == coordinate
+    )
+    how = "is organised by" if sure else "follows no coordinate beyond chance; nearest is"
+    return [f"What is unexplained {how} {name_of(coordinate)}."]
+
+
+def _clear(places: Sequence[Place]) -> bool:
+    return bool(places) and places[0].significant and places[0].share > CLEAR
+
+
 def _coordinate(rest: Sequence[Place], trial: Trial, held_out: Problem) -> str:
     """Return the coordinate of a residual: "frequency" where it rings and nothing else tells."""
     telling = [place for place in rest if place.significant] or list(rest)
-    if telling and telling[0].significant and telling[0].share > CLEAR:
+    if _clear(telling):
         return telling[0].coordinate
     if ringing(trial, held_out) > RINGS:
         return "frequency"
