@@ -8,11 +8,9 @@ from numpy.typing import NDArray
 from ..errors import RecordError
 from ..records.derived import derived_velocity
 from ..records.measurement import Measurement
-from .drive import smooth_drive, smooth_steps
+from .drive import smooth_drive
 from .fit import Run
 from .smooth import posterior_draws, smooth
-
-__all__ = ["prepare", "saturated", "smooth_steps"]
 
 Array = NDArray[np.float64]
 

@@ -309,13 +309,6 @@ def work_size(n: int) -> int:
     return 6 * n
 
 
-def default_building() -> Building:
-    """Return the building of a Structure that names none."""
-    from .building import paper_building
-
-    return paper_building()
-
-
 def read_building(path: Any) -> Building:
     """Return the building of a TOML file; see `building.read_building`."""
     from .building import read_building as read

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,13 +44,6 @@ def first_look_png(runs: list[Measurement], level: str = "") -> bytes:
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=110)
     return file.getvalue()
-
-
-def save_first_look(runs: list[Measurement], path: Path, level: str = "") -> None:
-    """Write the picture of a first look, whole."""
-    from .files import write_whole
-
-    write_whole(path, first_look_png(runs, level))
 
 
 def _rows(run: Measurement) -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bristle.compiled.bench import Bench
@@ -11,8 +12,6 @@ from bristle.diagnose.limits import detectable, untestable
 from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
 from bristle.records.measurement import ChannelSpec, measurements_of_frame
-
-pd = pytest.importorskip("pandas")
 
 STEP = 0.002
 T = STEP * np.arange(3000)
