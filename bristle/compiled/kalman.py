@@ -6,15 +6,23 @@ which is what makes smoothing cheap enough to draw errors by it.
 
 from __future__ import annotations
 
-import numba
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
 import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 _SETTLED = 1e-12
 """Relative change of a covariance in a sample below which it stays."""
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def kalman_smooth(y, r, have, dt, jerk, backward, state, cov, loss):  # type: ignore[no-untyped-def]
+def kalman_smooth(
+    y: Array, r: Array, have: NDArray[np.bool_], dt: float, jerk: float, backward: bool,
+    state: Array, cov: Array, loss: Array,
+) -> float:  # fmt: skip
     """Kalman filter and smoother for [x, v, a] with white jerk; return -log L.
 
     Parameters
@@ -26,18 +34,39 @@ def kalman_smooth(y, r, have, dt, jerk, backward, state, cov, loss):  # type: ig
     state, cov : (n, 3) the motion, (3,) its variances in the middle; loss (2,) mean squares of the
         normalised innovations, filled either way
     """
+    n = len(y) if backward else 1
+    total: float = _compiled()(
+        y, r, have, dt, jerk, backward, state, cov, loss, np.zeros((n, 17)), np.zeros((6, 6))
+    )
+    return total
+
+
+@cache
+def _compiled() -> Callable[..., float]:
+    from .jit import compiled
+
+    function: Callable[..., float] = compiled(_filter)
+    return function
+
+
+def _filter(
+    y: Any, r: Any, have: Any, dt: float, jerk: float, backward: bool, state: Any, cov: Any,
+    loss: Any, kept: Any, work: Any,
+) -> float:  # fmt: skip
+    """Do the work of `kalman_smooth`; elements one by one, for slices take seconds to compile.
+
+    `kept` has a row per sample: the predicted covariance (6), two gains (3 each), the prediction
+    (3), the shares of the innovations (2). `work` has six rows of room.
+    """
     n = len(y)
     h, h2 = dt, 0.5 * dt * dt
     q00, q01, q02 = jerk * dt**5 / 20.0, jerk * dt**4 / 8.0, jerk * dt**3 / 6.0
     q11, q12, q22 = jerk * dt**3 / 3.0, jerk * dt**2 / 2.0, jerk * dt
-    x, v, a, p = _start(y, r, have, dt)
-    means = np.zeros((n if backward else 1, 3))
-    shares = np.zeros((n if backward else 1, 2))  # innovation over its variance
-    kept = np.zeros((n if backward else 1, 12))  # predicted covariance (6), two gains (3 each)
-    g = np.zeros(6)
-    s, logs = np.ones(2), np.zeros(2)
-    total = 0.0
-    loss[:] = 0.0
+    p, g, s, logs = work[0], work[1], work[2], work[3]
+    x, v = _start(y, r, have, dt, p)
+    a = 0.0
+    s[0] = s[1] = 1.0
+    total = loss[0] = loss[1] = 0.0
     settled = False
     for k in range(n):
         if k > 0:
@@ -54,9 +83,10 @@ def kalman_smooth(y, r, have, dt, jerk, backward, state, cov, loss):  # type: ig
                 p[4] = b12 + q12
                 p[5] = a22 + q22
         if backward:
-            means[k, 0], means[k, 1], means[k, 2] = x, v, a
+            kept[k, 12], kept[k, 13], kept[k, 14] = x, v, a
             if not settled:
-                kept[k, :6] = p
+                for i in range(6):
+                    kept[k, i] = p[i]
         change = 0.0
         both = True
         for c in range(2):
@@ -66,7 +96,8 @@ def kalman_smooth(y, r, have, dt, jerk, backward, state, cov, loss):  # type: ig
                 both = False
                 settled = False
                 if backward:
-                    kept[k, 6 + 3 * c : 9 + 3 * c] = 0.0
+                    for i in range(3):
+                        kept[k, 6 + 3 * c + i] = 0.0
                 continue
             if not settled:
                 i0, i1, i2 = (p[0], p[1], p[2]) if c == 0 else (p[1], p[3], p[4])
@@ -90,19 +121,22 @@ def kalman_smooth(y, r, have, dt, jerk, backward, state, cov, loss):  # type: ig
             v += g[3 * c + 1] * e
             a += g[3 * c + 2] * e
             if backward:
-                shares[k, c] = share
-                kept[k, 6 + 3 * c : 9 + 3 * c] = g[3 * c : 3 * c + 3]
+                kept[k, 15 + c] = share
+                for i in range(3 * c, 3 * c + 3):
+                    kept[k, 6 + i] = g[i]
         if backward and k > 0 and settled:
-            kept[k, :6] = kept[k - 1, :6]
+            for i in range(6):
+                kept[k, i] = kept[k - 1, i]
         settled = settled or (both and k > 10 and change < _SETTLED)
     if backward:
-        _smooth_back(means, shares, kept, have, y, r, h, h2, state, cov)
+        _smooth_back(kept, have, y, r, h, h2, state, cov, work)
     return total
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _start(y, r, have, dt):  # type: ignore[no-untyped-def]
-    """Return x, v, a before the first sample and their covariance (6,), wide if nothing tells."""
+def _start(
+    y: Any, r: Any, have: Any, dt: float, p: Any,
+) -> tuple[float, float]:  # fmt: skip
+    """Return x, v before the first sample; fill their covariance (6,), wide if nothing tells."""
     n = len(y)
     c = 0 if have[0] else 1
     first, before, fastest = 0.0, 0.0, 0.0
@@ -115,7 +149,6 @@ def _start(y, r, have, dt):  # type: ignore[no-untyped-def]
                 fastest = max(fastest, abs(y[k, c] - before) / dt)
             before = y[k, c]
             seen += 1
-    p = np.zeros(6)
     x, v = 0.0, 0.0
     if have[0]:
         x = first
@@ -134,48 +167,60 @@ def _start(y, r, have, dt):  # type: ignore[no-untyped-def]
     p[5] = (2.0 * fastest / dt if have[0] else 2.0 * fastest) ** 2 + 1e-30
     if have[0] and have[1]:
         p[5] = 1e4 * r[1] / (dt * dt) / n + 1e-30
-    return x, v, 0.0, p
+    return x, v
 
 
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def _smooth_back(means, shares, kept, have, y, r, h, h2, state, cov):  # type: ignore[no-untyped-def]
+def _square(
+    a: float, b: float, c: float, L: Any,
+) -> float:  # fmt: skip
+    """Return w' L w for w = [a, b, c]."""
+    return (  # type: ignore[no-any-return]
+        a * (L[0, 0] * a + L[0, 1] * b + L[0, 2] * c)
+        + b * (L[1, 0] * a + L[1, 1] * b + L[1, 2] * c)
+        + c * (L[2, 0] * a + L[2, 1] * b + L[2, 2] * c)
+    )
+
+
+def _smooth_back(
+    kept: Any, have: Any, y: Any, r: Any, h: float, h2: float, state: Any, cov: Any, work: Any,
+) -> None:  # fmt: skip
     """Fill `state` and `cov` from what the filter kept."""
-    n = len(means)
-    m = np.zeros(3)
-    L = np.zeros((3, 3))
-    T = np.zeros((3, 3))
+    n = len(y)
+    m, across, L = work[0], work[1], work[2:5]
+    for i in range(5):
+        for j in range(6):
+            work[i, j] = 0.0
     for k in range(n - 1, -1, -1):
         wanted = k >= n // 2
         for c in (1, 0):
             if not have[c] or not np.isfinite(y[k, c]):
                 continue
-            g = kept[k, 6 + 3 * c : 9 + 3 * c]
-            m[c] -= g[0] * m[0] + g[1] * m[1] + g[2] * m[2] + shares[k, c]
+            g0, g1, g2 = kept[k, 6 + 3 * c], kept[k, 7 + 3 * c], kept[k, 8 + 3 * c]
+            own = g0 if c == 0 else g1
+            m[c] -= g0 * m[0] + g1 * m[1] + g2 * m[2] + kept[k, 15 + c]
             if wanted:  # L = (I - g H)' L (I - g H) + H' H / s
-                p = kept[k]
                 # The variance of this channel's innovation, behind the other's update for c = 1.
-                size = r[c] / (1.0 - g[c]) if g[c] < 1.0 else p[0] + r[c]
+                size = r[c] / (1.0 - own) if own < 1.0 else kept[k, 0] + r[c]
                 for i in range(3):
-                    T[c, i] = g[0] * L[0, i] + g[1] * L[1, i] + g[2] * L[2, i]
+                    across[i] = g0 * L[0, i] + g1 * L[1, i] + g2 * L[2, i]
                 for i in range(3):
-                    L[c, i] -= T[c, i]
-                across = L[0, :] * 0.0
+                    L[c, i] -= across[i]
                 for i in range(3):
-                    across[i] = L[i, 0] * g[0] + L[i, 1] * g[1] + L[i, 2] * g[2]
+                    across[i] = L[i, 0] * g0 + L[i, 1] * g1 + L[i, 2] * g2
                 for i in range(3):
                     L[i, c] -= across[i]
                 L[c, c] += 1.0 / size
         p00, p01, p02, p11, p12, p22 = (
             kept[k, 0], kept[k, 1], kept[k, 2], kept[k, 3], kept[k, 4], kept[k, 5],
         )  # fmt: skip
-        state[k, 0] = means[k, 0] - (p00 * m[0] + p01 * m[1] + p02 * m[2])
-        state[k, 1] = means[k, 1] - (p01 * m[0] + p11 * m[1] + p12 * m[2])
-        state[k, 2] = means[k, 2] - (p02 * m[0] + p12 * m[1] + p22 * m[2])
+        state[k, 0] = kept[k, 12] - (p00 * m[0] + p01 * m[1] + p02 * m[2])
+        state[k, 1] = kept[k, 13] - (p01 * m[0] + p11 * m[1] + p12 * m[2])
+        state[k, 2] = kept[k, 14] - (p02 * m[0] + p12 * m[1] + p22 * m[2])
         if k == n // 2:
-            P = np.array([[p00, p01, p02], [p01, p11, p12], [p02, p12, p22]])
-            after = P - P @ L @ P
-            for i in range(3):
-                cov[i] = after[i, i]
+            # The diagonal of P - P L P.
+            cov[0] = p00 - _square(p00, p01, p02, L)
+            cov[1] = p11 - _square(p01, p11, p12, L)
+            cov[2] = p22 - _square(p02, p12, p22, L)
         m0, m1 = m[0], m[1]
         m[1] = m1 + h * m0
         m[2] = m[2] + h * m1 + h2 * m0
@@ -186,17 +231,3 @@ def _smooth_back(means, shares, kept, have, y, r, h, h2, state, cov):  # type: i
             for i in range(3):
                 L[2, i] += h * L[1, i] + h2 * L[0, i]
                 L[1, i] += h * L[0, i]
-
-
-@numba.njit(cache=True, nogil=True, error_model="numpy")
-def random_walk(F, steps):  # type: ignore[no-untyped-def]
-    """Return the path (n, m) of z_k = F z_k-1 + step_k, from zero."""
-    n, m = steps.shape
-    path = np.zeros_like(steps)
-    for k in range(1, n):
-        for i in range(m):
-            total = steps[k, i]
-            for j in range(m):
-                total += F[i, j] * path[k - 1, j]
-            path[k, i] = total
-    return path

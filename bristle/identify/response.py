@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from ..compiled.kalman import random_walk
 from ..compiled.response import smooth_level
 from ..errors import RecordError
 from ..physics.building import Building
 from ..records.measurement import Measurement
 from .drive import smooth_steps
 from .prepare import SHORTEST
+from .smooth import random_motion
 
 Array = NDArray[np.float64]
 
@@ -227,19 +227,10 @@ def _draws(n: int, runs: list[dict[str, Any]], dt: float, draws: int, seed: int)
     have = runs[0]["have"]
     lead = min(200, n)
     total = n + 2 * lead
-    F = np.array([[1.0, dt, 0.5 * dt * dt], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
-    Q = np.array(
-        [
-            [dt**4 / 20.0, dt**3 / 8.0, dt**2 / 6.0],
-            [dt**3 / 8.0, dt**2 / 3.0, dt / 2.0],
-            [dt**2 / 6.0, dt / 2.0, 1.0],
-        ]
-    ) * (jerk * dt)
-    root = np.linalg.cholesky(Q + np.diag([1e-30, 1e-30, 1e-30]) * max(jerk, 1.0))
     out = np.zeros((draws, n, 3))
     state, cov = np.zeros((total, 3)), np.zeros(3)
     for d in range(draws):
-        path = random_walk(F, generator.standard_normal((total, 3)) @ root.T)
+        path = random_motion(generator, total, dt, jerk)
         y = path + generator.standard_normal((total, 3)) * np.sqrt(r)
         smooth_level(y, r, have, dt, np.full(total, jerk), True, state, cov)
         out[d] = (path - state)[lead : lead + n]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.optimize import minimize_scalar
 
-from ..compiled.kalman import kalman_smooth, random_walk
+from ..compiled.kalman import kalman_smooth
 
 Array = NDArray[np.float64]
 
@@ -121,7 +121,7 @@ def posterior_draws(
     for d in range(draws):
         truth = np.zeros((total, 3))
         if motion is None:
-            truth = _random_motion(generator, total, dt, jerk)
+            truth = random_motion(generator, total, dt, jerk)
         y = truth[:, :2] + generator.standard_normal((total, 2)) * np.sqrt(r)
         kalman_smooth(y, r, np.array(have), dt, jerk, True, state, cov, loss)
         out[d] = (truth - state)[lead : lead + n]
@@ -161,9 +161,8 @@ def _left_out(motion: Motion, draw: Array, r: Array, have: NDArray[np.bool_], dt
     return count * left
 
 
-def _random_motion(generator: np.random.Generator, n: int, dt: float, jerk: float) -> Array:
-    """Return a motion (n, 3) of white jerk, from rest."""
-    F = np.array([[1.0, dt, 0.5 * dt * dt], [0.0, 1.0, dt], [0.0, 0.0, 1.0]])
+def random_motion(generator: np.random.Generator, n: int, dt: float, jerk: float) -> Array:
+    """Return a motion (n, 3) of white jerk, from rest [m, m/s, m/s2]; `jerk` in m2/s5."""
     Q = np.array(
         [
             [dt**4 / 20.0, dt**3 / 8.0, dt**2 / 6.0],
@@ -173,5 +172,9 @@ def _random_motion(generator: np.random.Generator, n: int, dt: float, jerk: floa
     ) * (jerk * dt)
     root = np.linalg.cholesky(Q + np.eye(3) * 1e-30 * max(jerk, 1.0))
     steps = generator.standard_normal((n, 3)) @ root.T
-    path: Array = random_walk(F, steps)
+    path = np.zeros((n, 3))
+    x, v, a = path.T
+    a[1:] = np.cumsum(steps[1:, 2])
+    v[1:] = np.cumsum(steps[1:, 1] + dt * a[:-1])
+    x[1:] = np.cumsum(steps[1:, 0] + dt * v[:-1] + 0.5 * dt * dt * a[:-1])
     return path

@@ -338,10 +338,7 @@ def step(
         Whether any effect is on; without, only the bristle (slot 0 of the state) is advanced.
     """
     if not active:
-        z1[0] = lugre_advance(z0[0], 0.5 * (v0 + v1), dt, p[6]) if law == 1 else z0[0]
-        return evaluate_law(  # type: ignore[no-any-return]
-            law, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, work, z1
-        )
+        return step_law(law, v0, x1, v1, a1, V1, dt, energy, halt, halts, z0, p, on, z1, work)
     size = len(z0)
     for i in range(size):
         z1[i] = z0[i]
@@ -374,6 +371,17 @@ def step(
         )  # fmt: skip
     return evaluate(  # type: ignore[no-any-return]
         law, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, work[0:size], work[size : 2 * size]
+    )
+
+
+def step_law(
+    law: int, v0: float, x1: float, v1: float, a1: float, V1: float, dt: float, energy: float,
+    halt: float, halts: bool, z0: Row, p: Row, on: Row, z1: Row, work: Row,
+) -> tuple[float, float]:  # fmt: skip
+    """Do what `step` does for a damper without effects: only the bristle has to be advanced."""
+    z1[0] = lugre_advance(z0[0], 0.5 * (v0 + v1), dt, p[6]) if law == 1 else z0[0]
+    return evaluate_law(  # type: ignore[no-any-return]
+        law, x1, v1, a1, V1, dt, energy, halt, halts, z1, p, on, work, z1
     )
 
 

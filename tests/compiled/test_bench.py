@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from bristle.compiled.bench import Bench, before_jump
+from bristle.compiled.bench import Bench, before_jump, compiled_history
 from tests.physics.rigs import force_at
 
 DT = 0.002
@@ -79,3 +79,16 @@ def test_a_mount_finds_its_new_balance_when_the_voltage_jumps(law: str) -> None:
     w = float(brentq(short, 1e-3, SPEED))
     assert force[AT] == pytest.approx(before + c * (SPEED - w), rel=5e-3)
     assert force[-1] == pytest.approx(after, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", ["bingham", "lugre"])
+def test_a_law_alone_has_the_force_that_it_has_among_effects_that_are_off(law: str) -> None:
+    t = DT * np.arange(1500)
+    x, v, a = 0.01 * np.sin(9.0 * t), 0.09 * np.cos(9.0 * t), -0.81 * np.sin(9.0 * t)
+    V = 2.0 + np.sin(3.0 * t) + np.where(t > 1.0, 1.5, 0.0)
+    bench = Bench(law, [])
+    values = {"bristle_deflection_0": 2e-4}
+    alone = bench.force(x, v, a, V, DT, values)
+    bench._history = compiled_history(effects=True)
+    assert np.array_equal(alone, bench.force(x, v, a, V, DT, values))
+    assert np.ptp(alone) > 1.0
