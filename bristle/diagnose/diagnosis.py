@@ -7,21 +7,19 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.signal import welch
 
-from ..compare.coordinates import coordinates_of, late_speed
-from ..compare.names import name_of
-from ..compare.where import Place, places
+from ..compare.where import Place
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.prepare import SHORTEST, prepare
 from ..records.derived import derived_velocity
 from ..records.measurement import Measurement
 from .candidates import SECONDS, Trial, judge, try_all, try_members
-from .decision import decide, missing
+from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
 from .search import refine
 from .sensors import SensorFault, mended, sensor_faults
+from .unexplained import sentences, unexplained, where
 from .unlike import MISFIT, unlike
 from .unseen import unseen_fault
 
@@ -29,15 +27,6 @@ Progress = Callable[[str], None]
 
 STRONG = 0.12
 """Share of a residual's power along a coordinate (a correlation of 0.35) that is no accident."""
-
-CLEAR = 0.3
-"""Share of a residual's power along a coordinate that needs no second look."""
-
-RINGS = 0.4
-"""Share of a residual's power within a third of an octave that is a resonance."""
-
-FLIPS = 499
-"""Random patterns of signs that say what chance would organise."""
 
 QUIETEST = 3.0
 """A force must exceed its noise by this factor for a verdict to mean anything."""
@@ -229,8 +218,8 @@ def _judged(
     told = {name: s for name, s in fitted.std.items() if name not in fitted.unidentified}
     coordinate = ""
     if kind == "unknown":
-        coordinate, rest = _unexplained(before, trials, rest, held_out)
-        words += _told(coordinate, rest)
+        coordinate, rest = unexplained(before, trials, rest, held_out)
+        words += sentences(coordinate, rest)
     return Diagnosis(
         kind, decision.effects, " ".join(words), before, decision.best, tuple(trials),
         tuple(faults), tuple(hidden), visible, coordinate, tuple(rest), experiment, noise,
@@ -245,85 +234,6 @@ def _with_instrument(found: Diagnosis) -> Diagnosis:
     if found.kind not in ("none", "effect"):
         return found
     return replace(found, kind="effect", effects=("velocity_sensor", *found.effects))
-
-
-def where(trial: Trial, held_out: Problem) -> list[Place]:
-    """Return along which coordinates a trial's residual is organised, the most telling first."""
-    normalised, raw, coordinates, begin = [], [], [], 0
-    for run in held_out.runs:
-        size = len(run.force) - run.skip
-        normalised.append(trial.residual[begin : begin + size])
-        raw.append(normalised[-1] * run.noise)
-        along = coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force)
-        along["rest"] = late_speed(run.v, run.dt)
-        coordinates.append({name: values[run.skip :] for name, values in along.items()})
-        begin += size
-    return places(normalised, raw, coordinates, flips=FLIPS)
-
-
-def _unexplained(
-    before: Trial, trials: Sequence[Trial], rest: list[Place], held_out: Problem
-) -> tuple[str, list[Place]]:
-    """Return the coordinate that organises what no effect explains, and all places of it.
-
-    What an effect can mimic may hide what no effect can: where `rest`, the places of the residual
-    of `before`, is not clear, what the nearest effect leaves is looked at.
-    """
-    nearest = min(trials, key=lambda trial: trial.z, default=before)
-    if _clear(rest) or not missing(before, nearest):
-        return _coordinate(rest, before, held_out), rest
-    rest = where(nearest, held_out)
-    return _coordinate(rest, nearest, held_out), rest
-
-
-def _told(coordinate: str, rest: Sequence[Place]) -> list[str]:
-    """Return the sentence about the coordinate of what is unexplained, if there is one."""
-    if not coordinate:
-        return []
-    sure = coordinate == "frequency" or any(
-        place.significant for place in rest if place.coordinate == coordinate
-    )
-    how = "is organised by" if sure else "follows no coordinate beyond chance; nearest is"
-    return [f"What is unexplained {how} {name_of(coordinate)}."]
-
-
-def _clear(places: Sequence[Place]) -> bool:
-    return bool(places) and places[0].significant and places[0].share > CLEAR
-
-
-def _coordinate(rest: Sequence[Place], trial: Trial, held_out: Problem) -> str:
-    """Return the coordinate of a residual: "frequency" where it rings and nothing else tells."""
-    telling = [place for place in rest if place.significant] or list(rest)
-    if _clear(telling):
-        return telling[0].coordinate
-    if ringing(trial, held_out) > RINGS:
-        return "frequency"
-    return telling[0].coordinate if telling else ""
-
-
-def ringing(trial: Trial, held_out: Problem) -> float:
-    """Return the largest share of a residual's power within a third of an octave, above the motion.
-
-    The motion ends where nine tenths of the velocity's power lie below.
-    """
-    largest, begin = 0.0, 0
-    powers, motions = [], []
-    size = min(1024, *(len(run.force) - run.skip for run in held_out.runs))
-    rate = 1.0 / held_out.runs[0].dt
-    for run in held_out.runs:
-        count = len(run.force) - run.skip
-        residual = np.clip(trial.residual[begin : begin + count], -50.0, 50.0)
-        begin += count
-        f, power = welch(residual, rate, nperseg=size)
-        powers.append(power)
-        motions.append(welch(run.v[run.skip :], rate, nperseg=size)[1])
-    power, motion = np.mean(powers, axis=0), np.cumsum(np.mean(motions, axis=0))
-    ends = f[int(np.searchsorted(motion, 0.9 * motion[-1]))]
-    total = float(power.sum())
-    for centre in f[f > 1.5 * ends]:
-        inside = (f >= centre / 2 ** (1 / 6)) & (f <= centre * 2 ** (1 / 6))
-        largest = max(largest, float(power[inside].sum()) / total)
-    return largest
 
 
 def _left(runs: Sequence[Measurement]) -> list[Measurement]:

@@ -1,0 +1,59 @@
+"""Which coordinate is named for what no effect explains."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bristle.compare.where import LEVEL, Place
+from bristle.diagnose import unexplained
+from bristle.diagnose.unexplained import CLEAR, HALF, RINGS, most_telling, sentences
+
+NONE = np.zeros(0)
+
+
+def place(coordinate: str, share: float, sure: bool = True) -> Place:
+    p = 0.1 * LEVEL if sure else 10.0 * LEVEL
+    return Place(coordinate, False, share, share, p, share, 0.0, NONE, NONE, NONE, NONE, NONE)
+
+
+@pytest.fixture
+def rings(monkeypatch: pytest.MonkeyPatch):
+    """Return what sets the share of a residual's power in a narrow band."""
+
+    def answer(share: float) -> None:
+        monkeypatch.setattr(unexplained, "ringing", lambda trial, held_out: share)
+
+    answer(0.0)
+    return answer
+
+
+def test_a_significant_place_is_named_before_one_that_tells_little_more(rings):
+    found = [place("rest", 0.20, sure=False), place("speed", 1.1 * HALF * 0.20)]
+    assert most_telling(found, None, None) == "speed"
+
+
+def test_not_before_one_that_tells_far_more(rings):
+    found = [place("rest", 0.26, sure=False), place("acceleration", 0.9 * HALF * 0.26)]
+    assert most_telling(found, None, None) == "rest"
+    assert "beyond chance" in sentences("rest", found)[0]
+
+
+def test_what_rings_and_follows_nothing_else_clearly_has_a_frequency(rings):
+    found = [place("speed", 0.9 * CLEAR)]
+    assert most_telling(found, None, None) == "speed"
+    rings(1.1 * RINGS)
+    assert most_telling(found, None, None) == "frequency"
+    assert most_telling([place("displacement", 1.1 * CLEAR)], None, None) == "displacement"
+
+
+def test_what_rings_after_each_reversal_has_a_frequency(rings):
+    found = [place("time_since_reversal", 1.1 * CLEAR)]
+    assert most_telling(found, None, None) == "time_since_reversal"
+    rings(1.1 * RINGS)
+    assert most_telling(found, None, None) == "frequency"
+
+
+def test_nothing_is_named_where_there_is_no_place(rings):
+    assert most_telling([], None, None) == ""
+    assert sentences("", []) == []
