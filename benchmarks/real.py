@@ -23,7 +23,7 @@ if __package__ in (None, ""):  # `python benchmarks/real.py` finds only this fol
 
 from bristle.diagnose import Diagnosis, diagnose
 from bristle.diagnose.candidates import Trial
-from bristle.diagnose.sensors import mended
+from bristle.diagnose.mended import mended
 from bristle.diagnose.structure import diagnose_structure
 from bristle.identify.building import equilibrium, identify_structure
 from bristle.identify.model import Problem

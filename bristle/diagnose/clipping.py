@@ -18,6 +18,9 @@ LONGEST = 5
 CROWDED = 8.0
 """How many times more samples stand at a cut than at a step of a coarse instrument below it."""
 
+BESIDE = 4.0
+"""Noises inside the end of a range within which a sample may have been cut."""
+
 
 def clipped(runs: Sequence[Measurement]) -> list[SensorFault]:
     """Return the channels that repeat an extreme: their range ends before the motion does."""
@@ -68,17 +71,31 @@ def _limit(values: Array) -> float | None:
     At a cut the very same number comes many times in a row; a noisy signal never does that. One in
     coarse steps does at its turns, but not many times more often than one step below.
     """
-    cut = [
-        abs(end)
-        for end, way in ((float(values.max()), 1.0), (float(values.min()), -1.0))
-        if _stands_at_top(way * values)
-    ]
+    cut = [abs(float(np.max(way * values))) for way in (1.0, -1.0) if _stands_at_top(way * values)]
     return max(cut) if cut else None
 
 
+def beyond_range(values: Array, noise: float, level: float) -> NDArray[np.bool_]:
+    """Return which samples (n,) of a signal may have been cut off.
+
+    What is cut may get its `noise` behind the cut: then it stands a little inside of it, too.
+    `level` is where the channel was seen to be cut: a run may touch it a few times only.
+    """
+    lost = np.zeros(len(values), dtype=np.bool_)
+    for way in (1.0, -1.0):
+        turned = way * values
+        top, near = float(turned.max()), _rounding(values)
+        if _stands_at_top(turned) or abs(top - level) <= near:
+            lost |= turned >= top - near - BESIDE * noise
+    return lost
+
+
+def _rounding(values: Array) -> float:
+    return 1e-9 * float(np.max(np.abs(values)))
+
+
 def _stands_at_top(values: Array) -> bool:
-    near = 1e-9 * float(np.max(np.abs(values)))
-    at_end = values >= values.max() - near
+    at_end = values >= values.max() - _rounding(values)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(int), [0]])))
     stays, often = edges[1::2] - edges[::2], int(at_end.sum())
     # Once may be a rest before or after the test, at that end of the stroke.

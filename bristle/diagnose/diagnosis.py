@@ -17,8 +17,9 @@ from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
+from .mended import mended
 from .search import refine
-from .sensors import SensorFault, mended, sensor_faults
+from .sensors import SensorFault, sensor_faults
 from .unexplained import sentences, unexplained, where
 from .unlike import MISFIT, unlike
 from .unseen import unseen_fault
@@ -241,7 +242,7 @@ def _left(runs: Sequence[Measurement]) -> list[Measurement]:
     return [
         run
         for run in runs
-        if len(run.time) < SHORTEST or np.count_nonzero(run.measured) >= SHORTEST
+        if len(run.time) < SHORTEST or np.count_nonzero(run.told(*run.channels)) >= SHORTEST
     ]
 
 

@@ -17,9 +17,9 @@ from scipy.signal import butter, sosfiltfilt
 from ..records.derived import LATE, derived_velocity
 from ..records.measurement import Measurement
 from .clipping import clipped
-from .faults import SensorFault, earlier, mended
+from .faults import SensorFault
 
-__all__ = ["SensorFault", "earlier", "mended", "sensor_faults"]
+__all__ = ["SensorFault", "sensor_faults"]
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,8 @@ from ..identify.structure import problems_of
 from ..physics.building import Building
 from ..records.measurement import Measurement
 from .load_cell import load_cell
-from .sensors import SensorFault, mended, sensor_faults
+from .mended import mended
+from .sensors import SensorFault, sensor_faults
 from .sites import CLEAN, Finding, look_at
 from .structure_damper import damper_verdict, fit_damper, forgiven, left_by_filter
 from .structure_verdict import INSTRUMENT, StructureDiagnosis, combine

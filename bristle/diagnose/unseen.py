@@ -19,7 +19,8 @@ from ..identify.fit import Model, Problem, Run
 from ..identify.model import steady
 from ..identify.search import HUBER_AT_ONE, losses
 from .candidates import Trial, begin, joinable, judge
-from .faults import SensorFault, earlier
+from .faults import SensorFault
+from .mended import earlier
 from .search import refine, residuals
 from .starts import Ground, ranked
 

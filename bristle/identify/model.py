@@ -75,10 +75,9 @@ class Model:
         """Return the names of the parameters that a fit moves."""
         names = [name for name in law_parameters(self.law) if name not in CHOICES]
         for effect in self.effects:
-            fixed = CHOICES if self.law == "lugre" else (*CHOICES, *EFFECTS[effect].bristles)
-            names += [
-                f"{effect}.{name}" for name in EFFECTS[effect].parameters if name not in fixed
-            ]
+            joined = EFFECTS[effect]
+            fixed = (*CHOICES, *joined.assumed, *(joined.bristles if self.law != "lugre" else ()))
+            names += [f"{effect}.{name}" for name in joined.parameters if name not in fixed]
         if "v_n" in names and self.value("exponent") == 0.0:
             names.remove("v_n")  # the standard law does not know it
         return [name for name in names if name not in self.held]

@@ -27,13 +27,16 @@ STANDS = 0.2
 """Time [s] for which it does: a motion that begins gently is faster."""
 
 LOADED = 0.2
-"""Share of its RMS that the force has at the begin of a run that was cut out under load."""
+"""Share of its RMS that the force has at the begin of a rest under load."""
 
 MOST = 5
 """What part of a run this may cost at most: one in so many samples."""
 
-FORGOTTEN = 0.3
-"""Share of the stroke after which the damper forgets how such a run began."""
+FORGOTTEN = 0.5
+"""Path, as a share of the stroke, after which the damper forgets how such a run began."""
+
+COARSE = 0.05
+"""Step [s] in which the path is followed: noise would lengthen it sample by sample."""
 
 
 def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
@@ -70,35 +73,40 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
         V, error[:, :, 3] = smooth_drive(
             measurement[drive], measurement.noise.get(drive, 0.0), dt, draws, seed + 1
         )
-    measured = None if measurement.measured.all() else measurement.measured
+    # Where one of two channels of the motion is lost, the other one tells it.
+    alone = tuple(c for c in ("displacement", "velocity") if measurement.has(c))
+    needed = ("force", drive or "", *(alone if len(alone) == 1 else ()))
+    told = measurement.told(*needed)
     force = measurement["force"]
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
-        _noise_of_force(measurement), error, _begin(motion.x, force, dt), measured,
+        _noise_of_force(measurement), error, _begin(motion.x, force, dt),
+        None if told.all() else told,
     )  # fmt: skip
 
 
 def _begin(x: Array, force: Array, dt: float) -> int:
     """Return the first sample that is judged.
 
-    A run that begins at rest under load was cut out of a longer one: what elastic parts hold is not
-    known, until the motion has passed them.
+    A run that begins in motion, or at rest under load, was cut out of a longer one: what elastic
+    parts hold is not known, until the motion has passed them.
     """
+    span = float(np.ptp(x))
     rms = float(np.sqrt(np.mean(force**2)))
-    begin = x[: max(SETTLING, round(STANDS / dt))]
-    moves = float(np.ptp(begin)) > RESTS * float(np.ptp(x))
-    if moves or abs(float(np.mean(force[:SETTLING]))) <= LOADED * rms:
+    rests = float(np.ptp(x[: max(SETTLING, round(STANDS / dt))])) <= RESTS * span
+    if rests and abs(float(np.mean(force[:SETTLING]))) <= LOADED * rms:
         return SETTLING
-    away = np.abs(x - x[0]) > FORGOTTEN * float(np.ptp(x))
-    first = int(np.argmax(away)) if away.any() else len(x)
+    every = max(1, round(COARSE / dt))
+    passed = np.cumsum(np.abs(np.diff(x[::every]))) > FORGOTTEN * span
+    first = every * (1 + int(np.argmax(passed))) if passed.any() else len(x)
     return min(max(SETTLING, first), max(SETTLING, len(x) // MOST))
 
 
 def _seen(measurement: Measurement, channel: str) -> Array | None:
-    """Return a channel with NaN where a sample was filled in, None if it is not there."""
+    """Return a channel with NaN where a sample was filled in or lost, None if it is not there."""
     if not measurement.has(channel):
         return None
-    return np.where(measurement.measured, measurement[channel], np.nan)
+    return np.where(measurement.told(channel), measurement[channel], np.nan)
 
 
 def _noise_of_force(measurement: Measurement) -> float:

@@ -94,6 +94,8 @@ class Effect:
         States that begin with the value of a signal where a measurement begins: {state: signal}.
     bristles
         Parameters that count for laws with bristles alone; with others a fit leaves them.
+    assumed
+        Parameters that measurements hardly tell: a fit leaves them unless it is told to.
     contact
         Of a structure's effect: its `force` is dry friction, which carries what holds the base
         (`q.halt`), or the push of a stop. It is found together with the motion, whatever its
@@ -120,6 +122,7 @@ class Effect:
     parameters: ClassVar[dict[str, Parameter]] = {}
     starts: ClassVar[dict[str, str]] = {}
     bristles: ClassVar[tuple[str, ...]] = ()
+    assumed: ClassVar[tuple[str, ...]] = ()
     contact: ClassVar[bool] = False
     shows: ClassVar[str] = "force"
     own: ClassVar[bool] = False

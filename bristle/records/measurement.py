@@ -48,8 +48,9 @@ class Measurement:
     """One piece of one run.
 
     `time` (n,) s, evenly spaced; `channels` name to (n,) in the SI `units`; `measured` (n,) False
-    where a sample was missing and is interpolated; `noise` the standard deviation of each channel
-    in SI, `noise_facts` how it was found (None where it was given); `notes` what was done.
+    where a sample was missing and is interpolated, `lost` by channel (n,) True where that one alone
+    says nothing, such as beyond the end of its range; `noise` the standard deviation of each
+    channel in SI, `noise_facts` how it was found (None where it was given); `notes` what was done.
     """
 
     name: str
@@ -62,6 +63,7 @@ class Measurement:
     sampling: Sampling
     source: str
     notes: tuple[str, ...] = field(default=())
+    lost: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
 
     @property
     def step(self) -> float:
@@ -72,6 +74,14 @@ class Measurement:
     def duration(self) -> float:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
+
+    def told(self, *channels: str) -> NDArray[np.bool_]:
+        """Return at which samples (n,) all of these channels say something."""
+        told = self.measured
+        for channel in channels:
+            if channel in self.lost:
+                told = told & ~self.lost[channel]
+        return told
 
     def has(self, *channels: str) -> bool:
         """Return whether all of these channels were measured."""
@@ -93,6 +103,7 @@ class Measurement:
             time=self.time[start:stop],
             channels={key: values[start:stop] for key, values in self.channels.items()},
             measured=self.measured[start:stop],
+            lost={key: flags[start:stop] for key, flags in self.lost.items()},
         )
 
     def digest(self) -> str:

@@ -239,7 +239,7 @@ def _declared(law: str, effect: str = "") -> dict[str, Parameter]:
 
 def _defaults(law: str, effect: str = "") -> dict[str, Value]:
     """Return the parameters of an effect, or of a law, at their defaults."""
-    fixed: tuple[str, ...] = CHOICES
+    fixed: tuple[str, ...] = (*CHOICES, *(EFFECTS[effect].assumed if effect else ()))
     if law in STANDARD and not effect:
         fixed = (*CHOICES, "v_n")  # without the exponential there is no speed to divide by
     return {

@@ -8,7 +8,8 @@ import numpy as np
 from test_starts import LAW, recorded_rig
 
 from bristle.diagnose.diagnosis import _left, diagnose
-from bristle.diagnose.faults import SensorFault, mended
+from bristle.diagnose.faults import SensorFault
+from bristle.diagnose.mended import mended
 
 
 def test_a_run_of_which_clipping_leaves_nothing_is_left_out():
@@ -21,7 +22,7 @@ def test_a_run_of_which_clipping_leaves_nothing_is_left_out():
 
 def test_no_run_left_is_a_verdict_of_insufficiency(monkeypatch):
     runs = recorded_rig((), {})
-    cut = SensorFault("voltage", "clipping", 1e-9, 0.0, "The voltage stands at its end.")
+    cut = SensorFault("voltage", "clipping", 1.0, 0.0, "The voltage stands at its end.")
     monkeypatch.setattr("bristle.diagnose.diagnosis.sensor_faults", lambda _runs: [cut])
     every = [replace(run, channels={**run.channels, "voltage": np.ones(3000)}) for run in runs]
     found = diagnose(every[:2], every[2:], law="bingham", values=LAW)

@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
-from bristle.diagnose.sensors import mended, sensor_faults
+from bristle.diagnose.mended import mended
+from bristle.diagnose.sensors import sensor_faults
 from bristle.records.measurement import ChannelSpec, measurements_of_frame
 
 STEP, SECONDS, NOISE = 0.002, 10.0, 0.01
@@ -155,8 +156,28 @@ def test_a_channel_cut_on_one_side():
     assert (fault.channel, fault.fault) == ("force", "clipping")
     for before, after in zip(spoilt, mended(spoilt, [fault]), strict=True):
         cut = before["force"] == before["force"].max()
-        assert not after.measured[cut].any()
-        assert after.measured[~cut].sum() >= (~cut).sum() - 1  # the least value of all may go
+        told, level = after.told("force"), before["force"].max()
+        assert not told[cut].any()
+        far = before["force"] < level - 5.0 * before.noise["force"]
+        assert told[far].all()
+        assert after.told("displacement").all()
+
+
+def test_noise_that_comes_after_the_cut_is_lost_with_it():
+    level = []
+
+    def clip(channels):
+        end = 0.6 * np.max(np.abs(channels["force"]))
+        noise = 0.01 * end * np.random.default_rng(len(level)).standard_normal(5000)
+        channels["force"] = np.clip(np.clip(channels["force"], -end, end) + noise, -end, end)
+        level.append(end)
+
+    spoilt = runs(after=clip)
+    fault = only([one for one in sensor_faults(spoilt) if one.fault == "clipping"])
+    for after, end in zip(mended(spoilt, [fault]), level, strict=True):
+        beyond = np.abs(after["force"]) > 0.985 * end
+        assert beyond.sum() > 100
+        assert np.mean(after.told("force")[beyond]) < 0.1
 
 
 def test_a_coarse_instrument_is_not_clipped():

@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.diagnose.sensors import mended, sensor_faults
+from bristle.diagnose.mended import mended
+from bristle.diagnose.sensors import sensor_faults
 from bristle.identify.prepare import prepare
 from bristle.records.derived import derived_velocity
 from bristle.records.measurement import ChannelSpec, measurements_of_frame

@@ -24,6 +24,7 @@ class Backlash(Effect):
     expect = "after each reversal of the force no force at all over the width of the gap"
     states = {"compression": "m", "joint_velocity": "m/s"}
     joint = ("compression", "joint_velocity")
+    assumed = ("c",)  # felt while a gap closes, for less than a sample
     parameters = {
         "gap": Parameter(2e-4, "m", (0.0, 0.05), "half the play"),
         "k": Parameter(1e5, "N/m", (1e3, 1e9), "stiffness of the closed joint"),

@@ -1,4 +1,4 @@
-"""A run cut out under load is judged from where the damper has forgotten how it began."""
+"""A run cut out of a longer one is judged from where the damper has forgotten how it began."""
 
 from __future__ import annotations
 
@@ -55,6 +55,15 @@ def test_a_run_cut_out_under_load_is_judged_once_the_bristles_have_slipped(begin
     assert run.skip > SETTLING
     assert float(np.std(left[: run.skip])) > 20.0 * NOISE  # the bent bristles, which nobody knows
     assert float(np.sqrt(np.mean(left[run.skip :] ** 2))) < 3.0 * NOISE
+
+
+def test_a_run_cut_out_of_a_motion_is_judged_once_the_bristles_have_slipped():
+    t = np.arange(5000) * DT
+    run = recorded(0.01 * np.sin(2.0 * t), begin=800)  # it turns there: the force has lost its load
+    left = run.force - Problem([run]).predict(MODEL, run)
+    assert run.skip > SETTLING
+    assert float(np.std(left[: run.skip])) > 20.0 * NOISE
+    assert float(np.sqrt(np.mean(left[run.skip :] ** 2))) < 2.0 * NOISE
 
 
 def test_a_run_from_rest_without_load_is_judged_from_its_begin():
