@@ -36,7 +36,10 @@ PAIR_LEFT = 0.5
 """What a second effect may leave, as a share of the excess that the first one leaves."""
 
 PAIR_PART = 0.05
-"""Smallest part of the first excess that the lesser effect of a pair must account for."""
+"""Smallest part of the first excess that the lesser effect of a pair must account for, unless..."""
+
+COMPLETE = 1.04
+"""... the pair leaves no more than this z: the misfit of a form is not closed by another effect."""
 
 RIVAL = 1.25
 """Where the best model is not adequate, others rival it up to this many times its excess: a misfit
@@ -98,7 +101,7 @@ def decide(
     best = ranked[0]
     explained = 1.0 - excess(best) / excess(before)
     single = best.z <= ADEQUATE or explained >= SHARE
-    if best.z > ADEQUATE and explained < 1.0 - PAIR_PART:
+    if best.z > ADEQUATE:
         pair = _pair(before, ranked, grow, single)
         if pair is not None and reduce is not None:
             alone = min(reduce(pair.best), key=lambda trial: trial.z)
@@ -162,7 +165,7 @@ def _pair(
     without = [alone[name] for name in names if name in alone]
     parts = [(excess(other) - excess(pair)) / excess(before) for other in without]
     explained = 1.0 - excess(pair) / excess(before)
-    if min(parts, default=0.0) < PAIR_PART:
+    if min(parts, default=0.0) < PAIR_PART and pair.z > COMPLETE:
         return None
     if pair.z > ADEQUATE and explained < SHARE:
         return None

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.fit import Model, Problem
+from ..identify.fit import Model, Problem, Run
+from .search import Search
 
 Array = NDArray[np.float64]
 
@@ -21,8 +22,8 @@ class Experiment:
     """A proposed run: a sine or a chirp under a voltage.
 
     `amplitude` m, `low`, `high` Hz (equal for a sine), `voltage` V (low, high: equal where held,
-    else switched every `switch` s), `contrast` the smallest difference between any two rivals'
-    forces, in units of the force's noise.
+    else switched every `switch` s), `contrast` the smallest RMS difference between any two rivals'
+    forces, each refitted, in units of the force's noise.
     """
 
     amplitude: float
@@ -49,7 +50,7 @@ class Experiment:
         )
         return (
             f"Run {motion} {drive} for {LENGTH:g} s: there the rivals' forces differ by "
-            f"{self.contrast:.1f} times the noise."
+            f"{self.contrast:.2g} times the noise, however they are refitted."
         )
 
     def signals(self, dt: float) -> tuple[Array, Array, Array, Array]:
@@ -75,30 +76,65 @@ def separating(models: Sequence[Model], problem: Problem) -> Experiment:
 
     Amplitudes, speeds and voltages stay within those of the runs at hand.
     """
+    rivals = [_Rival(model, problem) for model in models]
+    noise = float(np.median([run.noise for run in problem.runs]))
+    dt = problem.runs[0].dt
+    plans = [
+        replace(plan, contrast=_contrast(rivals, _run(plan, dt, noise))) for plan in _plans(problem)
+    ]
+    return max(plans, key=lambda plan: plan.contrast)
+
+
+def _plans(problem: Problem) -> list[Experiment]:
     x_top = max(float(np.max(np.abs(run.x - run.x.mean()))) for run in problem.runs)
     v_top = max(float(np.max(np.abs(run.v))) for run in problem.runs)
     V_low = min(float(run.V.min()) for run in problem.runs)
     V_top = max(float(run.V.max()) for run in problem.runs)
-    noise = float(np.median([run.noise for run in problem.runs]))
-    dt = problem.runs[0].dt
-    best: Experiment | None = None
+    drives = [((V_low, V_low), 1.0), ((V_top, V_top), 1.0)]
+    drives += [((V_low, V_top), 0.25), ((V_low, V_top), 2.0)] if V_top > V_low else []
+    plans = []
     for amplitude in (x_top, 0.3 * x_top, 0.1 * x_top):
         top = v_top / (2.0 * np.pi * amplitude)
         for low, high in ((0.05 * top, top), (0.1 * top, 0.1 * top), (top, top)):
-            drives = [((V_low, V_low), 1.0), ((V_top, V_top), 1.0)]
-            drives += [((V_low, V_top), 0.25), ((V_low, V_top), 2.0)] if V_top > V_low else []
-            for voltage, switch in drives:
-                plan = Experiment(amplitude, low, high, voltage, switch, 0.0)
-                forces = [
-                    problem.bench(model).force(*plan.signals(dt), dt, model.values)
-                    for model in models
-                ]
-                contrast = min(
-                    float(np.sqrt(np.mean((one - other) ** 2))) / noise
-                    for i, one in enumerate(forces)
-                    for other in forces[:i]
-                )
-                if best is None or contrast > best.contrast:
-                    best = Experiment(amplitude, low, high, voltage, switch, contrast)
-    assert best is not None
-    return best
+            plans += [Experiment(amplitude, low, high, *drive, 0.0) for drive in drives]
+    return plans
+
+
+def _run(plan: Experiment, dt: float, noise: float) -> Run:
+    x, v, a, V = plan.signals(dt)
+    return Run("plan", dt, x, v, a, V, np.zeros_like(x), noise, np.zeros((0, len(x), 4)), skip=0)
+
+
+class _Rival:
+    """A model, and how firmly the runs at hand hold its parameters."""
+
+    def __init__(self, model: Model, problem: Problem) -> None:
+        self.model = model
+        known = Search(problem, model, problem.expectation(model), model.free()).sensitivities()
+        self.held = known.T @ known
+
+    def on(self, run: Run) -> tuple[Array, Array]:
+        """Return the force (n,) of a planned run and its sensitivities (n, p), in noises."""
+        nothing = np.zeros_like(run.x)
+        expected = [(nothing, np.full_like(run.x, run.noise), np.zeros((0, len(run.x))))]
+        search = Search(Problem([run]), self.model, expected, self.model.free())
+        return -search.residuals(search.start), -search.sensitivities()
+
+
+def _contrast(rivals: Sequence[_Rival], run: Run) -> float:
+    """Return the smallest difference that any rival leaves to any other's force, in noises.
+
+    The rival may move its parameters as far as the runs at hand allow: a difference that a refit
+    takes up separates nothing.
+    """
+    seen = [rival.on(run) for rival in rivals]
+    least = np.inf
+    for j, (own, J) in enumerate(seen):
+        normal = J.T @ J + rivals[j].held
+        for i, (other, _) in enumerate(seen):
+            if i != j:
+                apart = other - own
+                pull = J.T @ apart
+                taken = float(pull @ np.linalg.lstsq(normal, pull, rcond=None)[0])
+                least = min(least, max(0.0, float(apart @ apart) - taken))
+    return float(np.sqrt(least / len(run.x)))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bristle.diagnose.candidates import Trial
-from bristle.diagnose.decision import CLEAN, GAIN, decide, missing
+from bristle.diagnose.decision import CLEAN, COMPLETE, GAIN, PAIR_PART, decide, missing
 from bristle.identify.fit import Model
 
 SAMPLES = 6000
@@ -123,6 +123,19 @@ def test_a_second_effect_that_takes_little_is_not_named():
 
     found = decide(trial(3.0), [trial(1.4, "gas_spring"), trial(2.9, "coil_lag")], grow)
     assert found.effects == ("gas_spring",)
+
+
+@pytest.mark.parametrize(("left", "names"), [(COMPLETE, 2), (1.1 * COMPLETE, 1)])
+def test_a_small_second_effect_counts_where_it_leaves_nothing(left, names):
+    large = 8.0
+    best = trial(1.4, "gas_spring")
+    assert (best.z**2 - 1.0) / (large**2 - 1.0) < PAIR_PART
+    found = decide(
+        trial(large),
+        [best, trial(7.7, "delay")],
+        lambda _first: [trial(left, "gas_spring", "delay")],
+    )
+    assert (found.kind, len(found.effects)) == ("effect", names)
 
 
 def test_a_pair_is_reduced_where_one_of_it_suffices_alone():

@@ -1,0 +1,66 @@
+"""Which run separates rivals: what a refit takes up is no difference."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_starts import LAW, recorded_rig
+
+from bristle.diagnose.experiments import _contrast, _run, separating
+from bristle.diagnose.mended import mended
+from bristle.identify.fit import Model, Problem
+from bristle.identify.prepare import prepare
+
+N = 1000
+FORCE, SLOPE = np.random.default_rng(3).standard_normal((2, N))
+FORCE -= SLOPE * (SLOPE @ FORCE) / (SLOPE @ SLOPE)
+
+
+class Rival:
+    """A force with one parameter, `SLOPE` its derivative, known to 1/sqrt(`held`)."""
+
+    def __init__(self, force: np.ndarray, held: float) -> None:
+        self.force, self.held = force, np.array([[held]])
+
+    def on(self, _run: object) -> tuple[np.ndarray, np.ndarray]:
+        """Return force and sensitivities."""
+        return self.force, SLOPE[:, None]
+
+
+@pytest.mark.parametrize(
+    ("held", "left"), [(0.0, 0.0), (float(SLOPE @ SLOPE), 0.5), (1e9 * float(SLOPE @ SLOPE), 1.0)]
+)
+def test_a_difference_along_a_parameter_counts_as_far_as_it_is_known(held, left):
+    rivals = [Rival(FORCE, held), Rival(FORCE + 2.0 * SLOPE, held)]
+    run = _run_of(N)
+    expected = np.sqrt(left * np.mean((2.0 * SLOPE) ** 2))
+    assert _contrast(rivals, run) == pytest.approx(expected, rel=1e-4, abs=1e-6)
+
+
+def test_a_difference_across_all_parameters_counts_whole():
+    rivals = [Rival(SLOPE, 0.0), Rival(SLOPE + FORCE, 0.0)]
+    assert _contrast(rivals, _run_of(N)) == pytest.approx(np.sqrt(np.mean(FORCE**2)))
+
+
+def test_a_plan_stays_within_what_the_rig_has_done():
+    runs = recorded_rig((), {})
+    problem = Problem([prepare(one) for one in mended(runs, [])])
+    rivals = [
+        Model("bingham", ("gas_spring",), {**LAW, "gas_spring.k": 100.0}),
+        Model("bingham", ("asymmetry",), {**LAW, "asymmetry.ratio": 0.1}),
+    ]
+    plan = separating(rivals, problem)
+    x, v, _, V = plan.signals(problem.runs[0].dt)
+    assert plan.contrast > 1.0
+    assert np.max(np.abs(x)) <= max(np.max(np.abs(r.x - r.x.mean())) for r in problem.runs) * 1.001
+    assert np.max(np.abs(v)) <= max(np.max(np.abs(r.v)) for r in problem.runs) * 1.001
+    assert V.min() >= min(r.V.min() for r in problem.runs)
+    assert V.max() <= max(r.V.max() for r in problem.runs)
+
+
+def _run_of(samples: int):
+    from bristle.diagnose.experiments import Experiment
+
+    whole = _run(Experiment(0.01, 1.0, 1.0, (0.0, 0.0), 1.0, 0.0), 12.0 / (samples - 1), 1.0)
+    assert len(whole.x) == samples
+    return whole
