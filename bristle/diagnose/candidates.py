@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..identify.fit import Model, Problem
 from ..identify.search import loss, losses, z_of, z_scale
 from ..physics.effect import EFFECTS, effects_of
-from .search import Expected, Search, refine, residuals
+from .search import Expected, Search, is_rough, refine, residuals
 from .starts import Begun, Ground, ranked
 
 Array = NDArray[np.float64]
@@ -25,7 +25,10 @@ QUICK = 8
 """Jacobians of the first, short search from each start."""
 
 ROUGH = 24
-"""The same where impacts make the way rough."""
+"""The same where impacts make the way rough, for the `CARRIED` best after `OUTSET` Jacobians."""
+
+OUTSET = 4
+CARRIED = 2
 
 LONG = 20
 """Jacobians of the second search, of those that promise enough."""
@@ -126,13 +129,22 @@ def begin(effect: str, ground: Ground, begun: Sequence[Begun], fewer: bool = Fal
     Its loss is that on the training runs.
 
     All parameters move at once: with the law's held, an effect that the law has taken up vanishes.
+    Where impacts make the way rough the first step says little of a start: all go a short way, and
+    those that came farthest go on.
     """
     light = ground.light(effect)
-    found = []
-    for one in begun[: max(1, light.kept // 2) if fewer else light.kept]:
+
+    def searched(one: Begun, sweeps: int) -> Begun:
         search = Search(light.problem, one.model, light.expected, one.model.free())
-        model, ended = search.run(ROUGH if search.rough else QUICK)
-        found.append(Begun(model, ended.cost))
+        model, ended = search.run(sweeps)
+        return Begun(model, ended.cost)
+
+    some = begun[: max(1, light.kept // 2) if fewer else light.kept]
+    if is_rough(begun[0].model):
+        first = sorted((searched(one, OUTSET) for one in some), key=lambda one: one.cost)
+        found = [searched(one, ROUGH) for one in first[: 1 if fewer else CARRIED]]
+    else:
+        found = [searched(one, QUICK) for one in some]
     best = min(found, key=lambda one: one.cost).model
     return Begun(best, float(np.mean(loss(residuals(ground.train, best, ground.expected)))))
 

@@ -22,13 +22,18 @@ PAYS = 0.95
 """What the loss must fall to, as a share, for another turn."""
 
 
+def is_rough(model: Model) -> bool:
+    """Return whether events such as impacts make a model's residuals jump."""
+    return any(EFFECTS[name].joint for name in model.effects)
+
+
 class Search:
     """The search for a model's parameters on runs: logarithms where a bound is above zero."""
 
     def __init__(self, problem: Problem, model: Model, expected: Expected, names: Sequence[str]):
         self.problem, self.model, self.expected = problem, model, expected
         self.names = list(names)
-        self.rough = any(EFFECTS[name].joint for name in model.effects)
+        self.rough = is_rough(model)
         declared = [parameter(model.law, name) for name in self.names]
         value = np.array([model.value(name) for name in self.names])
         bounds = np.array([model.bounds(name) for name in self.names], dtype=float).reshape(-1, 2)

@@ -42,7 +42,7 @@ RELAXED = ((0.3, 2.0), (0.05, 10.0))
 THIN = 6
 """Of what has no memory every so many samples suffice for a search."""
 
-KEPT = {"none": 24, "memory": 2, "joint": 2}
+KEPT = {"none": 24, "memory": 2, "joint": 6}
 """From how many starts a search is made, by what the model has that makes it dear."""
 
 STEPS = (1.0, 0.3)
