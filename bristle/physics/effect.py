@@ -16,7 +16,7 @@ from ..errors import PhysicsError
 SITES = ("damper", "structure", "sensor")
 
 CHOICES = ("exponent", "mass", "which")
-"""Parameters that choose a form or regularise: no fit moves them unless it is told to."""
+"""Parameters that choose a form or regularise: no fit moves them."""
 
 CHANNELS = ("force", "velocity")
 """Channels whose instrument a sensor's effect may be."""
@@ -95,7 +95,7 @@ class Effect:
     bristles
         Parameters that count for laws with bristles alone; with others a fit leaves them.
     assumed
-        Parameters that measurements hardly tell: a fit leaves them unless it is told to.
+        Parameters that measurements hardly tell: no fit moves them.
     contact
         Of a structure's effect: its `force` is dry friction, which carries what holds the base
         (`q.halt`), or the push of a stop. It is found together with the motion, whatever its

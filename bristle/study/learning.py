@@ -83,10 +83,13 @@ DIAGNOSERS: dict[str, Callable[[Study, StudyModel, Say], Verdict]] = {
 
 
 def verdict_of(study: Study, found: Verdict) -> dict[str, Any]:
-    """Return the content of verdict.json, with what weakens the split of the runs."""
+    """Return the content of verdict.json, with how the runs were split and channels turned."""
     verdict = found.as_dict()
-    notes = study.runs().notes
-    return {**verdict, "notes": list(notes)} if notes else verdict
+    notes = list(study.runs().notes)
+    for name, channel in study.settings.channels.items():
+        if channel.sign < 0:
+            notes.append(f"{name.capitalize()} is read with its sign turned, as study.toml says.")
+    return {**verdict, "notes": notes} if notes else verdict
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ import pandas as pd
 import pytest
 
 from bristle.cli import main
+from bristle.diagnose import Diagnosis
 from bristle.study import learning
 from bristle.study.errors import StudyError
 from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects, diagnose_frames, diagnose_study, learn
+from bristle.study.learning import add_effects, diagnose_frames, diagnose_study, learn, verdict_of
 from bristle.study.new import create_study
 from bristle.study.study import Study
 from tests.independent.generate import make_case
@@ -70,6 +71,17 @@ def test_the_verdict_file_holds_what_a_program_needs(study):
     assert isinstance(verdict["noise_floor"], dict)
     assert verdict["sensors"] == []
     assert verdict["words"]
+
+
+def test_a_channel_that_is_turned_is_told_with_the_verdict(study):
+    found = Diagnosis("none", (), "Nothing is missing.")
+    assert "notes" not in verdict_of(study, found)
+    path = study.folder / "study.toml"
+    text = path.read_text()
+    begin = text.index("[channels.force]")
+    path.write_text(text[:begin] + text[begin:].replace("sign = 1", "sign = -1", 1))
+    (note,) = verdict_of(Study(study.folder), found)["notes"]
+    assert note.startswith("Force is read with its sign turned")
 
 
 def test_what_the_verdict_names_is_added_and_then_nothing_is_missing(study):
