@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..diagnose import Diagnosis, diagnose
+from ..diagnose.faults import SensorFault
 from ..diagnose.structure import diagnose_structure
 from ..diagnose.structure_verdict import StructureDiagnosis
 from ..physics.effect import EFFECTS
@@ -51,9 +52,22 @@ def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> V
     if diagnoser is None:
         raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not diagnosed yet.')
     found = diagnoser(study, model, say)
+    found = replace(found, sensors=(*found.sensors, *_turned(study)))
     if write:
         study.write_verdict(verdict_of(study, found))
     return found
+
+
+def _turned(study: Study) -> list[SensorFault]:
+    """Return the channels whose sign the study turns: their files have the other one."""
+    return [
+        SensorFault(
+            name, "sign", -1.0, 0.0,
+            f"{name.capitalize()} has the other sign in its files; study.toml turns it.",
+        )
+        for name, channel in study.settings.channels.items()
+        if channel.sign < 0
+    ]  # fmt: skip
 
 
 def _diagnose_bench(study: Study, model: StudyModel, say: Say) -> Diagnosis:
@@ -83,13 +97,10 @@ DIAGNOSERS: dict[str, Callable[[Study, StudyModel, Say], Verdict]] = {
 
 
 def verdict_of(study: Study, found: Verdict) -> dict[str, Any]:
-    """Return the content of verdict.json, with how the runs were split and channels turned."""
+    """Return the content of verdict.json, with what weakens the split of the runs."""
     verdict = found.as_dict()
-    notes = list(study.runs().notes)
-    for name, channel in study.settings.channels.items():
-        if channel.sign < 0:
-            notes.append(f"{name.capitalize()} is read with its sign turned, as study.toml says.")
-    return {**verdict, "notes": notes} if notes else verdict
+    notes = study.runs().notes
+    return {**verdict, "notes": list(notes)} if notes else verdict
 
 
 @dataclass(frozen=True)

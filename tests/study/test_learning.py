@@ -13,7 +13,7 @@ from bristle.diagnose import Diagnosis
 from bristle.study import learning
 from bristle.study.errors import StudyError
 from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects, diagnose_frames, diagnose_study, learn, verdict_of
+from bristle.study.learning import add_effects, diagnose_frames, diagnose_study, learn
 from bristle.study.new import create_study
 from bristle.study.study import Study
 from tests.independent.generate import make_case
@@ -73,15 +73,16 @@ def test_the_verdict_file_holds_what_a_program_needs(study):
     assert verdict["words"]
 
 
-def test_a_channel_that_is_turned_is_told_with_the_verdict(study):
-    found = Diagnosis("none", (), "Nothing is missing.")
-    assert "notes" not in verdict_of(study, found)
+def test_a_channel_that_the_study_turns_is_told_with_the_verdict(study, monkeypatch):
+    bench = lambda *_given: Diagnosis("none", (), "Nothing is missing.")  # noqa: E731
+    monkeypatch.setitem(learning.DIAGNOSERS, "bench", bench)
+    assert diagnose_study(study, write=False).sensors == ()
     path = study.folder / "study.toml"
     text = path.read_text()
     begin = text.index("[channels.force]")
     path.write_text(text[:begin] + text[begin:].replace("sign = 1", "sign = -1", 1))
-    (note,) = verdict_of(Study(study.folder), found)["notes"]
-    assert note.startswith("Force is read with its sign turned")
+    (told,) = diagnose_study(Study(study.folder)).as_dict()["sensors"]
+    assert (told["channel"], told["fault"], told["value"]) == ("force", "sign", -1.0)
 
 
 def test_what_the_verdict_names_is_added_and_then_nothing_is_missing(study):
