@@ -22,6 +22,9 @@ MOST_RMS = 1.1
 CLEAN = 1.15
 """z of a base model above which something is missing, whether an effect explains it or not."""
 
+LOUD = 0.9
+"""z of a base model below which the noise was estimated too high to judge anything by it."""
+
 ADEQUATE = 1.08
 """z up to which a model with an effect leaves nothing that matters."""
 
@@ -99,6 +102,8 @@ def decide(
     if not ranked or not missing(before, ranked[0]):
         return _without_effect(before, ranked, organised)
     best = ranked[0]
+    if before.z < LOUD:
+        return _too_loud(before, best)
     explained = 1.0 - excess(best) / excess(before)
     single = best.z <= ADEQUATE or explained >= SHARE
     if best.z > ADEQUATE:
@@ -143,6 +148,18 @@ def _without_effect(before: Trial, ranked: Sequence[Trial], organised: bool) -> 
     return Decision(
         "unknown", (), before, 0.0,
         (f"z = {before.z:.2f}, and no effect of the library lowers it by {GAIN:.0%}.",),
+    )  # fmt: skip
+
+
+def _too_loud(before: Trial, best: Trial) -> Decision:
+    return Decision(
+        "insufficient", (), before, 0.0,
+        (
+            f"The model errs by {before.z:.2f} times the noise: that was estimated too high, as "
+            "happens where a force turns within a few samples. "
+            f"{_new(best, before)[0].capitalize()} lowers the error further, which this noise "
+            "cannot judge. State the noise of the channels in study.toml, or sample faster.",
+        ),
     )  # fmt: skip
 
 

@@ -170,7 +170,16 @@ def diagnose(
     )
     instruments = ("delay",) if redundant else ("delay", "velocity_sensor")
     found = _judged(before, problem, held_out, faults, noise, instruments, say)
-    return _with_instrument(found)
+    return _without_drive(_with_instrument(found), [*train, *holdout])
+
+
+def _without_drive(found: Diagnosis, runs: Sequence[Measurement]) -> Diagnosis:
+    """Return the diagnosis with the doubt that a drive which nobody recorded leaves."""
+    driven = any(run.has("voltage") or run.has("current") for run in runs)
+    if driven or found.kind != "unknown":
+        return found
+    doubt = "Neither voltage nor current was recorded: a drive that changed would look like this."
+    return replace(found, words=f"{found.words} {doubt}")
 
 
 def _judged(

@@ -17,6 +17,7 @@ from ..identify.response import responses
 from ..identify.structure import problems_of
 from ..physics.building import Building
 from ..records.measurement import Measurement
+from .known_building import as_known, told
 from .load_cell import load_cell
 from .mended import mended
 from .sensors import SensorFault, sensor_faults
@@ -91,6 +92,13 @@ def diagnose_structure(
     if softer and "damper" in problems and problems["damper"][0].reconstructed:
         problems = problems_of(ours, theirs, building, law, linear_storeys=False)
     base, verdict = None, None
+    notes: list[str] = []
+    if "damper" in problems and problems["damper"][0].reconstructed:
+        say("damper: what the building's file leaves open")
+        first = fit_damper(problems["damper"][0], at_site(present, "damper", problems))
+        known = as_known(first.model, ours, building, law, straight and not softer)
+        problems = problems_of(ours, theirs, known, law, straight and not softer)
+        notes = told(building, known)
     if "damper" in problems:
         say("damper: its law, then effects")
         base = fit_damper(problems["damper"][0], at_site(present, "damper", problems))
@@ -100,7 +108,8 @@ def diagnose_structure(
         if _rounded(findings.get("layer", _NOTHING)):
             most = left_by_filter(law, *problems["damper"])
             verdict = forgiven(verdict, most, "The load cell's filter has another form than ours.")
-    return combine(findings, base, verdict, problems, sensors)
+    whole = combine(findings, base, verdict, problems, sensors)
+    return replace(whole, words=" ".join([whole.words, *notes]))
 
 
 def _rounded(layer: Finding) -> bool:

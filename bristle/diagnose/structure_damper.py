@@ -84,7 +84,7 @@ def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem)
         return DamperVerdict(decide(before, [], grow), before, ())
     trials = grow(before)
     decision = decide(before, trials, grow, reduce=reduce)
-    if decision.kind in ("none", "unknown"):
+    if decision.kind in ("none", "unknown", "insufficient"):
         decision = _seldom(before, trials) or decision
     return DamperVerdict(decision, before, tuple(trials))
 

@@ -60,6 +60,13 @@ def test_a_gain_at_the_cost_of_the_plain_error_is_none_missing():
     assert not missing(before, replace(after, rms=1.2 * before.rms))
 
 
+def test_noise_that_was_estimated_too_high_judges_nothing():
+    found = decide(trial(0.5), [trial(0.4, "stribeck")], refuse)
+    assert (found.kind, found.effects) == ("insufficient", ())
+    assert "State the noise" in found.reasons[0]
+    assert decide(trial(0.5), [trial(0.499, "stribeck")], refuse).kind == "none"
+
+
 def test_one_effect_that_explains_it():
     before = trial(3.0)
     found = decide(before, [trial(2.7, "stribeck"), trial(1.01, "gas_spring")], refuse)

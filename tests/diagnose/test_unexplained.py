@@ -7,6 +7,7 @@ import pytest
 
 from bristle.compare.where import LEVEL, Place
 from bristle.diagnose import unexplained
+from bristle.diagnose.diagnosis import Diagnosis, _without_drive
 from bristle.diagnose.unexplained import CLEAR, HALF, RINGS, most_telling, sentences
 
 NONE = np.zeros(0)
@@ -57,3 +58,16 @@ def test_what_rings_after_each_reversal_has_a_frequency(rings):
 def test_nothing_is_named_where_there_is_no_place(rings):
     assert most_telling([], None, None) == ""
     assert sentences("", []) == []
+
+
+@pytest.mark.parametrize(
+    ("channels", "kind", "doubted"),
+    [(("force",), "unknown", True), (("force",), "none", False), (("current",), "unknown", False)],
+)
+def test_a_drive_that_nobody_recorded_leaves_a_doubt(channels, kind, doubted):
+    class Bare:
+        def has(self, channel: str) -> bool:
+            return channel in channels
+
+    found = _without_drive(Diagnosis(kind, (), "Something."), [Bare()])
+    assert ("Neither voltage nor current" in found.words) is doubted
