@@ -39,10 +39,12 @@ PAIR_LEFT = 0.5
 """What a second effect may leave, as a share of the excess that the first one leaves."""
 
 PAIR_PART = 0.05
-"""Smallest part of the first excess that the lesser effect of a pair must account for, unless..."""
+"""Smallest part of the first excess that the lesser effect of a pair must account for: a misfit of
+form is lowered by many effects."""
 
 COMPLETE = 1.04
-"""... the pair leaves no more than this z: the misfit of a form is not closed by another effect."""
+"""z up to which a pair counts whatever its lesser effect accounts for: no effect closes a misfit of
+another one's form."""
 
 RIVAL = 1.25
 """Where the best model is not adequate, others rival it up to this many times its excess: a misfit
