@@ -16,6 +16,12 @@ Array = NDArray[np.float64]
 LENGTH = 12.0
 """Length of a proposed run [s]."""
 
+TELLS = 4.0
+"""Standard deviations between two rivals below which a run tells them apart by luck at best."""
+
+ZERO = 0.02
+"""Share of the largest voltage below which the smallest is zero, but for its noise."""
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -23,7 +29,8 @@ class Experiment:
 
     `amplitude` m, `low`, `high` Hz (equal for a sine), `voltage` V (low, high: equal where held,
     else switched every `switch` s), `contrast` the smallest RMS difference between any two rivals'
-    forces, each refitted, in units of the force's noise.
+    forces, each refitted, in units of the force's noise; `deviations` the same over the whole run,
+    in standard deviations.
     """
 
     amplitude: float
@@ -31,10 +38,17 @@ class Experiment:
     high: float
     voltage: tuple[float, float]
     switch: float
-    contrast: float
+    contrast: float = 0.0
+    deviations: float = 0.0
 
     def words(self) -> str:
         """Return the run as a sentence of an experiment's plan."""
+        if self.deviations < TELLS:
+            return (
+                "No run within the strokes, speeds and voltages of these would tell: at best the "
+                f"rivals' forces differ by {self.deviations:.1f} standard deviations over "
+                f"{LENGTH:g} s. Go beyond them."
+            )
         motion = (
             f"a sine of {1e3 * self.amplitude:.3g} mm at {self.low:.3g} Hz"
             if self.low == self.high
@@ -79,9 +93,12 @@ def separating(models: Sequence[Model], problem: Problem) -> Experiment:
     rivals = [_Rival(model, problem) for model in models]
     noise = float(np.median([run.noise for run in problem.runs]))
     dt = problem.runs[0].dt
-    plans = [
-        replace(plan, contrast=_contrast(rivals, _run(plan, dt, noise))) for plan in _plans(problem)
-    ]
+    plans = []
+    for plan in _plans(problem):
+        run = _run(plan, dt, noise)
+        contrast = _contrast(rivals, run)
+        far = contrast * float(np.sqrt(len(run.x)))
+        plans.append(replace(plan, contrast=contrast, deviations=far))
     return max(plans, key=lambda plan: plan.contrast)
 
 
@@ -90,13 +107,14 @@ def _plans(problem: Problem) -> list[Experiment]:
     v_top = max(float(np.max(np.abs(run.v))) for run in problem.runs)
     V_low = min(float(run.V.min()) for run in problem.runs)
     V_top = max(float(run.V.max()) for run in problem.runs)
+    V_low = 0.0 if abs(V_low) < ZERO * V_top else V_low
     drives = [((V_low, V_low), 1.0), ((V_top, V_top), 1.0)]
     drives += [((V_low, V_top), 0.25), ((V_low, V_top), 2.0)] if V_top > V_low else []
     plans = []
     for amplitude in (x_top, 0.3 * x_top, 0.1 * x_top):
         top = v_top / (2.0 * np.pi * amplitude)
         for low, high in ((0.05 * top, top), (0.1 * top, 0.1 * top), (top, top)):
-            plans += [Experiment(amplitude, low, high, *drive, 0.0) for drive in drives]
+            plans += [Experiment(amplitude, low, high, *drive) for drive in drives]
     return plans
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_starts import LAW, recorded_rig
@@ -54,13 +56,15 @@ def test_a_plan_stays_within_what_the_rig_has_done():
     assert plan.contrast > 1.0
     assert np.max(np.abs(x)) <= max(np.max(np.abs(r.x - r.x.mean())) for r in problem.runs) * 1.001
     assert np.max(np.abs(v)) <= max(np.max(np.abs(r.v)) for r in problem.runs) * 1.001
-    assert V.min() >= min(r.V.min() for r in problem.runs)
+    assert V.min() >= min(0.0, *(r.V.min() for r in problem.runs))
     assert V.max() <= max(r.V.max() for r in problem.runs)
+    assert plan.words().startswith("Run a s")
+    assert "Go beyond" in replace(plan, deviations=1.0).words()
 
 
 def _run_of(samples: int):
     from bristle.diagnose.experiments import Experiment
 
-    whole = _run(Experiment(0.01, 1.0, 1.0, (0.0, 0.0), 1.0, 0.0), 12.0 / (samples - 1), 1.0)
+    whole = _run(Experiment(0.01, 1.0, 1.0, (0.0, 0.0), 1.0), 12.0 / (samples - 1), 1.0)
     assert len(whole.x) == samples
     return whole
