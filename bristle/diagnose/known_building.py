@@ -98,7 +98,7 @@ def told(before: Building, after: Building) -> list[str]:
     return [
         "The force is reconstructed from the building's numbers, moved within what a laboratory "
         f"knows of them: {', '.join(changed)}. A spring or a mass of that size beside the damper "
-        "would look the same."
+        "would look the same. Put them into the building's file if they suit."
     ]
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from ..identify.fit import Model
 from ..identify.placed import at_site, on_time
-from ..identify.response import responses
+from ..identify.response import Response, responses
 from ..identify.structure import problems_of
 from ..physics.building import Building
 from ..records.measurement import Measurement
@@ -88,15 +88,12 @@ def diagnose_structure(
             problems = problems_of(ours, theirs, building, law)
             if _rounded(findings["layer"]):
                 problems["damper"], present = shown, _late(present, findings["layer"])
-    softer = any(f.kind != "none" for s, f in findings.items() if s.startswith("storey"))
-    if softer and "damper" in problems and problems["damper"][0].reconstructed:
-        problems = problems_of(ours, theirs, building, law, linear_storeys=False)
     base, verdict = None, None
     notes: list[str] = []
     if "damper" in problems and problems["damper"][0].reconstructed:
         say("damper: what the building's file leaves open")
-        first = fit_damper(problems["damper"][0], at_site(present, "damper", problems))
-        known = as_known(first.model, ours, building, law, straight and not softer)
+        softer = any(f.kind != "none" for s, f in findings.items() if s.startswith("storey"))
+        known = _as_known(present, ours, building, straight and not softer)
         problems = problems_of(ours, theirs, known, law, straight and not softer)
         notes = told(building, known)
     if "damper" in problems:
@@ -110,6 +107,15 @@ def diagnose_structure(
             verdict = forgiven(verdict, most, "The load cell's filter has another form than ours.")
     whole = combine(findings, base, verdict, problems, sensors)
     return replace(whole, words=" ".join([whole.words, *notes]))
+
+
+def _as_known(
+    present: Model, responses: list[Response], building: Building, straight: bool
+) -> Building:
+    """Return the building that makes the damper's force, its numbers as far as they are known."""
+    problem = problems_of(responses, [], building, present.law, straight)
+    damper = fit_damper(problem["damper"][0], at_site(present, "damper", problem))
+    return as_known(damper.model, responses, building, present.law, straight)
 
 
 def _rounded(layer: Finding) -> bool:
