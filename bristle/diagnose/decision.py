@@ -43,8 +43,8 @@ PAIR_PART = 0.05
 form is lowered by many effects."""
 
 COMPLETE = 1.04
-"""z up to which a pair counts whatever its lesser effect accounts for: no effect closes a misfit of
-another one's form."""
+"""z up to which a pair counts whatever its lesser effect accounts for, where the best one leaves
+more than `CLEAN`: no effect closes a misfit of another one's form."""
 
 RIVAL = 1.25
 """Where the best model is not adequate, others rival it up to this many times its excess: a misfit
@@ -184,7 +184,8 @@ def _pair(
     without = [alone[name] for name in names if name in alone]
     parts = [(excess(other) - excess(pair)) / excess(before) for other in without]
     explained = 1.0 - excess(pair) / excess(before)
-    if min(parts, default=0.0) < PAIR_PART and pair.z > COMPLETE:
+    closes = pair.z <= COMPLETE and best.z > CLEAN
+    if min(parts, default=0.0) < PAIR_PART and not closes:
         return None
     if pair.z > ADEQUATE and explained < SHARE:
         return None

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import uniform_filter, uniform_filter1d
 from scipy.optimize import minimize_scalar
+from scipy.signal import istft, stft
 
 from ..compiled.kalman import kalman_smooth
 
@@ -25,6 +26,15 @@ GROUP = 12
 
 EDGE = 25
 """Samples at either end in which the smoother has not settled."""
+
+SPAN = 1.0
+"""Time [s] over which a short-time spectrum is taken."""
+
+ALIKE = (3, 5)
+"""Frequencies and times, in steps of that spectrum, over which a power is averaged."""
+
+MASKED = 1.1
+"""How many times the noise's mean power is called noise, for it scatters."""
 
 WINDOW = 51
 """Samples over which the power of what was left out is averaged."""
@@ -127,8 +137,37 @@ def posterior_draws(
         out[d] = (truth - state)[lead : lead + n]
     _centre(out)
     if motion is not None and draws:
-        out += _left_out(motion, out[0], r, np.array(have), dt)
+        left = _left_out(motion, out[0], r, np.array(have), dt)
+        out[:, :, 2] = _by_spectrum(motion.a, out[:, :, 2], dt)
+        out += left
     return out
+
+
+def _by_spectrum(a: Array, draws: Array, dt: float) -> Array:
+    """Return draws (d, n) of the error of a smoothed acceleration (n,), known for the most part.
+
+    White jerk is a wide guess: the smoother lets noise pass at frequencies where nothing moves. A
+    parameter that multiplies the acceleration comes out too small by that noise, for it goes along
+    with the estimate. So where, in time and frequency, the noise of the `draws` makes up the power
+    of the estimate, this is expected to be wrong by itself and by no more (Wiener's filter on the
+    short-time spectrum, as in speech: Lim & Oppenheim 1979, Proc. IEEE 67, 1586-1604).
+    """
+    size = int(min(max(round(SPAN / dt), 64), len(a) // 4))
+
+    def spectrum(y: Array) -> NDArray[np.complex128]:
+        seen: NDArray[np.complex128] = stft(y, nperseg=size, noverlap=size * 3 // 4)[2]
+        return seen
+
+    def signal(Z: NDArray[np.complex128]) -> Array:
+        return np.asarray(istft(Z, nperseg=size, noverlap=size * 3 // 4)[1][: len(a)], dtype=float)
+
+    seen, drawn = spectrum(a), [spectrum(draw) for draw in draws]
+    noise = np.mean([np.mean(np.abs(Z[:, 2:-2]) ** 2, axis=1) for Z in drawn], axis=0)
+    power = uniform_filter(np.abs(seen) ** 2, ALIKE)
+    moved = np.clip(1.0 - MASKED * noise[:, None] / np.maximum(power, 1e-300), 0.0, 1.0)
+    near = np.minimum(np.arange(len(a)), np.arange(len(a))[::-1])
+    known = np.minimum(near / (4.0 * EDGE), 1.0) * (signal(moved * seen) - a)
+    return np.array([signal(np.sqrt(moved) * Z) for Z in drawn]) + known
 
 
 def _centre(draws: Array) -> None:

@@ -132,10 +132,12 @@ def test_a_second_effect_that_takes_little_is_not_named():
     assert found.effects == ("gas_spring",)
 
 
-@pytest.mark.parametrize(("left", "names"), [(COMPLETE, 2), (1.1 * COMPLETE, 1)])
-def test_a_small_second_effect_counts_where_it_leaves_nothing(left, names):
+@pytest.mark.parametrize(
+    ("alone", "left", "names"), [(1.4, COMPLETE, 2), (1.4, 1.1 * COMPLETE, 1), (1.12, 1.02, 1)]
+)
+def test_a_small_second_effect_counts_where_it_leaves_nothing(alone, left, names):
     large = 8.0
-    best = trial(1.4, "gas_spring")
+    best = trial(alone, "gas_spring")
     assert (best.z**2 - 1.0) / (large**2 - 1.0) < PAIR_PART
     found = decide(
         trial(large),
