@@ -1,7 +1,9 @@
 """Which forms of the generator are bristle's own, shape parameter included, and their true values.
 
 A case is "same form" if some value of bristle's parameters gives the generator's law, or comes as
-near as one wishes (a rigid stop is the limit of a stiff one); else it is "other form".
+near as one wishes (a rigid stop is the limit of a stiff one); else it is "other form". The memory of
+the fluid's inertia is one: each code has its own sum of exponentials for 1/sqrt(t), and they differ
+by some per cent of that force.
 """
 
 from __future__ import annotations
@@ -73,7 +75,6 @@ SAME: dict[tuple[str, str], Callable[[Fields], Values]] = {
     ("gas_spring", "preloaded"): _gas,
     ("gas_spring", "progressive"): _gas,
     ("fluid_inertia", "mass"): lambda f: {"m_f": f["mass"], "m_h": 0.0},
-    ("fluid_inertia", "with_history"): lambda f: {"m_f": f["mass"], "m_h": f["basset"] / 20**0.5},
     ("mount_compliance", "kelvin_voigt"): _mount,
     ("mount_compliance", "hardening"): _mount,
     ("backlash", "rigid"): _rigid,

@@ -430,8 +430,8 @@ def test_the_fluids_memory_is_half_way_between_mass_and_damping(frequency: float
     pair = np.column_stack([np.sin(omega * t), np.cos(omega * t)])
     (in_phase, ahead), *_ = np.linalg.lstsq(pair, force, rcond=None)
     size = (20.0 * omega) ** 0.5
-    assert np.hypot(in_phase, ahead) == pytest.approx(size, rel=0.12)
-    assert np.degrees(np.arctan2(ahead, in_phase)) == pytest.approx(45.0, abs=6.0)
+    assert np.hypot(in_phase, ahead) == pytest.approx(size, rel=0.04)
+    assert np.degrees(np.arctan2(ahead, in_phase)) == pytest.approx(45.0, abs=2.5)
 
 
 # -- temperature

@@ -9,6 +9,11 @@ from ..effect import Effect, Parameter
 R_1, R_2, R_3, R_4 = 0.4, 4.0, 40.0, 400.0
 SCALE = 20.0**0.5 * 0.7329
 
+# What all slower rates make of a motion, a share of the velocity, and all faster ones, a share of
+# the acceleration: (2/ln 10) sqrt(rate/sqrt(10)) and (2/ln 10)/sqrt(rate sqrt(10)) of the ends.
+SLOWER = 0.8686 * (R_1 / 10.0**0.5) ** 0.5
+FASTER = 0.8686 / (R_4 * 10.0**0.5) ** 0.5
+
 
 class FluidInertia(Effect):
     """Fluid inertia: the fluid in the gap is accelerated with the piston.
@@ -21,7 +26,7 @@ class FluidInertia(Effect):
 
     name = "fluid_inertia"
     site = "damper"
-    needs = ("a", "dt")
+    needs = ("v", "a", "dt")
     passive = True
     zero_at_rest = True
     source = (
@@ -38,6 +43,7 @@ class FluidInertia(Effect):
     @staticmethod
     def force(q, z, p):
         memory = R_1**0.5 * z.v_1 + R_2**0.5 * z.v_2 + R_3**0.5 * z.v_3 + R_4**0.5 * z.v_4
+        memory += SLOWER * q.v + FASTER * q.a
         return p.m_f * q.a + p.m_h * SCALE * memory
 
     @staticmethod
