@@ -1,9 +1,9 @@
 """Which forms of the generator are bristle's own, shape parameter included, and their true values.
 
 A case is "same form" if some value of bristle's parameters gives the generator's law, or comes as
-near as one wishes (a rigid stop is the limit of a stiff one); else it is "other form". The memory of
-the fluid's inertia is one: each code has its own sum of exponentials for 1/sqrt(t), and they differ
-by some per cent of that force.
+near as one wishes (a rigid stop is the limit of a stiff one); else it is "other form". The memory
+of the fluid's inertia is one: each code has its own sum of exponentials for 1/sqrt(t), and they
+differ by some per cent of that force.
 """
 
 from __future__ import annotations
