@@ -14,9 +14,11 @@ from dataclasses import replace
 from ..identify.fit import Model
 from ..identify.placed import at_site, on_time
 from ..identify.response import Response, responses
-from ..identify.structure import problems_of
+from ..identify.structure import StructureProblem, problems_of
 from ..physics.building import Building
 from ..records.measurement import Measurement
+from .candidates import judge
+from .decision import excess
 from .known_building import as_known, told
 from .load_cell import load_cell
 from .mended import mended
@@ -24,6 +26,11 @@ from .sensors import SensorFault, sensor_faults
 from .sites import CLEAN, Finding, look_at
 from .structure_damper import damper_verdict, fit_damper, forgiven, left_by_filter
 from .structure_verdict import INSTRUMENT, StructureDiagnosis, combine
+
+Pair = tuple[StructureProblem, StructureProblem]
+
+MOVED = 0.5
+"""What moved numbers of a building may leave of the excess, as a share, to be taken."""
 
 BLURRED = (*INSTRUMENT, "delay", "derived")
 """Faults for which a building's velocity is left out: displacement and accelerometer say the same
@@ -93,9 +100,12 @@ def diagnose_structure(
     if "damper" in problems and problems["damper"][0].reconstructed:
         say("damper: what the building's file leaves open")
         softer = any(f.kind != "none" for s, f in findings.items() if s.startswith("storey"))
-        known = _as_known(present, ours, building, straight and not softer)
-        problems = problems_of(ours, theirs, known, law, straight and not softer)
-        notes = told(building, known)
+        straight = straight and not softer
+        problems = problems_of(ours, theirs, building, law, straight)
+        known = _as_known(present, ours, building, straight)
+        suited = problems_of(ours, theirs, known, law, straight)
+        if _suits(suited["damper"], problems["damper"], present):
+            problems, notes = suited, told(building, known)
     if "damper" in problems:
         say("damper: its law, then effects")
         base = fit_damper(problems["damper"][0], at_site(present, "damper", problems))
@@ -116,6 +126,19 @@ def _as_known(
     problem = problems_of(responses, [], building, present.law, straight)
     damper = fit_damper(problem["damper"][0], at_site(present, "damper", problem))
     return as_known(damper.model, responses, building, present.law, straight)
+
+
+def _suits(suited: Pair, given: Pair, present: Model) -> bool:
+    """Return whether moved numbers of a building explain what the file's leave, held-out runs too.
+
+    What an effect does they may follow in part; then they are the file's still.
+    """
+
+    def left(pair: Pair) -> float:
+        base = fit_damper(pair[0], at_site(present, "damper", ("damper",)))
+        return excess(judge(base.model, *pair))
+
+    return left(suited) <= MOVED * left(given)
 
 
 def _rounded(layer: Finding) -> bool:
