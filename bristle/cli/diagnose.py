@@ -44,6 +44,8 @@ def speaker(quiet: bool):  # type: ignore[no-untyped-def]
     return lambda text: print(f"\033[2K{text} ...", end="\r", file=sys.stderr, flush=True)
 
 
+SHORT = "  (short search: it gains too little, as the others do)"
+
 TITLES = {
     "none": "Nothing is missing.",
     "effect": "Missing: {names}.",
@@ -67,8 +69,12 @@ def text(found: Verdict, folder: Path) -> str:
     if found.trials and found.before is not None:
         lines += ["", f"  {'model':34} {'z, training':>12} {'z, held out':>12}"]
         lines.append(f"  {'as it is':34} {found.before.train:>12.3f} {found.before.z:>12.3f}")
-        for trial in found.trials[:5]:
-            note = "" if trial.refined else "  (short search: it gains too little)"
+        refined = [trial for trial in found.trials[:5] if trial.refined]
+        others = [trial for trial in found.trials if not trial.refined]
+        # The order of equals is that of a rounding: one stands for all of them.
+        others.sort(key=lambda trial: (round(trial.z, 2), trial.effects))
+        for trial in [*refined, *others[:1]]:
+            note = "" if trial.refined else SHORT
             lines.append(
                 f"  {'with ' + trial.effects[-1]:34} {trial.train:>12.3f} {trial.z:>12.3f}{note}"
             )

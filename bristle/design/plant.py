@@ -230,6 +230,10 @@ def check_building(building: Building) -> None:
             )
 
 
+NOTHING = 1e-13
+"""Square of a Hankel singular value, as a share of the largest, that is rounding."""
+
+
 def balancing(plant: Plant, order: int | None = None) -> States:
     """Return the states that balance the plant from all inputs to all outputs, strongest first.
 
@@ -254,7 +258,7 @@ def balancing(plant: Plant, order: int | None = None) -> States:
     try:
         L = linalg.cholesky(0.5 * (controllable + controllable.T), lower=True)
         squares, U = linalg.eigh(0.5 * L.T @ (observable + observable.T) @ L)
-        if squares[0] <= 0.0:
+        if squares[0] <= NOTHING * squares[-1]:
             raise linalg.LinAlgError
     except linalg.LinAlgError:
         raise DesignError(

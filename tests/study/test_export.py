@@ -226,13 +226,15 @@ def test_what_cannot_be_exported_is_said(
 def test_a_bad_effect_of_ones_own_is_left_out_with_a_note(
     bench: Study, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    from bristle.diagnose import Diagnosis
     from bristle.study import learning
 
     (bench.effects_folder / "own_spring.py").write_text(OWN.replace("p.k * q.x", "p.k / q.x"))
     said: list[str] = []
-    monkeypatch.setitem(learning.DIAGNOSERS, "bench", lambda study, model, say: "a diagnosis")
+    nothing = Diagnosis("none", (), "Nothing is missing.")
+    monkeypatch.setitem(learning.DIAGNOSERS, "bench", lambda study, model, say: nothing)
     study = Study(bench.folder)
-    assert learning.diagnose_study(study, write=False, say=said.append) == "a diagnosis"
+    assert learning.diagnose_study(study, write=False, say=said.append) == nothing
     assert len(said) == 1
     assert "own_spring.py, line" in said[0]
     assert "ZeroDivisionError" in said[0]
