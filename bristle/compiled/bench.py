@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ damper_step_law = damper.step_law
 damper_jump = damper.jump
 damper_evaluate = damper.evaluate
 
+
+_ONE_AT_A_TIME = Lock()
 
 JUMP = 8.0
 """How many times the changes beside it a change of voltage exceeds that is a jump."""
@@ -94,7 +97,8 @@ def compiled_history(effects: bool = True) -> Callable[..., None]:
 
     The first call on a machine takes seconds, that without effects one or two.
     """
-    return _compiled(damper.evaluate) if effects else _compiled_law()
+    with _ONE_AT_A_TIME:  # threads that try effects ask for it at once
+        return _compiled(damper.evaluate) if effects else _compiled_law()
 
 
 @cache

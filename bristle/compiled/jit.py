@@ -13,6 +13,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Lock
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -28,6 +29,9 @@ _OPTIONS = {"error_model": "numpy", "_nrt": False}
 _CALLEE = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 _NUMBERS = (bool, int, float, str)
+
+# numba asks for the folder of its cache in a global of its own, more than once per function.
+_FOLDER = Lock()
 
 
 def compiled(
@@ -46,13 +50,14 @@ def compiled(
         Whether to keep the machine code on disk.
     """
     folder = _folder(function) if keep else None
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(folder or "")
-    try:
-        root = _closed(function, {}, inline)
-        return numba.njit(cache=folder is not None, nogil=True, **_OPTIONS)(root)
-    finally:
-        numba.config.CACHE_DIR = before
+    with _FOLDER:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(folder or "")
+        try:
+            root = _closed(function, {}, inline)
+            return numba.njit(cache=folder is not None, nogil=True, **_OPTIONS)(root)
+        finally:
+            numba.config.CACHE_DIR = before
 
 
 def _folder(function: Callable[..., Any]) -> Path | None:

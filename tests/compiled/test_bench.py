@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
 from math import exp
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from bristle.compiled import bench
 from bristle.compiled.bench import Bench, before_jump, compiled_history
 from tests.physics.rigs import force_at
 
 DT = 0.002
+EFFECTS = ("coil_lag", "gas_spring", "remanence", "stribeck")
 SPEED = 0.1
 AT = 200
 
@@ -81,14 +84,25 @@ def test_a_mount_finds_its_new_balance_when_the_voltage_jumps(law: str) -> None:
     assert force[-1] == pytest.approx(after, rel=1e-6)
 
 
+def test_threads_that_ask_at_once_get_one_function_and_leave_nothing_behind(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    bench._compiled.cache_clear()
+    x = np.zeros(300)
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda _: compiled_history(), range(32)))
+        list(pool.map(lambda name: Bench("lugre", [name]).force(x, x, x, x, DT, {}), EFFECTS))
+    assert len({id(one) for one in found}) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("law", ["bingham", "lugre"])
 def test_a_law_alone_has_the_force_that_it_has_among_effects_that_are_off(law: str) -> None:
     t = DT * np.arange(1500)
     x, v, a = 0.01 * np.sin(9.0 * t), 0.09 * np.cos(9.0 * t), -0.81 * np.sin(9.0 * t)
     V = 2.0 + np.sin(3.0 * t) + np.where(t > 1.0, 1.5, 0.0)
-    bench = Bench(law, [])
+    rig = Bench(law, [])
     values = {"bristle_deflection_0": 2e-4}
-    alone = bench.force(x, v, a, V, DT, values)
-    bench._history = compiled_history(effects=True)
-    assert np.array_equal(alone, bench.force(x, v, a, V, DT, values))
+    alone = rig.force(x, v, a, V, DT, values)
+    rig._history = compiled_history(effects=True)
+    assert np.array_equal(alone, rig.force(x, v, a, V, DT, values))
     assert np.ptp(alone) > 1.0
