@@ -93,7 +93,7 @@ def structure_record() -> np.dtype[np.void]:
             *((name, _FLOAT, (n * n,)) for name in ("m_inverse", "c", "k")),
             ("phi", _FLOAT, (4 * n * n,)),
             *((name, _FLOAT, (2 * n * (n + 1),)) for name in ("held", "ramp")),
-            *((name, _FLOAT, (max(1, lay.z_size),)) for name in ("z", "z1")),
+            *((name, _FLOAT, (max(1, structure.state_size(n)),)) for name in ("z", "z1")),
             ("p", _FLOAT, (max(1, lay.p_size),)),
             ("on", _SWITCH, (max(1, len(lay.effects)),)),
             ("work", _FLOAT, (structure.work_size(n),)),

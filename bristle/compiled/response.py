@@ -145,13 +145,16 @@ def forces_along(
     slides wherever the motion is not zero: whoever asks leaves out the samples at rest.
     """
     for k in range(len(x)):
+        if k > 0:
+            level[n - 1] = 0.5 * (x[k - 1] + x[k])
+            level[2 * n - 1] = 0.5 * (v[k - 1] + v[k])
+            halt = 1e300 if level[2 * n - 1] > 0.0 else -1e300
+            advance_effects(n, isolated, stiffnesses, level, dt, 0.0, halt, 0.0, z, p, on, z1)
+            for i in range(len(z)):
+                z[i] = z1[i]
         level[n - 1] = x[k]
         level[2 * n - 1] = v[k]
         halt = 1e300 if v[k] > 0.0 else -1e300
-        if k > 0:
-            advance_effects(n, level, dt, 0.0, halt, 0.0, z, p, on, z1)
-            for i in range(len(z)):
-                z[i] = z1[i]
         effect_forces(n, isolated, stiffnesses, level, dt, 0.0, halt, z, p, on, forces)
         out[k] = forces[n - 1]
         if n == 1:
@@ -205,10 +208,9 @@ class Along:
         for name, slot in layout.parameters.items():
             effect, own = name.split(".", 1)
             p[slot] = values.get(name, EFFECTS[effect].parameters[own].value)
-        z = np.zeros(max(1, layout.z_size))
-        for name, slot in layout.states.items():
-            z[slot] = values.get(name + "_0", 0.0)
         n = max(1, self._storey)
+        begin = [values.get(name + "_0", 0.0) for name in layout.states]
+        z = np.tile(begin or [0.0], n + 1)
         self._forces(
             n, np.full(n, stiffness), self._storey == 0, np.ascontiguousarray(x),
             np.ascontiguousarray(v), dt, z, p, self.on, np.zeros(2 * n), np.zeros(n),

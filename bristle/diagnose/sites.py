@@ -157,27 +157,34 @@ def structure_starts(effect: str, base: Model, train: Problem) -> list[Model]:
     speed = max(float(np.max(np.abs(run.v))) for run in train.runs)
     force, stiffness = train.size("N"), train.size("N/m")
     damping = train.size("N.s/m")
-    grid: dict[str, dict[str, tuple[float, ...]]] = {
-        "base_friction": {
-            "limit": (0.1 * force,), "x_s": (0.0, 0.05 * reach), "v_r": (0.1 * speed,),
-        },
-        "duffing": {
-            "k_3": (0.3 * stiffness / reach**2, -0.1 * stiffness / reach**2), "shape": (3.0, 5.0),
-        },
-        "end_stop": {
-            "clearance": (0.55 * reach, 0.75 * reach, 0.9 * reach),
-            "k": (1.0 * stiffness,), "c": (1e-3 * damping,),
-        },
-        "storey_softening": {"d_half": (0.7 * reach, 2.5 * reach), "which": (0.0,)},
+    grid: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
+        "base_friction": (
+            {"limit": (0.1 * force,), "x_s": (0.0, 0.05 * reach), "v_r": (0.1 * speed,)},
+        ),
+        "duffing": (
+            {"k_3": (0.3 * stiffness / reach**2, -0.1 * stiffness / reach**2), "shape": (3.0, 5.0)},
+        ),
+        "end_stop": (
+            {
+                "clearance": (0.55 * reach, 0.75 * reach, 0.9 * reach),
+                "k": (1.0 * stiffness,), "c": (1e-3 * damping,),
+            },
+        ),
+        "storey_softening": (
+            {"d_half": (0.7 * reach, 2.5 * reach)},
+            {"d_half": (5.0 * reach,), "yields": (0.3,), "d_y": (0.15 * reach, 0.4 * reach)},
+        ),
     }  # fmt: skip
     if effect not in grid:  # a user's own
         return starts(effect, base, train)
     own = {name: p.value for name, p in EFFECTS[effect].parameters.items()}
     out = []
-    for values in product(*grid[effect].values()):
-        chosen = {**own, **dict(zip(grid[effect], values, strict=True))}
-        named = {f"{effect}.{name}": value for name, value in chosen.items()}
-        out.append(replace(base, effects=(*base.effects, effect), values={**base.values, **named}))
+    for net in grid[effect]:
+        for values in product(*net.values()):
+            chosen = {**own, **dict(zip(net, values, strict=True))}
+            named = {f"{effect}.{name}": value for name, value in chosen.items()}
+            values_now = {**base.values, **named}
+            out.append(replace(base, effects=(*base.effects, effect), values=values_now))
     if effect == "end_stop":
         limits = {**base.limits, "end_stop.clearance": (STOP * reach, reach)}
         out = [replace(model, limits=limits) for model in out]

@@ -138,23 +138,38 @@ _STOREY = {
 }
 
 
+def _each_storey(*body: str) -> list[str]:
+    """Return the loop over the storeys; `i` is the level that a storey carries."""
+    return [
+        "    for i in range(1 if isolated else 0, n):",
+        "        drift = x[i] - (x[i - 1] if i > 0 else 0.0)",
+        "        drift_rate = x[n + i] - (x[n + i - 1] if i > 0 else 0.0)",
+        "        storey = float(i if isolated else i + 1)",
+        *("    " + line for line in body),
+    ]
+
+
+def _of_storeys(layout: Layout) -> Layout:
+    """Return the layout of the effects of storeys, each storey with states of its own."""
+    part = layout.only(lambda effect: "spring" in effect.hooks())
+    return part.at(f" + (i + 1) * {layout.z_size}")
+
+
 def _forces_source(layout: Layout) -> str:
     smooth = layout.only(lambda effect: not effect.contact)
-    spring = ["    " + line for line in switched(layout, "spring", "pull += {call}", **_STOREY)]
+    storeys = switched(_of_storeys(layout), "spring", "pull += {call}", **_STOREY)
     lines = [
         "def effect_forces(n, isolated, stiffnesses, x, dt, energy, halt, z, p, on, forces):",
         "    for i in range(n):",
         "        forces[i] = 0.0",
         *switched(smooth, "force", "forces[0] += {call}", **_ISOLATION),
-        "    for i in range(1 if isolated else 0, n):",
-        "        drift = x[i] - (x[i - 1] if i > 0 else 0.0)",
-        "        drift_rate = x[n + i] - (x[n + i - 1] if i > 0 else 0.0)",
-        "        storey = float(i if isolated else i + 1)",
-        "        pull = 0.0",
-        *spring,
-        "        forces[i] += pull",
-        "        if i > 0:",
-        "            forces[i - 1] -= pull",
+        *_each_storey(
+            "    pull = 0.0",
+            *storeys,
+            "    forces[i] += pull",
+            "    if i > 0:",
+            "        forces[i - 1] -= pull",
+        ),
     ]
     return "\n".join(lines)
 
@@ -171,21 +186,28 @@ def _contact_source(layout: Layout) -> str:
 
 
 def _advance_source(layout: Layout) -> str:
+    base = layout.only(lambda effect: "force" in effect.hooks() or "spring" not in effect.hooks())
+    storeys = _of_storeys(layout)
     lines = [
-        "def advance_effects(n, x, dt, energy, halt, force, z, p, on, z_next):",
-        *switched(layout, "rate", "{z_next}= {call}", force="force", **_BASE),
-        *(
-            "    if on[{0}]:\n        z_next[{1}] = z[{1}] + dt * z_next[{1}]".format(
-                layout.switches[effect.name], layout.states[effect.name + "." + state]
-            )
-            for effect in layout.effects
-            if "rate" in effect.hooks()
-            for state in effect.states
-        ),
-        *switched(layout, "advance", "{z_next}= {call}", force="force", **_BASE),
+        "def advance_effects(",
+        "    n, isolated, stiffnesses, x, dt, energy, halt, force, z, p, on, z_next",
+        "):",
+        *_advanced(base, **_ISOLATION, force="force"),
+        *_each_storey("    pass", *_advanced(storeys, **_STOREY)),
         "    return",
     ]
     return "\n".join(lines)
+
+
+def _advanced(layout: Layout, **q: str) -> list[str]:
+    """Return the source that advances the states of effects, by Euler's rule where they flow."""
+    lines = switched(layout, "rate", "{z_next}= {call}", **q)
+    for effect in layout.effects:
+        if "rate" in effect.hooks():
+            slots = layout.slots(effect)
+            lines.append(f"    if on[{layout.switches[effect.name]}]:")
+            lines += [f"        z_next[{k}] = z[{k}] + dt * z_next[{k}]" for k in slots]
+    return [*lines, *switched(layout, "advance", "{z_next}= {call}", **q)]
 
 
 def reweave() -> None:
@@ -217,7 +239,7 @@ def step(
     a0, a1 : float, ground acceleration [m/s2]
     f0, f1 : float, force of the devices on the first level [N], linear between
     active : bool, whether any effect is on
-    z0, z1 : states of the effects; p, on : their parameters and switches
+    z0, z1 : states of the effects, `state_size(n)` each; p, on : their parameters and switches
     work : room for `work_size(n)` floats
     """
     free_step(n, phi, held, ramp, x0, a0, a1, x1)
@@ -246,7 +268,7 @@ def step(
     for i in range(size):
         middle[i] = 0.5 * (x0[i] + x1[i])
     force = 0.5 * (g0[0] + g1[0]) + contact
-    advance_effects(n, middle, h, energy, contact, force, z0, p, on, z1)
+    advance_effects(n, isolated, stiffnesses, middle, h, energy, contact, force, z0, p, on, z1)
 
 
 def balance_contact(
@@ -269,7 +291,7 @@ def balance_contact(
         for i in range(2 * n):
             middle[i] = x0[i] + part * (x1[i] - x0[i])
         halt = tried - x1[n] / gain
-        advance_effects(n, middle, h, energy, halt, tried, z0, p, on, z1)
+        advance_effects(n, isolated, stiffnesses, middle, h, energy, halt, tried, z0, p, on, z1)
         found = contact_force(n, isolated, stiffnesses, middle, h, energy, halt, z1, p, on)
         excess = found - tried
         if abs(excess) <= 1e-10 * (1.0 + abs(found)):
@@ -304,6 +326,11 @@ def rest_forces(
     return hold
 
 
+def state_size(n: int) -> int:
+    """Return how many states the effects have: those of the first level, then each level's own."""
+    return LAYOUT.z_size * (n + 1)
+
+
 def work_size(n: int) -> int:
     """Return how many floats `step` needs as room to work."""
     return 6 * n
@@ -336,7 +363,7 @@ class StructureModel:
             for name, parameter in effect.parameters.items():
                 key = effect.name + "." + name
                 self.p[LAYOUT.parameters[key]] = values.get(key, parameter.value)
-        self.z = [values.get(name + "_0", 0.0) for name in LAYOUT.states]
+        self.z = [values.get(name + "_0", 0.0) for name in LAYOUT.states] * (self.m.n + 1)
         self._step: dict[float, tuple[int, StepMatrices]] = {}
         self._unloaded = [0.0] * self.m.n
         self._gives = self.m.M_inverse[:: self.m.n]  # acceleration per force on the first level

@@ -33,6 +33,8 @@ class Layout:
         Effect name to its index in `on`.
     elsewhere : dict
         State name to the variable that holds it in woven source, for those not read from `z`.
+    block : str
+        Source of what is added to a state's index: where the states of one of several places begin.
     """
 
     def __init__(self, site: str, parameters_first: int, states_first: int) -> None:
@@ -41,6 +43,7 @@ class Layout:
         self.states: dict[str, int] = {}
         self.switches: dict[str, int] = {}
         self.elsewhere: dict[str, str] = {}
+        self.block = ""
         self.p_size = parameters_first
         self.z_size = states_first
         for effect in self.effects:
@@ -64,6 +67,16 @@ class Layout:
         part.elsewhere = elsewhere
         return part
 
+    def at(self, block: str) -> Layout:
+        """Return the same layout with every state's index further by what `block` says."""
+        part = copy(self)
+        part.block = block
+        return part
+
+    def slots(self, effect: type[Effect]) -> list[str]:
+        """Return the source of the indices of the effect's states in `z`."""
+        return [f"{self.states[effect.name + '.' + name]}{self.block}" for name in effect.states]
+
     def values(self, effect: type[Effect]) -> str:
         """Return the source that makes the effect's parameter tuple from `p`."""
         slots = [self.parameters[effect.name + "." + name] for name in effect.parameters]
@@ -72,7 +85,8 @@ class Layout:
     def state(self, effect: type[Effect]) -> str:
         """Return the source that makes the effect's state tuple, from `z` where nothing else is."""
         names = [effect.name + "." + name for name in effect.states]
-        sources = [self.elsewhere.get(name, f"z[{self.states[name]}]") for name in names]
+        slots = zip(names, self.slots(effect), strict=True)
+        sources = [self.elsewhere.get(name, f"z[{slot}]") for name, slot in slots]
         return "{}_Z({})".format(effect.name, ", ".join(sources))
 
 
@@ -103,7 +117,7 @@ def switched(layout: Layout, hook: str, line: str, **q: str) -> list[str]:
             q["V"] = "V_" + effect.name
         elif "V" in q:
             q["V"] = "V"
-        slots = [layout.states[effect.name + "." + name] for name in effect.states]
+        slots = layout.slots(effect)
         lines.append(f"    if on[{layout.switches[effect.name]}]:  # {effect.name}")
         text = line.format(
             call=call(effect, hook, layout, q_source(**q)),

@@ -99,8 +99,15 @@ def test_dampers(fast_damper: Any, law: str, effects: list[str]) -> None:
         assert np.abs(plain[:, 0]).max() > 1.0
 
 
+VALUES = {
+    "storey_softening.d_half": 0.003,
+    "storey_softening.yields": 0.4,
+    "storey_softening.d_y": 0.001,
+}
+
+
 def structure_run(step: Any, effects: list[str], to: Any) -> np.ndarray:
-    model = structure.StructureModel(paper_building(), {"storey_softening.d_half": 0.003}, effects)
+    model = structure.StructureModel(paper_building(), VALUES, effects)
     m = model.m
     s = structure.step_matrices(m, 5e-4)
     stiffnesses, matrices = to(m.stiffnesses), [to(row) for row in (s.phi, s.held, s.ramp)]
