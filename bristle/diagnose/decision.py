@@ -46,6 +46,9 @@ COMPLETE = 1.04
 """z up to which a pair counts whatever its lesser effect accounts for, where the best one leaves
 more than `CLEAN`: no effect closes a misfit of another one's form."""
 
+REST = 0.03
+"""Share of what the first effect leaves that may remain for the same where a pair is adequate."""
+
 RIVAL = 1.25
 """Where the best model is not adequate, others rival it up to this many times its excess: a misfit
 of form cannot decide between what is nearly as wrong."""
@@ -184,7 +187,9 @@ def _pair(
     without = [alone[name] for name in names if name in alone]
     parts = [(excess(other) - excess(pair)) / excess(before) for other in without]
     explained = 1.0 - excess(pair) / excess(before)
-    closes = pair.z <= COMPLETE and best.z > CLEAN
+    closes = best.z > CLEAN and (
+        pair.z <= COMPLETE or (pair.z <= ADEQUATE and excess(pair) <= REST * excess(best))
+    )
     if min(parts, default=0.0) < PAIR_PART and not closes:
         return None
     if pair.z > ADEQUATE and explained < SHARE:

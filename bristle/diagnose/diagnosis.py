@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..compare.where import Place
-from ..identify.fit import Model, Problem, fit, identify
+from ..identify.fit import Model, Problem, identify, settled
 from ..identify.prepare import SHORTEST, prepare
 from ..records.derived import derived_velocity
 from ..records.measurement import Measurement
@@ -18,7 +18,7 @@ from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
 from .mended import mended
-from .search import refine
+from .search import is_rough, refine
 from .sensors import SensorFault, sensor_faults
 from .unexplained import sentences, unexplained, where
 from .unlike import MISFIT, unlike
@@ -224,14 +224,17 @@ def _judged(
     if kind == "none":
         words.append(f"An effect that leaves {visible:.2%} of the force would have been seen.")
     say("intervals")
-    fitted = fit(problem, decision.best.model, max_evaluations=4)
+    fitted = settled(problem, decision.best.model, 4)
+    after = decision.best
+    if is_rough(after.model):
+        after = min(after, judge(fitted.model, problem, held_out), key=lambda one: one.z)
     told = {name: s for name, s in fitted.std.items() if name not in fitted.unidentified}
     coordinate = ""
     if kind == "unknown":
         coordinate, rest = unexplained(before, trials, rest, held_out)
         words += sentences(coordinate, rest)
     return Diagnosis(
-        kind, decision.effects, " ".join(words), before, decision.best, tuple(trials),
+        kind, decision.effects, " ".join(words), before, after, tuple(trials),
         tuple(faults), tuple(hidden), visible, coordinate, tuple(rest), experiment, noise,
         decision.explained, told,
     )  # fmt: skip

@@ -28,7 +28,7 @@ NET: dict[str, dict[str, tuple[float, ...]]] = {
     "backlash": {"gap": (0.01, 0.017, 0.03, 0.05, 0.09, 0.15, 0.26, 0.45, 0.8, 1.3, 2.3, 4.0)},
     "quadratic_damping": {"shape": (0.875, 1.0, 1.25)},
     "remanence": {"width": (0.3, 1.0)},
-    "delay": {"time": (0.02, 0.1, 0.4, 1.0), "filtered": (0.2, 1.0)},
+    "delay": {"time": (0.02, 0.1, 0.4, 1.0, 2.5), "filtered": (0.0, 0.2, 1.0)},
     "velocity_sensor": {"tau": (0.3, 1.0)},
 }
 """The values looked at, as factors on an effect's defaults scaled to the rig."""

@@ -31,7 +31,7 @@ class MountCompliance(Effect):
         "k": Parameter(2e4, "N/m", (1e2, 1e9), "stiffness of the mount"),
         "hard": Parameter(0.0, "1", (0.0, 1e4), "growth of the stiffness per square millimetre"),
         "c": Parameter(60.0, "N.s/m", (0.0, 1e6), "damping of the mount"),
-        "mass": Parameter(0.004, "kg", (1e-5, 10.0), "mass of the joint"),
+        "mass": Parameter(4e-4, "kg", (1e-5, 10.0), "mass of the joint"),
     }
 
     @staticmethod

@@ -43,7 +43,7 @@ class Temperature(Effect):
         "curve": Parameter(
             0.0, "1", (-1.0, 2.0), "0 exponential, -1 linear, above 0: less and less"
         ),
-        "housing": Parameter(0.0, "1", (0.0, 1.0), "share of the heat that the steel takes"),
+        "housing": Parameter(0.0, "1", (0.0, 0.7), "share of the heat that the steel takes"),
     }
 
     @staticmethod
