@@ -81,14 +81,16 @@ def _march(law, effects, length, kept, motion) -> Points:  # type: ignore[no-unt
 
 def _of_storey(effect: type[Effect]) -> tuple[bytes, str, float]:
     values = effect.Values(*(p.value for p in effect.parameters.values()))
+    z = effect.State(*(0.0 for _ in effect.states))
     stiffness = 1366.5  # N/m, of the default building
-    drifts = [0.02 * (k / 100 - 1) for k in range(201)]
-    rest = Q(*(0.0 for _ in Q._fields))
-    forces = [
-        stiffness * d
-        + effect.spring(rest._replace(drift=d, stiffness=stiffness, storey=1.0), None, values)
-        for d in drifts
-    ]
+    rest = Q(*(0.0 for _ in Q._fields))._replace(dt=STEP, stiffness=stiffness, storey=1.0)
+    drifts = [0.02 * sin(2.0 * pi * STEP * k) for k in range(round(1.25 / STEP) + 1)]
+    forces = []
+    for before, drift in zip([0.0, *drifts], drifts, strict=False):
+        q = rest._replace(drift=0.5 * (before + drift), drift_rate=(drift - before) / STEP)
+        if "advance" in effect.hooks():
+            z = effect.State(*effect.advance(q, z, values))
+        forces.append(stiffness * drift + effect.spring(q._replace(drift=drift), z, values))
     with look():
         page = Page(4.6, 2.9, "")
         axes = page.figure.add_subplot(page.grid(1, 1, left=0.5, top=0.3)[0, 0])

@@ -84,9 +84,10 @@ class Layout:
 
     def state(self, effect: type[Effect]) -> str:
         """Return the source that makes the effect's state tuple, from `z` where nothing else is."""
-        names = [effect.name + "." + name for name in effect.states]
-        slots = zip(names, self.slots(effect), strict=True)
-        sources = [self.elsewhere.get(name, f"z[{slot}]") for name, slot in slots]
+        sources = [
+            self.elsewhere.get(effect.name + "." + name, f"z[{slot}]")
+            for name, slot in zip(effect.states, self.slots(effect))
+        ]
         return "{}_Z({})".format(effect.name, ", ".join(sources))
 
 
