@@ -133,10 +133,16 @@ def test_a_second_effect_that_takes_little_is_not_named():
 
 
 @pytest.mark.parametrize(
-    ("alone", "left", "names"), [(1.4, COMPLETE, 2), (1.4, 1.1 * COMPLETE, 1), (1.12, 1.02, 1)]
+    ("large", "alone", "left", "names"),
+    [
+        (8.0, 1.4, COMPLETE, 2),
+        (8.0, 1.4, 1.1 * COMPLETE, 1),
+        (8.0, 1.12, 1.02, 1),
+        (36.0, 6.7, 1.02 * COMPLETE, 2),
+        (36.0, 6.7, 2.0, 1),
+    ],
 )
-def test_a_small_second_effect_counts_where_it_leaves_nothing(alone, left, names):
-    large = 8.0
+def test_a_small_second_effect_counts_where_it_leaves_nothing(large, alone, left, names):
     best = trial(alone, "gas_spring")
     assert (best.z**2 - 1.0) / (large**2 - 1.0) < PAIR_PART
     found = decide(

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from truths import true_case
+from truths import hidden_case, true_case
 
-from bristle.identify.fit import identify
+from bristle.identify.fit import fit, identify, settled
 from bristle.study.judged import robust_z
 
 RIGS = ("bench_10N", "bench_2kN")
 NOISES = (0.01, 0.03)
+CLOSED = {"backlash.gap": 7e-4, "backlash.k": 8e5, "backlash.c": 60.0, "backlash.mass": 0.004}
 
 
 def errors(seed, law, rig, noise):
@@ -34,6 +37,26 @@ def test_truth_within_its_intervals(law, rig, noise):
     assert np.max(np.abs(error)) < 4.0
     assert np.median(width) < 0.05
     assert 0.9 < z < 1.1
+
+
+def test_a_rough_loss_widens_its_intervals_by_the_spread_of_its_ends():
+    """Impacts leave a loss of many dents, each far narrower than the errors are."""
+    train, truth = hidden_case(21, "backlash", "rigid", 0.15, "bench_10N", "lugre")
+    begun = replace(truth, effects=("backlash",), values={**truth.values, **CLOSED})
+    once = fit(train, begun)
+    found = settled(train, once.model)
+    assert found.cost <= once.cost
+    wider = [found.std[name] / once.std[name] for name in truth.values if name in found.std]
+    assert min(wider) > 0.9
+    assert np.median(wider) > 1.5
+    errors = [
+        (found.model.values[name] - value) / found.std[name]
+        for name, value in truth.values.items()
+        if name in found.std
+    ]
+    assert np.max(np.abs(errors)) < 6.0
+    smooth = fit(train, truth, max_evaluations=6)
+    assert settled(train, smooth.model).std == pytest.approx(smooth.std, rel=0.3)
 
 
 @pytest.mark.slow

@@ -29,3 +29,10 @@ def true_case(seed, law, rig="bench_10N", noise=0.01):
         for role in ("train", "holdout")
     )
     return train, held, Model(law, (), dict(case.specimen.rig.values))
+
+
+def hidden_case(seed, effect, form, strength, rig, law):
+    """Return the training problem of a case with an effect, and the model without that effect."""
+    case = make_case(seed, effect, form, strength, 0.01, rig, law)
+    runs = [prepare(measured(run)) for run in case.runs if run["role"] == "train"]
+    return Problem(runs), Model(law, (), dict(case.specimen.rig.values))
