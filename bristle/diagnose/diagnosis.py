@@ -21,7 +21,7 @@ from .mended import mended
 from .search import is_rough, refine
 from .sensors import SensorFault, sensor_faults
 from .unexplained import sentences, unexplained, where
-from .unlike import MISFIT, unlike
+from .unlike import MISFIT, groups, unlike
 from .unseen import unseen_fault
 
 Progress = Callable[[str], None]
@@ -216,6 +216,9 @@ def _judged(
         )
     if kind == "none" and decision.best.train > MISFIT:
         kind, words = "insufficient", [unlike(decision.best.model, problem, held_out)]
+    mixed = groups(before.model, problem, held_out) if kind == "unknown" else ""
+    if mixed:
+        kind, words = "insufficient", [mixed]
     experiment = None
     if kind == "class":
         members = [t.model for t in trials if set(t.effects) & set(decision.effects)]
