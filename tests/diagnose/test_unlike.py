@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import pytest
-from tests.identify.truths import hidden_case, true_case
 
 from bristle.diagnose.unlike import groups
 from bristle.identify.fit import identify
+from tests.identify.truths import hidden_case, true_case
 
 
 @pytest.mark.parametrize(("law", "other"), [("bingham", "bench_2kN"), ("lugre", "bench_10N")])
