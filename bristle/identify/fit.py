@@ -194,7 +194,7 @@ def _intervals(scaled: Scaled, theta: Array) -> tuple[dict[str, float], tuple[st
     inner = np.abs(r) <= 2.0
     A = J[inner].T @ J[inner]
     values, vectors = np.linalg.eigh(A)
-    weak = values < _WEAK**2 * values[-1]
+    weak = values <= _WEAK**2 * values[-1]
     inverse = (vectors * np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, values))) @ vectors.T
     pairs = list(zip(scaled.problem.runs, scaled.expected, strict=True))
     own = np.concatenate([run.noise / e[1][run.skip :] for run, e in pairs])

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from bristle.compiled.bench import Bench
 from bristle.errors import RecordError
 from bristle.identify.drive import smooth_steps
-from bristle.identify.fit import Model, Problem, Run, identify
+from bristle.identify.fit import Model, Problem, Run, fit, identify
 from bristle.identify.prepare import prepare
 from bristle.identify.smooth import posterior_draws, smooth
 from bristle.physics.damper import LAWS
@@ -108,3 +110,12 @@ def test_a_run_without_force_is_refused():
     frame = pd.DataFrame({"time [s]": T, "displacement [m]": x, "velocity [m/s]": v})
     with pytest.raises(RecordError, match="force"):
         prepare(measurements_of_frame(frame)[0])
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_fit_far_from_all_samples_tells_no_parameter():
+    """Where no residual is near noise nothing says how sharp the loss is."""
+    run = bench_run("bingham", truth_of("bingham"), 1)
+    away = replace(run, force=run.force + 1e4 * run.noise)
+    found = fit(Problem([away]), Model("bingham", (), truth_of("bingham")), max_evaluations=2)
+    assert set(found.unidentified) == set(found.std)
