@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import warnings
 from math import inf
 from pathlib import Path
@@ -51,8 +52,12 @@ def test_hinf_tells_gamma_norm_poles_and_margins(
 ) -> None:
     assert main(["design", "hinf", "my_hinf.toml"]) == 0
     said = capsys.readouterr().out
-    for words in ("gamma 6.01", "no controller below 4.900", "closed-loop norm", "-5.0", "phase"):
+    for words in ("gamma 6.01", "no controller below 4.900", "closed-loop norm", "phase"):
         assert words in said
+    # The solver's kernels differ in the third digit: -5.062 to -5.118 over five of them.
+    pole = re.search(r"(-\d\.\d+) ± (59\.9\d*)j", said)
+    assert pole is not None
+    assert float(pole[1]) == pytest.approx(-5.09, abs=0.04)
     assert sorted(path.name for path in here.iterdir()) == [
         "houses", "my_hinf.json", "my_hinf.png", "my_hinf.toml", "my_lpv.toml",
     ]  # fmt: skip

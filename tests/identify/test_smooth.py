@@ -51,29 +51,22 @@ def smoothed(kind, seed, level, have, draws=GROUP):
 @pytest.mark.parametrize("level", [0.01, 0.03])
 @pytest.mark.parametrize("kind", ["lines", "swelling sine", "chirp"])
 def test_draws_are_as_large_as_the_error(kind, level, have):
-    ratios = []
+    ratios, beyond = [], []
     for seed in (1, 2, 3):
         errors, drawn = smoothed(kind, seed, level, have)
         ratios.append(np.sqrt(np.mean(errors**2, axis=0) / np.mean(drawn**2, axis=(0, 1))))
-    mean = np.mean(ratios, axis=0)
-    # Where nothing but the velocity was measured, displacement is known up to its wandering alone.
-    assert mean[1] == pytest.approx(1.0, abs=0.1)
-    if have[0]:
-        assert mean[0] == pytest.approx(1.0, abs=0.2)  # of few independent errors
-
-
-@pytest.mark.parametrize("have", [(True, True), (True, False), (False, True)])
-@pytest.mark.parametrize("level", [0.01, 0.03])
-@pytest.mark.parametrize("kind", ["lines", "swelling sine", "chirp"])
-def test_the_error_of_the_acceleration_is_foretold_for_the_most_part(kind, level, have):
-    ratios = []
-    for seed in (1, 2, 3):
-        errors, drawn = smoothed(kind, seed, level, have)
+        # The mean of the draws foretells most of the acceleration's error, their spread the rest.
         known = drawn[:, :, 2].mean(axis=0)
         left = np.std(errors[:, 2] - known)
         assert left < 0.5 * np.std(errors[:, 2])
-        ratios.append(left / np.std(drawn[:, :, 2] - known))
-    assert np.mean(ratios) == pytest.approx(1.0, abs=0.2)
+        beyond.append(left / np.std(drawn[:, :, 2] - known))
+    mean = np.mean(ratios, axis=0)
+    # Where nothing but the velocity was measured, displacement is known up to its wandering alone.
+    assert mean[1] == pytest.approx(1.0, abs=0.1)
+    assert mean[2] == pytest.approx(1.0, abs=0.2)
+    assert np.mean(beyond) == pytest.approx(1.0, abs=0.18)
+    if have[0]:
+        assert mean[0] == pytest.approx(1.0, abs=0.2)  # of few independent errors
 
 
 def test_the_mean_of_the_draws_does_not_foretell_noise_of_the_velocity():

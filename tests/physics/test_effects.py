@@ -351,10 +351,10 @@ def test_quadratic_damping_is_a_power_of_the_speed(shape: float) -> None:
 def test_asymmetry_sets_in_for_both_directions_or_for_one(
     side: int, out: float, slow: float, back: float
 ) -> None:
-    values = on("asymmetry", ratio=0.4, v_s=1e-3, side=float(side))
-    for v, factor in ((10.0, out), (1e-13, slow), (-1e-13, slow), (-10.0, back)):
+    values = on("asymmetry", ratio=0.4, v_s=1e-4, side=float(side))
+    for v, factor in ((10.0, out), (1e-14, slow), (-1e-14, slow), (-10.0, back)):
         found = force_at("bingham", v=v, V=4.0, values=values, effects=["asymmetry"])
-        assert found == pytest.approx(factor * force_at("bingham", v=v, V=4.0), rel=1e-7)
+        assert found == pytest.approx(factor * force_at("bingham", v=v, V=4.0), rel=1e-9)
 
 
 # -- saturation
