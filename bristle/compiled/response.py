@@ -209,8 +209,7 @@ class Along:
             effect, own = name.split(".", 1)
             p[slot] = values.get(name, EFFECTS[effect].parameters[own].value)
         n = max(1, self._storey)
-        begin = [values.get(name + "_0", 0.0) for name in layout.states]
-        z = np.tile(begin or [0.0], n + 1)
+        z = np.array(structure.start_states(n, values) or [0.0])
         self._forces(
             n, np.full(n, stiffness), self._storey == 0, np.ascontiguousarray(x),
             np.ascontiguousarray(v), dt, z, p, self.on, np.zeros(2 * n), np.zeros(n),

@@ -150,7 +150,7 @@ def settled(problem: Problem, model: Model, max_evaluations: int = 25) -> Fit:
     joints = [name for name in model.effects if EFFECTS[name].joint]
     if not joints:
         return found
-    generator = np.random.default_rng(len(found.std))
+    generator = np.random.default_rng(len(found.std))  # fixed: a model has the same ends again
     ends = [found]
     for _ in range(_ENDS):
         values = dict(found.model.values)

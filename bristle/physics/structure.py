@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .building import Building
 from .linear import Row, inverse, multiply, phi_functions
-from .weave import Layout, switched, weave
+from .structure_source import advance_source, contact_source, forces_source
+from .weave import Layout, weave
 
 EFFECT_STEP = 5e-4
 """Longest substep [s] of a structure with effects."""
@@ -126,97 +127,13 @@ def holding_force(n: int, C: Row, K: Row, mass: float, x: Row, a_g: float, other
     return total
 
 
-_SHARED = {"dt": "dt", "energy": "energy", "halt": "halt"}
-_BASE = {"x": "x[0]", "v": "x[n]", **_SHARED}
-_ISOLATION = {**_BASE, "stiffness": "stiffnesses[0] if isolated else 0.0"}
-_STOREY = {
-    "drift": "drift",
-    "drift_rate": "drift_rate",
-    "stiffness": "stiffnesses[i]",
-    "storey": "storey",
-    **_SHARED,
-}
-
-
-def _each_storey(*body: str) -> list[str]:
-    """Return the loop over the storeys; `i` is the level that a storey carries."""
-    return [
-        "    for i in range(1 if isolated else 0, n):",
-        "        drift = x[i] - (x[i - 1] if i > 0 else 0.0)",
-        "        drift_rate = x[n + i] - (x[n + i - 1] if i > 0 else 0.0)",
-        "        storey = float(i if isolated else i + 1)",
-        *("    " + line for line in body),
-    ]
-
-
-def _of_storeys(layout: Layout) -> Layout:
-    """Return the layout of the effects of storeys, each storey with states of its own."""
-    part = layout.only(lambda effect: "spring" in effect.hooks())
-    return part.at(f" + (i + 1) * {layout.z_size}")
-
-
-def _forces_source(layout: Layout) -> str:
-    smooth = layout.only(lambda effect: not effect.contact)
-    storeys = switched(_of_storeys(layout), "spring", "pull += {call}", **_STOREY)
-    lines = [
-        "def effect_forces(n, isolated, stiffnesses, x, dt, energy, halt, z, p, on, forces):",
-        "    for i in range(n):",
-        "        forces[i] = 0.0",
-        *switched(smooth, "force", "forces[0] += {call}", **_ISOLATION),
-        *_each_storey(
-            "    pull = 0.0",
-            *storeys,
-            "    forces[i] += pull",
-            "    if i > 0:",
-            "        forces[i - 1] -= pull",
-        ),
-    ]
-    return "\n".join(lines)
-
-
-def _contact_source(layout: Layout) -> str:
-    contact = layout.only(lambda effect: effect.contact)
-    lines = [
-        "def contact_force(n, isolated, stiffnesses, x, dt, energy, halt, z, p, on):",
-        "    total = 0.0",
-        *switched(contact, "force", "total += {call}", **_ISOLATION),
-        "    return total",
-    ]
-    return "\n".join(lines)
-
-
-def _advance_source(layout: Layout) -> str:
-    base = layout.only(lambda effect: "force" in effect.hooks() or "spring" not in effect.hooks())
-    storeys = _of_storeys(layout)
-    lines = [
-        "def advance_effects(",
-        "    n, isolated, stiffnesses, x, dt, energy, halt, force, z, p, on, z_next",
-        "):",
-        *_advanced(base, **_ISOLATION, force="force"),
-        *_each_storey("    pass", *_advanced(storeys, **_STOREY)),
-        "    return",
-    ]
-    return "\n".join(lines)
-
-
-def _advanced(layout: Layout, **q: str) -> list[str]:
-    """Return the source that advances the states of effects, by Euler's rule where they flow."""
-    lines = switched(layout, "rate", "{z_next}= {call}", **q)
-    for effect in layout.effects:
-        if "rate" in effect.hooks():
-            slots = layout.slots(effect)
-            lines.append(f"    if on[{layout.switches[effect.name]}]:")
-            lines += [f"        z_next[{k}] = z[{k}] + dt * z_next[{k}]" for k in slots]
-    return [*lines, *switched(layout, "advance", "{z_next}= {call}", **q)]
-
-
 def reweave() -> None:
     """Weave the structure's functions anew; call it after effects were registered late."""
     global LAYOUT, effect_forces, contact_force, advance_effects
     LAYOUT = Layout("structure", 0, 0)
-    effect_forces = weave("effect_forces", _forces_source(LAYOUT), LAYOUT)
-    contact_force = weave("contact_force", _contact_source(LAYOUT), LAYOUT)
-    advance_effects = weave("advance_effects", _advance_source(LAYOUT), LAYOUT)
+    effect_forces = weave("effect_forces", forces_source(LAYOUT), LAYOUT)
+    contact_force = weave("contact_force", contact_source(LAYOUT), LAYOUT)
+    advance_effects = weave("advance_effects", advance_source(LAYOUT), LAYOUT)
 
 
 LAYOUT: Layout
@@ -331,6 +248,11 @@ def state_size(n: int) -> int:
     return LAYOUT.z_size * (n + 1)
 
 
+def start_states(n: int, values: dict[str, float]) -> list[float]:
+    """Return the states of n levels at the begin; `values` names start values, "EFFECT.STATE_0"."""
+    return [values.get(name + "_0", 0.0) for name in LAYOUT.states] * (n + 1)
+
+
 def work_size(n: int) -> int:
     """Return how many floats `step` needs as room to work."""
     return 6 * n
@@ -363,7 +285,7 @@ class StructureModel:
             for name, parameter in effect.parameters.items():
                 key = effect.name + "." + name
                 self.p[LAYOUT.parameters[key]] = values.get(key, parameter.value)
-        self.z = [values.get(name + "_0", 0.0) for name in LAYOUT.states] * (self.m.n + 1)
+        self.z = start_states(self.m.n, values)
         self._step: dict[float, tuple[int, StepMatrices]] = {}
         self._unloaded = [0.0] * self.m.n
         self._gives = self.m.M_inverse[:: self.m.n]  # acceleration per force on the first level
