@@ -86,7 +86,8 @@ def unknown(what: str, name: str, names: Iterable[str], more: str = "") -> str:
     elif len(names) <= LIST_AT_MOST:
         words += f" There are: {', '.join(names)}."
     else:
-        some = nearest(name, names, 3) or names[:3]
+        others = dict.fromkeys((*nearest(name, names, 3), *names))
+        some = [one for one in others if one not in close[:1]][:3]
         words += f" There are {len(names)}, among them {', '.join(some)}."
         if more:
             words += f" All: {more}"
