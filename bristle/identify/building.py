@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
 
+from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
-from ..records.measurement import Measurement
 from .response import Response, responses
 from .search import z_scale
 from .simulated import simulated, stiffness_matrix
