@@ -71,7 +71,7 @@ def export_study(study: Study, out: Path | None = None) -> Exported:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         fmu = _damper(study, model, measurement, folder, notes)
-        write = _structure if study.settings.rig == "structure" else _bench
+        write = _structure if study.settings.has_building else _bench
         scenario, files = write(study, model, measurement, fmu, folder, notes)
     except OSError as error:
         raise StudyError(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import LOST
+from ..identify.residuals import over_noise
 from ..identify.structure import StructureRun
 from .coordinates import coordinates_of
 
@@ -60,7 +61,7 @@ class Held:
     @property
     def normalised(self) -> Array:
         """The residual over the noise expected of a true model."""
-        return np.asarray(self.residual / self.sigma[self.skip :])
+        return over_noise(self.residual, self.sigma[self.skip :])
 
     @property
     def carried(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from os import cpu_count
@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem
+from ..identify.residuals import Expected, errors, residuals
 from ..identify.search import loss, losses, z_of, z_scale
-from ..identify.search_context import Expected, Search, is_rough, refine, residuals
+from ..identify.search_context import Search, is_rough, refine
 from ..identify.start_grid import Begun, Ground, ranked
 from ..physics.effect import EFFECTS, effects_of
 
@@ -76,17 +77,12 @@ def judge(
     fitted, expected = noise or (train.expectation(model), held_out.expectation(model))
     z = residuals(held_out, model, expected)
     own = residuals(train, model, fitted)
-    raw = np.concatenate(list(_raw(held_out, model, expected)))
+    raw = np.concatenate(errors(held_out, model, expected))
     lost = losses(z)
     return Trial(
         model, z_scale(own), z_of(float(np.mean(lost))),
         float(np.sqrt(np.mean(raw**2))), lost, z, noise is None,
     )  # fmt: skip
-
-
-def _raw(problem: Problem, model: Model, expected: Expected) -> Iterable[Array]:
-    for run, (bias, _, _) in zip(problem.runs, expected, strict=True):
-        yield (run.force - problem.predict(model, run) - bias)[run.skip :]
 
 
 def joinable(base: Model, instruments: Sequence[str] = ("delay",)) -> list[str]:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from ..identify.assigned import corrected
 from ..identify.line import fit_line
-from ..identify.placed import corrected
 from ..identify.response import Response
 from ..identify.structure import LinearLayer, StructureProblem, layer_run
 from ..physics.building import Building

@@ -12,9 +12,10 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..data.measurement import Measurement
+from ..identify.assigned import at_site, corrected_for_delay
 from ..identify.fit import Model
-from ..identify.placed import at_site, on_time
 from ..identify.response import Response, responses
+from ..identify.site_fit import fit_damper
 from ..identify.structure import StructureProblem, problems_of
 from ..physics.building import Building
 from .candidates import judge
@@ -24,7 +25,7 @@ from .load_cell import load_cell
 from .mended import mended
 from .sensors import SensorFault, sensor_faults
 from .sites import CLEAN, Finding, look_at
-from .structure_damper import damper_verdict, fit_damper, forgiven, left_by_filter
+from .structure_damper import damper_verdict, forgiven, left_by_filter
 from .structure_verdict import INSTRUMENT, StructureDiagnosis, combine
 
 Pair = tuple[StructureProblem, StructureProblem]
@@ -77,7 +78,7 @@ def diagnose_structure(
     sensors = tuple(sensor_faults([_as_bench(one, building) for one in (*train, *holdout)]))
     train, holdout = (_mended(runs, sensors, building) for runs in (train, holdout))
     say("smoothing the motion of each level")
-    found, present = on_time(responses([*train, *holdout], building), present)
+    found, present = corrected_for_delay(responses([*train, *holdout], building), present)
     ours, theirs = found[: len(train)], found[len(train) :]
     straight = "storey_softening" not in present.effects
     problems = problems_of(ours, theirs, building, law, linear_storeys=straight)

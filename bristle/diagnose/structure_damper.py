@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..identify.fit import Fit, Model, identify
+from ..identify.fit import Fit, Model
 from ..identify.search_context import refine
+from ..identify.site_fit import fit_damper
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS, effects_of
 from .candidates import SECONDS, Trial, judge, try_all, try_members
@@ -33,17 +34,6 @@ class DamperVerdict:
     decision: Decision
     before: Trial
     trials: tuple[Trial, ...]
-
-
-def fit_damper(problem: StructureProblem, present: Model) -> Fit:
-    """Return the damper's law fitted anew, with the effects that the model has already."""
-    effects = present.effects
-    known = {n: v for n, v in present.values.items() if n.partition(".")[0] in effects}
-    kept = {n: v for n, v in present.values.items() if n in present.held}
-    return identify(
-        problem, present.law, effects, values={**known, **kept}, held=present.held,
-        limits=present.limits,
-    )  # fmt: skip
 
 
 def damper_verdict(base: Fit, train: StructureProblem, held_out: StructureProblem) -> DamperVerdict:

@@ -26,6 +26,7 @@ from .model import (
     steady,
     without,
 )  # fmt: skip
+from .residuals import Expected, residuals
 from .search import HUBER_AT_ONE, descend, jacobian, loss
 from .starts import start_model, start_models
 
@@ -35,7 +36,6 @@ __all__ = [
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
-Expected = list[tuple[Array, Array, Array]]
 
 _ALIKE = 1e-3  # relative difference of costs below which two starts have come to the same end
 _WEAK = 1e-6  # a singular value of the scaled Jacobian below this share of the largest is none
@@ -88,12 +88,7 @@ class Scaled:
 
     def residuals(self, theta: Array) -> Array:
         """Return the normalised residuals of all runs, finite."""
-        trial = self.at(theta)
-        parts = []
-        for run, (bias, sigma, _) in zip(self.problem.runs, self.expected, strict=True):
-            r = (run.force - self.problem.predict(trial, run) - bias) / sigma
-            parts.append(np.nan_to_num(r[run.skip :], nan=1e6, posinf=1e6, neginf=-1e6))
-        return np.concatenate(parts)
+        return residuals(self.problem, self.at(theta), self.expected)
 
     def jacobian(self, theta: Array, r: Array) -> Array:
         """Return the derivatives (n, p) of the residuals at theta."""

@@ -226,10 +226,15 @@ def damper_run(
         force, noise = response.force, response.noise_force
     else:
         force, noise = reconstructed(response, building, linear_storeys)
-    keep = sliding(response) if law.startswith("bingham") else None
+    keep = sliding(response) if blind_at_rest(law) else None
     return structure_run(
         response.name, response.dt, motion, force, noise, _error(response, 0), keep
     )
+
+
+def blind_at_rest(law: str) -> bool:
+    """Return whether a law tells nothing where the base may be held: it has a sign there."""
+    return law.startswith("bingham")
 
 
 def reconstructed(

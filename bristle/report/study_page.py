@@ -19,6 +19,7 @@ from .study_verdict import badge, noise_floor, rivals, separating, untestable, w
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
+    from ..compare.rig import RigComparer
     from ..data.model import StudyModel
     from ..study.history import Step
     from ..study.study import Study
@@ -60,7 +61,8 @@ def study_report(study: Study) -> str:
 def gather(study: Study) -> Content:
     """Return what the report of a study tells; it compares the models before and after."""
     from ..data.model import read_model
-    from ..study.comparison import holder
+    from ..study.comparison import comparer
+    from ..study.identification import as_model
 
     model, steps = study.model(), tuple(study.steps())
     runs = study.runs()
@@ -68,8 +70,8 @@ def gather(study: Study) -> Content:
     trouble, added = "", ""
     found = treads(steps)
     try:
-        hold = holder(study)
-        now = hold.compare(model)
+        against = comparer(study)
+        now = against.compare(as_model(model))
         for step in reversed(steps):
             gone = set(read_model(study.history.model_file(step.number), study.folder).effects)
             if step.number == 0 or not gone <= set(model.effects):
@@ -77,9 +79,9 @@ def gather(study: Study) -> Content:
             earlier = read_model(study.history.model_file(step.number - 1), study.folder)
             new = [name for name in model.effects if name not in earlier.effects]
             if new:
-                before, added = hold.compare(earlier), " and ".join(new)
+                before, added = against.compare(as_model(earlier)), " and ".join(new)
                 break
-        found = [_judged(one, hold, study) for one in found]
+        found = [_judged(one, against, study) for one in found]
     except BristleError as error:
         trouble = str(error)
     return Content(
@@ -87,7 +89,7 @@ def gather(study: Study) -> Content:
     )
 
 
-def _judged(tread: Tread, hold: Any, study: Study) -> Tread:
+def _judged(tread: Tread, against: RigComparer, study: Study) -> Tread:
     """Return a tread with its z where the history does not tell it: an edit by hand."""
     from dataclasses import replace
 
@@ -95,10 +97,12 @@ def _judged(tread: Tread, hold: Any, study: Study) -> Tread:
 
     from ..data.model import read_model
     from ..identify.search import z_scale
+    from ..study.identification import as_model
 
     if tread.z is not None or tread.number == 0:
         return tread  # the model that a study begins with is nobody's guess of this damper
-    held = hold(read_model(study.history.model_file(tread.number), study.folder))
+    then = read_model(study.history.model_file(tread.number), study.folder)
+    held = against.held(as_model(then))
     return replace(tread, z=z_scale(np.concatenate([one.normalised for one in held])))
 
 
@@ -106,7 +110,7 @@ def render(content: Content) -> str:
     """Return the HTML document."""
     study = content.study
     settings = study.settings
-    rig = "test bench" if settings.rig == "bench" else "structure"
+    rig = "structure" if settings.has_building else "test bench"
     what = " + ".join([content.model.law, *content.model.effects])
     body = [
         f"<h1>{html.escape(settings.title)}</h1>",

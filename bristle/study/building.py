@@ -14,7 +14,7 @@ from ..identify.building import StructureFit, equilibrium, identify_structure
 from ..identify.building_file import building_text
 from ..physics.building import Building, frequencies
 from .history import Step
-from .structure import building_of
+from .rig import building_of
 from .study import Study
 
 
@@ -83,7 +83,7 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
     RecordError
         If a file cannot be read, a channel is missing, or a stiffness comes out negative.
     """
-    if study.settings.rig != "structure":
+    if not study.settings.has_building:
         raise StudyError(
             f'{study.folder}: rig = "{study.settings.rig}": there is no building in it. '
             "--structure needs a study made with  --rig structure --building FILE"

@@ -14,7 +14,7 @@ from ..diagnose.structure_verdict import StructureDiagnosis
 from ..errors import StudyError
 from ..physics.effect import EFFECTS
 from .history import Step
-from .identification import Identified, as_model, errors_of, identify_study
+from .identification import FitTask, Identified, as_model, identify_model, identify_study
 from .study import Study, split_in_time
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def _diagnose_bench(study: Study, model: StudyModel, say: Say) -> Diagnosis:
 
 
 def _diagnose_building(study: Study, model: StudyModel, say: Say) -> StructureDiagnosis:
-    from .structure import building_of
+    from .rig import building_of
 
     runs, present = study.runs(), as_model(model)
     building = building_of(study, model)
@@ -135,25 +135,19 @@ def add_effects(
     for name in names:
         _refuse(model, name)
         model = model.with_effect(name)
-    start: Mapping[str, float] | None = None
-    if found is not None and found.values:
-        known = set(model.flat())
-        start = {k: v for k, v in found.values.items() if k in known}
-    identified = identify_study(study, model=model, begin=start, table=False, write=False)
-    before = identified.before
-    if study.settings.rig == "bench":
-        # It has the new effects at their defaults, which is nobody's model.
-        before = errors_of(
-            identified.train, identified.holdout, as_model(present), identified.cutoff
-        )
+    known = set(model.flat())
+    start = {k: v for k, v in found.values.items() if k in known} if found is not None else {}
+    # With the new effects at their defaults it would be nobody's model: before is the one without.
+    task = FitTask(study.settings.cut_off, table=False, present=present, begin=start)
+    identified = identify_model(study, model, task)
     verdict = study.verdict()
     if not why:
         agreed = verdict is not None and set(names) <= set(verdict.get("effects", []))
         why = f"verdict: {verdict['kind']}" if agreed and verdict else "by hand"
     step = study.add_step(
-        "add " + ", ".join(names), why, identified.model, before, identified.after
+        "add " + ", ".join(names), why, identified.model, identified.before, identified.after
     )
-    return Added(tuple(names), replace(identified, before=before, step=step), step)
+    return Added(tuple(names), replace(identified, step=step), step)
 
 
 def _refuse(model: StudyModel, name: str) -> None:

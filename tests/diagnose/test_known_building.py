@@ -14,9 +14,9 @@ from bristle.diagnose.known_building import (
     moved,
     told,
 )
-from bristle.diagnose.structure_damper import fit_damper
 from bristle.identify.fit import Model
 from bristle.identify.response import responses
+from bristle.identify.site_fit import fit_damper
 from bristle.identify.structure import problems_of
 
 

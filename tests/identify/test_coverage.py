@@ -9,7 +9,7 @@ import pytest
 from truths import hidden_case, true_case
 
 from bristle.identify.fit import fit, identify, settled
-from bristle.study.judged import robust_z
+from bristle.identify.residuals import robust_z
 
 RIGS = ("bench_10N", "bench_2kN")
 NOISES = (0.01, 0.03)

@@ -47,13 +47,13 @@ def _acts(name: str, model: Model, site: str, sites: Container[str]) -> bool:
     return "force" in effect.hooks() and site == ("layer" if "layer" in sites else "damper")
 
 
-def homeless(model: Model, sites: Sequence[str]) -> list[str]:
-    """Return the effects of a model that act at none of the sites that the runs show."""
-    placed = {name for site in sites for name in at_site(model, site, sites).effects}
-    return [name for name in model.effects if name not in placed]
+def unassigned(model: Model, sites: Sequence[str]) -> list[str]:
+    """Return the effects of a model that act at none of the sites that runs show."""
+    assigned = {name for site in sites for name in at_site(model, site, sites).effects}
+    return [name for name in model.effects if name not in assigned]
 
 
-def on_time(found: list[Response], model: Model) -> tuple[list[Response], Model]:
+def corrected_for_delay(found: list[Response], model: Model) -> tuple[list[Response], Model]:
     """Return responses whose measured force is set right by a model's `delay`, and the rest of it.
 
     Equilibrium needs the force of the same instant as the accelerations.
