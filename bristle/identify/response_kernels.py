@@ -112,7 +112,7 @@ def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no
         for j in range(3):
             P[i, j] = covs[n - 1, i, j]
     for k in range(n - 2, -1, -1):
-        _gain(covs[k], predicted_covs[k + 1], h1, h2, A, G)
+        _gain(covs[k], predicted_covs[k + 1], h1, h2, A, G)  # type: ignore[no-untyped-call]
         for i in range(3):
             state[k, i] = means[k, i]
             for j in range(3):
