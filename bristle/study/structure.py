@@ -17,7 +17,7 @@ from ..diagnose.sites import try_effect
 from ..diagnose.structure_damper import fit_damper
 from ..identify.fit import Fit, Model, fit, identify
 from ..identify.line import fit_line
-from ..identify.placed import at_site, homeless, on_time
+from ..identify.placed import at_site, lateness, linear_storeys, on_time, unassigned
 from ..identify.response import Response, responses
 from ..identify.structure import StructureProblem, problems_of
 from ..identify.table import error_rms, force_rms
@@ -53,8 +53,7 @@ class Sites:
 
     def problems(self, model: Model) -> dict[str, Pair]:
         """Return the problems by site, each for training and held-out runs."""
-        straight = "storey_softening" not in model.effects
-        late = model.value("delay.time") if "delay" in model.effects else 0.0
+        straight, late = linear_storeys(model.effects), lateness(model)
         key = (model.law, straight, late)
         if key not in self._made:
             plain = self._pairs(self._found, model.law, straight)
@@ -69,7 +68,7 @@ class Sites:
             found[: self._count], found[self._count :], self.building, law, linear_storeys=straight
         )
 
-    def placed(self, model: Model) -> dict[str, Pair]:
+    def assigned(self, model: Model) -> dict[str, Pair]:
         """Return the problems of a model whose effects all have a site.
 
         Raises
@@ -78,7 +77,7 @@ class Sites:
             If an effect acts at a site that these runs do not show.
         """
         problems = self.problems(model)
-        lost = homeless(model, list(problems))
+        lost = unassigned(model, list(problems))
         if lost:
             raise StudyError(
                 f"{', '.join(lost)}: acts at no site that these runs show; they show "
@@ -88,12 +87,12 @@ class Sites:
 
     def fitted(self, model: Model, starts: int, begin: Mapping[str, float] | None) -> SiteFits:
         """Return a model fitted at all its sites, from the values in `begin` too, if given."""
-        problems = self.placed(model)
+        problems = self.assigned(model)
         fits: dict[str, Fit] = {}
         if "damper" in problems:
             fits["damper"] = _fit_damper(model, problems, starts, begin or {})
             model = replace(model, values={**model.values, **fits["damper"].model.values})
-            problems = self.placed(model)
+            problems = self.assigned(model)
         for site, pair in problems.items():
             if site != "damper":
                 fits[site] = _fit_line(at_site(model, site, problems), site, pair, begin or {})
@@ -104,7 +103,7 @@ class Sites:
 
         `only` names the one site that is asked for.
         """
-        problems = self.placed(model)
+        problems = self.assigned(model)
         out = {}
         for site, pair in problems.items():
             if only and site != only:

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from bristle.compiled.bench import Bench
-from bristle.diagnose.decision import GAIN
 from bristle.diagnose.limits import detectable, untestable
+from bristle.diagnose.rule import BENCH
 from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
 from bristle.records.measurement import ChannelSpec, measurements_of_frame
@@ -72,7 +72,7 @@ def test_the_share_is_what_raises_z_by_the_smallest_gain():
     share = detectable(problem, white(problem, sigma))
     force = np.concatenate([run.force[run.skip :] for run in problem.runs])
     missing = share * np.sqrt(np.mean(force**2))  # N, RMS
-    assert np.sqrt(1.0 + (missing / sigma) ** 2) == pytest.approx(1.0 + GAIN, rel=1e-9)
+    assert np.sqrt(1.0 + (missing / sigma) ** 2) == pytest.approx(1.0 + BENCH.gain, rel=1e-9)
 
 
 def test_less_noise_on_all_channels_shows_less():

@@ -14,7 +14,7 @@ from bristle.diagnose.sites import Finding
 from bristle.diagnose.structure_damper import DamperVerdict
 from bristle.diagnose.structure_verdict import combine
 from bristle.identify.model import Model
-from bristle.identify.placed import at_site, homeless
+from bristle.identify.placed import at_site, unassigned
 from bristle.physics.effect import EFFECTS
 from bristle.study.comparison import compare_study
 from bristle.study.errors import StudyError
@@ -74,7 +74,7 @@ def test_each_effect_acts_at_its_own_site():
     second = replace(model, values={"storey_softening.which": 2.0})
     assert at_site(second, "storey1", sites).effects == ()
     assert at_site(model, "damper", ("damper",)).effects == ("stribeck", "duffing")
-    assert homeless(model, ["damper", "layer"]) == ["storey_softening"]
+    assert unassigned(model, ["damper", "layer"]) == ["storey_softening"]
 
 
 def test_wrong_load_cell_is_a_sensor_fault_and_no_effect():
