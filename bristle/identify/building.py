@@ -16,9 +16,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
-from ..records.measurement import Measurement
 from .equilibrium_system import SKIP, EquilibriumSystem, cross_products, modes_of, ratios_of
 from .response import Response, responses
 from .search import z_scale
