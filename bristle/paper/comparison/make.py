@@ -23,9 +23,10 @@ from .. import optimum, stiction
 from ..figures import Drawing, Runs, prepare
 from . import identification
 from . import page as page_of
-from .claims import Numbers, Statement, Verdict, ledger
+from .claims import Statement, ledger
 from .experiment import Comparison, cases, compare, motions, published_table
 from .facts import facts
+from .numbers import Numbers, Verdict
 from .pictures import FIGURES
 
 if TYPE_CHECKING:
