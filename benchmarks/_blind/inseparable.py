@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bristle.diagnose.candidates import short_search
-from bristle.diagnose.search import refine
-from bristle.diagnose.starts import SearchContext, ranked_guesses
 from bristle.identify.fit import Model, Problem, Run, identify
 from bristle.identify.prepare import prepare
+from bristle.identify.search_context import refine
+from bristle.identify.start_grid import SearchContext, ranked_guesses
 
 from . import cases, separate, subject
 from .cases import Recorded

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..compare.where import Place
+from ..data.measurement import Measurement
 from ..identify.fit import Model, multistart_refit
-from ..records.measurement import Measurement
+from ..identify.search_context import is_rough
 from .candidates import Trial, judge
 from .decision import Decision, decide
 from .experiments import Experiment, separating
@@ -20,7 +21,6 @@ from .limits import detectable, untestable
 from .opening import Insufficient, Opening, Progress, Trials, opening, silent
 from .remaining_residual import remaining_residual, sentences
 from .rule import BENCH, DecisionRule
-from .search import is_rough
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
+from ..identify.search_context import Search
 from .rule import BENCH, DecisionRule
-from .search import Search
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,8 @@ from itertools import chain
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.model import Run
 from ..identify.search import z_scale
+from ..identify.search_context import residuals
 from .rule import BENCH, DecisionRule
-from .search import residuals
 
 
 def inconsistent_runs(

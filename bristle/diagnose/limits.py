@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem
+from ..identify.search_context import Expected, Search
+from ..identify.start_grid import initial_guesses
 from .candidates import joinable
 from .rule import BENCH, DecisionRule
-from .search import Expected, Search
-from .starts import initial_guesses
 
 Array = NDArray[np.float64]
 

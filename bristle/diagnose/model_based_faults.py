@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import steady
 from ..identify.search import HUBER_AT_ONE, losses
+from ..identify.search_context import refine, residuals
+from ..identify.start_grid import SearchContext, ranked_guesses
 from ..physics.effect import EFFECTS, Effect, effects_of
 from .candidates import Trial, joinable, judge, short_search
 from .corrected import earlier
 from .faults import SensorFault
 from .rule import DRIVE, DecisionRule
-from .search import refine, residuals
-from .starts import SearchContext, ranked_guesses
 
 Array = NDArray[np.float64]
 

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..data.derived import derived_velocity
+from ..data.measurement import Measurement
 from ..identify.fit import Model, Problem, identify
 from ..identify.prepare import SHORTEST, prepare
-from ..records.derived import derived_velocity
-from ..records.measurement import Measurement
+from ..identify.search_context import refine
 from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .corrected import corrected
 from .faults import SensorFault, words_of
 from .model_based_faults import model_based_fault
 from .remaining_residual import patterns_of
 from .rule import BENCH, DecisionRule
-from .search import refine
 from .sensors import sensor_faults
 
 Progress = Callable[[str], None]

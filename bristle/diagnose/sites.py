@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..identify.fit import fit
 from ..identify.line import fit_line
 from ..identify.model import Model, Problem, Run
+from ..identify.start_grid import initial_guesses
 from ..identify.structure import (
     LinearLayer,
     LinearStorey,
@@ -26,7 +27,6 @@ from ..physics.effect import EFFECTS, effects_of
 from .candidates import Trial, judge
 from .evidence import paired
 from .rule import SITE, DecisionRule
-from .starts import initial_guesses
 
 Array = NDArray[np.float64]
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..identify.fit import Fit, Model, identify
+from ..identify.search_context import refine
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS, effects_of
 from .candidates import SECONDS, SHOWN, Trial, judge, try_all, try_members
 from .decision import Decision, decide
 from .rule import BENCH, SITE, DecisionRule
-from .search import refine
 from .sites import better, equals, shortened, try_effect
 
 SEARCHED = 12.0

@@ -6,12 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.compiled.bench import Bench
 from bristle.diagnose.limits import detectable, untestable
 from bristle.diagnose.rule import BENCH
+from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
-from bristle.records.measurement import ChannelSpec, measurements_of_frame
 
 STEP = 0.002
 T = STEP * np.arange(3000)

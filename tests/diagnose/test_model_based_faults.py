@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.compiled.bench import Bench
 from bristle.diagnose.candidates import judge
 from bristle.diagnose.inconsistent_runs import inconsistent_runs
 from bristle.diagnose.model_based_faults import model_based_fault
+from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, identify
 
 DT, N, NOISE = 0.002, 3000, 0.03
