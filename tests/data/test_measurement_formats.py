@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.data.table import Table, read_table, table_from_frame
+from bristle.data.read import read_table
+from bristle.data.table import Table, table_from_frame
 from bristle.errors import RecordError
 
 TIME = np.arange(80) * 0.002
@@ -140,7 +141,7 @@ def test_what_is_no_table_is_refused(tmp_path: Path, text: str | bytes, told: st
 def test_large_files_are_refused_before_they_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bristle.data.table.LARGEST", 1000)
+    monkeypatch.setattr("bristle.data.read.LARGEST", 1000)
     text = "time [s],x [mm],F [kN]\n" + body(",")
     with pytest.raises(RecordError, match="limit"):
         read(tmp_path, text)
