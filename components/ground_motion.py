@@ -9,7 +9,7 @@ BUILT_IN = ("el_centro_1940_ns",)
 class GroundMotion(Slave):
     """Ground acceleration from a record, scaled to a peak and by a factor."""
 
-    files = ("records/data/el_centro_1940_ns.csv",)
+    files = ("data/ground_motions/el_centro_1940_ns.csv",)
 
     def declare(self):
         record = self.baked.get("record", "el_centro_1940_ns")

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bristle.data.channels import ChannelSpec
 from bristle.data.derived import derived_velocity
 from bristle.data.measurement import ChannelSpec, measurements_of_frame
 from bristle.diagnose.corrected import corrected

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
+from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import ChannelSpec, measurements_of_frame
 from bristle.diagnose.corrected import corrected
 from bristle.diagnose.sensors import sensor_faults

@@ -20,7 +20,8 @@ from ...draw.style import Page, look
 from ...errors import DesignError, not_usable
 from ...progress import Progress
 from .. import optimum, stiction
-from ..figures import Drawing, Runs, prepare
+from ..figures import prepare
+from ..runs import Drawing, Runs
 from . import identification
 from . import page as page_of
 from .claims import Statement, ledger
