@@ -8,7 +8,7 @@ import pytest
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.derived import derived_velocity
-from bristle.data.measurement import ChannelSpec, measurements_of_frame
+from bristle.data.measurement import measurements_of_frame
 from bristle.diagnose.corrected import corrected
 from bristle.diagnose.sensors import sensor_faults
 from bristle.identify.prepare import prepare

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from bristle.data.channels import ChannelSpec
-from bristle.data.measurement import ChannelSpec, measurements_of_frame
+from bristle.data.measurement import measurements_of_frame
 from bristle.diagnose.limits import detectable, untestable
 from bristle.diagnose.rule import BENCH
 from bristle.identify.bench import Bench

@@ -10,7 +10,7 @@ import pytest
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
 from bristle.data.channels import ChannelSpec
-from bristle.data.measurement import ChannelSpec, measurements_of_frame
+from bristle.data.measurement import measurements_of_frame
 from bristle.diagnose.corrected import corrected
 from bristle.diagnose.sensors import sensor_faults
 
