@@ -25,7 +25,7 @@ from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import Measurement, read_measurement, read_measurements
 from bristle.diagnose import Diagnosis, diagnose
 from bristle.diagnose.candidates import Trial
-from bristle.diagnose.mended import mended
+from bristle.diagnose.corrected import corrected
 from bristle.diagnose.structure import diagnose_structure
 from bristle.identify.building import equilibrium, identify_structure
 from bristle.identify.model import Problem
@@ -104,7 +104,7 @@ def bench_row(
     row.after, row.z_after = after.rms / size, after.z
     row.after_with = " + ".join(after.effects) + ("" if named else ", the best single one")
     problems = [
-        Problem([prepare(m) for m in mended(part, found.sensors)]) for part in (train, held)
+        Problem([prepare(m) for m in corrected(part, found.sensors)]) for part in (train, held)
     ]
     row.least_squares = error_table(*problems, 0.0, laws=(row.law,), starts=2)[0].share
     row.reference = told(after)

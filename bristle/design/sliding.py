@@ -177,7 +177,12 @@ def _added(damper: Damper, top: float) -> tuple[Array, Array, Array]:
 def _slid(damper: Damper, v: float, V: float, x: float, effects: tuple[str, ...]) -> float:
     """Return the mean force [N] of sliding past x [m] at v [m/s] and V [V], once settled."""
     p = damper.parameters()
-    start = {"coil_lag.voltage_0": V}
+    start = {
+        f"{name}.{state}_0": V
+        for name in effects
+        for state, signal in EFFECTS[name].starts.items()
+        if signal == "V"
+    }
     if damper.base == "lugre":
         start["bristle_deflection_0"] = float(np.sign(v)) / p["a_0"]
     model = DamperModel(damper.base, {**damper.values, **p, **start}, list(effects))

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .rule import BENCH
+
 Array = NDArray[np.float64]
 
 
@@ -25,13 +27,19 @@ class Difference:
 
 
 def paired(
-    first: Array, second: Array, block: int = 250, draws: int = 400, seed: int = 0
+    first: Array,
+    second: Array,
+    chance: float = BENCH.chance,
+    block: int = 250,
+    draws: int = 400,
+    seed: int = 0,
 ) -> Difference:
-    """Return the mean of first - second per sample with its 99 % interval by block bootstrap.
+    """Return the mean of first - second per sample with its interval by block bootstrap.
 
     Parameters
     ----------
     first, second : (n,) losses of two models on the same samples
+    chance : probability left outside the interval, half on either side
     block : samples per block, longer than the residuals' correlation
     """
     difference = first - second
@@ -41,5 +49,5 @@ def paired(
     generator = np.random.default_rng(seed)
     picks = generator.integers(0, len(blocks), (draws, len(blocks)))
     means = blocks[picks].mean(axis=1)
-    low, high = np.quantile(means, [0.005, 0.995])
+    low, high = np.quantile(means, [0.5 * chance, 1.0 - 0.5 * chance])
     return Difference(float(blocks.mean()), float(low), float(high))

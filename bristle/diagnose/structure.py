@@ -12,34 +12,27 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from ..data.measurement import Measurement
-from ..identify.assigned import at_site, corrected_for_delay
+from ..identify.assigned import at_site, corrected_for_delay, linear_storeys
 from ..identify.fit import Model
 from ..identify.response import Response, responses
 from ..identify.site_fit import fit_damper
 from ..identify.structure import StructureProblem, problems_of
 from ..physics.building import Building
+from .building_prior import moved_numbers, within_prior
 from .candidates import judge
-from .decision import excess
-from .known_building import as_known, told
+from .corrected import corrected
 from .load_cell import load_cell
-from .mended import mended
+from .rule import BENCH, SITE, DecisionRule
 from .sensors import SensorFault, sensor_faults
-from .sites import CLEAN, Finding, look_at
-from .structure_damper import damper_verdict, forgiven, left_by_filter
-from .structure_verdict import INSTRUMENT, StructureDiagnosis, combine
+from .sites import Finding, look_at
+from .structure_damper import damper_verdict, excused_by_sensor, left_by_filter
+from .structure_verdict import StructureDiagnosis, combine, late_values
 
 Pair = tuple[StructureProblem, StructureProblem]
 
-MOVED = 0.5
-"""What moved numbers of a building may leave of the excess, as a share, to be taken."""
-
-BLURRED = (*INSTRUMENT, "delay", "derived")
+BLURRED = ("lag", "high-pass", "delay", "derived")
 """Faults for which a building's velocity is left out: displacement and accelerometer say the same
 without them, and what is left of a delay would be held against the law at each reversal."""
-
-BLIND = 1.25
-"""z that a true Bingham law may read where the base's velocity had to be left out: its jumps come
-when the velocity changes sign, which then is told by displacement and accelerometer alone."""
 
 _NOTHING = Finding("", "none", (), 1.0, 1.0, 0.0, 0.0)
 
@@ -76,11 +69,11 @@ def diagnose_structure(
     law = present.law
     say("looking for sensor faults")
     sensors = tuple(sensor_faults([_as_bench(one, building) for one in (*train, *holdout)]))
-    train, holdout = (_mended(runs, sensors, building) for runs in (train, holdout))
+    train, holdout = (_corrected(runs, sensors, building) for runs in (train, holdout))
     say("smoothing the motion of each level")
     found, present = corrected_for_delay(responses([*train, *holdout], building), present)
     ours, theirs = found[: len(train)], found[len(train) :]
-    straight = "storey_softening" not in present.effects
+    straight = linear_storeys(present.effects)
     problems = problems_of(ours, theirs, building, law, linear_storeys=straight)
     findings = {}
     for site, (own, other) in problems.items():
@@ -89,7 +82,7 @@ def diagnose_structure(
             findings[site] = look_at(site, own, other, at_site(present, site, problems))
     if "damper" in problems and findings.get("layer", _NOTHING).kind != "none":
         say("layer: the load cell")
-        late = load_cell(findings["layer"], ours, theirs, building, law)
+        late = load_cell(findings["layer"], ours, theirs, building)
         if late is not None:
             findings["layer"], (ours, theirs) = late
             shown = problems["damper"]
@@ -103,33 +96,37 @@ def diagnose_structure(
         softer = any(f.kind != "none" for s, f in findings.items() if s.startswith("storey"))
         straight = straight and not softer
         problems = problems_of(ours, theirs, building, law, straight)
-        known = _as_known(present, ours, building, straight)
+        known = _within_prior(present, ours, building, straight)
         suited = problems_of(ours, theirs, known, law, straight)
         if _suits(suited["damper"], problems["damper"], present):
-            problems, notes = suited, told(building, known)
+            problems, notes = suited, moved_numbers(building, known)
     if "damper" in problems:
         say("damper: its law, then effects")
         base = fit_damper(problems["damper"][0], at_site(present, "damper", problems))
         verdict = damper_verdict(base, *problems["damper"])
         if _blurred(sensors):
-            verdict = forgiven(verdict, BLIND, "Without its velocity the base's reversals blur.")
+            verdict = excused_by_sensor(
+                verdict, BENCH.blurred, "Without its velocity the base's reversals blur."
+            )
         if _rounded(findings.get("layer", _NOTHING)):
             most = left_by_filter(law, *problems["damper"])
-            verdict = forgiven(verdict, most, "The load cell's filter has another form than ours.")
+            verdict = excused_by_sensor(
+                verdict, most, "The load cell's filter has another form than ours."
+            )
     whole = combine(findings, base, verdict, problems, sensors)
     return replace(whole, words=" ".join([whole.words, *notes]))
 
 
-def _as_known(
+def _within_prior(
     present: Model, responses: list[Response], building: Building, straight: bool
 ) -> Building:
     """Return the building that makes the damper's force, its numbers as far as they are known."""
     problem = problems_of(responses, [], building, present.law, straight)
     damper = fit_damper(problem["damper"][0], at_site(present, "damper", problem))
-    return as_known(damper.model, responses, building, present.law, straight)
+    return within_prior(damper.model, responses, building, present.law, straight)
 
 
-def _suits(suited: Pair, given: Pair, present: Model) -> bool:
+def _suits(suited: Pair, given: Pair, present: Model, rule: DecisionRule = BENCH) -> bool:
     """Return whether moved numbers of a building explain what the file's leave, held-out runs too.
 
     What an effect does they may follow in part; then they are the file's still.
@@ -137,31 +134,30 @@ def _suits(suited: Pair, given: Pair, present: Model) -> bool:
 
     def left(pair: Pair) -> float:
         base = fit_damper(pair[0], at_site(present, "damper", ("damper",)))
-        return excess(judge(base.model, *pair))
+        return rule.excess(judge(base.model, *pair).z)
 
-    return left(suited) <= MOVED * left(given)
+    return left(suited) <= rule.moved * left(given)
 
 
-def _rounded(layer: Finding) -> bool:
+def _rounded(layer: Finding, rule: DecisionRule = SITE) -> bool:
     """Return whether a load cell is late in a way that moving its record ahead does not undo.
 
     A filter rounds the force besides. That cannot be taken back, but it can be put on the model.
     """
-    return layer.effects == ("delay",) and layer.z_after > CLEAN
+    return bool(late_values(layer)) and layer.z_after > rule.clean
 
 
 def _late(present: Model, layer: Finding) -> Model:
     """Return the model whose damper's force is shown as late as equilibrium says."""
-    time = float(layer.coordinate.split()[0])
-    effects = (*present.effects, "delay")
-    return replace(present, effects=effects, values={**present.values, "delay.time": time})
+    effects = (*present.effects, *layer.effects)
+    return replace(present, effects=effects, values={**present.values, **late_values(layer)})
 
 
 def _blurred(faults: tuple[SensorFault, ...]) -> bool:
     return any(f.channel == "velocity" and f.fault in BLURRED for f in faults)
 
 
-def _mended(
+def _corrected(
     runs: list[Measurement], faults: tuple[SensorFault, ...], building: Building
 ) -> list[Measurement]:
     """Return measurements without the faults of the damper's channels.
@@ -172,7 +168,7 @@ def _mended(
     names = {"displacement": f"{first}_displacement", "velocity": f"{first}_velocity"}
     theirs = [replace(f, channel=names.get(f.channel, f.channel)) for f in faults]
     late = names["velocity"]
-    out = mended(runs, [f for f in theirs if not (f.channel == late and f.fault in BLURRED)])
+    out = corrected(runs, [f for f in theirs if not (f.channel == late and f.fault in BLURRED)])
     if not _blurred(faults):
         return out
     return [

@@ -11,12 +11,10 @@ from ..identify.search_context import refine
 from ..identify.site_fit import fit_damper
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS, effects_of
-from .candidates import SECONDS, Trial, judge, try_all, try_members
-from .decision import GAIN, SHARE, Decision, decide, excess
-from .sites import CLEAN, NEARLY, better, shortened, try_effect
-
-QUIET = 1.0 + 0.5 * GAIN
-"""z of the damper's law up to which no effect can lower it by `GAIN`: noise is all there is."""
+from .candidates import SECONDS, SHOWN, Trial, judge, try_all, try_members
+from .decision import Decision, decide
+from .rule import BENCH, SITE, DecisionRule
+from .sites import better, equals, shortened, try_effect
 
 SEARCHED = 12.0
 """Seconds of each run, from its begin, on which the damper's effects are searched: the strongest
@@ -36,22 +34,26 @@ class DamperVerdict:
     trials: tuple[Trial, ...]
 
 
-def damper_verdict(base: Fit, train: StructureProblem, held_out: StructureProblem) -> DamperVerdict:
+def damper_verdict(
+    base: Fit, train: StructureProblem, held_out: StructureProblem, rule: DecisionRule = BENCH
+) -> DamperVerdict:
     """Return what the damper lacks; with a reconstructed force the layer's effects take part."""
     model = refine(base.model, train)
     before = judge(model, train, held_out)
-    return _decided(before, train, held_out)
+    return _decided(before, train, held_out, rule)
 
 
-def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem) -> DamperVerdict:
+def _decided(
+    before: Trial, train: StructureProblem, held_out: StructureProblem, rule: DecisionRule = BENCH
+) -> DamperVerdict:
     # A force that no load cell shows cannot be late.
-    instruments = () if train.reconstructed else ("delay",)
+    shown = () if train.reconstructed else SHOWN
 
     brief = shortened(train, SEARCHED)
 
     def grow(first: Trial) -> list[Trial]:
         most = None if first is before else SECONDS
-        trials = try_all(first.model, brief, held_out, instruments, most)
+        trials = try_all(first.model, brief, held_out, shown, most)
         if train.reconstructed:
             taken = first.model.effects
             trials += [
@@ -70,38 +72,44 @@ def _decided(before: Trial, train: StructureProblem, held_out: StructureProblem)
     def reduce(pair: Trial) -> list[Trial]:
         return try_members(pair, before.model, train, held_out)
 
-    if max(before.z, before.train) <= QUIET:
-        return DamperVerdict(decide(before, [], grow), before, ())
+    if max(before.z, before.train) <= rule.quiet:
+        return DamperVerdict(decide(before, [], grow, rule=rule), before, ())
     trials = grow(before)
-    decision = decide(before, trials, grow, reduce=reduce)
+    decision = decide(before, trials, grow, reduce=reduce, rule=rule)
     if decision.kind in ("none", "unknown", "insufficient"):
-        decision = _seldom(before, trials) or decision
+        decision = _rare(before, trials, rule) or decision
     return DamperVerdict(decision, before, tuple(trials))
 
 
-def forgiven(verdict: DamperVerdict, most: float, reason: str) -> DamperVerdict:
+def excused_by_sensor(
+    verdict: DamperVerdict, most: float, reason: str, rule: DecisionRule = BENCH
+) -> DamperVerdict:
     """Return a verdict that does not call unknown what an instrument already known explains.
 
-    `most` is the z that it accounts for; what an effect of the library lowers is not forgiven.
+    `most` is the z that it accounts for; what an effect of the library lowers is not excused.
     """
     made, before = verdict.decision, verdict.before
-    gains = any(1.0 - trial.z / before.z >= GAIN for trial in verdict.trials)
+    gains = any(1.0 - trial.z / before.z >= rule.gain for trial in verdict.trials)
     if made.kind != "unknown" or gains or max(before.z, before.train) > most:
         return verdict
     words = f"{reason} z = {before.z:.2f} is no more than that."
     return replace(verdict, decision=replace(made, kind="none", reasons=(words,)))
 
 
-def left_by_filter(law: str, train: StructureProblem, held_out: StructureProblem) -> float:
+def left_by_filter(
+    law: str, train: StructureProblem, held_out: StructureProblem, rule: DecisionRule = BENCH
+) -> float:
     """Return the z that a late and rounded force may leave once our delay is in the model.
 
-    As for any effect of another form: it must explain `SHARE` of the excess that is there without.
+    As for any effect of another form: it must explain `rule.share` of the excess without.
     """
     bare = judge(fit_damper(train, Model(law)).model, train, held_out)
-    return float(np.sqrt(1.0 + (1.0 - SHARE) * excess(bare)))
+    return float(np.sqrt(1.0 + (1.0 - rule.share) * rule.excess(bare.z)))
 
 
-def _seldom(before: Trial, trials: list[Trial]) -> Decision | None:
+def _rare(
+    before: Trial, trials: list[Trial], rule: DecisionRule = BENCH, site: DecisionRule = SITE
+) -> Decision | None:
     """Return the decision for an effect of the layer that acts in a few samples only, if any.
 
     A stop that is met once or twice is seen in no resampling of blocks; its likelihood tells, where
@@ -109,16 +117,12 @@ def _seldom(before: Trial, trials: list[Trial]) -> Decision | None:
     """
     best = trials[0]
     name = best.effects[-1]
-    if EFFECTS[name].site != "structure" or best.z > CLEAN:
+    if EFFECTS[name].site != "structure" or best.z > site.clean:
         return None
-    if 1.0 - best.z / before.z < GAIN or not better(before, best):
+    if 1.0 - best.z / before.z < rule.gain or not better(before, best, site):
         return None
-    rivals = [
-        other.effects[-1]
-        for other in trials[1:]
-        if other.z / best.z - 1.0 < NEARLY or not better(other, best)
-    ]
-    explained = 1.0 - excess(best) / excess(before)
+    rivals = [other.effects[-1] for other in trials[1:] if equals(best, other, site)]
+    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
     reason = f"With {name} the error on runs not seen falls from {before.z:.2f} to {best.z:.2f}."
     kind = "class" if rivals else "effect"
-    return Decision(kind, (name, *rivals)[:3], best, explained, (reason,))
+    return Decision(kind, (name, *rivals)[: rule.largest_class], best, explained, (reason,))

@@ -9,34 +9,15 @@ from typing import Any
 import numpy as np
 
 from ..identify.fit import Fit
+from ..identify.placed import late_effects
 from ..identify.structure import StructureProblem
-from ..physics.effect import EFFECTS
+from ..physics.effect import EFFECTS, effects_of
 from .candidates import Trial
 from .experiments import Experiment
-from .sensors import SensorFault
+from .faults import SensorFault, instruments_of
+from .load_cell import FORCE_GAIN
 from .sites import Finding, coordinate_of
 from .structure_damper import DamperVerdict
-
-LOOKALIKE = {
-    "gas_spring": ("duffing",),
-    "duffing": ("gas_spring",),
-    "fluid_inertia": ("base_mass",),
-    "base_friction": ("f_c",),
-}
-"""What else does the same where the damper's force is reconstructed from equilibrium."""
-
-WHY = {
-    "duffing": "a spring of the damper and one of the isolation layer add up to one force",
-    "gas_spring": "a spring of the damper and one of the isolation layer add up to one force",
-    "base_mass": "a mass that moves with the piston and one of the base add up to one force",
-    "f_c": "friction under the base and the damper's own yield force add up to one force",
-}
-
-NAMES = {"base_mass": "a mass of the base that the file does not know", "f_c": "f_c of the damper"}
-"""Rivals that are no effects, as words name them."""
-
-INSTRUMENT = ("lag", "high-pass")
-"""Faults of a velocity that are an instrument's own, which the library knows as an effect."""
 
 
 @dataclass(frozen=True)
@@ -94,12 +75,13 @@ class StructureDiagnosis:
             model = finding.model.values if finding.model is not None else {}
             own = {n: v for n, v in model.items() if n.partition(".")[0] in finding.effects}
             out.update(own)
-            if finding.effects == ("delay",):
-                out["delay.time"] = float(finding.coordinate.split()[0])
-        soft = [f.site for f in self.findings.values() if "storey_softening" in f.effects]
+            out.update(late_values(finding))
         storeys = [site for site in self.findings if site.startswith("storey")]
-        if len(soft) == 1 < len(storeys):  # else it is in every storey, which is 0
-            out["storey_softening.which"] = float(soft[0].removeprefix("storey"))
+        for name in dict.fromkeys(e for f in self.findings.values() for e in f.effects):
+            at = [f.site for f in self.findings.values() if name in f.effects]
+            # One that is in every storey has the number 0, its default.
+            if _in_a_storey(name) and len(at) == 1 < len(storeys):
+                out[f"{name}.which"] = float(at[0].removeprefix("storey"))
         return out
 
     def as_dict(self) -> dict[str, Any]:
@@ -152,19 +134,19 @@ def combine(
         parts.append(("damper", made.kind, made.effects, verdict.before.z, made.best.z))
     named: list[str] = []
     rivals: list[str] = []
-    alike: list[str] = []
+    alike: dict[str, str] = {}
     sites: dict[str, str] = {}
     for site, kind, effects, _, _ in parts:
-        twins = lookalikes(effects) if reconstructed and site == "damper" else []
-        alike += twins
+        twins = lookalikes(effects) if reconstructed and site == "damper" else {}
+        alike |= twins
         sure = kind == "effect" and not twins
         # What is no effect, such as a mass of the base, is a rival that words alone can name.
         known = [one for one in (*effects, *twins) if one in EFFECTS]
         (named if sure else rivals).extend(known if kind != "unknown" else [])
         sites.update({effect: sites.get(effect, _site_of(effect, site)) for effect in effects})
-    if any(fault.fault in INSTRUMENT for fault in sensors):
-        named.append("velocity_sensor")
-        sites["velocity_sensor"] = "sensor"
+    for name in instruments_of(sensors):
+        named.append(name)
+        sites[name] = "sensor"
     effects = tuple(dict.fromkeys([*named, *rivals]))
     unknown = [part for part in parts if part[1] == "unknown"]
     kind = "unknown" if unknown else "class" if rivals else "effect" if named else "none"
@@ -175,7 +157,7 @@ def combine(
         if site == "damper" and verdict is not None:
             coordinate = coordinate_of(verdict.before.residual, problems["damper"][1])
     worst = max(parts, key=lambda part: part[3], default=("", "none", (), np.nan, np.nan))
-    untestable = ("base_friction",) if reconstructed and "base_friction" not in effects else ()
+    untestable = _absorbed(effects) if reconstructed else ()
     return StructureDiagnosis(
         kind, effects[:3] if kind == "class" else effects,
         words(kind, effects, sites, alike, coordinate), float(worst[3]), float(worst[4]),
@@ -191,14 +173,36 @@ def _site_of(effect: str, site: str) -> str:
     return "layer" if site == "damper" and known and known.site == "structure" else site
 
 
-def lookalikes(effects: tuple[str, ...]) -> list[str]:
-    """Return what else would do the same to a reconstructed force as these effects."""
-    twins = [twin for effect in effects for twin in LOOKALIKE.get(effect, ())]
-    return [twin for twin in dict.fromkeys(twins) if twin not in effects]
+def lookalikes(effects: tuple[str, ...]) -> dict[str, str]:
+    """Return what else would do the same to a reconstructed force as these effects, and why."""
+    twins: dict[str, str] = {}
+    for name in effects:
+        for twin, why in (EFFECTS[name].lookalikes if name in EFFECTS else {}).items():
+            if twin not in effects:
+                twins.setdefault(twin, why)
+    return twins
+
+
+def _absorbed(effects: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the effects that the damper's law takes up whole, without a load cell."""
+    able = [effect.name for effect in effects_of("structure") if effect.absorbed_by]
+    return tuple(name for name in able if name not in effects)
+
+
+def _in_a_storey(name: str) -> bool:
+    return name in EFFECTS and "which" in EFFECTS[name].parameters
+
+
+def late_values(finding: Finding) -> dict[str, float]:
+    """Return the parameter and the time [s] of a finding that the load cell is late, if it is."""
+    if len(finding.effects) != 1 or not late_effects([n for n in finding.effects if n in EFFECTS]):
+        return {}
+    (name,) = finding.effects
+    return {f"{name}.{EFFECTS[name].late[0]}": float(finding.coordinate.split()[0])}
 
 
 def _is_gain(finding: Finding) -> bool:
-    return "force_gain" in finding.effects
+    return FORCE_GAIN in finding.effects
 
 
 def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
@@ -216,7 +220,11 @@ def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
 
 
 def words(
-    kind: str, effects: tuple[str, ...], sites: Mapping[str, str], alike: list[str], coordinate: str
+    kind: str,
+    effects: tuple[str, ...],
+    sites: Mapping[str, str],
+    alike: Mapping[str, str],
+    coordinate: str,
 ) -> str:
     """Return the verdict as sentences."""
     told = []
@@ -225,14 +233,13 @@ def words(
     elif kind == "effect":
         told.append(f"Missing: {', '.join(f'{e} ({sites[e]})' for e in effects)}.")
     elif kind == "class":
-        others = [NAMES[twin] for twin in alike if twin in NAMES]
+        others = [twin for twin in alike if twin not in EFFECTS]
         told.append(
             f"Missing is one of {', '.join([*effects, *others])}; these runs cannot say which."
         )
     else:
         told.append(f"Something is missing that no effect explains, along {coordinate}.")
         told += [f"Besides, {e} is missing ({sites[e]})." for e in effects if e in sites]
-    for twin in alike:
-        reason = WHY.get(twin, "both add up to one force")
+    for reason in alike.values():
         told.append(f"Without a measured force {reason}: a load cell at the damper would tell.")
     return " ".join(told)

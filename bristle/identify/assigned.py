@@ -48,25 +48,42 @@ def _acts(name: str, model: Model, site: str, sites: Container[str]) -> bool:
 
 
 def unassigned(model: Model, sites: Sequence[str]) -> list[str]:
-    """Return the effects of a model that act at none of the sites that runs show."""
+    """Return the effects of a model that act at none of the sites that the runs show."""
     assigned = {name for site in sites for name in at_site(model, site, sites).effects}
     return [name for name in model.effects if name not in assigned]
 
 
-def corrected_for_delay(found: list[Response], model: Model) -> tuple[list[Response], Model]:
-    """Return responses whose measured force is set right by a model's `delay`, and the rest of it.
+def linear_storeys(effects: Sequence[str]) -> bool:
+    """Return whether no effect acts on the springs of a building's storeys."""
+    return not any("spring" in EFFECTS[name].hooks() for name in effects)
 
-    Equilibrium needs the force of the same instant as the accelerations.
+
+def late_effects(effects: Sequence[str]) -> list[str]:
+    """Return the effects among these that show the force late."""
+    known = [EFFECTS[name] for name in effects]
+    return [e.name for e in known if e.site == "sensor" and e.shows == "force" and e.late]
+
+
+def lateness(model: Model) -> float:
+    """Return by how much [s] a model's effects show the force late."""
+    return sum(model.value(f"{n}.{EFFECTS[n].late[0]}") for n in late_effects(model.effects))
+
+
+def corrected_for_delay(found: list[Response], model: Model) -> tuple[list[Response], Model]:
+    """Return responses whose measured force is set right by how late a model shows it.
+
+    And the rest of that model. Equilibrium needs the force of the same instant as the
+    accelerations.
     """
-    if "delay" not in model.effects or any(one.force is None for one in found):
+    late = late_effects(model.effects)
+    if not late or any(one.force is None for one in found):
         return found, model
-    late = model.value("delay.time")
     rest = replace(
         model,
-        effects=tuple(name for name in model.effects if name != "delay"),
-        values={n: v for n, v in model.values.items() if not n.startswith("delay.")},
+        effects=tuple(name for name in model.effects if name not in late),
+        values={n: v for n, v in model.values.items() if n.partition(".")[0] not in late},
     )
-    return [corrected(one, late, 1.0) for one in found], rest
+    return [corrected(one, lateness(model), 1.0) for one in found], rest
 
 
 def corrected(response: Response, delay: float, gain: float) -> Response:

@@ -31,8 +31,20 @@ from .search import HUBER_AT_ONE, descend, jacobian, loss
 from .starts import start_model, start_models
 
 __all__ = [
-    "OTHER_LAWS", "Expected", "Fit", "Model", "Problem", "Run", "Scaled", "fit",
-    "identify", "law_parameters", "parameter", "settled", "sizes", "start_model",
+    "OTHER_LAWS",
+    "Expected",
+    "Fit",
+    "Model",
+    "Problem",
+    "Run",
+    "Scaled",
+    "fit",
+    "identify",
+    "law_parameters",
+    "multistart_refit",
+    "parameter",
+    "sizes",
+    "start_model",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -133,7 +145,7 @@ def fit(
     return Fit(best, std, found.cost, lost, found.sweeps)
 
 
-def settled(problem: Problem, model: Model, max_evaluations: int = 25) -> Fit:
+def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) -> Fit:
     """Fit a model for the report: many draws for its intervals, and the spread of a rough loss.
 
     Impacts make the loss of a joint rough: a search ends in one of many dents, whose own width says
@@ -275,7 +287,7 @@ def identify(
     best = min(fits, key=lambda one: one.cost)
     agreed = sum(one.cost <= best.cost * (1.0 + _ALIKE) for one in fits)
     best = fit(problem, best.model, expectation=problem.expectation(best.model), with_std=False)
-    best = settled(problem, best.model)
+    best = multistart_refit(problem, best.model)
     return replace(
         best, unidentified=(*silent, *best.unidentified), starts=len(trials), agreed=agreed
     )

@@ -16,7 +16,7 @@ from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..physics.building import Building
 from ..physics.effect import EFFECTS
-from .assigned import corrected_for_delay, unassigned
+from .assigned import corrected_for_delay, lateness, linear_storeys, unassigned
 from .model import Model, Problem
 from .prepare import prepare
 from .response import Response, responses
@@ -186,8 +186,7 @@ class _BuildingSites:
         self._made: dict[tuple[object, ...], dict[str, Site]] = {}
 
     def __call__(self, model: Model) -> dict[str, Site]:
-        straight = "storey_softening" not in model.effects
-        late = model.value("delay.time") if "delay" in model.effects else 0.0
+        straight, late = linear_storeys(model.effects), lateness(model)
         key = (model.law, straight, late)
         if key not in self._made:
             plain = self._sites(self._found, model.law, straight)

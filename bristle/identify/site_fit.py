@@ -7,9 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from itertools import product
-
-import numpy as np
 
 from ..physics.effect import EFFECTS
 from .assigned import at_site
@@ -18,14 +15,11 @@ from .line import fit_line
 from .model import Model, Problem
 from .rig import Site
 from .search_context import refine
-from .start_grid import starts
+from .start_grid import initial_guesses
 from .structure import StructureProblem, thinned
 
 QUICK = 8
 """Sweeps of the first, short search from each start, on every fifth sample."""
-
-STOP = 0.4
-"""Share of the largest travel within which a stop would be met so often that it is a spring."""
 
 Values = Mapping[str, float]
 
@@ -127,51 +121,8 @@ def joined(effect: str, base: Model, train: StructureProblem) -> Model:
     light = few.expectation(base)
     begun = [
         fit(few, model, expectation=light, max_evaluations=QUICK, with_std=False)
-        for model in structure_starts(effect, base, train)
+        for model in initial_guesses(effect, base, train)
     ]
     best = min(begun, key=lambda one: one.cost).model
     expected = train.expectation(base)
     return fit(train, best, expectation=expected, max_evaluations=25, with_std=False).model
-
-
-def structure_starts(effect: str, base: Model, train: Problem) -> list[Model]:
-    """Return the models from which the search for an effect of the structure begins.
-
-    Lengths are shares of the largest motion, for a stop beyond it has no force at all.
-    """
-    reach = max(float(np.max(np.abs(run.x))) for run in train.runs)
-    speed = max(float(np.max(np.abs(run.v))) for run in train.runs)
-    force, stiffness = train.size("N"), train.size("N/m")
-    damping = train.size("N.s/m")
-    grid: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
-        "base_friction": (
-            {"limit": (0.1 * force,), "x_s": (0.0, 0.05 * reach), "v_r": (0.1 * speed,)},
-        ),
-        "duffing": (
-            {"k_3": (0.3 * stiffness / reach**2, -0.1 * stiffness / reach**2), "shape": (3.0, 5.0)},
-        ),
-        "end_stop": (
-            {
-                "clearance": (0.55 * reach, 0.75 * reach, 0.9 * reach),
-                "k": (1.0 * stiffness,), "c": (1e-3 * damping,),
-            },
-        ),
-        "storey_softening": (
-            {"d_half": (0.7 * reach, 2.5 * reach)},
-            {"d_half": (5.0 * reach,), "yields": (0.3,), "d_y": (0.15 * reach, 0.4 * reach)},
-        ),
-    }  # fmt: skip
-    if effect not in grid:  # a user's own
-        return starts(effect, base, train)
-    own = {name: p.value for name, p in EFFECTS[effect].parameters.items()}
-    out = []
-    for net in grid[effect]:
-        for values in product(*net.values()):
-            chosen = {**own, **dict(zip(net, values, strict=True))}
-            named = {f"{effect}.{name}": value for name, value in chosen.items()}
-            values_now = {**base.values, **named}
-            out.append(replace(base, effects=(*base.effects, effect), values=values_now))
-    if effect == "end_stop":
-        limits = {**base.limits, "end_stop.clearance": (STOP * reach, reach)}
-        out = [replace(model, limits=limits) for model in out]
-    return out

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import gzip
+import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from bristle.data import formats
 from bristle.data.read import read_table
 from bristle.data.table import Table, table_from_frame
 from bristle.errors import RecordError
@@ -190,3 +192,45 @@ def test_frame_with_units_in_attrs() -> None:
     table = table_from_frame(frame)
     units = [column.unit.name for column in table.columns if column.unit]
     assert units == ["s", "N"]
+
+
+READER = '''
+"""Pairs: a format of this test, one pair of numbers a line after a mark."""
+
+import numpy as np
+
+from bristle.data.table import from_arrays
+
+
+def recognises(content, suffix):
+    return content.startswith(b"PAIRS") or suffix == ".pairs"
+
+
+def read(content, name):
+    rows = [line.split(b"|") for line in content.splitlines()[1:]]
+    time, force = np.array(rows, dtype=float).T
+    return from_arrays({"time [s]": time, "force [N]": force}, name)
+'''
+
+
+@pytest.fixture
+def another_format(tmp_path, monkeypatch):
+    """Put a file of one more format beside the others."""
+    folder = tmp_path / "formats"
+    folder.mkdir()
+    (folder / "pairs.py").write_text(READER, encoding="utf-8")
+    monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(folder)])
+    formats.formats.cache_clear()
+    yield
+    formats.formats.cache_clear()
+    sys.modules.pop(f"{formats.__name__}.pairs", None)
+
+
+def test_a_format_is_one_file(tmp_path, another_format):
+    path = tmp_path / "run.txt"
+    path.write_text("PAIRS\n0|1.5\n0.1|-2\n", encoding="utf-8")
+    table = read_table(path)
+    assert [column.text for column in table.columns] == ["time [s]", "force [N]"]
+    np.testing.assert_array_equal(table.values["force [N]"], [1.5, -2.0])
+    path.write_text("time [s],force [N]\n0,1.5\n0.1,-2\n0.2,1\n", encoding="utf-8")
+    np.testing.assert_array_equal(read_table(path).values["force [N]"], [1.5, -2.0, 1.0])

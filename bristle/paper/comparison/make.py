@@ -24,9 +24,10 @@ from ..figures import prepare
 from ..runs import Drawing, Runs
 from . import identification
 from . import page as page_of
-from .claims import Numbers, Statement, Verdict, ledger
+from .claims import Statement, ledger
 from .experiment import Comparison, cases, compare, motions, published_table
 from .facts import facts
+from .numbers import Numbers, Verdict
 from .pictures import FIGURES
 
 if TYPE_CHECKING:

@@ -18,16 +18,16 @@ ORDER = {"bias": 1, "sign": 2, "gain": 3, "delay": 4}
 """In which order faults are taken back: an offset is on what the instrument shows."""
 
 
-def mended(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> list[Measurement]:
+def corrected(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> list[Measurement]:
     """Return the measurements as they would be without the faults, so that physics can be judged.
 
     Displacement is the reference of velocity. Clipped samples of a channel are lost, those of the
     others are not.
     """
-    return [_mended(run, faults) for run in runs]
+    return [_corrected(run, faults) for run in runs]
 
 
-def _mended(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
+def _corrected(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
     channels, lost, noise = dict(run.channels), dict(run.lost), dict(run.noise)
     for fault in sorted(faults, key=lambda one: ORDER.get(one.fault, 0)):
         if fault.channel not in channels:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from bristle.diagnose.candidates import judge
-from bristle.diagnose.unlike import unlike
-from bristle.diagnose.unseen import unseen_fault
+from bristle.diagnose.inconsistent_runs import inconsistent_runs
+from bristle.diagnose.model_based_faults import model_based_fault
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, identify
 
@@ -36,7 +36,7 @@ def problems(**choices):
 
 def found(train, held_out):
     base = identify(train, "bingham", starts=2).model
-    return unseen_fault(judge(base, train, held_out), train, held_out)
+    return model_based_fault(judge(base, train, held_out), train, held_out)
 
 
 def preload(k):
@@ -87,7 +87,7 @@ def test_a_run_of_another_damper_is_named():
     train, held_out = problems()
     strange = made(7, ("gas_spring",), {"gas_spring.k": 300.0, "gas_spring.preload": 0.0})
     mixed = Problem([*train.runs, strange])
-    words = unlike(Model("bingham", (), LAW), mixed, held_out)
+    words = inconsistent_runs(Model("bingham", (), LAW), mixed, held_out)
     assert "run_7 (" in words
     assert "run_1 (" not in words
-    assert unlike(Model("bingham", (), LAW), train, held_out) == ""
+    assert inconsistent_runs(Model("bingham", (), LAW), train, held_out) == ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from bristle.diagnose.unlike import groups
+from bristle.diagnose.inconsistent_runs import groups
 from bristle.identify.fit import identify
 from tests.identify.truths import hidden_case, true_case
 

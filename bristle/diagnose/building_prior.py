@@ -22,14 +22,9 @@ from ..identify.search import HUBER
 from ..identify.search_context import Search
 from ..identify.structure import StructureProblem, damper_run
 from ..physics.building import Building
+from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
-
-STIFFNESS, MASS = 0.03, 0.01
-"""Standard deviations of a file's numbers, as shares: what a careful laboratory reaches."""
-
-FARTHEST = 2.0
-"""Standard deviations by which they may move: what is farther off is an effect, or a mistake."""
 
 TURNS, SETTLED = 3, 0.1
 """How often law and building are fitted in turn at most, and the step that ends it, in standard
@@ -39,8 +34,13 @@ TOLD = 0.005
 """Change of a number, as a share, from which it is told."""
 
 
-def as_known(
-    model: Model, responses: Sequence[Response], building: Building, law: str, straight: bool = True
+def within_prior(
+    model: Model,
+    responses: Sequence[Response],
+    building: Building,
+    law: str,
+    straight: bool = True,
+    rule: DecisionRule = BENCH,
 ) -> Building:
     """Return the building whose numbers, within what is known of them, suit the runs best.
 
@@ -50,39 +50,39 @@ def as_known(
     responses : the training runs
     law, straight : see `identify.structure.damper_run`
     """
-    slopes = _slopes(responses, building, law, straight)
+    slopes = _slopes(responses, building, law, straight, rule)
     shift = np.zeros(2 * building.size - 1)
     for _ in range(TURNS):
-        now = moved(building, shift)
+        now = moved(building, shift, rule)
         problem = StructureProblem(
             [damper_run(one, now, law, straight) for one in responses], 0, reconstructed=True
         )
         step, model = _step(problem, model, slopes, shift)
-        shift = np.clip(shift + step, -FARTHEST, FARTHEST)
+        shift = np.clip(shift + step, -rule.farthest, rule.farthest)
         if float(np.max(np.abs(step))) < SETTLED:
             break
-    return moved(building, shift)
+    return moved(building, shift, rule)
 
 
-def moved(building: Building, shift: Array) -> Building:
+def moved(building: Building, shift: Array, rule: DecisionRule = BENCH) -> Building:
     """Return a building with stiffnesses and upper masses (2 n - 1,) moved, in deviations."""
     n = building.size
     M, K = np.array(building.M), np.array(building.K)
     stiffnesses = np.array(building.stiffnesses)
     for i in range(n):
-        more = STIFFNESS * shift[i] * stiffnesses[i]
+        more = rule.stiffness_known * shift[i] * stiffnesses[i]
         across = np.eye(n)[i] - (np.eye(n)[i - 1] if i else 0.0)
         K += more * np.outer(across, across)
         stiffnesses[i] += more
         if i:
-            M[i, i] *= 1.0 + MASS * shift[n + i - 1]
+            M[i, i] *= 1.0 + rule.mass_known * shift[n + i - 1]
     return building._replace(
         M=tuple(map(tuple, M.tolist())), K=tuple(map(tuple, K.tolist())),
         stiffnesses=tuple(stiffnesses.tolist()),
     )  # fmt: skip
 
 
-def told(before: Building, after: Building) -> list[str]:
+def moved_numbers(before: Building, after: Building) -> list[str]:
     """Return sentences about the numbers that a building's file has otherwise."""
     names = before.levels()
     below = ["isolation" if before.isolated else "storey 1"]
@@ -103,13 +103,17 @@ def told(before: Building, after: Building) -> list[str]:
 
 
 def _slopes(
-    responses: Sequence[Response], building: Building, law: str, straight: bool
+    responses: Sequence[Response],
+    building: Building,
+    law: str,
+    straight: bool,
+    rule: DecisionRule,
 ) -> list[list[Array]]:
     """Return, per number and run, what a standard deviation of it adds to the force (n,) [N]."""
     here = [damper_run(one, building, law, straight) for one in responses]
     slopes = []
     for unit in np.eye(2 * building.size - 1):
-        other = moved(building, unit)
+        other = moved(building, unit, rule)
         there = [damper_run(one, other, law, straight) for one in responses]
         slopes.append([(b.force - a.force)[a.skip :] for a, b in zip(here, there, strict=True)])
     return slopes

@@ -19,51 +19,24 @@ from ..identify.fit import Model, Problem, Run
 from ..identify.model import steady
 from ..identify.search import HUBER_AT_ONE, losses
 from ..identify.search_context import refine, residuals
-from ..identify.start_grid import Ground, ranked
-from .candidates import Trial, begin, joinable, judge
+from ..identify.start_grid import SearchContext, ranked_guesses
+from ..physics.effect import EFFECTS, Effect, effects_of
+from .candidates import Trial, joinable, judge, short_search
+from .corrected import earlier
 from .faults import SensorFault
-from .mended import earlier
+from .rule import DRIVE, DecisionRule
 
 Array = NDArray[np.float64]
-
-GAIN = 0.03
-"""Share by which z on held-out runs must fall."""
-
-SHARE = 0.9
-"""Least part of what was unexplained that a fault must explain."""
-
-CLEAN = 1.05
-"""z below which nothing is left to explain."""
-
-CLOSE = 0.75
-"""Least part explained where z comes below `CLEAN`: of a small z the unexplained is uncertain."""
-
-MARGIN = 0.02
-"""Share by which an effect's loss may be below that of a fault: its parameters are more."""
 
 LATEST = 0.15
 """Largest delay of the voltage that is looked for [s]."""
 
-SMALLEST = 0.25
-"""Smallest delay of the voltage that matters, in sampling steps."""
-
-FIRST = 0.3
-"""Part of the loss that a first look must explain for a search to go on."""
-
 BLOCK = 250
 """Samples, longer than a residual's correlation."""
 
-_SPRING = ("gas_spring.k", "gas_spring.k_2", "gas_spring.k_3")
-_EVEN = ("gas_spring", "asymmetry")
-_SLOW = ("coil_lag", "remanence", "saturation", "temperature", "delay")
-
-PLAIN = 1.3
-"""z above which a record of the voltage that comes late needs no comparison: no effect precedes
-its cause, and by chance alone no lead explains so much."""
-
 
 @dataclass(frozen=True)
-class Unseen:
+class ModelBasedFault:
     """A fault, the runs set right, and how the model does on them."""
 
     fault: SensorFault
@@ -72,9 +45,13 @@ class Unseen:
     trial: Trial
 
 
-def unseen_fault(
-    before: Trial, train: Problem, held_out: Problem, drive: str = "voltage"
-) -> Unseen | None:
+def model_based_fault(
+    before: Trial,
+    train: Problem,
+    held_out: Problem,
+    drive: str = "voltage",
+    rule: DecisionRule = DRIVE,
+) -> ModelBasedFault | None:
     """Return the fault that explains what a model leaves; None where none does, or physics better.
 
     Parameters
@@ -82,33 +59,39 @@ def unseen_fault(
     before : the model without further effects, fitted to `train` and judged on `held_out`
     drive : {"voltage", "current"}, the channel that is the runs' drive
     """
-    if before.z < 1.0 + GAIN:
+    if before.z < 1.0 + rule.gain:
         return None
-    found = _zero_of_force(before, train, held_out)
-    if found and _explains(found.trial, before) and not _rival(found, before, train, _EVEN):
+    found = _zero_of_force(before, train, held_out, rule)
+    explains = found is not None and _explains(found.trial, before, rule)
+    if found and explains and not _rival(found, before, train, "force_bias", rule):
         return found
-    found = _late_drive(before, train, held_out, drive)
-    if found and _explains(found.trial, before):
-        rivals = () if before.z > PLAIN else _SLOW
-        return None if _rival(found, before, train, rivals) else found
+    found = _late_drive(before, train, held_out, drive, rule)
+    if found and _explains(found.trial, before, rule):
+        sure = before.z > rule.plain
+        return found if sure or not _rival(found, before, train, "late_drive", rule) else None
     return None
 
 
-def _explains(trial: Trial, before: Trial) -> bool:
+def _explains(trial: Trial, before: Trial, rule: DecisionRule) -> bool:
     share = 1.0 - max(trial.z**2 - 1.0, 0.0) / (before.z**2 - 1.0)
-    return 1.0 - trial.z / before.z > GAIN and share > (CLOSE if trial.z < CLEAN else SHARE)
+    least = rule.share_when_clean if trial.z < rule.clean else rule.share
+    return 1.0 - trial.z / before.z > rule.gain and share > least
 
 
-def _rival(found: Unseen, before: Trial, train: Problem, names: tuple[str, ...]) -> bool:
-    """Return whether an effect explains the runs as they are better than the fault does."""
+def _rival(
+    found: ModelBasedFault, before: Trial, train: Problem, fault: str, rule: DecisionRule
+) -> bool:
+    """Return whether an effect that looks like the fault explains the runs as they are better."""
     model = before.model
     own = found.trial.model
     cost = _loss(own, found.train)
-    ground = Ground(model, train)
-    rivals = [name for name in joinable(model) if name in names]
+    context = SearchContext(model, train)
+    rivals = [name for name in joinable(model) if fault in EFFECTS[name].mimics]
     with ThreadPoolExecutor(cpu_count()) as pool:
-        begun = pool.map(lambda name: begin(name, ground, ranked(name, ground)), rivals)
-        return any(_loss(one.model, train) < cost * (1.0 - MARGIN) for one in begun)
+        found_there = pool.map(
+            lambda name: short_search(name, context, ranked_guesses(name, context)), rivals
+        )
+        return any(_loss(one.model, train) < cost * (1.0 - rule.margin) for one in found_there)
 
 
 def _promise(cost: float, before: float) -> float:
@@ -123,31 +106,40 @@ def _loss(model: Model, problem: Problem) -> float:
 # --- the zero of the force ----------------------------------------------------------------------
 
 
-def _zero_of_force(before: Trial, train: Problem, held_out: Problem) -> Unseen | None:
+def _zero_of_force(
+    before: Trial, train: Problem, held_out: Problem, rule: DecisionRule
+) -> ModelBasedFault | None:
     """Return the offset of the force that fits best, as a preload without stiffness."""
-    if "gas_spring" in before.effects:
-        return None  # its preload is that offset
+    carrier = _carrier(before.model.law)
+    if carrier is None or any(EFFECTS[name].offset for name in before.effects):
+        return None  # an offset of its own would be that one
     base = before.model
     offset = float(np.median(_left(base, train)))
-    if _promise(_loss(base, _shifted(train, offset)), _loss(base, train)) < FIRST:
+    if _promise(_loss(base, _shifted(train, offset)), _loss(base, train)) < rule.promise:
         return None
-    values = {**base.values, **dict.fromkeys(_SPRING, 0.0), "gas_spring.preload": offset}
-    fitted = refine(
-        replace(
-            base, effects=(*base.effects, "gas_spring"), values=values, held=(*base.held, *_SPRING)
-        ),
-        train,
-    )
-    offset = fitted.value("gas_spring.preload")
-    own = {k: v for k, v in fitted.values.items() if not k.startswith("gas_spring.")}
+    own = f"{carrier.name}.{carrier.offset}"
+    others = tuple(f"{carrier.name}.{n}" for n in carrier.parameters if n != carrier.offset)
+    begun = replace(
+        base, effects=(*base.effects, carrier.name), held=(*base.held, *others),
+        values={**base.values, **dict.fromkeys(others, 0.0), own: offset},
+    )  # fmt: skip
+    fitted = refine(begun, train)
+    offset = fitted.value(own)
+    plain = {k: v for k, v in fitted.values.items() if k not in (own, *others)}
     right = [_shifted(problem, offset) for problem in (train, held_out)]
-    trial = judge(replace(base, values=own), right[0], right[1])
+    trial = judge(replace(base, values=plain), right[0], right[1])
     fault = SensorFault(
         "force", "bias", offset, _deviation(_left(trial.model, right[0])),
         f"Force shows {offset:.3g} N whatever the motion and the voltage, without the stiffness of "
         "a spring: the zero of the load cell is off, or a preload acts on the rod.",
     )  # fmt: skip
-    return Unseen(fault, right[0], right[1], trial)
+    return ModelBasedFault(fault, right[0], right[1], trial)
+
+
+def _carrier(law: str) -> type[Effect] | None:
+    """Return the effect whose offset is fitted in place of a constant, the library's own first."""
+    able = [effect for effect in effects_of("damper", law) if effect.offset]
+    return min(able, key=lambda effect: effect.own, default=None)
 
 
 def _left(model: Model, problem: Problem) -> Array:
@@ -170,7 +162,9 @@ def _deviation(left: Array) -> float:
 # --- a late voltage -----------------------------------------------------------------------------
 
 
-def _late_drive(before: Trial, train: Problem, held_out: Problem, drive: str) -> Unseen | None:
+def _late_drive(
+    before: Trial, train: Problem, held_out: Problem, drive: str, rule: DecisionRule
+) -> ModelBasedFault | None:
     """Return the delay of the voltage's record that fits best, the law refitted to it."""
     if steady(train):
         return None
@@ -182,11 +176,11 @@ def _late_drive(before: Trial, train: Problem, held_out: Problem, drive: str) ->
     for turn in range(3):
         cost = _cost_of_delay(model, train)
         late = _between(cost, grid, int(np.argmin([cost(delay) for delay in grid])))
-        if late < SMALLEST * dt:
+        if late < rule.least_delay * dt:
             return None
         moved = _moved(train, late)
         model = refine(model, moved, 4)
-        if turn == 0 and _promise(_loss(model, moved), at_first) < FIRST:
+        if turn == 0 and _promise(_loss(model, moved), at_first) < rule.promise:
             return None
     bend = cost(late + dt) + cost(late - dt) - 2.0 * cost(late)
     std = dt * float(np.sqrt(2.0 / max(bend, 1e-12)))
@@ -196,7 +190,9 @@ def _late_drive(before: Trial, train: Problem, held_out: Problem, drive: str) ->
         f"The force follows the {drive} {1e3 * late:.2f} ms before the {drive} was recorded: its "
         "record is late.",
     )  # fmt: skip
-    return Unseen(fault, right[0], right[1], judge(refine(model, right[0]), right[0], right[1]))
+    return ModelBasedFault(
+        fault, right[0], right[1], judge(refine(model, right[0]), right[0], right[1])
+    )
 
 
 def _cost_of_delay(model: Model, train: Problem) -> Callable[[float], float]:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from bristle.compare.where import LEVEL, Place
-from bristle.diagnose import unexplained
+from bristle.diagnose import remaining_residual
 from bristle.diagnose.diagnosis import Diagnosis, _without_drive
-from bristle.diagnose.unexplained import CLEAR, HALF, RINGS, most_telling, sentences
+from bristle.diagnose.remaining_residual import most_telling, sentences
+from bristle.diagnose.rule import BENCH
 
 NONE = np.zeros(0)
 
@@ -23,35 +24,35 @@ def rings(monkeypatch: pytest.MonkeyPatch):
     """Return what sets the share of a residual's power in a narrow band."""
 
     def answer(share: float) -> None:
-        monkeypatch.setattr(unexplained, "ringing", lambda trial, held_out: share)
+        monkeypatch.setattr(remaining_residual, "ringing", lambda trial, held_out: share)
 
     answer(0.0)
     return answer
 
 
 def test_a_significant_place_is_named_before_one_that_tells_little_more(rings):
-    found = [place("rest", 0.20, sure=False), place("speed", 1.1 * HALF * 0.20)]
+    found = [place("rest", 0.20, sure=False), place("speed", 1.1 * BENCH.half * 0.20)]
     assert most_telling(found, None, None) == "speed"
 
 
 def test_not_before_one_that_tells_far_more(rings):
-    found = [place("rest", 0.26, sure=False), place("acceleration", 0.9 * HALF * 0.26)]
+    found = [place("rest", 0.26, sure=False), place("acceleration", 0.9 * BENCH.half * 0.26)]
     assert most_telling(found, None, None) == "rest"
     assert "beyond chance" in sentences("rest", found)[0]
 
 
 def test_what_rings_and_follows_nothing_else_clearly_has_a_frequency(rings):
-    found = [place("speed", 0.9 * CLEAR)]
+    found = [place("speed", 0.9 * BENCH.clear)]
     assert most_telling(found, None, None) == "speed"
-    rings(1.1 * RINGS)
+    rings(1.1 * BENCH.rings)
     assert most_telling(found, None, None) == "frequency"
-    assert most_telling([place("displacement", 1.1 * CLEAR)], None, None) == "displacement"
+    assert most_telling([place("displacement", 1.1 * BENCH.clear)], None, None) == "displacement"
 
 
 def test_what_rings_after_each_reversal_has_a_frequency(rings):
-    found = [place("time_since_reversal", 1.1 * CLEAR)]
+    found = [place("time_since_reversal", 1.1 * BENCH.clear)]
     assert most_telling(found, None, None) == "time_since_reversal"
-    rings(1.1 * RINGS)
+    rings(1.1 * BENCH.rings)
     assert most_telling(found, None, None) == "frequency"
 
 

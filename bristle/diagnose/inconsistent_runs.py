@@ -9,15 +9,12 @@ from ..identify.fit import Model, Problem, fit, identify
 from ..identify.model import Run
 from ..identify.search import z_scale
 from ..identify.search_context import residuals
-
-MISFIT = 1.15
-"""z of training runs above which a model that explains the held-out ones still has not fitted."""
-
-MOST_GROUPS = 3
-"""More groups than that are no rigs: something changes from run to run."""
+from .rule import BENCH, DecisionRule
 
 
-def unlike(model: Model, train: Problem, held_out: Problem) -> str:
+def inconsistent_runs(
+    model: Model, train: Problem, held_out: Problem, rule: DecisionRule = BENCH
+) -> str:
     """Return, in words, which runs a model leaves unexplained and which it explains.
 
     For a model that the held-out runs do not contradict, while those that it was fitted to do: two
@@ -28,7 +25,7 @@ def unlike(model: Model, train: Problem, held_out: Problem) -> str:
         for problem in (train, held_out)
         for run in problem.runs
     }
-    bad = [name for name, size in z.items() if size > MISFIT]
+    bad = [name for name, size in z.items() if size > rule.misfit]
     good = [name for name in z if name not in bad]
     if not bad:
         return ""
@@ -39,7 +36,7 @@ def unlike(model: Model, train: Problem, held_out: Problem) -> str:
     )
 
 
-def groups(model: Model, train: Problem, held_out: Problem) -> str:
+def groups(model: Model, train: Problem, held_out: Problem, rule: DecisionRule = BENCH) -> str:
     """Return, in words, the groups of runs that each have values of their own, "" where not so.
 
     For a model that leaves the runs unexplained together: where it explains each of two or three
@@ -48,11 +45,11 @@ def groups(model: Model, train: Problem, held_out: Problem) -> str:
     found: list[list[Run]] = []
     for run in chain(train.runs, held_out.runs):
         for group in found:
-            if _explains(model, train, [*group, run]):
+            if _explains(model, train, [*group, run], rule):
                 group.append(run)
                 break
         else:
-            if len(found) == MOST_GROUPS or not _explains(model, train, [run]):
+            if len(found) == rule.most_groups or not _explains(model, train, [run], rule):
                 return ""
             found.append([run])
     if len(found) < 2 or min(len(group) for group in found) < 2:
@@ -64,19 +61,19 @@ def groups(model: Model, train: Problem, held_out: Problem) -> str:
     )
 
 
-def _explains(model: Model, problem: Problem, runs: list[Run]) -> bool:
+def _explains(model: Model, problem: Problem, runs: list[Run], rule: DecisionRule) -> bool:
     """Return whether a model that is fitted to these runs alone leaves noise.
 
     From the values of all runs, and from the runs' own: rigs may differ in size.
     """
     part = problem.of(runs)
-    if _z(fit(part, model, with_std=False).model, part) <= MISFIT:
+    if _z(fit(part, model, with_std=False).model, part) <= rule.misfit:
         return True
     own = identify(
         part, model.law, model.effects, 2, held=model.held,
         values={name: model.value(name) for name in model.held}, limits=model.limits,
     )  # fmt: skip
-    return _z(own.model, part) <= MISFIT
+    return _z(own.model, part) <= rule.misfit
 
 
 def _z(model: Model, problem: Problem) -> float:

@@ -13,21 +13,13 @@ from ..compare.where import Place, places
 from ..identify.fit import Problem
 from .candidates import Trial
 from .decision import missing
-
-CLEAR = 0.3
-"""Share of a residual's power along a coordinate that needs no second look."""
-
-RINGS = 0.4
-"""Share of a residual's power within a third of an octave that is a resonance."""
-
-HALF = 0.5
-"""Share of the most telling place's share from which a significant one is named before it."""
+from .rule import BENCH, DecisionRule
 
 FLIPS = 499
 """Random patterns of signs that say what chance would organise."""
 
 
-def where(trial: Trial, held_out: Problem) -> list[Place]:
+def patterns_of(trial: Trial, held_out: Problem) -> list[Place]:
     """Return along which coordinates a trial's residual is organised, the most telling first."""
     normalised, raw, coordinates, begin = [], [], [], 0
     for run in held_out.runs:
@@ -41,8 +33,12 @@ def where(trial: Trial, held_out: Problem) -> list[Place]:
     return places(normalised, raw, coordinates, flips=FLIPS)
 
 
-def unexplained(
-    before: Trial, trials: Sequence[Trial], rest: list[Place], held_out: Problem
+def remaining_residual(
+    before: Trial,
+    trials: Sequence[Trial],
+    rest: list[Place],
+    held_out: Problem,
+    rule: DecisionRule = BENCH,
 ) -> tuple[str, list[Place]]:
     """Return the coordinate that organises what no effect explains, and all places of it.
 
@@ -50,40 +46,42 @@ def unexplained(
     of `before`, is not clear, what the nearest effect leaves is looked at.
     """
     nearest = min(trials, key=lambda trial: trial.z, default=before)
-    if _clear(rest) or not missing(before, nearest):
-        return most_telling(rest, before, held_out), rest
-    rest = where(nearest, held_out)
-    return most_telling(rest, nearest, held_out), rest
+    if _clear(rest, rule) or not missing(before, nearest, rule):
+        return most_telling(rest, before, held_out, rule), rest
+    rest = patterns_of(nearest, held_out)
+    return most_telling(rest, nearest, held_out, rule), rest
 
 
-def sentences(coordinate: str, rest: Sequence[Place]) -> list[str]:
+def sentences(coordinate: str, rest: Sequence[Place], rule: DecisionRule = BENCH) -> list[str]:
     """Return the sentence about the coordinate of what is unexplained, in a list; none without."""
     if not coordinate:
         return []
     sure = coordinate == "frequency" or any(
-        place.significant for place in rest if place.coordinate == coordinate
+        place.p <= rule.chance for place in rest if place.coordinate == coordinate
     )
     how = "is organised by" if sure else "follows no coordinate beyond chance; nearest is"
     return [f"What is unexplained {how} {name_of(coordinate)}."]
 
 
-def _clear(places: Sequence[Place]) -> bool:
-    return bool(places) and places[0].significant and places[0].share > CLEAR
+def _clear(places: Sequence[Place], rule: DecisionRule) -> bool:
+    return bool(places) and places[0].p <= rule.chance and places[0].share > rule.clear
 
 
-def most_telling(rest: Sequence[Place], trial: Trial, held_out: Problem) -> str:
+def most_telling(
+    rest: Sequence[Place], trial: Trial, held_out: Problem, rule: DecisionRule = BENCH
+) -> str:
     """Return the coordinate of a residual: "frequency" where it rings and nothing else tells.
 
     A residual that rings with the time since a reversal belongs to a resonance that reversals
     strike. Significance chooses among places that tell about as much: one along which the data
     fall into few blocks may carry most of the residual all the same.
     """
-    telling = [place for place in rest if place.significant] or list(rest)
+    telling = [place for place in rest if place.p <= rule.chance] or list(rest)
     if not telling:
         return ""
-    first = telling[0] if telling[0].share > HALF * rest[0].share else rest[0]
+    first = telling[0] if telling[0].share > rule.half * rest[0].share else rest[0]
     struck = first.coordinate == "time_since_reversal"
-    if (struck or not _clear(telling)) and ringing(trial, held_out) > RINGS:
+    if (struck or not _clear(telling, rule)) and ringing(trial, held_out) > rule.rings:
         return "frequency"
     return first.coordinate
 

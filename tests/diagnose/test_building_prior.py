@@ -6,14 +6,8 @@ import numpy as np
 import pytest
 from shaken import building, measured, shake
 
-from bristle.diagnose.known_building import (
-    FARTHEST,
-    MASS,
-    STIFFNESS,
-    as_known,
-    moved,
-    told,
-)
+from bristle.diagnose.building_prior import moved, moved_numbers, within_prior
+from bristle.diagnose.rule import BENCH
 from bristle.identify.fit import Model
 from bristle.identify.response import responses
 from bristle.identify.site_fit import fit_damper
@@ -41,16 +35,18 @@ def known(file, runs):
     problem, _ = problems_of(found[:2], found[2:], file, "bingham")["damper"]
     assert problem.reconstructed
     model = fit_damper(problem, Model("bingham")).model
-    return as_known(model, found[:2], file, "bingham")
+    return within_prior(model, found[:2], file, "bingham")
 
 
 def test_a_move_is_that_of_the_numbers():
     b = building(2, True, 6)
     other = moved(b, np.array([1.0, -1.0, 0.0, 0.0, 2.0]))
-    assert other.stiffnesses[0] == pytest.approx((1.0 + STIFFNESS) * b.stiffnesses[0])
-    assert other.stiffnesses[1] == pytest.approx((1.0 - STIFFNESS) * b.stiffnesses[1])
+    assert other.stiffnesses[0] == pytest.approx((1.0 + BENCH.stiffness_known) * b.stiffnesses[0])
+    assert other.stiffnesses[1] == pytest.approx((1.0 - BENCH.stiffness_known) * b.stiffnesses[1])
     assert other.stiffnesses[2] == b.stiffnesses[2]
-    assert [other.M[i][i] / b.M[i][i] for i in range(3)] == pytest.approx([1, 1, 1 + 2 * MASS])
+    assert [other.M[i][i] / b.M[i][i] for i in range(3)] == pytest.approx(
+        [1, 1, 1 + 2 * BENCH.mass_known]
+    )
     K, file = np.array(other.K), np.array(b.K)
     assert np.allclose(K, K.T)
     assert K.sum() == pytest.approx(other.stiffnesses[0])  # moved as one, the first spring alone
@@ -65,12 +61,14 @@ def test_stiffnesses_that_the_file_has_wrong_come_back(shaken, off):
     found = known(file, runs)
     for mine, true in zip(found.stiffnesses[:2], b.stiffnesses[:2], strict=True):
         assert mine == pytest.approx(true, rel=0.004)
-    assert bool(told(file, found)) == bool(off)
+    assert bool(moved_numbers(file, found)) == bool(off)
 
 
 def test_what_is_farther_off_than_anybody_errs_stays(shaken):
     b, runs = shaken
     file = moved(b, np.array([-8.0, 0.0, 0.0, 0.0, 0.0]))
     found = known(file, runs)
-    assert found.stiffnesses[0] / file.stiffnesses[0] == pytest.approx(1.0 + FARTHEST * STIFFNESS)
-    assert "isolation" in told(file, found)[0]
+    assert found.stiffnesses[0] / file.stiffnesses[0] == pytest.approx(
+        1.0 + BENCH.farthest * BENCH.stiffness_known
+    )
+    assert "isolation" in moved_numbers(file, found)[0]
