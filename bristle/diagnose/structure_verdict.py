@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ..identify.assigned import late_effects
 from ..identify.fit import Fit
-from ..identify.placed import late_effects
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS, effects_of
 from .candidates import Trial
