@@ -14,8 +14,9 @@ from ..identify.structure import LinearLayer, StructureProblem, layer_run
 from ..physics.building import Building
 from ..physics.effect import instrument_of
 from .candidates import judge
+from .finding import Finding
 from .rule import SITE, DecisionRule
-from .sites import Finding, detectable
+from .sites import detectable
 
 FORCE_GAIN = "force_gain"
 """What a finding names for a load cell of a wrong scale, which is no effect."""

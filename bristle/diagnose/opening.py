@@ -1,17 +1,22 @@
-"""From measurements to trials: faults of the sensors, the present model, every effect inside it."""
+"""From measurements to trials at the damper: sensors' faults, the present model, every effect."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from ..compare.where import Place
 from ..data.derived import derived_velocity
 from ..data.measurement import Measurement
 from ..identify.fit import Model, Problem, identify
-from ..identify.prepare import SHORTEST, prepare
+from ..identify.prepare import SHORTEST
+from ..identify.rig import DAMPER, Seeds, bench_rig
 from ..identify.search_context import refine
+from ..identify.structure import StructureProblem
+from ..physics.effect import effects_of
 from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .corrected import corrected
 from .faults import SensorFault, words_of
@@ -19,6 +24,14 @@ from .model_based_faults import model_based_fault
 from .remaining_residual import patterns_of
 from .rule import BENCH, DecisionRule
 from .sensors import sensor_faults
+from .sites import try_effect
+
+DRAWS = Seeds(train=0, holdout=1000, apart=1)
+"""Draws of the motion's error of a diagnosis's own: what a fit was drawn from does not judge it."""
+
+CONTENDERS, NEAR = 3, 1.03
+"""How many trials at most are fitted to all that was recorded, and up to which z as a multiple of
+the best one's: rivals are told apart on equal terms."""
 
 Progress = Callable[[str], None]
 
@@ -38,10 +51,11 @@ class Insufficient:
 
 @dataclass(frozen=True)
 class Opening:
-    """What a diagnosis begins with: runs freed of their sensors' faults, and the present model.
+    """What a diagnosis of a damper begins with: runs freed of sensors' faults, and its model.
 
-    `before` is that model, fitted to `problem` and judged on `held_out`; `shown` the channels whose
-    instruments may still have an effect.
+    `before` is the present model, fitted to `problem` and judged on `held_out`; `shown` the
+    channels whose instruments may still have an effect. Inside a building `brief` is the part of
+    the training runs that effects are searched on, None on a bench.
     """
 
     before: Trial
@@ -50,6 +64,7 @@ class Opening:
     faults: tuple[SensorFault, ...]
     noise: Mapping[str, float]
     shown: tuple[str, ...]
+    brief: StructureProblem | None = None
 
 
 def opening(
@@ -78,10 +93,7 @@ def opening(
     if not all(left):
         told = ("No run has enough samples that are not clipped.", *words_of(faults))
         return Insufficient(told, tuple(faults), noise)
-    problem, held_out = (
-        Problem([prepare(one, seed=seed + i) for i, one in enumerate(runs)])
-        for runs, seed in zip(left, (0, 1000), strict=True)
-    )
+    problem, held_out = bench_rig(left[0], left[1], DRAWS).sites(present)[DAMPER].pair
     say("fitting the present model")
     base = refine(present, problem) if identified else _identified(present, problem)
     before = judge(base, problem, held_out)
@@ -111,22 +123,48 @@ class Trials:
         self.opened, self.say = opened, say
         self.before = opened.before
         say("trying every effect inside the model")
-        self.single = try_all(
-            self.before.model, opened.problem, opened.held_out, shown=opened.shown
-        )
-        self.patterns = patterns_of(self.before, opened.held_out)
+        self.single = self._all(self.before, None)
+
+    @cached_property
+    def patterns(self) -> list[Place]:
+        """Along which coordinates the present model's residual is organised."""
+        return patterns_of(self.before, self.opened.held_out)
 
     def grow(self, first: Trial) -> list[Trial]:
         """Return the trials of all effects added to a trial's model."""
         self.say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
-        opened = self.opened
-        return try_all(
-            first.model, opened.problem, opened.held_out, shown=opened.shown, most=SECONDS
-        )
+        return self._all(first, SECONDS)
 
     def reduce(self, pair: Trial) -> list[Trial]:
         """Return the trials of a pair's members alone."""
         return try_members(pair, self.before.model, self.opened.problem, self.opened.held_out)
+
+    def _all(self, first: Trial, most: int | None) -> list[Trial]:
+        opened = self.opened
+        on, held_out = opened.brief or opened.problem, opened.held_out
+        trials = try_all(first.model, on, held_out, shown=opened.shown, most=most)
+        if opened.brief is None:
+            return trials
+        trials = sorted([*trials, *self._of_layer(first)], key=lambda trial: trial.z)
+        if opened.brief is not opened.problem:
+            best = trials[0].z
+            for k, one in enumerate(trials[:CONTENDERS]):
+                if one.refined and one.z <= NEAR * best:
+                    trials[k] = judge(refine(one.model, opened.problem), opened.problem, held_out)
+        return sorted(trials, key=lambda trial: trial.z)
+
+    def _of_layer(self, first: Trial) -> list[Trial]:
+        """Return the trials of the layer's effects, of which a reconstructed force has a share."""
+        problem, held_out = self.opened.problem, self.opened.held_out
+        assert isinstance(problem, StructureProblem)
+        assert isinstance(held_out, StructureProblem)
+        if not problem.reconstructed:
+            return []
+        return [
+            try_effect(effect.name, first.model, problem, held_out)
+            for effect in effects_of("structure")
+            if "force" in effect.hooks() and effect.name not in first.model.effects
+        ]
 
 
 def _left(runs: Sequence[Measurement]) -> list[Measurement]:

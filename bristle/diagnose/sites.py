@@ -7,7 +7,7 @@ effects of the structure are few and distinct, and each is judged by held-out ru
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,31 +25,10 @@ from ..identify.structure import (
 from ..physics.effect import EFFECTS, effects_of
 from .candidates import Trial, judge
 from .evidence import paired
+from .finding import Finding
 from .rule import SITE, DecisionRule
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What one site shows: "layer", "storey1", ... or "force" for the load cell.
-
-    `kind` is "none", "effect", "class" or "unknown"; `z_before`, `z_after` on held-out runs;
-    `share` what the best effect explains of the excess, `detectable` the smallest share of the
-    site's force that would have been seen.
-    """
-
-    site: str
-    kind: str
-    effects: tuple[str, ...]
-    z_before: float
-    z_after: float
-    share: float
-    detectable: float
-    coordinate: str = ""
-    model: Model | None = None
-    trials: tuple[Trial, ...] = ()
-    before: Trial | None = None
 
 
 def look_at(
@@ -131,7 +110,7 @@ def judge_site(
     where = coordinate_of(named.residual, held_out) if kind == "unknown" else ""
     return Finding(
         site, kind, effects, before.z, named.z, share, detectable(held_out, rule), where,
-        named.model, tuple(trials), before,
+        named.model, tuple(trials), before, named,
     )  # fmt: skip
 
 

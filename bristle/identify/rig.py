@@ -76,6 +76,13 @@ class Site:
         """The runs that models are judged on, None where none is held out."""
         return self.make(ROLES[1])
 
+    @property
+    def pair(self) -> tuple[Problem, Problem]:
+        """The runs of both roles, where some are held out."""
+        held_out = self.holdout
+        assert held_out is not None
+        return self.train, held_out
+
     def problem_of(self, role: str) -> Problem | None:
         """Return the runs of a role, None where no run is held out."""
         return self.train if role == ROLES[0] else self.holdout

@@ -83,13 +83,14 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
     RecordError
         If a file cannot be read, a channel is missing, or a stiffness comes out negative.
     """
-    if not study.settings.has_building:
+    model = study.model()
+    given = building_of(study, model)
+    if given is None:
         raise StudyError(
             f'{study.folder}: rig = "{study.settings.rig}": there is no building in it. '
             "--structure needs a study made with  --rig structure --building FILE"
         )
-    model, runs = study.model(), study.runs()
-    given = building_of(study, model)
+    runs = study.runs()
     fit = identify_structure(runs.train, given)
     before: dict[str, float] = {}
     after: dict[str, float] = {}

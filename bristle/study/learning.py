@@ -7,21 +7,19 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..data.model import StudyModel
-from ..diagnose import Diagnosis, diagnose
+from ..diagnose import Diagnosis, diagnose, diagnose_rig
 from ..diagnose.faults import SensorFault
-from ..diagnose.structure import diagnose_structure
-from ..diagnose.structure_verdict import StructureDiagnosis
 from ..errors import StudyError
 from ..physics.effect import EFFECTS
 from .history import Step
 from .identification import FitTask, Identified, as_model, identify_model, identify_study
+from .rig import building_of
 from .study import Study, split_in_time
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Say = Callable[[str], None]
-Verdict = Diagnosis | StructureDiagnosis
 
 MOST_EFFECTS = 4
 """Effects that `learn` adds at the most: a model that asks for more is the wrong model."""
@@ -31,7 +29,7 @@ def _silent(text: str) -> None:
     """Say nothing."""
 
 
-def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> Verdict:
+def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> Diagnosis:
     """Return what the present model of a study is missing; write verdict.json.
 
     Parameters
@@ -47,11 +45,11 @@ def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> V
     """
     for why in study.usable_effects():
         say(f"left out: {why}")
-    model = study.model()
-    diagnoser = DIAGNOSERS.get(study.settings.rig)
-    if diagnoser is None:
-        raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not diagnosed yet.')
-    found = diagnoser(study, model, say)
+    model, runs = study.model(), study.runs()
+    found = diagnose_rig(
+        runs.train, runs.holdout, as_model(model), building_of(study, model),
+        identified=any(value.origin == "identified" for value in model.flat().values()), say=say,
+    )  # fmt: skip
     found = replace(found, sensors=(*found.sensors, *_turned(study)))
     if write:
         study.write_verdict(verdict_of(study, found))
@@ -70,33 +68,7 @@ def _turned(study: Study) -> list[SensorFault]:
     ]  # fmt: skip
 
 
-def _diagnose_bench(study: Study, model: StudyModel, say: Say) -> Diagnosis:
-    runs = study.runs()
-    start = as_model(model)
-    identified = any(value.origin == "identified" for value in model.flat().values())
-    return diagnose(
-        runs.train, runs.holdout, law=start.law, effects=start.effects,
-        values=start.values if identified else None, held=start.held, limits=start.limits,
-        progress=say,
-    )  # fmt: skip
-
-
-def _diagnose_building(study: Study, model: StudyModel, say: Say) -> StructureDiagnosis:
-    from .rig import building_of
-
-    runs, present = study.runs(), as_model(model)
-    building = building_of(study, model)
-    return diagnose_structure(runs.train, runs.holdout, building, present=present, say=say)
-
-
-DIAGNOSERS: dict[str, Callable[[Study, StudyModel, Say], Verdict]] = {
-    "bench": _diagnose_bench,
-    "structure": _diagnose_building,
-}
-"""What diagnoses a study, by its rig."""
-
-
-def verdict_of(study: Study, found: Verdict) -> dict[str, Any]:
+def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
     """Return the content of verdict.json, with what weakens the split of the runs."""
     verdict = found.as_dict()
     notes = study.runs().notes
@@ -117,7 +89,7 @@ class Added:
 
 
 def add_effects(
-    study: Study, names: Sequence[str], *, why: str = "", found: Verdict | None = None
+    study: Study, names: Sequence[str], *, why: str = "", found: Diagnosis | None = None
 ) -> Added:
     """Add effects to a study's model, refit it, and write the step.
 
@@ -171,7 +143,7 @@ def _refuse(model: StudyModel, name: str) -> None:
 class Learned:
     """What `learn` came to: the last diagnosis, and the steps that it made."""
 
-    verdict: Verdict
+    verdict: Diagnosis
     steps: tuple[Step, ...]
 
     def as_dict(self) -> dict[str, Any]:

@@ -19,11 +19,17 @@ def rig_of(study: Study, model: StudyModel, runs: Runs) -> Rig:
     RecordError
         If a building lacks a channel, or has other levels than were measured.
     """
-    if study.settings.has_building:
-        return building_rig(runs.train, runs.holdout, building_of(study, model))
-    return bench_rig(runs.train, runs.holdout)
+    building = building_of(study, model)
+    if building is None:
+        return bench_rig(runs.train, runs.holdout)
+    return building_rig(runs.train, runs.holdout, building)
 
 
-def building_of(study: Study, model: StudyModel) -> Building:
-    """Return the building of a study: its file, or the paper's where it names none."""
+def building_of(study: Study, model: StudyModel) -> Building | None:
+    """Return the building of a study: its file, or the paper's where it names none.
+
+    None where the damper was measured on a test bench.
+    """
+    if not study.settings.has_building:
+        return None
     return read_building(study.folder / model.building) if model.building else paper_building()

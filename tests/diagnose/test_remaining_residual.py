@@ -7,9 +7,10 @@ import pytest
 
 from bristle.compare.where import LEVEL, Place
 from bristle.diagnose import remaining_residual
-from bristle.diagnose.diagnosis import Diagnosis, _without_drive
+from bristle.diagnose.bench import without_drive
 from bristle.diagnose.remaining_residual import most_telling, sentences
 from bristle.diagnose.rule import BENCH
+from bristle.diagnose.verdict import Diagnosis
 
 NONE = np.zeros(0)
 
@@ -70,5 +71,5 @@ def test_a_drive_that_nobody_recorded_leaves_a_doubt(channels, kind, doubted):
         def has(self, channel: str) -> bool:
             return channel in channels
 
-    found = _without_drive(Diagnosis(kind, (), "Something."), [Bare()])
+    found = without_drive(Diagnosis(kind, (), "Something."), [Bare()])
     assert ("Neither voltage nor current" in found.words) is doubted

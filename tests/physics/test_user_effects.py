@@ -12,7 +12,7 @@ from bristle.check.user_effects import refused, usable
 from bristle.cli import main
 from bristle.cli._effect_template import template
 from bristle.diagnose.candidates import joinable
-from bristle.diagnose.structure_verdict import lookalikes
+from bristle.diagnose.verdict import lookalikes
 from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
 from bristle.identify.model import REFERENCE, Model, Problem, Run
