@@ -144,11 +144,12 @@ def _without_drive(found: Diagnosis, runs: Sequence[Measurement]) -> Diagnosis:
     return replace(found, words=f"{found.words} {doubt}")
 
 
-def is_organised(patterns: Sequence[Place], rule: DecisionRule = BENCH) -> bool:
-    """Return whether a coordinate organises a residual strongly, and beyond chance."""
-    if not patterns:
-        return False
-    return patterns[0].p <= rule.chance and patterns[0].share > rule.organised
+def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:
+    """Return whether a coordinate organises a residual strongly, and beyond chance.
+
+    `share` of its power lies along the coordinate; `p` is the probability that chance does that.
+    """
+    return p <= rule.chance and share > rule.organised
 
 
 def kind_of(decision: Decision, before: Trial, rule: DecisionRule = BENCH) -> str:
@@ -182,7 +183,8 @@ def _judged(opened: Opening, say: Progress, rule: DecisionRule = BENCH) -> Diagn
     faults, noise = opened.faults, opened.noise
     made = Trials(opened, say)
     trials, rest = made.single, made.patterns
-    decision = decide(before, trials, made.grow, is_organised(rest, rule), made.reduce, rule)
+    organised = bool(rest) and is_organised(rest[0].share, rest[0].p, rule)
+    decision = decide(before, trials, made.grow, organised, made.reduce, rule)
     expected = problem.expectation(before.model)
     visible = detectable(problem, expected, rule)
     hidden = untestable(before.model, problem, expected, visible, rule)
