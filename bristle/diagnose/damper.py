@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from ..compare.where import Place
 from ..identify.fit import Model, multistart_refit
 from ..identify.search_context import is_rough
 from ..identify.site_fit import fit_damper
@@ -36,7 +34,10 @@ def look_at_damper(opened: Opening, say: Progress = silent, rule: DecisionRule =
     if inside and max(before.z, before.train) <= rule.quiet:
         return of_decision(decide(before, [], lambda _first: [], rule=rule), before)
     made = Trials(opened, say)
-    organised = not inside and is_organised(made.patterns, rule)
+    organised = False
+    if not inside and made.patterns:
+        first = made.patterns[0]
+        organised = is_organised(first.share, first.p, rule)
     decision = decide(before, made.single, made.grow, organised, made.reduce, rule)
     if inside:
         if decision.kind in ("none", "unknown", "insufficient"):
@@ -69,11 +70,12 @@ def _with_limits(found: Finding, opened: Opening, made: Trials, rule: DecisionRu
     )  # fmt: skip
 
 
-def is_organised(patterns: Sequence[Place], rule: DecisionRule = BENCH) -> bool:
-    """Return whether a coordinate organises a residual strongly, and beyond chance."""
-    if not patterns:
-        return False
-    return patterns[0].p <= rule.chance and patterns[0].share > rule.organised
+def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:
+    """Return whether a residual depends strongly on a coordinate, and beyond chance.
+
+    `share` of its power lies along the coordinate; `p` is the probability that chance does that.
+    """
+    return p <= rule.chance and share > rule.organised
 
 
 def kind_of(decision: Decision, before: Trial, rule: DecisionRule = BENCH) -> str:

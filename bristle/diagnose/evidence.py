@@ -12,6 +12,10 @@ from .rule import BENCH
 Array = NDArray[np.float64]
 
 
+BLOCK = 250
+"""Samples per block, longer than the residuals' correlation."""
+
+
 @dataclass(frozen=True)
 class Difference:
     """A paired difference of losses on held-out runs: its mean and the interval of that mean."""
@@ -26,11 +30,16 @@ class Difference:
         return self.low > 0.0 or self.high < 0.0
 
 
+def parts_of(losses: Array, block: int = BLOCK) -> list[Array]:
+    """Return losses (n,) in blocks of about so many samples, four at least."""
+    return np.array_split(losses, max(4, len(losses) // block))
+
+
 def paired(
     first: Array,
     second: Array,
     chance: float = BENCH.chance,
-    block: int = 250,
+    block: int = BLOCK,
     draws: int = 400,
     seed: int = 0,
 ) -> Difference:
@@ -43,9 +52,7 @@ def paired(
     block : samples per block, longer than the residuals' correlation
     """
     difference = first - second
-    blocks = np.array(
-        [part.mean() for part in np.array_split(difference, max(4, len(difference) // block))]
-    )
+    blocks = np.array([part.mean() for part in parts_of(difference, block)])
     generator = np.random.default_rng(seed)
     picks = generator.integers(0, len(blocks), (draws, len(blocks)))
     means = blocks[picks].mean(axis=1)

@@ -22,7 +22,7 @@ ELSEWHERE = {
     ("diagnose/load_cell.py", "delay"): "a kind of sensor fault",
     ("diagnose/model_based_faults.py", "delay"): "a kind of sensor fault",
     ("diagnose/sensors.py", "delay"): "a kind of sensor fault",
-    ("diagnose/structure.py", "delay"): "a kind of sensor fault",
+    ("diagnose/equilibrium.py", "delay"): "a kind of sensor fault",
     ("simulate/layout.py", "delay"): "a field of the engine's record: a sensor's parameter",
     ("simulate/system.py", "delay"): "a field of the engine's record: a sensor's parameter",
 }
