@@ -8,8 +8,8 @@ from ..errors import RecordError
 from ..identify.model import Model
 from ..identify.rig import DAMPER, Rig
 from ..identify.rig_fit import SiteModel, SiteModels, site_models
-from .comparison import Comparison, compare_held
-from .held import Held, held_runs
+from .comparison import Comparison, compare_predictions
+from .prediction import RunPrediction, run_predictions
 from .sites import compare_sites, site_errors
 
 
@@ -39,15 +39,15 @@ class RigComparer:
         self._last: tuple[Model, SiteModels] | None = None
         self.site = self._chosen(present)
 
-    def held(self, model: Model) -> list[Held]:
+    def predictions(self, model: Model) -> list[RunPrediction]:
         """Return the runs held against a model at the site."""
-        return self._held(self._models(model)[self.site])
+        return self._predictions(self._models(model)[self.site])
 
     def compare(self, model: Model) -> Comparison:
         """Compare a model at the site, and tell how it stands at the others, if there are any."""
         here = self._models(model)[self.site]
         if not here.site.shown:
-            return compare_held(self._held(here), seen=self.seen)
+            return compare_predictions(self._predictions(here), seen=self.seen)
         return compare_sites(self._everywhere(model), self.site, seen=self.seen)
 
     def _models(self, model: Model) -> SiteModels:
@@ -56,16 +56,16 @@ class RigComparer:
             self._last = model, site_models(self.rig, model)
         return self._last[1]
 
-    def _everywhere(self, model: Model) -> dict[str, list[Held]]:
-        return {name: self._held(at) for name, at in self._models(model).items()}
+    def _everywhere(self, model: Model) -> dict[str, list[RunPrediction]]:
+        return {name: self._predictions(at) for name, at in self._models(model).items()}
 
-    def _held(self, at: SiteModel) -> list[Held]:
+    def _predictions(self, at: SiteModel) -> list[RunPrediction]:
         site, problem = at.site, at.site.problem_of(self.role)
         if problem is None:
             raise RecordError("there is no run to compare with.")
         return [
             replace(one, quantity=site.quantity, unit=site.unit, site=site.shown)
-            for one in held_runs(problem, at.model)
+            for one in run_predictions(problem, at.model)
         ]
 
     def _chosen(self, present: Model) -> str:

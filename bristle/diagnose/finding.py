@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from ..compare.where import Place
+from ..compare.patterns import ResidualPattern
 from ..identify.model import Model
 from ..identify.rig import DAMPER
 from .candidates import Trial
@@ -42,7 +42,7 @@ class Finding:
     after: Trial | None = None
     reasons: tuple[str, ...] = ()
     std: Mapping[str, float] = field(default_factory=dict)
-    patterns: tuple[Place, ...] = ()
+    patterns: tuple[ResidualPattern, ...] = ()
     untestable: tuple[str, ...] = ()
     experiment: Experiment | None = None
 

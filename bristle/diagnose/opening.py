@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..compare.where import Place
+from ..compare.patterns import ResidualPattern
 from ..data.derived import derived_velocity
 from ..data.measurement import Measurement
 from ..identify.fit import Model, Problem, identify
@@ -126,7 +126,7 @@ class Trials:
         self.single = self._all(self.before, None)
 
     @cached_property
-    def patterns(self) -> list[Place]:
+    def patterns(self) -> list[ResidualPattern]:
         """Along which coordinates the present model's residual is organised."""
         return patterns_of(self.before, self.opened.held_out)
 

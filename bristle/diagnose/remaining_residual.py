@@ -9,7 +9,7 @@ from scipy.signal import welch
 
 from ..compare.coordinates import coordinates_of, late_speed
 from ..compare.names import name_of
-from ..compare.where import Place, places
+from ..compare.patterns import ResidualPattern, residual_patterns
 from ..identify.fit import Problem
 from .candidates import Trial
 from .decision import missing
@@ -19,7 +19,7 @@ FLIPS = 499
 """Random patterns of signs that say what chance would organise."""
 
 
-def patterns_of(trial: Trial, held_out: Problem) -> list[Place]:
+def patterns_of(trial: Trial, held_out: Problem) -> list[ResidualPattern]:
     """Return along which coordinates a trial's residual is organised, the most telling first."""
     normalised, raw, coordinates, begin = [], [], [], 0
     for run in held_out.runs:
@@ -30,19 +30,19 @@ def patterns_of(trial: Trial, held_out: Problem) -> list[Place]:
         along["rest"] = late_speed(run.v, run.dt)
         coordinates.append({name: values[run.skip :] for name, values in along.items()})
         begin += size
-    return places(normalised, raw, coordinates, flips=FLIPS)
+    return residual_patterns(normalised, raw, coordinates, flips=FLIPS)
 
 
 def remaining_residual(
     before: Trial,
     trials: Sequence[Trial],
-    rest: list[Place],
+    rest: list[ResidualPattern],
     held_out: Problem,
     rule: DecisionRule = BENCH,
-) -> tuple[str, list[Place]]:
-    """Return the coordinate that organises what no effect explains, and all places of it.
+) -> tuple[str, list[ResidualPattern]]:
+    """Return the coordinate that organises what no effect explains, and all patterns of it.
 
-    What an effect can mimic may hide what no effect can: where `rest`, the places of the residual
+    What an effect can mimic may hide what no effect can: where `rest`, the patterns of the residual
     of `before`, is not clear, what the nearest effect leaves is looked at.
     """
     nearest = min(trials, key=lambda trial: trial.z, default=before)
@@ -52,31 +52,33 @@ def remaining_residual(
     return most_telling(rest, nearest, held_out, rule), rest
 
 
-def sentences(coordinate: str, rest: Sequence[Place], rule: DecisionRule = BENCH) -> list[str]:
+def sentences(
+    coordinate: str, rest: Sequence[ResidualPattern], rule: DecisionRule = BENCH
+) -> list[str]:
     """Return the sentence about the coordinate of what is unexplained, in a list; none without."""
     if not coordinate:
         return []
     sure = coordinate == "frequency" or any(
-        place.p <= rule.chance for place in rest if place.coordinate == coordinate
+        pattern.p <= rule.chance for pattern in rest if pattern.coordinate == coordinate
     )
     how = "is organised by" if sure else "follows no coordinate beyond chance; nearest is"
     return [f"What is unexplained {how} {name_of(coordinate)}."]
 
 
-def _clear(places: Sequence[Place], rule: DecisionRule) -> bool:
-    return bool(places) and places[0].p <= rule.chance and places[0].share > rule.clear
+def _clear(patterns: Sequence[ResidualPattern], rule: DecisionRule) -> bool:
+    return bool(patterns) and patterns[0].p <= rule.chance and patterns[0].share > rule.clear
 
 
 def most_telling(
-    rest: Sequence[Place], trial: Trial, held_out: Problem, rule: DecisionRule = BENCH
+    rest: Sequence[ResidualPattern], trial: Trial, held_out: Problem, rule: DecisionRule = BENCH
 ) -> str:
     """Return the coordinate of a residual: "frequency" where it rings and nothing else tells.
 
     A residual that rings with the time since a reversal belongs to a resonance that reversals
-    strike. Significance chooses among places that tell about as much: one along which the data
+    strike. Significance chooses among patterns that tell about as much: one along which the data
     fall into few blocks may carry most of the residual all the same.
     """
-    telling = [place for place in rest if place.p <= rule.chance] or list(rest)
+    telling = [pattern for pattern in rest if pattern.p <= rule.chance] or list(rest)
     if not telling:
         return ""
     first = telling[0] if telling[0].share > rule.half * rest[0].share else rest[0]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..compare.where import Place as ResidualPattern
+from ..compare.patterns import ResidualPattern
 from ..identify.assigned import late_effects
 from ..identify.rig import DAMPER
 from ..physics.effect import EFFECTS, effects_of

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..compare.names import place_name
+from ..compare.names import site_name
 from ..draw.style import percent, short_z
 from ..errors import BristleError
 from . import html
@@ -102,8 +102,8 @@ def _judged(tread: Tread, against: RigComparer, study: Study) -> Tread:
     if tread.z is not None or tread.number == 0:
         return tread  # the model that a study begins with is nobody's guess of this damper
     then = read_model(study.history.model_file(tread.number), study.folder)
-    held = against.held(as_model(then))
-    return replace(tread, z=z_scale(np.concatenate([one.normalised for one in held])))
+    runs = against.predictions(as_model(then))
+    return replace(tread, z=z_scale(np.concatenate([one.normalised for one in runs])))
 
 
 def render(content: Content) -> str:
@@ -192,9 +192,9 @@ def _where(content: Content) -> str:
         return html.section("Where the model stands", html.paragraphs(content.trouble))
     from ..draw.style import png
     from .study_pictures import error_page
-    from .tables import place_table
+    from .tables import pattern_table
 
-    _, header, rows = place_table(now)
+    _, header, rows = pattern_table(now)
     along = "the two coordinates that organise it most"
     if now.second:
         along = "the coordinate that organises it most, and what is left after that along the next"
@@ -230,7 +230,7 @@ def _sites(content: Content) -> list[str]:
     _, header, rows = site_table(now)
     rings = f" Rings: without {content.added}." if content.before else ""
     worst = now.sites[0]
-    name = place_name(worst.site)
+    name = site_name(worst.site)
     title = f"The model is right within its noise at every site; {name} is worst"
     if worst.fails:
         title = f"Of the building's sites {name} is worst: z = {short_z(worst.z)}"

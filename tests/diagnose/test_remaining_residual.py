@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.compare.where import LEVEL, Place
+from bristle.compare.patterns import LEVEL, ResidualPattern
 from bristle.diagnose import remaining_residual
 from bristle.diagnose.bench import without_drive
 from bristle.diagnose.remaining_residual import most_telling, sentences
@@ -15,9 +15,11 @@ from bristle.diagnose.verdict import Diagnosis
 NONE = np.zeros(0)
 
 
-def place(coordinate: str, share: float, sure: bool = True) -> Place:
+def pattern(coordinate: str, share: float, sure: bool = True) -> ResidualPattern:
     p = 0.1 * LEVEL if sure else 10.0 * LEVEL
-    return Place(coordinate, False, share, share, p, share, 0.0, NONE, NONE, NONE, NONE, NONE)
+    return ResidualPattern(
+        coordinate, False, share, share, p, share, 0.0, NONE, NONE, NONE, NONE, NONE
+    )
 
 
 @pytest.fixture
@@ -32,26 +34,26 @@ def rings(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_significant_place_is_named_before_one_that_tells_little_more(rings):
-    found = [place("rest", 0.20, sure=False), place("speed", 1.1 * BENCH.half * 0.20)]
+    found = [pattern("rest", 0.20, sure=False), pattern("speed", 1.1 * BENCH.half * 0.20)]
     assert most_telling(found, None, None) == "speed"
 
 
 def test_not_before_one_that_tells_far_more(rings):
-    found = [place("rest", 0.26, sure=False), place("acceleration", 0.9 * BENCH.half * 0.26)]
+    found = [pattern("rest", 0.26, sure=False), pattern("acceleration", 0.9 * BENCH.half * 0.26)]
     assert most_telling(found, None, None) == "rest"
     assert "beyond chance" in sentences("rest", found)[0]
 
 
 def test_what_rings_and_follows_nothing_else_clearly_has_a_frequency(rings):
-    found = [place("speed", 0.9 * BENCH.clear)]
+    found = [pattern("speed", 0.9 * BENCH.clear)]
     assert most_telling(found, None, None) == "speed"
     rings(1.1 * BENCH.rings)
     assert most_telling(found, None, None) == "frequency"
-    assert most_telling([place("displacement", 1.1 * BENCH.clear)], None, None) == "displacement"
+    assert most_telling([pattern("displacement", 1.1 * BENCH.clear)], None, None) == "displacement"
 
 
 def test_what_rings_after_each_reversal_has_a_frequency(rings):
-    found = [place("time_since_reversal", 1.1 * BENCH.clear)]
+    found = [pattern("time_since_reversal", 1.1 * BENCH.clear)]
     assert most_telling(found, None, None) == "time_since_reversal"
     rings(1.1 * BENCH.rings)
     assert most_telling(found, None, None) == "frequency"

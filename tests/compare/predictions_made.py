@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from bristle.compare.coordinates import coordinates_of
-from bristle.compare.held import Held
+from bristle.compare.prediction import RunPrediction
 
 DT = 0.002
 
@@ -32,7 +32,7 @@ def coloured(n, random, phi=0.0):
     return lfilter([np.sqrt(1.0 - phi**2)], [1.0, -phi], white)[500:]
 
 
-def held_runs_with(
+def predictions_with(
     plant=None, *, count=3, n=4000, phi=0.0, noise=0.05, seed=0, kind="random", size=1.0
 ):
     """Return runs whose residual is `size` times the noise, and what `plant` adds [N].
@@ -51,6 +51,8 @@ def held_runs_with(
         zero = np.zeros((1, n))
         sigma = np.full(n, noise)
         out.append(
-            Held(f"run_{k}", DT, force + error, force, sigma, noise, zero, along, np.zeros(n))
+            RunPrediction(
+                f"run_{k}", DT, force + error, force, sigma, noise, zero, along, np.zeros(n)
+            )
         )
     return out

@@ -50,7 +50,7 @@ PREFERENCE = (
 
 
 @dataclass(frozen=True)
-class Place:
+class ResidualPattern:
     """How far one coordinate organises the residual.
 
     `turned`: the residual was taken times the direction of motion, so that positive means more
@@ -149,14 +149,14 @@ def correlation_time(r: Array) -> float:
     return float(max(1.0, tau[stop[0]] if len(stop) else tau.max()))
 
 
-def places(
+def residual_patterns(
     residuals: Sequence[Array],
     raw: Sequence[Array],
     coordinates: Sequence[Mapping[str, Array]],
     *,
     flips: int = FLIPS,
     seed: int = 0,
-) -> list[Place]:
+) -> list[ResidualPattern]:
     """Return every coordinate with its share of the residual; the most telling one first.
 
     Parameters
@@ -221,19 +221,19 @@ class Finder:
 
     def ranked(
         self, normalised: Array, raw: Array | None = None, leave_out: Sequence[str] = ()
-    ) -> list[Place]:
-        """Return the places of a residual (n,), the most telling one first.
+    ) -> list[ResidualPattern]:
+        """Return the patterns of a residual (n,), the most telling one first.
 
         `raw` (n,) is the same in its unit, by default that of the runs.
         """
         raw = self.raw if raw is None else raw
-        found: list[Place] = []
+        found: list[ResidualPattern] = []
         scores: list[Array] = []
         for name, bins in self.bins.items():
             if name in leave_out:
                 continue
             options = [
-                self._place(name, bins, normalised, raw, turned) for turned in self._ways(name)
+                self._pattern(name, bins, normalised, raw, turned) for turned in self._ways(name)
             ]
             scores += [score for _, score in options]
             best = max(range(len(options)), key=lambda i: options[i][0].share)
@@ -241,12 +241,12 @@ class Finder:
         if not found:
             return []
         most = np.max(np.array(scores), axis=0)
-        judged = [replace(one, p=_chance(one.p, most)) for one in found]
-        return preferred(judged)
+        tested = [replace(one, p=_chance(one.p, most)) for one in found]
+        return preferred(tested)
 
-    def without(self, normalised: Array, place: Place) -> Array:
-        """Return what is left of a residual (n,) after its means along a place are taken off."""
-        return self._less_means(normalised, self.bins[place.coordinate], place.turned)
+    def without(self, normalised: Array, pattern: ResidualPattern) -> Array:
+        """Return what is left of a residual (n,) after its means along a pattern are taken off."""
+        return self._less_means(normalised, self.bins[pattern.coordinate], pattern.turned)
 
     def _less_means(self, values: Array, bins: Bins, turned: bool) -> Array:
         values = values * self._turn(turned)
@@ -254,13 +254,15 @@ class Finder:
         mean = np.bincount(bins.label, weights=values, minlength=bins.count) / count
         return np.asarray((values - mean[bins.label]) * self._turn(turned))
 
-    def mean_along(self, place: Place, values: Array, chosen: Array) -> tuple[Array, Array]:
-        """Return means and standard deviations (b,) of values (n,) along a place, of some samples.
+    def mean_along(
+        self, pattern: ResidualPattern, values: Array, chosen: Array
+    ) -> tuple[Array, Array]:
+        """Return means and standard deviations (b,) of some values (n,) along a pattern.
 
         `chosen` (n,) is 1 for the samples that count and 0 for the others.
         """
-        bins = self.bins[place.coordinate]
-        turned = values * self._turn(place.turned)
+        bins = self.bins[pattern.coordinate]
+        turned = values * self._turn(pattern.turned)
         counts = self.blocks.sums(chosen, bins)
         sums = self.blocks.sums(turned * chosen, bins)
         n = counts.sum(axis=0)
@@ -281,10 +283,10 @@ class Finder:
         assert self.direction is not None
         return self.direction
 
-    def _place(
+    def _pattern(
         self, name: str, bins: Bins, normalised: Array, raw: Array, turned: bool
-    ) -> tuple[Place, Array]:
-        """Return a place, its `p` yet its score, and the scores that chance gives (flips,)."""
+    ) -> tuple[ResidualPattern, Array]:
+        """Return a pattern, its `p` yet its score, and the scores that chance gives (flips,)."""
         values = normalised * self._turn(turned)
         counts = np.maximum(np.bincount(bins.label, minlength=bins.count), 1.0)
         total = max(float(np.sum(normalised**2)), 1e-300)
@@ -301,12 +303,12 @@ class Finder:
         excess = share * power / (power - 1.0) if power > 1.1 else float("nan")
         raw = raw * self._turn(turned)
         mean = np.bincount(bins.label, weights=raw, minlength=bins.count) / counts
-        place = Place(
+        pattern = ResidualPattern(
             name, turned, share, min(excess, 1.0) if excess == excess else excess,
             (mine - middle) / width, mine, float(np.quantile(chance, 0.99)),
             bins.centre, bins.low, bins.high, mean, self.blocks.spread(raw, bins),
         )  # fmt: skip
-        return place, (chance - middle) / width
+        return pattern, (chance - middle) / width
 
 
 def _shares(sums: Array, counts: Array, total: float, centred: bool) -> Array:
@@ -321,8 +323,8 @@ def _chance(score: float, most: Array) -> float:
     return float((1 + np.count_nonzero(most >= score)) / (1 + len(most)))
 
 
-def preferred(found: list[Place]) -> list[Place]:
-    """Return places by share; of those that tell the same, the one to name comes first."""
+def preferred(found: list[ResidualPattern]) -> list[ResidualPattern]:
+    """Return patterns by share; of those that tell the same, the one to name comes first."""
     ordered = sorted(found, key=lambda one: -one.share)
     top = ordered[0].share
     # Significance first: a coordinate of few blocks may carry much by chance.
@@ -338,7 +340,7 @@ def _rank(name: str) -> int:
     return PREFERENCE.index(name) if name in PREFERENCE else len(PREFERENCE)
 
 
-def organised(
+def dependence(
     residual: Array, coordinate: Array, bins: int = BINS, flips: int = 299, seed: int = 0
 ) -> tuple[float, float]:
     """Return how much of a residual (n,) a coordinate (n,) organises, and the most by chance.
@@ -349,5 +351,5 @@ def organised(
     finder = Finder([residual], [residual], [{"it": coordinate}], flips, seed)
     if "it" not in finder.bins:
         return 0.0, 0.0
-    place, _ = finder._place("it", finder.bins["it"], finder.normalised, residual, False)
-    return float(np.sqrt(place.raw)), float(np.sqrt(place.chance))
+    pattern, _ = finder._pattern("it", finder.bins["it"], finder.normalised, residual, False)
+    return float(np.sqrt(pattern.raw)), float(np.sqrt(pattern.chance))

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Held:
+class RunPrediction:
     """One output of one run, measured and predicted, in SI.
 
     `measured`, `predicted`, `sigma` (n,): `sigma` is the noise expected of a true model, the
@@ -73,7 +73,7 @@ class Held:
         return {name: values[self.skip :] for name, values in self.coordinates.items()}
 
 
-def held_runs(problem: Problem, model: Model, draws: int = 12) -> list[Held]:
+def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[RunPrediction]:
     """Return the runs of a problem held against a model's force.
 
     Parameters
@@ -92,7 +92,7 @@ def held_runs(problem: Problem, model: Model, draws: int = 12) -> list[Held]:
         if run.measured is not None:
             sigma = np.where(run.measured, sigma, sigma / LOST)  # `known` says it instead
         out.append(
-            Held(
+            RunPrediction(
                 run.name, run.dt, run.force, predicted + bias, sigma, run.noise, spread,
                 coordinates_of_run(run), finer - predicted, skip=run.skip, known=run.measured,
                 index=run.keep if isinstance(run, StructureRun) else None,

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .coordinates import SHOWN
-from .names import joined, name_of, place_name, place_names
+from .names import joined, name_of, site_name, site_names
+from .patterns import Finder, ResidualPattern
 from .regimes import Regime
-from .where import Finder, Place
 
 if TYPE_CHECKING:
     from .comparison import Comparison
-    from .held import Held
+    from .prediction import RunPrediction
 
 Array = NDArray[np.float64]
 
@@ -62,10 +62,10 @@ def _elsewhere(comparison: Comparison) -> str:
     """Return how wrong the model is at the other sites of a building; "" on a bench."""
     others = [one for one in comparison.sites if one.site != comparison.site]
     fail = [one for one in others if one.fails]
-    right = [one for one in others if one.told and not one.fails]
+    right = [one for one in others if one.identifiable and not one.fails]
     text = ""
     if fail:
-        listed = [f"{place_name(one.site)} (z = {one.z:.3g})" for one in fail[:_NAMED]]
+        listed = [f"{site_name(one.site)} (z = {one.z:.3g})" for one in fail[:_NAMED]]
         if len(fail) > _NAMED:
             listed.append(f"{len(fail) - _NAMED} more sites")
         text += f"; it fails {'' if comparison.right else 'too '}at {joined(listed)}"
@@ -73,9 +73,9 @@ def _elsewhere(comparison: Comparison) -> str:
         span = f"z {min(one.z for one in right):.2f} to {max(one.z for one in right):.2f}"
         span = f"z = {right[0].z:.2f}" if len(right) == 1 else span
         are = "is right within its noise" if len(right) == 1 else "are right within their noise"
-        text += f"; {place_names([one.site for one in right])} {are} ({span})"
-    hidden = [one.site for one in others if not one.told]
-    return text + (f"; {place_names(hidden)}: too few samples to tell" if hidden else "")
+        text += f"; {site_names([one.site for one in right])} {are} ({span})"
+    hidden = [one.site for one in others if not one.identifiable]
+    return text + (f"; {site_names(hidden)}: too few samples to tell" if hidden else "")
 
 
 def _where(comparison: Comparison, finder: Finder) -> str:
@@ -91,16 +91,19 @@ def _where(comparison: Comparison, finder: Finder) -> str:
         )
         return f"No coordinate organises {most}{f'; {loud}' if loud else ''}."
     if comparison.right:
+        text = _pattern_text(first, comparison.predictions[0])
         return (
             f"A pattern is left with {name_of(first.coordinate, comparison.site)}, "
-            f"{_percent(first.share)} of the error's power: {_pattern(first, comparison.held[0])}."
+            f"{_percent(first.share)} of the error's power: {text}."
         )
     also = ""
     if first.alike:
         names = " and ".join(name_of(name, comparison.site) for name in first.alike[:2])
         also = f" (in these runs {names} tell{'s' * (len(first.alike) == 1)} the same)"
     text = f"The error turns with {name_of(first.coordinate, comparison.site)}{also}: "
-    text += _pattern(first, comparison.held[0]) + _at_voltages(first, comparison, finder)
+    text += _pattern_text(first, comparison.predictions[0]) + _at_voltages(
+        first, comparison, finder
+    )
     second = comparison.second
     if second is not None and second.share > 0.03:
         text += f"; what is left then turns with {name_of(second.coordinate, comparison.site)}"
@@ -119,17 +122,17 @@ def _where_right(comparison: Comparison) -> str:
     if right:
         best = max(right, key=lambda one: (not (one.speed and one.voltage), one.samples))
         others = [one for one in right if _beside(one, best)]
-        text = f"{begin(best.words)} it is right within its noise (z = {best.z:.2f})"
+        text = f"{begin(best.text)} it is right within its noise (z = {best.z:.2f})"
         if others:
-            text += f", and so it is {max(others, key=lambda one: one.samples).words}"
+            text += f", and so it is {max(others, key=lambda one: one.samples).text}"
         return text + "."
     loud = _loudest(comparison)
     if not every:
         return f"{begin(loud)}." if loud else "There is no speed to tell regimes by."
     best = min(every, key=lambda one: one.z)
     if comparison.right:
-        return f"It does best {best.words} (z = {best.z:.2f})."
-    text = f"Nowhere is it right within its noise: it does best {best.words} (z = {best.z:.3g})"
+        return f"It does best {best.text} (z = {best.z:.2f})."
+    text = f"Nowhere is it right within its noise: it does best {best.text} (z = {best.z:.3g})"
     return text + (f"; {loud}." if loud else ".")
 
 
@@ -157,28 +160,28 @@ def _loudest(comparison: Comparison) -> str:
     return f"{_percent(share)} of what exceeds the noise lies {span}"
 
 
-def _pattern(place: Place, held: Held) -> str:
+def _pattern_text(pattern: ResidualPattern, prediction: RunPrediction) -> str:
     """Return how a residual goes along a coordinate: "beyond 8 mm it pushes back 0.4 N more"."""
-    hot, unit = _hot(place), held.unit
-    peak = float(np.max(np.abs(place.mean)))
+    hot, unit = _hot(pattern), prediction.unit
+    peak = float(np.max(np.abs(pattern.mean)))
     if not hot:
         return f"by up to {peak:.2g} {unit}"
-    clear = place.mean[np.abs(place.mean) > 2.0 * place.std]
+    clear = pattern.mean[np.abs(pattern.mean) > 2.0 * pattern.std]
     changes = int(np.count_nonzero(np.diff(np.sign(clear))))
-    if changes >= _RIPPLES and place.coordinate in ("displacement", "velocity", "acceleration"):
+    if changes >= _RIPPLES and pattern.coordinate in ("displacement", "velocity", "acceleration"):
         return f"it goes up and down {changes + 1} times along it, by up to {peak:.2g} {unit}"
-    mirrored = _mirrored(place, hot, held)
+    mirrored = _mirrored(pattern, hot, prediction)
     if mirrored:
         return mirrored
-    return "; ".join(_one(place, begin, end, held) for begin, end in hot[:2])
+    return "; ".join(_one(pattern, begin, end, prediction) for begin, end in hot[:2])
 
 
-def _hot(place: Place) -> list[tuple[int, int]]:
+def _hot(pattern: ResidualPattern) -> list[tuple[int, int]]:
     """Return stretches of bins (first, last) where the mean is large and clear, largest first."""
-    mean = place.mean
+    mean = pattern.mean
     top = float(np.max(np.abs(mean)))
     large = np.abs(mean) >= 0.5 * top
-    clear = np.abs(mean) > 2.0 * place.std
+    clear = np.abs(mean) > 2.0 * pattern.std
     out: list[tuple[int, int]] = []
     for i in np.flatnonzero(large):
         if out and out[-1][1] == i - 1 and mean[i] * mean[i - 1] > 0.0:
@@ -189,24 +192,26 @@ def _hot(place: Place) -> list[tuple[int, int]]:
     return sorted(out, key=lambda pair: -float(np.sum(np.abs(mean[pair[0] : pair[1] + 1]))))
 
 
-def _mirrored(place: Place, hot: list[tuple[int, int]], held: Held) -> str:
+def _mirrored(
+    pattern: ResidualPattern, hot: list[tuple[int, int]], prediction: RunPrediction
+) -> str:
     """Return the words for a pattern that is alike, or opposite, on both sides of zero."""
-    if len(hot) < 2 or place.coordinate not in ("displacement", "velocity", "acceleration"):
+    if len(hot) < 2 or pattern.coordinate not in ("displacement", "velocity", "acceleration"):
         return ""
     (a, b), (c, d) = sorted(hot[:2])
-    ends = max(1, len(place.mean) // 16)  # the outermost bins may hold too few blocks
-    if a > ends or d < len(place.mean) - 1 - ends:
+    ends = max(1, len(pattern.mean) // 16)  # the outermost bins may hold too few blocks
+    if a > ends or d < len(pattern.mean) - 1 - ends:
         return ""
-    if place.high[b] >= 0.0 or place.low[c] <= 0.0:
+    if pattern.high[b] >= 0.0 or pattern.low[c] <= 0.0:
         return ""
-    factor, shown = SHOWN[place.coordinate]
-    edge = factor * 0.5 * float(place.low[c] - place.high[b])
-    left, right = _largest(place.mean, a, b), _largest(place.mean, c, d)
+    factor, shown = SHOWN[pattern.coordinate]
+    edge = factor * 0.5 * float(pattern.low[c] - pattern.high[b])
+    left, right = _largest(pattern.mean, a, b), _largest(pattern.mean, c, d)
     size = 0.5 * (abs(left) + abs(right))
     where = f"beyond {edge:.2g} {shown} to either side"
     if left * right > 0.0:
-        return f"{where} {_acts(place, right, 0.0, size, held)}"
-    return f"{where} {_acts(place, right, 1.0, size, held)}"
+        return f"{where} {_acts(pattern, right, 0.0, size, prediction)}"
+    return f"{where} {_acts(pattern, right, 1.0, size, prediction)}"
 
 
 def _largest(mean: Array, begin: int, end: int) -> float:
@@ -214,44 +219,46 @@ def _largest(mean: Array, begin: int, end: int) -> float:
     return float(part[int(np.argmax(np.abs(part)))])
 
 
-def _one(place: Place, begin: int, end: int, held: Held) -> str:
-    size = _largest(place.mean, begin, end)
-    centre = float(place.centre[begin : end + 1].mean())
-    acts = _acts(place, size, centre, abs(size), held)
-    return f"{_location(place, begin, end)} {acts}"
+def _one(pattern: ResidualPattern, begin: int, end: int, prediction: RunPrediction) -> str:
+    size = _largest(pattern.mean, begin, end)
+    centre = float(pattern.centre[begin : end + 1].mean())
+    acts = _acts(pattern, size, centre, abs(size), prediction)
+    return f"{_location(pattern, begin, end)} {acts}"
 
 
-def _acts(place: Place, size: float, side: float, amount: float, held: Held) -> str:
+def _acts(
+    pattern: ResidualPattern, size: float, side: float, amount: float, prediction: RunPrediction
+) -> str:
     """Return what the measured force does that the model's does not.
 
     `side` is where along the coordinate; 0 for a pattern alike on both sides.
     """
-    unit = held.unit
+    unit = prediction.unit
     up_to = f"up to {amount:.2g} {unit}"
     more = "more" if size > 0.0 else "less"
     if unit != "N":
         return f"it is {up_to} {'higher' if size > 0.0 else 'lower'} than the model's"
-    if place.turned:
-        return f"{place_name(held.site or 'damper')} resists {up_to} {more} than the model"
-    if side and place.coordinate in ("displacement", "velocity", "acceleration"):
+    if pattern.turned:
+        return f"{site_name(prediction.site or 'damper')} resists {up_to} {more} than the model"
+    if side and pattern.coordinate in ("displacement", "velocity", "acceleration"):
         more = "more" if size * side > 0.0 else "less"
         verb = {"displacement": "pushes back", "velocity": "resists"}.get(
-            place.coordinate, "resists the acceleration"
+            pattern.coordinate, "resists the acceleration"
         )
         return f"it {verb} {up_to} {more} than the model"
     return f"the force is {up_to} {'higher' if size > 0.0 else 'lower'} than the model's"
 
 
-def _location(place: Place, begin: int, end: int) -> str:
+def _location(pattern: ResidualPattern, begin: int, end: int) -> str:
     """Return where along a coordinate a stretch of bins lies."""
-    name = place.coordinate
+    name = pattern.coordinate
     factor, unit = SHOWN.get(name, (1.0, ""))
-    low, high = factor * float(place.low[begin]), factor * float(place.high[end])
-    last = len(place.mean) - 1
+    low, high = factor * float(pattern.low[begin]), factor * float(pattern.high[end])
+    last = len(pattern.mean) - 1
     if name == "direction":
-        return "moving outwards (+x)" if place.centre[begin] > 0.0 else "moving back (-x)"
+        return "moving outwards (+x)" if pattern.centre[begin] > 0.0 else "moving back (-x)"
     if name == "voltage_rate":
-        return "just after the voltage has " + ("risen" if place.centre[end] > 0.0 else "fallen")
+        return "just after the voltage has " + ("risen" if pattern.centre[end] > 0.0 else "fallen")
     if begin == 0 and end == last:
         return "throughout"
     if name == "time_since_reversal":
@@ -262,7 +269,7 @@ def _location(place: Place, begin: int, end: int) -> str:
         if begin == 0:
             return f"before {high:.2g} J are dissipated"
         return f"once {low:.2g} J are dissipated"
-    if name == "voltage" and high - low < 0.02 * factor * float(np.ptp(place.centre)):
+    if name == "voltage" and high - low < 0.02 * factor * float(np.ptp(pattern.centre)):
         return f"at {0.5 * (low + high):.2g} {unit}"
     if begin == 0:
         return f"below {high:.2g} {unit}"
@@ -271,38 +278,38 @@ def _location(place: Place, begin: int, end: int) -> str:
     return f"between {low:.2g} and {high:.2g} {unit}"
 
 
-def _at_voltages(place: Place, comparison: Comparison, finder: Finder) -> str:
+def _at_voltages(pattern: ResidualPattern, comparison: Comparison, finder: Finder) -> str:
     """Return whether a pattern is alike at low and high voltage; "" where that cannot be asked."""
-    if "voltage" in place.coordinate or "voltage" not in finder.bins:
+    if "voltage" in pattern.coordinate or "voltage" not in finder.bins:
         return ""
     if comparison.site not in ("", "damper"):
         return ""  # it tells how far the damper let a spring move, and nothing of the spring
-    V = np.concatenate([one.along()["voltage"] for one in comparison.held])
+    V = np.concatenate([one.along()["voltage"] for one in comparison.predictions])
     middle = 0.5 * float(np.quantile(V, 0.98))
-    sizes = [size_of(place, finder, chosen) for chosen in (middle > V, middle <= V)]
+    sizes = [size_of(pattern, finder, chosen) for chosen in (middle > V, middle <= V)]
     if not all(np.isfinite([*low, *high]).all() for low, high in [sizes]):
         return ""
     (low, low_std), (high, high_std) = sizes
     doubt = 2.0 * float(np.hypot(low_std, high_std))
     if abs(high - low) <= max(_ALIKE * max(abs(low), abs(high)), doubt):
         return ", at every voltage alike" if doubt < 0.7 else ""
-    peak = float(np.max(np.abs(place.mean)))
+    peak = float(np.max(np.abs(pattern.mean)))
     unit = comparison.unit
     parts = f"{low * peak:.2g} {unit} below {middle:.2g} V, {high * peak:.2g} {unit} above"
     return f", {'more' if high > low else 'less'} at high voltage ({parts})"
 
 
 def size_of(
-    place: Place, finder: Finder, chosen: Sequence[bool] | NDArray[np.bool_]
+    pattern: ResidualPattern, finder: Finder, chosen: Sequence[bool] | NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Return the size of a pattern among some samples, 1 for that of all, and its uncertainty."""
-    mean, std = finder.mean_along(place, finder.raw, np.asarray(chosen, dtype=float))
+    mean, std = finder.mean_along(pattern, finder.raw, np.asarray(chosen, dtype=float))
     good = np.isfinite(mean)
-    pattern = place.mean[good]
-    power = float(pattern @ pattern)
+    shape = pattern.mean[good]
+    power = float(shape @ shape)
     if power <= 0.0 or good.sum() < 2:
         return float("nan"), float("nan")
-    return float(pattern @ mean[good]) / power, float(np.sqrt(pattern**2 @ std[good] ** 2)) / power
+    return float(shape @ mean[good]) / power, float(np.sqrt(shape**2 @ std[good] ** 2)) / power
 
 
 def _percent(share: float) -> str:

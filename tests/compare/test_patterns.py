@@ -6,24 +6,24 @@ from time import process_time
 
 import numpy as np
 import pytest
-from held_made import coloured, held_runs_with, motion
+from predictions_made import coloured, motion, predictions_with
 
-from bristle.compare.comparison import compare_held
+from bristle.compare.comparison import compare_predictions
 from bristle.compare.coordinates import coordinates_of
-from bristle.compare.where import (
+from bristle.compare.patterns import (
     Finder,
     block_length,
     correlation_time,
-    organised,
-    places,
+    dependence,
+    residual_patterns,
 )
 
 DT = 0.002
 
 
 def found(held):
-    """Return the places of a residual."""
-    return places(
+    """Return the patterns of a residual."""
+    return residual_patterns(
         [h.normalised for h in held], [h.residual for h in held], [h.along() for h in held]
     )
 
@@ -79,7 +79,7 @@ PLANTED = {
 @pytest.mark.parametrize("coordinate", PLANTED)
 @pytest.mark.parametrize("phi", [0.0, 0.8])
 def test_a_planted_residual_is_found_along_its_coordinate(coordinate, phi):
-    first = found(held_runs_with(PLANTED[coordinate], phi=phi))[0]
+    first = found(predictions_with(PLANTED[coordinate], phi=phi))[0]
     assert first.significant
     told = {first.coordinate, *first.alike}
     # Energy and time grow together; an even motion has little else to tell them apart by.
@@ -90,7 +90,7 @@ def test_a_planted_residual_is_found_along_its_coordinate(coordinate, phi):
 
 def test_the_share_is_that_of_the_planted_part():
     plant = PLANTED["displacement"]
-    held = held_runs_with(plant)
+    held = predictions_with(plant)
     part = np.concatenate([plant(h.coordinates)[h.skip :] for h in held])
     residual = np.concatenate([h.residual for h in held])
     truth = np.mean((part - part.mean()) ** 2) / np.mean(residual**2)
@@ -100,7 +100,7 @@ def test_the_share_is_that_of_the_planted_part():
 
 
 def test_the_means_in_bins_are_those_of_the_planted_part():
-    first = found(held_runs_with(PLANTED["displacement"]))[0]
+    first = found(predictions_with(PLANTED["displacement"]))[0]
     expected = 4.0 * first.centre + 3.0e4 * first.centre**3
     inner = slice(2, -2)  # the outermost bins are wide
     off = (first.mean - expected)[inner] / first.std[inner]
@@ -109,7 +109,7 @@ def test_the_means_in_bins_are_those_of_the_planted_part():
 
 def test_a_pattern_along_a_periodic_motion_is_not_hidden_by_its_period():
     """A shift by whole periods brings the pattern back; signs of blocks do not."""
-    first = found(held_runs_with(lambda c: 4.0 * c["displacement"], kind="sine"))[0]
+    first = found(predictions_with(lambda c: 4.0 * c["displacement"], kind="sine"))[0]
     assert first.significant
     assert "displacement" in (first.coordinate, *first.alike)
     # In a sine the acceleration is the displacement: that is said, not guessed.
@@ -117,12 +117,14 @@ def test_a_pattern_along_a_periodic_motion_is_not_hidden_by_its_period():
 
 
 def test_a_ripple_along_the_stroke_is_seen():
-    first = found(held_runs_with(lambda c: 0.1 * np.sin(2.0 * np.pi * c["displacement"] / 3e-3)))[0]
+    first = found(predictions_with(lambda c: 0.1 * np.sin(2.0 * np.pi * c["displacement"] / 3e-3)))[
+        0
+    ]
     assert (first.coordinate, first.significant) == ("displacement", True)
 
 
 def test_what_is_left_after_the_first_is_found_next():
-    held = held_runs_with(lambda c: PLANTED["displacement"](c) + PLANTED["voltage_rate"](c))
+    held = predictions_with(lambda c: PLANTED["displacement"](c) + PLANTED["voltage_rate"](c))
     finder = Finder(
         [h.normalised for h in held], [h.residual for h in held], [h.along() for h in held]
     )
@@ -148,24 +150,24 @@ def test_blocks_are_longer_than_the_correlation():
 def test_share_of_one_coordinate_and_of_chance():
     random = np.random.default_rng(2)
     x = random.standard_normal(5000)
-    share, chance = organised(0.5 * x + random.standard_normal(5000), x)
+    share, chance = dependence(0.5 * x + random.standard_normal(5000), x)
     assert share == pytest.approx(np.sqrt(0.2), abs=0.03)
     assert chance < 0.15
-    share, chance = organised(random.standard_normal(5000), x)
+    share, chance = dependence(random.standard_normal(5000), x)
     assert share < 1.3 * chance
-    assert organised(random.standard_normal(500), np.zeros(500)) == (0.0, 0.0)
+    assert dependence(random.standard_normal(500), np.zeros(500)) == (0.0, 0.0)
 
 
 def test_a_comparison_of_18_000_samples_takes_less_than_a_second():
-    held = held_runs_with(PLANTED["displacement"], n=6000)
-    compare_held(held)
+    held = predictions_with(PLANTED["displacement"], n=6000)
+    compare_predictions(held)
     begin = process_time()
-    compare_held(held)
+    compare_predictions(held)
     assert process_time() - begin < 1.0
 
 
 def test_the_same_runs_give_the_same_places():
-    held = held_runs_with(PLANTED["voltage"], phi=0.5)
+    held = predictions_with(PLANTED["voltage"], phi=0.5)
     first, again = found(held), found(held)
     assert [(one.coordinate, one.share, one.p) for one in first] == [
         (one.coordinate, one.share, one.p) for one in again
