@@ -56,7 +56,8 @@ class SiteError:
 
     `site` is "damper", "layer", "storey1" ...; `quantity`, `unit` what is compared there; `runs`
     the error of each run, `total` over all; `z_interval` the 95 % interval of the total z;
-    `pattern` that of the error, None where chance explains all of it. `fails`: the error is more than noise, and chance is no fair explanation of that, all sites together.
+    `pattern` that of the error, None where chance explains all of it. `fails`: the error is more
+    than noise, and chance is no fair explanation of that, all sites together.
     """
 
     site: str
