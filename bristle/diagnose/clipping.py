@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.checks.clipping import stands_at_top
 from ..data.measurement import Measurement
 from .faults import SensorFault
 from .rule import SENSOR, DecisionRule
@@ -61,11 +62,7 @@ def _is_noisy(run: Measurement, channel: str) -> bool:
 
 
 def _limit(values: Array, rule: DecisionRule) -> float | None:
-    """Return the level at which a signal is cut off, on either side, None where it is not.
-
-    At a cut the very same number comes many times in a row; a noisy signal never does that. One in
-    coarse steps does at its turns, but not many times more often than one step below.
-    """
+    """Return the level at which a signal is cut off, on either side, None where it is not."""
     cut = [
         abs(float(np.max(way * values)))
         for way in (1.0, -1.0)
@@ -96,11 +93,4 @@ def _rounding(values: Array) -> float:
 
 
 def _stands_at_top(values: Array, rule: DecisionRule) -> bool:
-    at_end = values >= values.max() - _rounding(values)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(int), [0]])))
-    stays, often = edges[1::2] - edges[::2], int(at_end.sum())
-    # Once may be a rest before or after the test, at that end of the stroke.
-    if np.count_nonzero(stays >= rule.longest) < 2 or often < 2 * rule.longest:
-        return False
-    _, below = np.unique(values[~at_end], return_counts=True)
-    return bool(len(below)) and often > rule.crowded * float(np.mean(below[-rule.longest :]))
+    return stands_at_top(values, _rounding(values), rule.longest, rule.crowded)

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..data.checks.clipping import saturated_share
 from ..data.measurement import Measurement
 from ..data.model import LAW_NAMES, STANDARD, StudyModel, new_model
 from ..errors import StudyError
 from ..identify.fit import Fit, Model, Problem
-from ..identify.prepare import saturated
 from ..identify.residuals import robust_z
 from ..identify.rig import DAMPER, Rig, bench_rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
@@ -371,7 +371,7 @@ def _doubts(runs: list[Measurement]) -> list[str]:
     """Refuse a saturated force; say what weakens an identification."""
     notes = []
     for run in runs:
-        share = saturated(run)
+        share = saturated_share(run["force"])
         if share > _SATURATED:
             raise StudyError(
                 f"{run.name}: {share:.0%} of the force's samples stand at its extremes: the load "
