@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ..errors import PhysicsError
@@ -18,7 +19,10 @@ MIMICKED = ("force_bias", "late_drive")
 
 def check_search(effect: type[Effect], where: str) -> None:
     """Refuse starts that a search could not begin from."""
-    grids = [("start_grid", effect.start_grid), ("start_limits", effect.start_limits)]
+    grids: list[tuple[str, Mapping[str, tuple[float, ...]]]] = [
+        ("start_grid", effect.start_grid),
+        ("start_limits", effect.start_limits),
+    ]
     grids += [("start_shares", grid) for grid in effect.start_shares]
     grids += [("start_ties", dict.fromkeys(effect.start_ties, (0.0,)))]
     for field, grid in grids:
