@@ -12,7 +12,8 @@ from ..diagnose.faults import SensorFault
 from ..errors import StudyError
 from ..physics.effect import EFFECTS
 from .history import Step
-from .identification import FitTask, Identified, as_model, identify_model, identify_study
+from .identification import FitTask, as_model, identify_model, identify_study
+from .identified import Identified
 from .rig import building_of
 from .study import Study, split_in_time
 

@@ -168,7 +168,7 @@ def test_a_kill_within_a_diagnosis_leaves_the_study_as_it_was(study, monkeypatch
     def killed(*_arguments, **_choices):
         raise Killed
 
-    monkeypatch.setattr(learning, "diagnose", killed)
+    monkeypatch.setattr(learning, "diagnose_rig", killed)
     with pytest.raises(Killed):
         learn(study)
     assert Study(study.folder).model().effects == {}

@@ -47,7 +47,7 @@ def test_the_layer_whose_spring_stiffens_is_the_worst_site_along_displacement(st
     worst, *others = found.sites
     assert (found.site, worst.site, worst.fails) == ("layer", "layer", True)
     assert worst.z == found.z > 1.5
-    assert worst.place.coordinate == found.first.coordinate == "displacement"
+    assert worst.pattern.coordinate == found.first.coordinate == "displacement"
     assert not any(one.fails for one in others)
     how, where, _ = found.sentences
     assert "misses the force of the isolation layer" in how
