@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import floor, pi
+from math import pi
 from typing import Any
 
 import numpy as np
@@ -32,13 +32,9 @@ class Clocks:
         (component, port) -> slot of the signal.
     h : float
         Substep [s].
-    substeps : int
-        Of the whole run: so long noise is drawn in advance.
     """
 
-    def __init__(
-        self, slaves: dict[str, Any], slot: Callable[[str, str], int], h: float, substeps: int
-    ) -> None:
+    def __init__(self, slaves: dict[str, Any], slot: Callable[[str, str], int], h: float) -> None:
         self._constants: list[float] = []
         self._memory: list[float] = []
         self.records = np.zeros(len(slaves), layout.sampled_record())
@@ -51,7 +47,7 @@ class Clocks:
             ports = [port for port in outputs if port != "fault"]
             record["outputs"][: len(ports)] = [slot(name, port) for port in ports]
             if record["kind"] == SENSORS:
-                self._sensors(record, slave, floor(substeps * h / period + ROUNDING) + 1)
+                self._sensors(record, slave)
             else:
                 self._controller(record, slave)
         self.constants, self.memory = np.array(self._constants), np.array(self._memory)
@@ -79,16 +75,14 @@ class Clocks:
                 record[name] = _put(self._constants, getattr(c, name))
             record["state"] = _put(self._memory, [0.0] * (2 * c.n))  # and as much room to work
 
-    def _sensors(self, record: Any, slave: Any, samples: int) -> None:
-        record["noise"] = -1
+    def _sensors(self, record: Any, slave: Any) -> None:
+        record["seed"] = slave["seed"]
         for j, channel in enumerate(slave.instruments):
             record["own_gain"][j], record["bias"][j] = channel.gain, channel.bias
             record["quantisation"][j], record["corner"][j] = channel.quantisation, channel.corner
             record["share"][j], record["length"][j] = channel.share, channel.length
             record["ring"][j] = _put(self._memory, [0.0] * channel.length)
-            if channel.deviation > 0.0:
-                drawn = [channel.noise(k) for k in range(samples)]
-                record["noise"][j] = _put(self._constants, drawn)
+            record["deviation"][j] = channel.deviation
 
 
 def _put(numbers: list[float], more: list[float]) -> int:

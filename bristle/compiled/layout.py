@@ -110,21 +110,22 @@ def sampled_record() -> np.dtype[np.void]:
     clock whose instants are all ends of substeps is `aligned`; `next` is the sample to come.
 
     The matrices A, B, W, C begin at these places of the run's constants, the state at its place of
-    the run's memory. Of sensors, each channel has its own entry in the fields of arrays; `ring`
-    and `noise` are places in memory and constants (noise: -1 without any).
+    the run's memory. Of sensors, each channel has its own entry in the fields of arrays; `ring` is
+    a place in memory.
     """
     channels = len(MEASURED)
-    laws = ("kind", "n", "rows", "A", "B", "W", "C", "state")
+    laws = ("kind", "n", "rows", "A", "B", "W", "C", "state", "seed")
     numbers = ("v_max", "f_min", "anti_windup", "v_top", "velocity_corner", "still", "least_slope")
     hook = ("gain", "integral_corner", "absolute", "y_before")
     moving = ("low", "x_before", "deflection")
-    own = ("own_gain", "bias", "quantisation", "corner", "share", "channel_low", "channel_before")
+    own = ("own_gain", "bias", "deviation", "quantisation", "corner", "share")
+    own += ("channel_low", "channel_before")
     return np.dtype(
         [
             *((name, _INT) for name in (*laws, "next", "last")),
             *((name, _FLOAT) for name in ("period", *numbers, *hook, *moving)),
             *((name, _FLAG) for name in ("aligned", "filtered", "lugre", "switches")),
-            *((name, _INT, (channels,)) for name in ("inputs", "ring", "length", "noise")),
+            *((name, _INT, (channels,)) for name in ("inputs", "ring", "length")),
             *((name, _FLOAT, (channels,)) for name in ("now", "before", *own)),
             ("outputs", _INT, (channels,)),
             ("p", _FLOAT, (len(LuGre.parameters),)),

@@ -35,7 +35,7 @@ estimated_deflection = inverse.estimated_deflection
 low_passed, filtered_velocity = sensing.low_passed, sensing.filtered_velocity
 leaky_integral, skyhook_command = sensing.leaky_integral, sensing.skyhook_command
 skyhook_switch = sensing.skyhook_switch
-reading = instrument.reading
+reading, white_noise = instrument.reading, instrument.white_noise
 
 
 def due(sampled, at, h):
@@ -71,7 +71,7 @@ def act(c, k, share, constants, memory, s):
     """Take sample k, `share` of the way from the inputs before to those now."""
     if c.kind == SENSORS:
         for j in range(len(c.inputs)):
-            s[c.outputs[j]] = shown(c, j, k, measured(c, j, share), constants, memory)
+            s[c.outputs[j]] = shown(c, j, k, measured(c, j, share), memory)
         return
     y, x = measured(c, 0, share), measured(c, 1, share)
     v, f = measured(c, 2, share), measured(c, 3, share)
@@ -145,7 +145,7 @@ def hooked(c, y, v):
     return voltage, u
 
 
-def shown(c, j, k, value, constants, memory):
+def shown(c, j, k, value, memory):
     """Return what the instrument of channel j shows at sample k, and move it on."""
     ring = memory[c.ring[j] : c.ring[j] + c.length[j]]
     if k == 0:
@@ -158,7 +158,8 @@ def shown(c, j, k, value, constants, memory):
     else:
         c.channel_low[j] = value
     c.channel_before[j] = value
-    disturbance = constants[c.noise[j] + k] if c.noise[j] >= 0 else 0.0
+    deviation = c.deviation[j]
+    disturbance = white_noise(k, j, c.seed, deviation) if deviation > 0.0 else 0.0
     return reading(
         k, c.channel_low[j], ring, c.share[j], c.own_gain[j], c.bias[j], disturbance,
         c.quantisation[j],

@@ -115,10 +115,10 @@ class System:
         """Return the sample periods [s] of the components that have a clock."""
         return [self.slaves[name]["sample_period"] for name in self.names["sampled"]]
 
-    def sampled(self, h: float, substeps: int) -> tuple[Array, Array, Array]:
-        """Return sampled components, their constants and memory for so many substeps of h [s]."""
+    def sampled(self, h: float) -> tuple[Array, Array, Array]:
+        """Return sampled components, their constants and memory for substeps of h [s]."""
         slaves = {name: self.slaves[name] for name in self.names["sampled"]}
-        clocks = Clocks(slaves, lambda *port: self.slots[port], h, substeps)
+        clocks = Clocks(slaves, lambda *port: self.slots[port], h)
         return clocks.records, clocks.constants, clocks.memory
 
     def _sources(self) -> tuple[Array, Array, Array]:

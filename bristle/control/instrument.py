@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from math import floor, pi
-from random import Random
 from typing import Any
 
 from ..physics.linear import Row
+from .noise import standard_normal
 from .sensing import low_passed
 
 FINEST = 1e15
@@ -15,7 +15,7 @@ FINEST = 1e15
 
 def white_noise(k: int, channel: int, seed: int, deviation: float) -> float:
     """Return the noise of sample k, in the signal's unit: it depends on nothing else."""
-    return deviation * Random((seed * 64 + channel) * 2**40 + k).gauss(0.0, 1.0)
+    return deviation * standard_normal(seed, channel, k)
 
 
 def reading(
