@@ -24,6 +24,10 @@ def main() -> int:
         from .blind import main as blind
 
         return blind(sys.argv[2:])
+    if sys.argv[1:2] == ["characterise"] and len(sys.argv) > 2:
+        from .characterise import main as characterise
+
+        return characterise(sys.argv[2:])
     names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from bristle.data import read_ground_motion
 from bristle.errors import RecordError
-from bristle.records import read_ground_motion
 
 Array = NDArray[np.float64]
 

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from bristle.compiled.jit import compiled
 from bristle.control import inverse, linear, switching
 from bristle.control.controller import read_controller
+from bristle.jit import compiled
 from bristle.physics.building import paper_building
 from bristle.physics.lugre import LuGre
 

@@ -14,11 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from bristle.compiled import simulate
-from bristle.compiled.march import MAX_SWEEPS, TOLERANCE
-from bristle.compiled.model import LONGEST_SUBSTEP, compiled_march
-from bristle.compiled.system import System
-from bristle.cosim.scenario import load_scenario
+from bristle.scenario.scenario import load_scenario
+from bristle.simulate.coupled import LONGEST_SUBSTEP, compiled_march, simulate
+from bristle.simulate.march import MAX_SWEEPS, TOLERANCE
+from bristle.simulate.system import System
 
 from ._published import DRIFT, SECOND_FLOOR, half_sine, passive, peak_errors, symbol
 from ._rows import Row, interleave, ratio_of

@@ -12,12 +12,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from bristle.compiled import simulate
-from bristle.cosim.scenario import load_scenario
-from bristle.ensemble.file import read_ensemble
-from bristle.ensemble.plan import Plan
-from bristle.ensemble.pool import run_local
-from bristle.ensemble.worker import prepare, statistic
+from bristle.batch.file import read_ensemble
+from bristle.batch.plan import Plan
+from bristle.batch.pool import run_local
+from bristle.batch.worker import prepare, statistic
+from bristle.scenario.scenario import load_scenario
+from bristle.simulate.coupled import simulate
 
 from ._rows import Row
 

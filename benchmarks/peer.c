@@ -1,4 +1,4 @@
-/* The time march of bristle/compiled/march.py written in C, for one building and one LuGre damper:
+/* The time march of bristle/simulate/march.py written in C, for one building and one LuGre damper:
  * what compiled Python is measured against. Same scheme, same order of operations; the building may
  * have any number of levels; effects, other laws and other wirings are left out. */
 

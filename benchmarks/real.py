@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 if __package__ in (None, ""):  # `python benchmarks/real.py` finds only this folder
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from bristle.data.measurement import ChannelSpec, Measurement, read_measurement, read_measurements
 from bristle.diagnose import Diagnosis, diagnose
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.mended import mended
@@ -30,12 +31,6 @@ from bristle.identify.model import Problem
 from bristle.identify.prepare import prepare
 from bristle.identify.table import error_table
 from bristle.physics.building import Building, from_data
-from bristle.records.measurement import (
-    ChannelSpec,
-    Measurement,
-    read_measurement,
-    read_measurements,
-)
 
 Array = NDArray[np.float64]
 MARK = "<!-- measured -->"

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from .ensemble import ensemble as ensemble
-    from .run import run as run
+    from .batch import ensemble as ensemble
+    from .simulate.run import run as run
 
-_LAZY = {"ensemble": "ensemble", "run": "run"}
+_LAZY = {"ensemble": "batch", "run": "simulate.run"}
 
 __all__ = ["__version__", "ensemble", "run"]
 

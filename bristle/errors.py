@@ -48,3 +48,14 @@ class RunError(BristleError):
     """A run that started and failed; the text says what is kept, and where."""
 
     exit_code = 1
+
+
+class StudyError(BristleError):
+    """A study's folder or one of its files that cannot be read, or must not be changed."""
+
+
+def not_usable(text: str) -> RunError:
+    """Return a RunError for what is wrong before a run starts: exit code 2."""
+    error = RunError(text)
+    error.exit_code = 2
+    return error

@@ -6,9 +6,9 @@ import io
 from math import cos, pi, sin
 from typing import TYPE_CHECKING
 
+from bristle.draw.style import BLUE, PALE, Page, label, look, zero_lines
 from bristle.physics import damper
 from bristle.physics.effect import EFFECTS, Effect, Q
-from bristle.report.style import BLUE, PALE, Page, label, look, zero_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

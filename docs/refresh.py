@@ -19,9 +19,9 @@ FIGURES = ROOT / "docs" / "figures"
 def figures() -> None:
     """Draw the figures of README and pages into docs/figures."""
     import bristle
-    from bristle.report.comparison.make import make as comparison
+    from bristle.paper.comparison.make import make as comparison
+    from bristle.paper.figures import make, paper_figures
     from bristle.report.figures import run_figure
-    from bristle.report.paper import make, paper_figures
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

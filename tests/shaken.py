@@ -6,10 +6,10 @@ import numpy as np
 import pandas as pd
 from scipy.signal import butter, lfilter
 
+from bristle.data.channels import channel_unit
+from bristle.data.measurement import ChannelSpec, measurements_of_frame
 from bristle.physics.building import from_data
 from bristle.physics.structure import matrices, step_matrices
-from bristle.records.channels import channel_unit
-from bristle.records.measurement import ChannelSpec, measurements_of_frame
 
 DT = 0.002
 

@@ -130,8 +130,8 @@ def test_a_refusal_has_exit_code_2_one_message_and_no_file(
 def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    from bristle.data.model import new_model, write_model
     from bristle.physics.building import read_building
-    from bristle.study.model import new_model, write_model
 
     model = new_model("lugre").with_effect("gas_spring")
     found = {"sigma_a": 720.0, "sigma_0": 390.0, "gas_spring.k": 60.0}
@@ -174,7 +174,7 @@ def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
 def test_a_study_model_that_is_wrong_is_one_message(
     edit: tuple[str, str], words: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from bristle.study.model import new_model, write_model
+    from bristle.data.model import new_model, write_model
 
     write_model(here / "model.toml", new_model("lugre"))
     text = (here / "model.toml").read_text()

@@ -14,8 +14,8 @@ import pytest
 import bristle
 from bristle.cli import build_parser
 from bristle.fmu import catalogue
+from bristle.paper.figures import paper_figures
 from bristle.physics.effect import EFFECTS
-from bristle.report.paper import paper_figures
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"

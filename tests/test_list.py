@@ -5,10 +5,10 @@ import json
 import pytest
 
 from bristle.cli import main
-from bristle.cosim.scenario import stock_scenarios
+from bristle.data import list_ground_motions
 from bristle.fmu.catalogue import component_names
 from bristle.physics.effect import EFFECTS
-from bristle.records import list_ground_motions
+from bristle.scenario.scenario import stock_scenarios
 
 
 def answer(capsys, *arguments):

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.diagnose.search import refine
+from bristle.data.measurement import Measurement
 from bristle.diagnose.sites import try_effect
 from bristle.diagnose.structure import diagnose_structure
 from bristle.diagnose.structure_verdict import StructureDiagnosis
 from bristle.identify.fit import Model, identify
 from bristle.identify.line import fit_line
+from bristle.identify.search_context import refine
 from bristle.identify.structure import LinearLayer, LinearStorey, StructureProblem
 from bristle.identify.structure import structure_problems as problems
 from bristle.physics.building import Building, from_data
 from bristle.physics.effect import EFFECTS
-from bristle.records.measurement import Measurement
 
 from . import cases, inseparable
 from .cases import Recorded

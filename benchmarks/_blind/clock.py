@@ -29,7 +29,7 @@ diagnose(train, holdout, law=law)
 READ = """
 import sys
 from pathlib import Path
-from bristle.records.measurement import read_measurements
+from bristle.data.measurement import read_measurements
 folder, law = Path(sys.argv[1]), sys.argv[2]
 train = read_measurements(sorted(folder.glob("train_*.csv")))
 holdout = read_measurements(sorted(folder.glob("holdout_*.csv")))

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bristle.diagnose.candidates import begin
-from bristle.diagnose.search import refine
-from bristle.diagnose.starts import Ground, ranked
 from bristle.identify.fit import Model, Problem, Run, identify
 from bristle.identify.prepare import prepare
+from bristle.identify.search_context import refine
+from bristle.identify.start_grid import Ground, ranked
 
 from . import cases, separate, subject
 from .cases import Recorded

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from bristle.data.measurement import ChannelSpec, Measurement, measurements_of_frame
 from bristle.diagnose import Diagnosis, diagnose
 from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
 from bristle.identify.search import z_scale
 from bristle.physics.damper import LAWS
 from bristle.physics.effect import EFFECTS
-from bristle.records.measurement import ChannelSpec, Measurement, measurements_of_frame
 
 from .cases import ROOT, Recorded, digest_of
 from .forms import true_values

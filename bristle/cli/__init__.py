@@ -69,7 +69,7 @@ def run_and_exit() -> NoReturn:
     FMUs ends without calling such libraries again.
     """
     code = main()
-    if "bristle.cosim.session" in sys.modules:
+    if "bristle.simulate.session" in sys.modules:
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 def main(arguments: argparse.Namespace) -> int:
     """Identify the building, write its file and the step, print the tables."""
+    from ..errors import StudyError
     from ..study.building import identify_building_alone
-    from ..study.errors import StudyError
     from ..study.study import Study
 
     if arguments.law:

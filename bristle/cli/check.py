@@ -7,7 +7,7 @@ import sys
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..cosim.scenario import Finding
+    from ..scenario.scenario import Finding
 
 HELP = "check scenario files: every mistake at once, with its line"
 
@@ -38,13 +38,13 @@ def main(arguments: argparse.Namespace) -> int:
     from ..errors import ScenarioError
 
     if arguments.schema:
-        from ..cosim.schema import schema_text
+        from ..scenario.schema import schema_text
 
         print(schema_text(), end="")
         return 0
     if not arguments.files:
         raise ScenarioError("bristle check wants a FILE: a scenario, e.g. bristle check my.toml.")
-    from ..cosim.scenario import check_scenario, parse_overrides
+    from ..scenario.scenario import check_scenario, parse_overrides
 
     overrides = parse_overrides(arguments.overrides)
     found = {file: check_scenario(file, overrides) for file in arguments.files}

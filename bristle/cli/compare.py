@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ..bridge.fmu import FmuComparison
     from ..compare.comparison import Comparison
-    from ..compare.fmu import FmuComparison
 
 HELP = "where a model, or any FMU, fails against measurements: in words, then pictures"
 
@@ -65,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Compare, print the sentences and tables, draw the picture."""
-    from ..study.errors import StudyError
+    from ..errors import StudyError
 
     if arguments.fmu is not None:
         if arguments.folder is not None or arguments.data is None:
@@ -86,8 +86,8 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _of_study(arguments: argparse.Namespace) -> int:
+    from ..draw.style import png
     from ..report.residuals import draw_comparison
-    from ..report.style import png
     from ..study.comparison import compare_study
     from ..study.study import Study
 
@@ -113,7 +113,7 @@ def _of_study(arguments: argparse.Namespace) -> int:
 
 
 def _of_fmu(arguments: argparse.Namespace) -> int:
-    from ..compare.fmu import compare_fmu
+    from ..bridge.fmu import compare_fmu
     from ..report.residuals import draw_comparison
     from ..study.new import parse_channel
 
@@ -140,7 +140,7 @@ def _of_fmu(arguments: argparse.Namespace) -> int:
 
 
 def _pairs(texts: list[str], option: str) -> dict[str, str]:
-    from ..study.errors import StudyError
+    from ..errors import StudyError
 
     found: dict[str, str] = {}
     for text in texts:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..fmu.conform.report import Report
+    from ..conformance.report import Report
 
 HELP = "judge an FMU against FMI 2.0 co-simulation"
 
@@ -52,7 +52,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _judge(arguments: argparse.Namespace) -> Report:
-    from ..fmu.conform import conform
+    from ..conformance import conform
 
     def judge(progress: Callable[[str], None] | None) -> Report:
         return conform(

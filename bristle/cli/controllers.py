@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import pandas as pd
 
-    from ..report.comparison.make import Report
+    from ..paper.comparison.make import Report
 
 HELP = "run the paper's comparison of controllers and judge its statements"
 
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Design, run, judge, draw and write; print tables and verdicts."""
-    from ..report.comparison.make import make
+    from ..paper.comparison.make import make
 
     report = make(arguments.out, arguments.newhall, progress=not arguments.json)
     if arguments.json:

@@ -108,7 +108,7 @@ def _new(arguments: argparse.Namespace) -> int:
 
 def _check(arguments: argparse.Namespace) -> int:
     """Ask of an effect what is asked of the library's; 2 where something does not hold."""
-    from ..compiled.conformance import examine
+    from ..check.conformance import examine
     from ..physics.user import load_effect
 
     file = Path(arguments.target)

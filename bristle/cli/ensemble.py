@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..ensemble.execute import Ensemble
+    from ..batch.execute import Ensemble
 
 HELP = "run a scenario hundreds of times with what is uncertain varied"
 
@@ -37,8 +37,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run what is left, write tables and figure; return 1 if every run failed, else 0."""
-    from ..ensemble.execute import EnsembleInterrupted, ensemble
-    from ..ensemble.file import resolve_ensemble
+    from ..batch.execute import EnsembleInterrupted, ensemble
+    from ..batch.file import resolve_ensemble
 
     file = resolve_ensemble(arguments.file)
     folder: Path = arguments.out or Path("results", file.stem)
@@ -70,7 +70,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _write(found: Ensemble, folder: Path, figure: bool) -> dict[str, Path]:
-    from ..results import not_usable
+    from ..errors import not_usable
 
     files = {"runs": folder / "runs.csv", "quantiles": folder / "quantiles.csv"}
     try:

@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Export; say what was written, and what was left out."""
-    from ..study.export import export_study
+    from ..bridge.export import export_study
     from ..study.study import Study
 
     found = export_study(Study(arguments.folder), arguments.out)

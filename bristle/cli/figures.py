@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """List the figures, or draw one of them or all."""
-    from ..report.paper import find_figure, make, paper_figures
+    from ..paper.figures import find_figure, make, paper_figures
 
     if arguments.name is None:
         _list(arguments.json)
@@ -61,7 +61,7 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _list(as_json: bool) -> None:
-    from ..report.paper import paper_figures
+    from ..paper.figures import paper_figures
 
     figures = paper_figures().values()
     if as_json:

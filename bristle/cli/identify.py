@@ -51,8 +51,8 @@ def main(arguments: argparse.Namespace) -> int:
 
         return _building.main(arguments)
     from ..progress import Progress
+    from ..report.fit_picture import identify_png
     from ..study.identification import STAGES, identify_study
-    from ..study.identify_picture import identify_png
     from ..study.study import Study
 
     study = Study(arguments.folder)

@@ -68,8 +68,8 @@ def _components() -> Rows:
 
 def _describe(name: str, building: Path | None) -> Description:
     """Return the description of a built-in component or of an FMU file."""
-    from ..cosim.findings import unknown
     from ..errors import ScenarioError
+    from ..findings import unknown
     from ..fmu import catalogue
     from ..fmu.description import read_description
 
@@ -108,7 +108,7 @@ def _port(variable: Variable) -> dict[str, Any]:
 def _records() -> Rows:
     from dataclasses import asdict
 
-    from ..records import list_ground_motions
+    from ..data import list_ground_motions
 
     return [asdict(row) for row in list_ground_motions()]
 
@@ -116,7 +116,7 @@ def _records() -> Rows:
 def _scenarios() -> Rows:
     import tomllib
 
-    from ..cosim.scenario import stock_scenarios
+    from ..scenario.scenario import stock_scenarios
 
     rows = []
     for file in stock_scenarios():

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..optimise import Passive
+    from ..batch.passive import Passive
 
 HELP = "find the best constant voltage for a set of ground motions"
 
@@ -68,10 +68,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Optimise, write table and figure, print what was found."""
-    from ..cosim.scenario import parse_overrides
+    from ..batch.passive import INTENSITIES, Motion, optimise_passive
     from ..errors import ScenarioError
-    from ..optimise import Motion, optimise_passive
-    from ..optimise.passive import INTENSITIES
+    from ..scenario.scenario import parse_overrides
 
     intensities = arguments.intensities or INTENSITIES
     for intensity in intensities:
@@ -99,7 +98,7 @@ def main(arguments: argparse.Namespace) -> int:
 def _write(found: Passive, folder: Path, figure: bool) -> dict[str, Path]:
     import pandas as pd
 
-    from ..results import not_usable
+    from ..errors import not_usable
 
     table = pd.DataFrame(found.values.T, columns=[motion.name for motion in found.motions])
     table.insert(0, "voltage [V]", found.grid)

@@ -44,10 +44,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Run, draw, print; return 0, 1 if the run failed on its way, 130 if it was interrupted."""
-    from ..cosim.scenario import parse_overrides, resolve_scenario
     from ..errors import RunError
-    from ..output import Output
-    from ..run import IncompleteRunError, RunInterrupted, execute
+    from ..scenario.scenario import parse_overrides, resolve_scenario
+    from ..simulate.output import Output
+    from ..simulate.run import IncompleteRunError, RunInterrupted, execute
 
     overrides = parse_overrides(arguments.overrides)
     file = resolve_scenario(arguments.file)

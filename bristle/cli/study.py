@@ -75,9 +75,9 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 
 def _new(arguments: argparse.Namespace) -> int:
-    from ..records.measurement import ChannelSpec
-    from ..study.errors import StudyError
-    from ..study.model import LAW_NAMES
+    from ..data.measurement import ChannelSpec
+    from ..data.model import LAW_NAMES
+    from ..errors import StudyError
     from ..study.new import create_study, parse_channel
 
     if arguments.law not in LAW_NAMES:
@@ -110,7 +110,7 @@ def _new(arguments: argparse.Namespace) -> int:
 
 def _files(patterns: list[str]) -> list[str]:
     """Return the files that patterns name, each once, in order."""
-    from ..study.errors import StudyError
+    from ..errors import StudyError
 
     found: list[str] = []
     for pattern in patterns:
@@ -159,9 +159,9 @@ def _print_new(created: Created) -> None:
 
 
 def _first_look(arguments: argparse.Namespace) -> int:
+    from ..draw.data_check import first_look_png
     from ..progress import Progress
     from ..study.first_look import damper_level, first_look
-    from ..study.pictures import first_look_png
     from ..study.study import Study
 
     study = Study(arguments.folder)

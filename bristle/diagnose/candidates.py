@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem
 from ..identify.search import loss, losses, z_of, z_scale
+from ..identify.search_context import Expected, Search, is_rough, refine, residuals
+from ..identify.start_grid import Begun, Ground, ranked
 from ..physics.effect import EFFECTS, effects_of
-from .search import Expected, Search, is_rough, refine, residuals
-from .starts import Begun, Ground, ranked
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ..records.measurement import Measurement
+from ..data.measurement import Measurement
 from .faults import SensorFault
 
 Array = NDArray[np.float64]

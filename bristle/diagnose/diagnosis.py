@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 
 from ..compare.where import Place
+from ..data.derived import derived_velocity
+from ..data.measurement import Measurement
 from ..identify.fit import Model, Problem, identify, settled
 from ..identify.prepare import SHORTEST, prepare
-from ..records.derived import derived_velocity
-from ..records.measurement import Measurement
+from ..identify.search_context import is_rough, refine
 from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .decision import decide
 from .experiments import Experiment, separating
 from .limits import detectable, untestable
 from .mended import mended
-from .search import is_rough, refine
 from .sensors import SensorFault, sensor_faults
 from .unexplained import sentences, unexplained, where
 from .unlike import MISFIT, groups, unlike

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
-from .search import Search
+from ..identify.search_context import Search
 
 Array = NDArray[np.float64]
 

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from ..identify.fit import Model
 from ..identify.response import Response
 from ..identify.search import HUBER
+from ..identify.search_context import Search
 from ..identify.structure import StructureProblem, damper_run
 from ..physics.building import Building
-from .search import Search
 
 Array = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem
+from ..identify.search_context import Expected, Search
+from ..identify.start_grid import starts
 from .candidates import joinable
 from .decision import GAIN
-from .search import Expected, Search
-from .starts import starts
 
 Array = NDArray[np.float64]
 

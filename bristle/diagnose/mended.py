@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..records.measurement import Measurement
+from ..data.measurement import Measurement
 from .clipping import beyond_range
 from .faults import SensorFault
 

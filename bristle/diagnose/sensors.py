@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from ..records.derived import LATE, derived_velocity
-from ..records.measurement import Measurement
+from ..data.derived import LATE, derived_velocity
+from ..data.measurement import Measurement
 from .clipping import clipped
 from .faults import SensorFault
 

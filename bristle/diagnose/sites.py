@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from ..identify.fit import Fit, fit
 from ..identify.line import fit_line
 from ..identify.model import Model, Problem, Run
+from ..identify.start_grid import starts
 from ..identify.structure import (
     LinearLayer,
     LinearStorey,
@@ -25,7 +26,6 @@ from ..identify.structure import (
 from ..physics.effect import EFFECTS, effects_of
 from .candidates import Trial, judge
 from .evidence import paired
-from .starts import starts
 
 Array = NDArray[np.float64]
 

@@ -11,12 +11,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
+from ..data.measurement import Measurement
 from ..identify.fit import Model
 from ..identify.placed import at_site, on_time
 from ..identify.response import Response, responses
 from ..identify.structure import StructureProblem, problems_of
 from ..physics.building import Building
-from ..records.measurement import Measurement
 from .candidates import judge
 from .decision import excess
 from .known_building import as_known, told

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..identify.fit import Fit, Model, identify
+from ..identify.search_context import refine
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS, effects_of
 from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .decision import GAIN, SHARE, Decision, decide, excess
-from .search import refine
 from .sites import CLEAN, NEARLY, better, shortened, try_effect
 
 QUIET = 1.0 + 0.5 * GAIN

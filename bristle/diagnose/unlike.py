@@ -8,7 +8,7 @@ from itertools import chain
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.model import Run
 from ..identify.search import z_scale
-from .search import residuals
+from ..identify.search_context import residuals
 
 MISFIT = 1.15
 """z of training runs above which a model that explains the held-out ones still has not fitted."""

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import steady
 from ..identify.search import HUBER_AT_ONE, losses
+from ..identify.search_context import refine, residuals
+from ..identify.start_grid import Ground, ranked
 from .candidates import Trial, begin, joinable, judge
 from .faults import SensorFault
 from .mended import earlier
-from .search import refine, residuals
-from .starts import Ground, ranked
 
 Array = NDArray[np.float64]
 

@@ -137,7 +137,7 @@ def plan(
         baked["building"] = catalogue.read_building_data(building)
     if record is not None:
         _only("GroundMotion", component, "a record")
-        from ..records import ground_motion_file
+        from ..data import ground_motion_file
 
         found = ground_motion_file(str(record), Path.cwd())
         if f"{found}.csv" not in files:  # else it is in every GroundMotion

@@ -12,10 +12,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.bench import jumps
-from ..compiled.channel import shown
+from ..check.channel import shown
+from ..data.measurement import Measurement
 from ..physics.effect import EFFECTS, Effect
-from ..records.measurement import Measurement
+from .bench import jumps
 
 Array = NDArray[np.float64]
 

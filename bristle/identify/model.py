@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.bench import Bench
 from ..physics.damper import LAWS
 from ..physics.effect import CHOICES, EFFECTS, Parameter
+from .bench import Bench
 from .instruments import earlier, pure_delay, shown_force, true_motion
 
 Array = NDArray[np.float64]

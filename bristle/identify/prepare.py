@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.derived import derived_velocity
+from ..data.measurement import Measurement
 from ..errors import RecordError
-from ..records.derived import derived_velocity
-from ..records.measurement import Measurement
 from .drive import smooth_drive
 from .fit import Run
 from .smooth import posterior_draws, smooth

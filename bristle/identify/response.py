@@ -17,12 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from ..compiled.response import smooth_level
+from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
-from ..records.measurement import Measurement
 from .drive import smooth_steps
 from .prepare import SHORTEST
+from .response_kernels import smooth_level
 from .smooth import random_motion
 
 Array = NDArray[np.float64]

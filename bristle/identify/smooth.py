@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter, uniform_filter1d
 from scipy.optimize import minimize_scalar
 from scipy.signal import istft, stft
 
-from ..compiled.kalman import kalman_smooth
+from .kalman import kalman_smooth
 
 Array = NDArray[np.float64]
 

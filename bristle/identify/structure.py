@@ -15,13 +15,13 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compiled.response import Along
+from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
 from ..physics.effect import EFFECTS, Parameter
-from ..records.measurement import Measurement
 from .model import OTHER_LAWS, Model, Problem, Run
 from .response import Response, base_equilibrium, responses, shear
+from .response_kernels import Along
 
 Array = NDArray[np.float64]
 

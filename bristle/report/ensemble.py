@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .style import BLUE, GREY, INK, PALE, VERMILION, Page, look
+from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, Page, look
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from ..ensemble import Ensemble
-    from ..ensemble.plan import Output
+    from ..batch import Ensemble
+    from ..batch.plan import Output
 
 MOST_OUTPUTS = 6
 MOST_NAMES = 8

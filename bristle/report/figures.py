@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
+from ..draw.style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..compare.coordinates import SHOWN
 from ..compare.names import name_of
-from .style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
+from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

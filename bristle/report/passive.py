@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .style import INK, PALE, Page, label, look, ramp
+from ..draw.style import INK, PALE, Page, label, look, ramp
 
 if TYPE_CHECKING:
-    from ..optimise import Passive
+    from ..batch.passive import Passive
 
 _DPI = 160
 

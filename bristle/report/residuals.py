@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..compare.names import name_of
+from ..draw.style import Page, look
 from .panels import (
     draw_error,
     draw_history,
@@ -15,7 +16,6 @@ from .panels import (
     worst_window,
 )
 from .site_pictures import draw_sites, sites_height
-from .style import Page, look
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison

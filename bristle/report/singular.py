@@ -9,7 +9,7 @@ import numpy as np
 
 from ..design.margins import grid_rows
 from ..design.responses import responses
-from .style import BLUE, GREY, INK, Page, look, ramp
+from ..draw.style import BLUE, GREY, INK, Page, look, ramp
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..compare.comparison import CLOSE
 from ..compare.names import name_of, place_name
 from ..compare.words import FAINT
-from .style import BLUE, FLOOR, GREY, INK, VERMILION, Page, look, short_z
+from ..draw.style import BLUE, FLOOR, GREY, INK, VERMILION, Page, look, short_z
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

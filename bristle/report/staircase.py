@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import log10
 from typing import TYPE_CHECKING, Any
 
-from .style import short_z
+from ..draw.style import short_z
 
 if TYPE_CHECKING:
     from rich.text import Text

@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..compare.names import place_name
+from ..draw.style import percent, short_z
 from ..errors import BristleError
 from . import html
 from .residuals import headline
 from .staircase import Tread, treads
 from .study_tables import data_table, data_words, parameter_table, ranking_table, run_errors
 from .study_verdict import badge, noise_floor, rivals, separating, untestable, words
-from .style import percent, short_z
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
+    from ..data.model import StudyModel
     from ..study.history import Step
-    from ..study.model import StudyModel
     from ..study.study import Study
 
 
@@ -59,8 +59,8 @@ def study_report(study: Study) -> str:
 
 def gather(study: Study) -> Content:
     """Return what the report of a study tells; it compares the models before and after."""
+    from ..data.model import read_model
     from ..study.comparison import holder
-    from ..study.model import read_model
 
     model, steps = study.model(), tuple(study.steps())
     runs = study.runs()
@@ -93,8 +93,8 @@ def _judged(tread: Tread, hold: Any, study: Study) -> Tread:
 
     import numpy as np
 
+    from ..data.model import read_model
     from ..identify.search import z_scale
-    from ..study.model import read_model
 
     if tread.z is not None or tread.number == 0:
         return tread  # the model that a study begins with is nobody's guess of this damper
@@ -186,8 +186,8 @@ def _where(content: Content) -> str:
     now = content.now
     if now is None:
         return html.section("Where the model stands", html.paragraphs(content.trouble))
+    from ..draw.style import png
     from .study_pictures import error_page
-    from .style import png
     from .tables import place_table
 
     _, header, rows = place_table(now)
@@ -219,8 +219,8 @@ def _sites(content: Content) -> list[str]:
     now = content.now
     if now is None or not now.sites:
         return []
+    from ..draw.style import png
     from .site_pictures import sites_page
-    from .style import png
     from .tables import site_table
 
     _, header, rows = site_table(now)
@@ -253,8 +253,8 @@ def _history(content: Content) -> str:
     ]  # fmt: skip
     picture = ""
     if judged:
+        from ..draw.style import png
         from .study_pictures import staircase_page
-        from .style import png
 
         fall = " → ".join(_or_dash(one.z) for one in judged)
         cut = content.study.settings.cut_off
@@ -272,8 +272,8 @@ def _history(content: Content) -> str:
 def _before_after(content: Content) -> str:
     if content.now is None or content.now.unit != "N":
         return ""
+    from ..draw.style import png
     from .study_pictures import loops_page, maps_page
-    from .style import png
 
     names = (f"without {content.added}", f"with {content.added}")
     if content.before is None:

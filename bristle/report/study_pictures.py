@@ -9,6 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..compare.names import name_of
+from ..draw.style import (
+    BLUE,
+    FLOOR,
+    GREEN,
+    GREY,
+    INK,
+    MINUS,
+    PALE,
+    VERMILION,
+    Page,
+    label,
+    look,
+    short_z,
+)
 from .panels import (
     draw_loop,
     draw_map,
@@ -18,7 +32,6 @@ from .panels import (
     residual_map,
 )
 from .residuals import telling_places
-from .style import BLUE, FLOOR, GREEN, GREY, INK, MINUS, PALE, VERMILION, Page, label, look, short_z
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .style import MINUS, TIMES, percent
+from ..draw.style import MINUS, TIMES, percent
 from .tables import run_table
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
-    from ..records.measurement import Measurement
-    from ..study.model import StudyModel, Value
+    from ..data.measurement import Measurement
+    from ..data.model import StudyModel, Value
     from ..study.study import Study
 
 _RANKED = 8

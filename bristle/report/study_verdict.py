@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..compare.names import name_of
+from ..data.channels import PLAIN
 from ..physics.effect import EFFECTS
-from ..records.channels import PLAIN
 from .study_tables import in_lab_unit, number, share
 
 Verdict = Mapping[str, Any]

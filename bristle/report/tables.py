@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..compare.names import name_of, place_name
 from ..compare.words import FAINT, begin
-from .style import percent, short_z
+from ..draw.style import percent, short_z
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison, RunError

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .errors import StudyError
+from ..data.model import StudyModel, Value, new_model, read_model, write_model
+from ..errors import StudyError
 from .history import Step
-from .model import StudyModel, Value, new_model, read_model, write_model
 from .new import Created, create_study
 from .settings import RunFile, Settings
 from .study import Runs, Study

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from ..data.files import write_whole
+from ..errors import StudyError
 from ..identify.building import StructureFit, equilibrium, identify_structure
 from ..identify.building_file import building_text
 from ..physics.building import Building, frequencies
-from .errors import StudyError
-from .files import write_whole
 from .history import Step
 from .structure import building_of
 from .study import Study

@@ -9,14 +9,14 @@ from ..compare.comparison import Comparison, compare_held
 from ..compare.held import Held, held_runs
 from ..compare.names import place_name
 from ..compare.sites import compare_sites, site_errors
+from ..data.model import StudyModel
+from ..errors import StudyError
 from ..identify.fit import Problem
 from ..identify.model import Model
 from ..identify.prepare import prepare
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
-from .errors import StudyError
 from .identification import as_model
-from .model import StudyModel
 from .structure import Pair, Sites, building_of
 from .study import Study
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..records.measurement import Measurement
-from ..records.relation import band
-from .finding import Finding, grouped, sentence
-from .look_channels import look_at_channels
-from .look_motion import look_at_force, look_at_motion, velocity_of_run
-from .look_runs import Excitation, look_at_runs
+from ..data.checks.channels import look_at_channels
+from ..data.checks.finding import Finding, grouped, sentence
+from ..data.checks.motion import look_at_force, look_at_motion, velocity_of_run
+from ..data.checks.runs import Excitation, look_at_runs
+from ..data.measurement import Measurement
+from ..data.relation import band
 from .study import Study
 
 _HEADINGS = {"error": "To mend", "warning": "To know", "note": "Noted"}

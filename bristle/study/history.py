@@ -14,8 +14,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .errors import StudyError
-from .files import read_json, write_json, write_whole
+from ..data.files import read_json, write_json, write_whole
+from ..errors import StudyError
 
 _NUMBER = re.compile(r"\d{3,}")
 

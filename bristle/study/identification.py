@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..data.channels import DRIVE
+from ..data.measurement import Measurement
+from ..data.model import LAW_NAMES, STANDARD, StudyModel, new_model
+from ..errors import StudyError
 from ..identify.fit import Fit, Model, Problem, identify
 from ..identify.fit import fit as fit_model
 from ..identify.prepare import prepare, saturated
 from ..identify.table import LawError, error_rms, error_table, force_rms
-from ..records.channels import DRIVE
-from ..records.measurement import Measurement
 from ..units import convert
-from .errors import StudyError
 from .history import Step
 from .judged import robust_z
-from .model import LAW_NAMES, STANDARD, StudyModel, new_model
 from .study import Runs, Study
 
 if TYPE_CHECKING:
@@ -264,8 +264,8 @@ def measurements_of_frames(
     frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame], stem: str
 ) -> list[Measurement]:
     """Return the measurements in frames whose columns are named by channel."""
-    from ..records.channels import channel_unit, is_channel
-    from ..records.measurement import ChannelSpec, measurements_of_frame
+    from ..data.channels import channel_unit, is_channel
+    from ..data.measurement import ChannelSpec, measurements_of_frame
 
     named = (
         dict(frames)

@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from ..data.model import StudyModel
 from ..diagnose import Diagnosis, diagnose
 from ..diagnose.faults import SensorFault
 from ..diagnose.structure import diagnose_structure
 from ..diagnose.structure_verdict import StructureDiagnosis
+from ..errors import StudyError
 from ..physics.effect import EFFECTS
-from .errors import StudyError
 from .history import Step
 from .identification import Identified, as_model, errors_of, identify_study
-from .model import StudyModel
 from .study import Study, split_in_time
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ def add_effects(
 
 
 def _refuse(model: StudyModel, name: str) -> None:
-    from ..cosim.findings import unknown
+    from ..findings import unknown
 
     if name not in EFFECTS:
         raise StudyError(unknown("effect", name, sorted(EFFECTS)))

@@ -9,16 +9,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..errors import BristleError, UnitError
+from ..data.channels import channel_unit
+from ..data.guess import Guess, guess_channels, left_out
+from ..data.measurement import ChannelSpec, measurements_of
+from ..data.model import model_text, new_model
+from ..data.table import Table, read_table
+from ..errors import BristleError, StudyError, UnitError
 from ..physics.building import read_building
-from ..records.channels import channel_unit
-from ..records.guess import Guess, guess_channels, left_out
-from ..records.measurement import ChannelSpec, measurements_of
-from ..records.table import Table, read_table
 from ..units import canonical
-from .errors import StudyError
 from .history import History, Step
-from .model import model_text, new_model
 from .settings import RunFile, Settings, write_settings
 from .study import Study
 

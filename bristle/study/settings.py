@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..cosim.findings import unknown, written
+from ..data.channels import PLAIN, channel_unit, is_channel
+from ..data.files import Toml, write_whole
+from ..data.measurement import ChannelSpec
 from ..errors import RecordError, UnitError
-from ..records.channels import PLAIN, channel_unit, is_channel
-from ..records.measurement import ChannelSpec
+from ..findings import unknown, written
 from ..units import same_dimension
-from .files import Toml, write_whole
 
 RIGS = ("bench", "structure")
 ROLES = ("train", "holdout")

@@ -12,20 +12,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..diagnose.search import refine
+from ..data.model import StudyModel
 from ..diagnose.sites import try_effect
 from ..diagnose.structure_damper import fit_damper
+from ..errors import StudyError
 from ..identify.fit import Fit, Model, fit, identify
 from ..identify.line import fit_line
 from ..identify.placed import at_site, homeless, on_time
 from ..identify.response import Response, responses
+from ..identify.search_context import refine
 from ..identify.structure import StructureProblem, problems_of
 from ..identify.table import error_rms, force_rms
 from ..physics.building import Building, paper_building, read_building
 from ..physics.effect import EFFECTS
-from .errors import StudyError
 from .judged import robust_z
-from .model import StudyModel
 from .study import Runs, Study
 
 Pair = tuple[StructureProblem, StructureProblem]

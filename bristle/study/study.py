@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 
+from ..data.files import read_json, write_json, write_whole
+from ..data.measurement import Measurement, read_measurements
+from ..data.model import StudyModel, model_text, read_model
+from ..errors import StudyError
 from ..identify.prepare import SHORTEST
 from ..physics.user import Loaded, load_effects
-from ..records.measurement import Measurement, read_measurements
-from .errors import StudyError
-from .files import read_json, write_json, write_whole
 from .history import History, Step
-from .model import StudyModel, model_text, read_model
 from .settings import ROLES, Settings, read_settings
 
 PATIENCE = 10.0
@@ -106,7 +106,7 @@ class Study:
         Call it before a fit or a diagnosis: an effect that cannot be compiled would take all others
         along.
         """
-        from ..compiled.own import usable
+        from ..check.user_effects import usable
 
         self.own_effects = usable(load_effects(self.effects_folder))
         return [one.error for one in self.own_effects if one.error]

@@ -12,8 +12,8 @@ from held_made import DT, held_runs_with, motion
 
 from bristle.compare import compare, compare_held
 from bristle.compare.held import halved, held_runs
-from bristle.compiled.bench import Bench
 from bristle.errors import RecordError
+from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run
 from bristle.identify.smooth import posterior_draws, smooth
 

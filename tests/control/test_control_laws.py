@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 import bristle.control
-from bristle.compiled.jit import compiled
 from bristle.control import inverse, linear, sensing, switching
+from bristle.jit import compiled
 from bristle.physics.lugre import LuGre
 
 P = [parameter.value for parameter in LuGre.parameters.values()]

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.compiled.jit import compiled
 from bristle.control import inverse, linear, switching
 from bristle.control.controller import Controller
+from bristle.data import read_ground_motion
+from bristle.jit import compiled
 from bristle.physics.building import paper_building
 from bristle.physics.lugre import LuGre
-from bristle.records import read_ground_motion
 
 Array = NDArray[np.float64]
 

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.compiled.bench import Bench
+from bristle.data.measurement import ChannelSpec, measurements_of_frame
 from bristle.diagnose.decision import GAIN
 from bristle.diagnose.limits import detectable, untestable
+from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
-from bristle.records.measurement import ChannelSpec, measurements_of_frame
 
 STEP = 0.002
 T = STEP * np.arange(3000)

@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
+from bristle.data.measurement import ChannelSpec, measurements_of_frame
 from bristle.diagnose.mended import mended
 from bristle.diagnose.sensors import sensor_faults
-from bristle.records.measurement import ChannelSpec, measurements_of_frame
 
 STEP, SECONDS, NOISE = 0.002, 10.0, 0.01
 T = STEP * np.arange(round(SECONDS / STEP))

@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bristle.data.measurement import measurements_of_frame
 from bristle.diagnose.candidates import begin, joinable
-from bristle.diagnose.search import refine
-from bristle.diagnose.starts import NET, Ground, ranked, starts
 from bristle.identify.fit import Model, Problem, identify
 from bristle.identify.prepare import prepare
-from bristle.records.measurement import measurements_of_frame
+from bristle.identify.search_context import refine
+from bristle.identify.start_grid import NET, Ground, ranked, starts
 
 DT, RATE = 0.002, 500.0
 LAW = {"f_c": 1.3, "f_v": 0.83, "c_0": 40.0, "c_v": 15.0, "v_n": 0.05, "exponent": 1.0}

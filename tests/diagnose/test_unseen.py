@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.compiled.bench import Bench
 from bristle.diagnose.candidates import judge
 from bristle.diagnose.unlike import unlike
 from bristle.diagnose.unseen import unseen_fault
+from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, identify
 
 DT, N, NOISE = 0.002, 3000, 0.03

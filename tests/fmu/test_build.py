@@ -125,7 +125,7 @@ def test_the_digest_changes_with_every_part_of_the_source(tmp_path: Path) -> Non
     for file in ("physics/effects/stribeck.py", "physics/linear.py", "fmu/slave.py", "units.py"):
         assert changed(f"bristle/{file}") == set(COMPONENTS), file
     assert changed("components/structure.py") == {"Structure"}
-    assert changed("bristle/records/data/el_centro_1940_ns.csv") == {"GroundMotion"}
+    assert changed("bristle/data/ground_motions/el_centro_1940_ns.csv") == {"GroundMotion"}
     assert changed("bristle/cli/__init__.py") == set()
 
 

@@ -17,8 +17,6 @@ from bristle.cli import main
 from bristle.control import inverse, linear, switching
 from bristle.control.controller import Controller, building_digest, read_controller
 from bristle.control.instrument import Instrument
-from bristle.cosim.scenario import load_scenario
-from bristle.cosim.text import scenario_text
 from bristle.errors import BuildError, DesignError
 from bristle.fmu import build, catalogue
 from bristle.fmu.controller import MEASURED
@@ -26,7 +24,9 @@ from bristle.fmu.description import extract, read_description
 from bristle.fmu.slave import Slave
 from bristle.physics.building import paper_building
 from bristle.physics.lugre import LuGre
-from bristle.run import run
+from bristle.scenario.scenario import load_scenario
+from bristle.scenario.text import scenario_text
+from bristle.simulate.run import run
 
 H = 0.002
 CONTROLLERS = ("ClippedOptimal", "HinfInverse", "LqgClipped", "Lpv", "Skyhook")

@@ -6,9 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bristle.data.measurement import measurements_of_frame
 from bristle.identify.model import Model, Problem, Run
 from bristle.identify.prepare import SETTLING, prepare
-from bristle.records.measurement import measurements_of_frame
 
 DT, NOISE = 0.002, 0.02
 MODEL = Model(

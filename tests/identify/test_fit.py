@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.compiled.bench import Bench
+from bristle.data.measurement import measurements_of_frame
 from bristle.errors import RecordError
+from bristle.identify.bench import Bench
 from bristle.identify.drive import smooth_steps
 from bristle.identify.fit import Model, Problem, Run, fit, identify
 from bristle.identify.prepare import prepare
 from bristle.identify.smooth import posterior_draws, smooth
 from bristle.physics.damper import LAWS
-from bristle.records.measurement import measurements_of_frame
 
 DT, N = 0.002, 4000
 T = np.arange(N) * DT

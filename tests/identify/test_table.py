@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.compiled.bench import Bench
 from bristle.errors import RecordError
+from bristle.identify.bench import Bench
 from bristle.identify.fit import Problem, Run
 from bristle.identify.table import LAWS_OF_TABLE, error_table, low_pass
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bristle.compiled.jit import compiled
+from bristle.jit import compiled
 from bristle.physics import damper, structure
 from bristle.physics.building import paper_building
 from bristle.physics.effect import EFFECTS, effects_of

@@ -10,7 +10,7 @@ import pytest
 from rigs import LAWS, NO_LAW, Bench, force_at, sine
 from scipy.integrate import solve_ivp
 
-from bristle.compiled.channel import shown
+from bristle.check.channel import shown
 from bristle.errors import PhysicsError
 from bristle.physics import damper
 from bristle.physics.building import paper_building

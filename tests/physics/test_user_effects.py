@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from bristle.check.user_effects import refused, usable
 from bristle.cli import main
 from bristle.cli._effect_template import template
-from bristle.compiled.own import refused, usable
 from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
 from bristle.physics import damper, user

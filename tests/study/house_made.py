@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from shaken import building, shake
 
-from bristle.records.channels import channel_unit
+from bristle.data.channels import channel_unit
 from bristle.study.new import create_study
 from bristle.study.study import Study
 

@@ -12,9 +12,8 @@ import pytest
 
 from bristle.cli import identify as command
 from bristle.cli import main
-from bristle.compiled.bench import Bench
-from bristle.errors import RecordError
-from bristle.study.errors import StudyError
+from bristle.errors import RecordError, StudyError
+from bristle.identify.bench import Bench
 from bristle.study.identification import identify_frames, identify_study
 from bristle.study.new import create_study
 from bristle.study.study import Study

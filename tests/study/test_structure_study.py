@@ -13,11 +13,11 @@ from bristle.cli import diagnose as diagnose_command
 from bristle.diagnose.sites import Finding
 from bristle.diagnose.structure_damper import DamperVerdict
 from bristle.diagnose.structure_verdict import combine
+from bristle.errors import StudyError
 from bristle.identify.model import Model
 from bristle.identify.placed import at_site, homeless
 from bristle.physics.effect import EFFECTS
 from bristle.study.comparison import compare_study
-from bristle.study.errors import StudyError
 from bristle.study.identification import identify_study
 from bristle.study.learning import add_effects, diagnose_study
 

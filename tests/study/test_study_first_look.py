@@ -12,11 +12,11 @@ import pytest
 from made import Columns, bench_run, write
 
 from bristle.cli import main
+from bristle.data.checks.channels import clipped_share
+from bristle.data.checks.finding import Finding
+from bristle.data.checks.runs import cycles, drive_levels
 from bristle.study import Study, create_study
-from bristle.study.finding import Finding
 from bristle.study.first_look import FirstLook, first_look
-from bristle.study.look_channels import clipped_share
-from bristle.study.look_runs import cycles, drive_levels
 
 Spoil = Callable[[Columns], None]
 

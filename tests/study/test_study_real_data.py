@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bristle.records.guess import guess_channels, left_out
-from bristle.records.measurement import read_measurements
-from bristle.records.table import read_table
+from bristle.data.guess import guess_channels, left_out
+from bristle.data.measurement import read_measurements
+from bristle.data.table import read_table
 from bristle.study import create_study
 from bristle.study.first_look import first_look
 

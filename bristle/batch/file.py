@@ -1,0 +1,336 @@
+"""The ensemble file: TOML in, a checked plan out.
+
+schema = 1
+title = "El Centro, damper and building as they may be"
+scenario = "el_centro_0p6g_constant_voltage"   # a stock scenario, or a file beside this one
+engine = "compiled"                            # or "fmu"
+runs = 500
+seed = 1
+
+[set]                                          # the same in all runs; as --set of bristle run
+"run.stop" = 31.18
+
+[vary]                                         # one distribution per name
+"damper.sigma_a" = { normal = [650.0, 65.0], within = [300.0, 1000.0] }
+"damper.sigma_0" = { uniform = [350.0, 480.0] }
+"damper.a_0" = { log_uniform = [250.0, 1000.0] }
+"ground.record" = { each = ["el_centro_1940_ns", "my_record.AT2"] }    # equally often, in turn
+"ground.peak" = { choice = [3.924, 5.886], weights = [2, 1] }
+"sensors.seed" = { integers = [1, 1000000] }
+"structure.building.masses.2" = { normal = [1.232, 0.06] }             # compiled only
+
+[outputs]                                      # peak, rms, max, min, mean, last
+"structure.floor2_acceleration_absolute" = ["peak", "rms"]
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from .. import resources
+from ..errors import BristleError, EnsembleError, PhysicsError
+from ..findings import nearest, unknown, written
+from ..lines import KeyPath, key_lines
+from ..scenario.document import FILE_PARAMETERS, MADE_FROM
+from ..scenario.parameters import Wrong, typed
+from ..scenario.scenario import Component, Scenario, load_scenario, resolve_scenario
+from ..scenario.text import scenario_text
+from ..simulate.rows import make_columns
+from . import buildings
+from .distributions import KINDS, Distribution, Value
+from .plan import STATISTICS, Output, Plan, Varied
+
+SCHEMA = 1
+LARGEST = 4 * 1024**2
+"""Largest ensemble file [bytes]."""
+MOST_RUNS = 10_000_000
+_KEYS = ("schema", "title", "scenario", "engine", "runs", "seed", "set", "vary", "outputs")
+_FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu")
+
+
+def stock_ensembles() -> list[Path]:
+    """Return the files of the stock ensembles, by name."""
+    return sorted(resources.ensembles_folder().glob("*.toml"))
+
+
+def resolve_ensemble(name: str | Path) -> Path:
+    """Return the path of an ensemble file, or of the stock ensemble of that name.
+
+    Raises
+    ------
+    EnsembleError
+        If neither is there; the text names the nearest.
+    """
+    path = Path(name)
+    if path.is_file():
+        return path.absolute()
+    if path.is_dir():
+        raise EnsembleError(f"{path}: is a folder; an ensemble is a TOML file.")
+    stock = {found.stem: found for found in stock_ensembles()}
+    if len(path.parts) == 1 and path.name.removesuffix(".toml") in stock:
+        return stock[path.name.removesuffix(".toml")].absolute()
+    close = nearest(path.stem, stock)
+    hint = f' Did you mean "{close[0]}"?' if close else ""
+    raise EnsembleError(
+        f'there is no ensemble file "{name}".{hint} Stock ensembles: {", ".join(stock)}.'
+    )
+
+
+def read_ensemble(name: str | Path, runs: int | None = None) -> Plan:
+    """Return the checked plan of an ensemble file; `runs` takes the place of the file's number.
+
+    Raises
+    ------
+    EnsembleError
+        With every mistake of the file and its line.
+    ScenarioError
+        If the base scenario is wrong.
+    """
+    path = resolve_ensemble(name)
+    return _Reader(path).plan(runs)
+
+
+class _Reader:
+    """Reads one file and collects what is wrong with it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.wrong: list[str] = []
+        try:
+            if path.stat().st_size > LARGEST:
+                raise EnsembleError(f"{path}: larger than {LARGEST // 1024**2} MB: no ensemble.")
+            text = path.read_text(encoding="utf-8-sig")
+            self.data: dict[str, Any] = tomllib.loads(text)
+        except OSError as error:
+            raise EnsembleError(f"{path}: cannot be read ({error.strerror or error}).") from None
+        except (ValueError, RecursionError) as error:  # not UTF-8, not TOML
+            raise EnsembleError(f"{path}: not TOML: {error}.") from None
+        self.lines = key_lines(text)
+
+    def error(self, keys: KeyPath, text: str) -> None:
+        while keys and keys not in self.lines:
+            keys = keys[:-1]
+        line = self.lines.get(keys, 0)
+        self.wrong.append(f"{self.path}{f':{line}' if line else ''}: {text}")
+
+    def check(self) -> None:
+        if self.wrong:
+            raise EnsembleError("\n  ".join(dict.fromkeys(self.wrong)))
+
+    def plan(self, runs: int | None) -> Plan:
+        if self.data.get("schema") != SCHEMA:
+            found = written(self.data["schema"]) if "schema" in self.data else "missing"
+            self.error(("schema",), f"schema is {found}; this version reads {SCHEMA}.")
+        for key in self.data:
+            if key not in _KEYS:
+                self.error((key,), unknown("key", key, _KEYS))
+        asked = self._whole("runs", 100, 1, MOST_RUNS)
+        seed = self._whole("seed", 1, 0, 2**62)
+        engine = self.data.get("engine", "compiled")
+        if engine not in ("compiled", "fmu"):
+            self.error(("engine",), f"engine = {written(engine)}; compiled or fmu is right.")
+        if runs is not None and not 1 <= runs <= MOST_RUNS:
+            raise EnsembleError(f"--runs {runs}: 1 to {MOST_RUNS} is right.")
+        fixed = {name: self._found(name, v) for name, v in self._table("set").items()}
+        base = self._scenario(fixed)
+        if base is None:
+            self.check()
+        assert base is not None
+        varied = tuple(
+            one
+            for name, table in self._table("vary").items()
+            if (one := self._varied(name, table, base, str(engine))) is not None
+        )
+        if not varied and not self.wrong:
+            self.error(("vary",), "nothing varies: [vary] names what does, and within what.")
+        outputs = self._outputs(base)
+        self.check()
+        content = hashlib.sha256(scenario_text(base).encode())
+        for file in _files_read(base, varied):
+            content.update(file.read_bytes())
+        title = str(self.data.get("title", "") or base.title)
+        return Plan(
+            self.path, title, base.file, str(engine), runs or asked, seed, varied, outputs, fixed,
+            content.hexdigest()[:16],
+        )  # fmt: skip
+
+    def _whole(self, key: str, default: int, low: int, high: int) -> int:
+        value = self.data.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            self.error((key,), f"{key} = {written(value)}; a whole number from {low} is right.")
+            return default
+        return value
+
+    def _table(self, key: str) -> dict[str, Any]:
+        value = self.data.get(key, {})
+        if not isinstance(value, dict):
+            self.error((key,), f"{key} is {written(value)}; a table, [{key}], is right.")
+            return {}
+        return value
+
+    def _scenario(self, fixed: Mapping[str, Value]) -> Scenario | None:
+        name = self.data.get("scenario")
+        if not isinstance(name, str) or not name:
+            self.error(("scenario",), "scenario names the base: a stock scenario or a file.")
+            return None
+        beside = self.path.parent / name
+        return load_scenario(resolve_scenario(beside if beside.is_file() else name), fixed)
+
+    def _found(self, name: str, value: Any) -> Any:
+        """Return a value, a file's name made absolute where it lies beside the ensemble file."""
+        if name.rpartition(".")[2] in _FILES and isinstance(value, str) and Path(value).suffix:
+            beside = (self.path.parent / value).absolute()
+            return str(beside) if beside.is_file() else value
+        return value
+
+    def _varied(self, name: str, table: Any, base: Scenario, engine: str) -> Varied | None:
+        keys: KeyPath = ("vary", name)
+        if not isinstance(table, dict):
+            self.error(keys, f'"{name}" must be a table such as {{ uniform = [1.0, 2.0] }}.')
+            return None
+        distribution = self._distribution(keys, name, table)
+        if distribution is None:
+            return None
+        try:
+            varied = Varied(name, distribution, place_of(name, base, engine))
+            mistake = _try(varied, base)
+        except EnsembleError as error:
+            mistake = str(error)
+        if mistake:
+            self.error(keys, mistake)
+            return None
+        return varied
+
+    def _distribution(self, keys: KeyPath, name: str, table: dict[str, Any]) -> Distribution | None:
+        kinds = [key for key in table if key in KINDS]
+        others = [key for key in table if key not in (*KINDS, "within", "weights")]
+        for key in others:
+            self.error((*keys, key), f'"{name}": {unknown("distribution", key, KINDS)}')
+        if len(kinds) != 1:
+            if not others:
+                self.error(keys, f'"{name}" needs one of {", ".join(KINDS)}.')
+            return None
+        kind = kinds[0]
+        lists = {}
+        for key in (kind, "within", "weights"):
+            value = table.get(key, [])
+            if not isinstance(value, list):
+                self.error((*keys, key), f'"{name}": {key} is {written(value)}; a list is right.')
+                return None
+            lists[key] = tuple(self._found(name, item) for item in value)
+        wrong = ""
+        for key, owner, size in (("within", "normal", 2), ("weights", "choice", 0)):
+            if key in table and kind != owner:
+                wrong = f"{key} goes with {owner}, not with {kind}."
+            elif not all(isinstance(v, int | float) for v in lists[key]):
+                wrong = f"{key} holds numbers."
+            elif key in table and size and len(lists[key]) != size:
+                wrong = f"{key} needs {size} numbers."
+        if not wrong:
+            distribution = Distribution(
+                kind,
+                lists[kind],
+                lists["within"] or None,
+                lists["weights"],
+            )
+            wrong = distribution.mistake()
+        if wrong:
+            self.error(keys, f'"{name}": {wrong}')
+            return None
+        return distribution
+
+    def _outputs(self, base: Scenario) -> tuple[Output, ...]:
+        columns = {
+            c.name: c for c in make_columns(base, {p.name: p.description for p in base.components})
+        }
+        outputs = []
+        for name, statistics in self._table("outputs").items():
+            keys: KeyPath = ("outputs", name)
+            if name not in columns:
+                self.error(keys, unknown("output", name, columns))
+                continue
+            if not isinstance(statistics, list) or not statistics:
+                self.error(keys, f'"{name}" needs a list of {", ".join(STATISTICS)}.')
+                continue
+            for statistic in statistics:
+                if statistic not in STATISTICS:
+                    words = unknown("statistic", str(statistic), STATISTICS)
+                    self.error(keys, f'"{name}": {words}')
+                else:
+                    outputs.append(Output(name, statistic, columns[name].unit or ""))
+        if not outputs and not self.wrong:
+            self.error(("outputs",), "nothing is kept: [outputs] names columns and statistics.")
+        return tuple(dict.fromkeys(outputs))
+
+
+def split(name: str, base: Scenario) -> tuple[Component | None, str]:
+    """Return the component that a name begins with, and the rest of the name."""
+    first, _, rest = name.removeprefix("components.").partition(".")
+    found = next((c for c in base.components if c.name == first), None)
+    return found, rest.removeprefix("parameters.")
+
+
+def place_of(name: str, base: Scenario, engine: str) -> str:
+    """Return where the value of a name goes; see `Varied`.
+
+    Raises
+    ------
+    EnsembleError
+        If a building's data cannot be varied there.
+    """
+    component, rest = split(name, base)
+    if component is not None and rest.startswith("building."):
+        if engine != "compiled":
+            raise EnsembleError(
+                f'"{name}": a building\'s data varies with engine = "compiled" only, for it is '
+                "baked into the FMU."
+            )
+        if component.path is not None or component.fmu != "Structure":
+            raise EnsembleError(f'"{name}": {component.name} is no Structure.')
+        return "building"
+    if component is not None and rest not in _FILES and rest in component.description.variables:
+        return "parameter"
+    return "scenario"
+
+
+def _try(varied: Varied, base: Scenario) -> str:
+    """Return the words for why a scenario cannot take what will be drawn, "" if it can."""
+    component, rest = split(varied.name, base)
+    for value in varied.distribution.extremes():
+        if varied.place == "scenario":
+            try:
+                load_scenario(base.file, {varied.name: value})
+            except BristleError as error:
+                return f'"{varied.name}" = {written(value)}: {error}'
+            continue
+        assert component is not None
+        if varied.place == "building":
+            try:
+                buildings.changed(component, {rest.removeprefix("building."): value})
+            except PhysicsError as error:
+                return f'"{varied.name}" = {written(value)}: {error}'
+            continue
+        variable = component.description.variables[rest]
+        if variable.causality not in ("parameter", "input"):
+            return f'"{varied.name}" is not a parameter or input and cannot be set.'
+        fits = typed(variable, value)
+        if isinstance(fits, Wrong):
+            return f'"{varied.name}" {fits.words}'
+    return ""
+
+
+def _files_read(base: Scenario, varied: tuple[Varied, ...]) -> list[Path]:
+    """Return the files whose content decides the numbers: records, signals, buildings."""
+    named: list[object] = []
+    for component in base.components:
+        named += [component.building, component.controller, component.path]
+        named += [component.parameters.get(key) for key in FILE_PARAMETERS]
+    for one in varied:
+        if one.name.rpartition(".")[2] in _FILES:
+            named += one.distribution.values
+    folder = base.file.parent
+    return sorted({folder / str(name) for name in named if name and (folder / str(name)).is_file()})

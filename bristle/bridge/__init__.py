@@ -1,0 +1,1 @@
+"""Where simulation and measurement meet: a study's model as an FMU, an FMU against measurements."""

@@ -1,0 +1,342 @@
+"""A study's present model as an FMU with its values baked in, and a scenario that uses it."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.files import write_whole
+from ..data.measurement import Measurement
+from ..data.model import StudyModel
+from ..errors import StudyError
+from ..fmu.build import build, plan
+from ..identify.fit import Model, Problem, Run
+from ..identify.instruments import true_motion
+from ..identify.prepare import prepare
+from ..physics.building import paper_building, read_building
+from ..physics.effect import EFFECTS
+from ..physics.user import own_effects
+from ..study.identification import as_model
+from ..study.study import Study
+
+Array = NDArray[np.float64]
+
+COMPONENTS = {"bingham": "BinghamDamper", "lugre": "LuGreDamper"}
+STEP = 5e-4
+"""Longest step [s] of a bench scenario: an FMU holds its inputs over a step, a prediction does not.
+
+At 0.5 ms the two differ by less than `AGREEMENT`.
+"""
+AGREEMENT = 0.01
+"""RMS difference of the exported FMU on the bench from the prediction, by the RMS of the force."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written: the FMU, the scenario, the files it reads; what was left out, and why."""
+
+    fmu: Path
+    scenario: Path
+    files: tuple[Path, ...]
+    run: str
+    notes: tuple[str, ...] = ()
+
+
+def export_study(study: Study, out: Path | None = None) -> Exported:
+    """Write a study's present model as an FMU and a scenario into a folder.
+
+    Parameters
+    ----------
+    out : the folder, made if it is not there; None takes export/ in the study
+
+    Raises
+    ------
+    StudyError
+        If the model cannot be read, or the folder cannot be written.
+    BuildError, RecordError
+        If the FMU cannot be built, or no run can be read.
+    """
+    model = study.model()
+    measurement = _one_run(study)
+    folder = study.folder / "export" if out is None else out
+    notes: list[str] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        fmu = _damper(study, model, measurement, folder, notes)
+        write = _structure if study.settings.rig == "structure" else _bench
+        scenario, files = write(study, model, measurement, fmu, folder, notes)
+    except OSError as error:
+        raise StudyError(
+            f"{error.filename or folder}: cannot be written ({error.strerror or error})."
+        ) from None
+    return Exported(fmu, scenario, tuple(files), measurement.name, tuple(notes))
+
+
+def _one_run(study: Study) -> Measurement:
+    """Return the run that the scenario plays: the first that is held out."""
+    runs = study.runs()
+    return (runs.holdout or runs.train)[0]
+
+
+def _of_site(model: StudyModel, site: str) -> list[str]:
+    return [name for name in model.effects if EFFECTS[name].site == site]
+
+
+def _damper(
+    study: Study, model: StudyModel, measurement: Measurement, folder: Path, notes: list[str]
+) -> Path:
+    """Build the damper with the model's values as its defaults."""
+    effects = _of_site(model, "damper")
+    sensors = _of_site(model, "sensor")
+    if sensors:
+        notes.append(
+            f"{', '.join(sensors)} left out: an instrument's effect is not in the damper. The "
+            "scenario's force is the one before the instrument."
+        )
+    values = model.values()
+    starts: dict[str, float | bool] = {
+        name: value
+        for name, value in values.items()
+        if "." not in name or name.partition(".")[0] in effects
+    }
+    starts |= {f"{effect}.on": True for effect in effects}
+    starts |= _range(measurement, notes)
+    own = own_effects()
+    what = plan(
+        COMPONENTS[model.base_law],
+        name=_model_name(study.name),
+        starts=starts,
+        effects=[own[name] for name in effects if EFFECTS[name].own],
+    )
+    return build(what, folder)
+
+
+def _range(measurement: Measurement, notes: list[str]) -> dict[str, float]:
+    """Return v_max [V] and stroke [m] that hold what was measured, where the defaults do not."""
+    found = {}
+    drive = _drive(measurement)
+    if drive is None:
+        notes.append("neither voltage nor current was measured: the scenario holds 0 V.")
+    elif drive == "current":
+        notes.append("the drive is a current [A]: the port voltage takes it, in A.")
+    if drive is not None and float(measurement[drive].max()) > 8.0:
+        found["v_max"] = float(ceil(1.05 * measurement[drive].max()))
+    for channel in ("displacement", "base_displacement"):
+        if measurement.has(channel):
+            most = float(np.abs(measurement[channel]).max())
+            if most > 0.02:
+                found["stroke"] = float(f"{1.05 * most:.3g}")
+    return found
+
+
+def _drive(measurement: Measurement) -> str | None:
+    return next((c for c in ("voltage", "current") if measurement.has(c)), None)
+
+
+def _model_name(name: str) -> str:
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return f"{plain if plain[:1].isalpha() else 'study_' + plain}_damper"
+
+
+# -- the bench: a run's motion played, its measured force beside the model's
+
+
+def _bench(
+    study: Study, model: StudyModel, measurement: Measurement, fmu: Path, folder: Path,
+    notes: list[str],
+) -> tuple[Path, list[Path]]:  # fmt: skip
+    """Write the scenario that moves the damper as in a measured run, and its files."""
+    fitted = as_model(model)
+    run = prepare(measurement)
+    v, a = true_motion(fitted.effects, fitted.values, run.v, run.a, run.dt)
+    run = replace(run, v=v, a=a)
+    fine = max(1, ceil(run.dt / STEP - 1e-9))
+    step = float(f"{run.dt / fine:.12g}")
+    stop = float(f"{(len(run.x) - 1) * fine * step:.12g}")
+    time = run.dt * np.arange(len(run.x))
+    files = [_motion_file(run, fine, folder / "motion.csv")]
+    rows = {"measured": ("force", "N", run.force)}
+    wires = {"damper.displacement": "rod.displacement", "damper.velocity": "rod.velocity"}
+    if _drive(measurement) is not None:
+        rows["drive"] = ("voltage", "V", run.V)
+        wires["damper.voltage"] = "drive.value"
+    effects = [EFFECTS[name] for name in _of_site(model, "damper")]
+    if any("a" in effect.needs for effect in effects):
+        rows["acceleration"] = ("acceleration", "m/s2", run.a)
+        wires["damper.acceleration"] = "acceleration.value"
+    parts = [_part("rod", "PrescribedMotion", {"kind": "csv", "file": files[0].name})]
+    for name, (title, unit, values) in rows.items():
+        files.append(_signal_file(time, values, title, unit, folder / f"{name}.csv"))
+        parts.append(_part(name, "SignalSource", {"kind": "csv", "file": files[-1].name}))
+    starts = _start_values(model, run)
+    if "damper.voltage" not in wires:
+        starts["voltage"] = 0.0
+    parts.append(_part("damper", fmu.name, starts))
+    text = _scenario(
+        f"{study.name}: the model on the bench, motion of {measurement.name}",
+        f"# damper.force is the model's, measured.value the measured one [N]. Sampled at "
+        f"{run.dt:g} s; the step is finer\n# because an FMU holds its inputs over a step.",
+        stop, step, parts, wires,
+    )  # fmt: skip
+    scenario = folder / "bench.toml"
+    write_whole(scenario, text)
+    return scenario, files
+
+
+def _motion_file(run: Run, fine: int, path: Path) -> Path:
+    """Write a displacement whose slope at every step is the run's velocity there.
+
+    PrescribedMotion gives the slope of the interval at hand: so the nodes lie half a step beside
+    the steps, and the displacement between them is the integral of the velocity.
+    """
+    h = run.dt / fine
+    count = (len(run.x) - 1) * fine + 1
+    steps = h * np.arange(count)
+    v = np.interp(steps, run.dt * np.arange(len(run.v)), run.v)
+    nodes: Array = np.concatenate([[0.0], steps + 0.5 * h])
+    x: Array = run.x[0] + np.concatenate([[0.0], np.cumsum(v * np.diff(nodes))])
+    return _signal_file(nodes, x, "displacement", "m", path)
+
+
+def _signal_file(
+    time: NDArray[Any], values: NDArray[Any], title: str, unit: str, path: Path
+) -> Path:
+    rows = [f"time [s],{title} [{unit}]"]
+    rows += [f"{t:.12g},{value!r}" for t, value in zip(time.tolist(), values.tolist(), strict=True)]
+    write_whole(path, "\n".join(rows) + "\n")
+    return path
+
+
+def _start_values(model: StudyModel, run: Run) -> dict[str, float]:
+    """Return the start values of states that begin with a signal of the run."""
+    first = {"x": run.x[0], "v": run.v[0], "a": run.a[0], "V": run.V[0]}
+    return {
+        f"{name}.{state}_0": float(first[signal])
+        for name in _of_site(model, "damper")
+        for state, signal in EFFECTS[name].starts.items()
+        if signal in first
+    }
+
+
+def prediction(model: StudyModel, run: Run) -> Array:
+    """Return the force (n,) [N] that the damper of a model gives in a run, before instruments."""
+    fitted = as_model(model)
+    v, a = true_motion(fitted.effects, fitted.values, run.v, run.a, run.dt)
+    bare = tuple(name for name in fitted.effects if EFFECTS[name].site == "damper")
+    return Problem([run]).predict(Model(fitted.law, bare, fitted.values), replace(run, v=v, a=a))
+
+
+# -- the building: ground motion of a run, the structure, the damper
+
+
+def _structure(
+    study: Study, model: StudyModel, measurement: Measurement, fmu: Path, folder: Path,
+    notes: list[str],
+) -> tuple[Path, list[Path]]:  # fmt: skip
+    """Write the scenario of the study's building with the damper, under a run's ground motion."""
+    if not measurement.has("ground_acceleration"):
+        raise StudyError(
+            f"{measurement.name}: no ground_acceleration was measured, which a structure's "
+            "scenario needs."
+        )
+    files, values = [], model.values()
+    building, extra = paper_building(), {}
+    if model.building:
+        files.append(Path(shutil.copyfile(study.folder / model.building, folder / "building.toml")))
+        building, extra = read_building(files[0]), {"building": files[0].name}
+    time = measurement.time - measurement.time[0]
+    ground = measurement["ground_acceleration"]
+    files.append(_signal_file(time, ground, "acceleration", "m/s2", folder / "ground.csv"))
+    level = building.levels()[0]
+    own: dict[str, float | bool] = {f"{name}.on": True for name in _of_site(model, "structure")}
+    own |= {
+        name: value
+        for name, value in values.items()
+        if name.partition(".")[0] in _of_site(model, "structure")
+    }
+    damper: dict[str, float | bool] = {}
+    mass = building.M[0][0]
+    if "fluid_inertia" in model.effects and values.get("fluid_inertia.m_f", 0.0) > 0.0:
+        moved = values["fluid_inertia.m_f"]
+        own["attached_mass"] = moved
+        damper["fluid_inertia.m_f"] = 0.0
+        mass += moved
+        notes.append(
+            f"fluid_inertia.m_f = {moved:g} kg is structure.attached_mass in the scenario: from "
+            "differences of velocity it would diverge near the mass that it moves."
+        )
+    wires = {
+        "structure.ground_acceleration": "ground.ground_acceleration",
+        "structure.damper_force": "damper.force",
+        "damper.displacement": f"structure.{level}_displacement",
+        "damper.velocity": f"structure.{level}_velocity",
+    }
+    if model.base_law == "bingham":
+        damper["moving_mass"] = mass
+        wires["damper.holding_force"] = "structure.holding_force"
+    parts = [
+        _part("ground", "GroundMotion", {"record": "ground.csv"}),
+        _part("structure", "Structure", own, extra),
+    ]
+    drive = _drive(measurement)
+    if drive is None:
+        damper["voltage"] = 0.0
+    else:
+        files.append(_signal_file(time, measurement[drive], "voltage", "V", folder / "drive.csv"))
+        parts.append(_part("drive", "SignalSource", {"kind": "csv", "file": "drive.csv"}))
+        wires["damper.voltage"] = "drive.value"
+    if measurement.has("force"):
+        files.append(
+            _signal_file(time, measurement["force"], "force", "N", folder / "measured.csv")
+        )
+        parts.append(_part("measured", "SignalSource", {"kind": "csv", "file": "measured.csv"}))
+    parts.append(_part("damper", fmu.name, damper))
+    fine = max(1, ceil(measurement.step / 2e-3 - 1e-9))
+    step = float(f"{measurement.step / fine:.12g}")
+    stop = float(f"{(len(time) - 1) * fine * step:.12g}")
+    text = _scenario(
+        f"{study.name}: the building with the model's damper, ground of {measurement.name}",
+        "# The model's damper in the study's building.", stop, step, parts, wires,
+    )  # fmt: skip
+    scenario = folder / "structure.toml"
+    write_whole(scenario, text)
+    return scenario, files
+
+
+# -- text
+
+
+def _part(
+    name: str, fmu: str, parameters: Mapping[str, float | bool | str],
+    extra: Mapping[str, str] | None = None,
+) -> str:  # fmt: skip
+    lines = [f"[components.{name}]", f"fmu = {_value(fmu)}"]
+    lines += [f"{key} = {_value(value)}" for key, value in (extra or {}).items()]
+    if parameters:
+        pairs = [f"{_value(key)} = {_value(value)}" for key, value in parameters.items()]
+        lines.append(f"parameters = {{ {', '.join(pairs)} }}")
+    return "\n".join(lines)
+
+
+def _value(value: float | bool | str) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else repr(float(value))
+
+
+def _scenario(
+    title: str, about: str, stop: float, step: float, parts: list[str], wires: Mapping[str, str]
+) -> str:
+    plain = title.replace("\\", "/").replace('"', "'")
+    head = f'{about}\n\nschema = 1\ntitle = "{plain}"\n\n[run]\nstop = {stop!r}\n'
+    head += f'step = {step!r}\nalgorithm = "gauss-seidel"\n'
+    lines = [f'"{target}" = "{source}"' for target, source in wires.items()]
+    return "\n".join([head, "\n\n".join(parts), "\n[connections]", *lines]) + "\n"

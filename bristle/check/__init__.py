@@ -1,0 +1,1 @@
+"""Rules that every effect obeys, and whether numba compiles an effect of a user."""

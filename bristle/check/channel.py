@@ -1,0 +1,54 @@
+"""What an instrument shows of a signal, compiled: the hooks of one sensor's effect, in time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from types import FunctionType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics.effect import Effect
+from ..physics.sensor import instrument
+from ..physics.weave import Layout
+
+Array = NDArray[np.float64]
+
+
+def channel_history(signal, dt, z, p, out):  # type: ignore[no-untyped-def]
+    """Fill `out` (n,) with what the instrument shows of a signal (n,) sampled every dt [s]."""
+    for k in range(len(signal)):
+        out[k] = show(signal[k], dt, z, p)  # type: ignore[name-defined]  # noqa: F821
+
+
+def shown(effect: type[Effect], values: dict[str, float], signal: Array, dt: float) -> Array:
+    """Return what an instrument shows (n,) of a signal (n,) sampled every dt [s].
+
+    Parameters
+    ----------
+    effect : Effect of the site "sensor"
+    values : parameters of the effect by their own names ("gain"), in SI; missing ones default
+    """
+    history, layout = _history(effect)  # type: ignore[arg-type]  # a class can be hashed
+    p, z = np.zeros(max(1, layout.p_size)), np.zeros(max(1, layout.z_size))
+    for name, known in effect.parameters.items():
+        p[layout.parameters[f"{effect.name}.{name}"]] = values.get(name, known.value)
+    for state in effect.starts:
+        z[layout.states[f"{effect.name}.{state}"]] = signal[0]
+    out = np.empty(len(signal))
+    history(np.ascontiguousarray(signal, dtype=np.float64), dt, z, p, out)
+    return out
+
+
+@cache
+def _history(effect: type[Effect]) -> tuple[Callable[..., None], Layout]:
+    """Return the compiled march of one effect's hooks over a signal."""
+    from ..jit import compiled
+
+    show, layout = instrument(effect)
+    namespace: dict[str, Any] = {**globals(), "show": show}
+    march = FunctionType(channel_history.__code__, namespace, "channel_history")
+    march.__module__, march.__qualname__ = __name__, "channel_history"
+    return compiled(march), layout

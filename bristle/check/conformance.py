@@ -1,0 +1,168 @@
+"""What is asked of every effect, asked of one: rest, energy, bounds, and the compiled path."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import cos, inf, isfinite, pi, sin
+
+import numpy as np
+
+from ..physics.building import paper_building
+from ..physics.damper import DamperModel
+from ..physics.effect import Effect
+from ..physics.structure import StructureModel
+from .channel import shown
+from .user_effects import refused
+
+STEP = 1e-3  # s
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing asked of an effect, whether it holds, and what was found."""
+
+    asked: str
+    holds: bool
+    found: str = ""
+
+
+def examine(effect: type[Effect]) -> list[Check]:
+    """Return what is asked of an effect that is registered, and whether it holds."""
+    asked: list[Callable[[type[Effect]], Check]] = [_says, _compiles]
+    if effect.site == "damper":
+        asked += [_rests, _matters, _bounds, _energy]
+    elif effect.site == "structure":
+        asked += [_building_rests, _building_bounds]
+    else:
+        asked += [_shows]
+    return [one(effect) for one in asked]
+
+
+def _says(effect: type[Effect]) -> Check:
+    lacking = []
+    if ":" not in effect.first_line() or not effect.first_line().endswith("."):
+        lacking.append('a first docstring line "Name: what happens."')
+    if "Leaves out" not in (effect.__doc__ or ""):
+        lacking.append('a docstring sentence "Leaves out ..."')
+    if not re.search(r"\b(1[89]|20)\d\d\b", effect.source):
+        lacking.append("a source with its year")
+    if len(effect.expect.split()) < 5:
+        lacking.append("expect, what a residual looks like without it")
+    return Check(
+        "it says what it is", not lacking, "lacks " + ", ".join(lacking) if lacking else ""
+    )
+
+
+def _compiles(effect: type[Effect]) -> Check:
+    flaw = refused(effect)
+    return Check("compiled it gives the same numbers", flaw is None, flaw[1] if flaw else "")
+
+
+def _corners(effect: type[Effect]) -> Iterator[dict[str, float]]:
+    yield {}
+    for name, parameter in effect.parameters.items():
+        for bound in parameter.bounds:
+            yield {f"{effect.name}.{name}": bound}
+
+
+def _rests(effect: type[Effect]) -> Check:
+    asked = "no force at rest" if effect.zero_at_rest else "a force at rest, as it says"
+    most, at = 0.0, ""
+    for law in effect.laws:
+        for values in _corners(effect):
+            for V in (0.0, 4.0, 8.0):
+                model = DamperModel(law, values, [effect.name])
+                force = abs(model.force(0.0, 0.0, 0.0, V, inf, 0.0, 0.0, False))
+                if force > most:
+                    most, at = force, f"{force:g} N at {V:g} V, {law}, {values or 'defaults'}"
+    return Check(asked, (most == 0.0) == effect.zero_at_rest, at or "none at any bound")
+
+
+def _cycle(
+    law: str, effects: list[str], values: dict[str, float], amplitude: float, frequency: float,
+    V: Callable[[float], float] | float,
+) -> tuple[list[float], list[float], list[float]]:  # fmt: skip
+    """Return times, velocities and forces of three cycles."""
+    model = DamperModel(law, values, effects)
+    voltage = V if callable(V) else lambda _t: V
+    w, before = 2.0 * pi * frequency, 2.0 * pi * frequency * amplitude
+    times, speeds, forces = [], [], []
+    for k in range(1, round(3.0 / frequency / STEP) + 1):
+        t = k * STEP
+        x, v = amplitude * sin(w * t), amplitude * w * cos(w * t)
+        forces.append(model.step(x, v, (v - before) / STEP, voltage(t), STEP, 0.0, 0.0, False))
+        times.append(t)
+        speeds.append(v)
+        before = v
+    return times, speeds, forces
+
+
+def _matters(effect: type[Effect]) -> Check:
+    best = 0.0
+    for law in effect.laws:
+        rows = [
+            np.array(_cycle(law, on, {}, 0.01, 2.0, lambda t: 4.0 + 3.0 * sin(9.0 * t))[2])
+            for on in ([], [effect.name])
+        ]
+        change = float(np.sqrt(np.mean((rows[1] - rows[0]) ** 2) / np.mean(rows[0] ** 2)))
+        best = max(best, change)
+    said = f"{100.0 * best:.3g} % of the force RMS on a damper of 10 N, at its defaults"
+    return Check("switched on it changes the force by more than 1 %", best > 0.01, said)
+
+
+def _bounds(effect: type[Effect]) -> Check:
+    for law in effect.laws:
+        for values in _corners(effect):
+            forces = _cycle(law, [effect.name], values, 0.01, 3.0, 8.0)[2]
+            if not all(isfinite(force) for force in forces):
+                return Check("it can be simulated at every bound", False, f"{law}, {values}")
+    return Check("it can be simulated at every bound", True)
+
+
+def _energy(effect: type[Effect]) -> Check:
+    asked = "a closed cycle gives no energy"
+    if not effect.passive:
+        return Check(asked, True, "not asked: passive = False")
+    for law in effect.laws:
+        for amplitude, frequency, V in ((0.001, 5.0, 6.0), (0.015, 5.0, 0.0), (0.015, 1.0, 6.0)):
+            for values in _corners(effect):
+                held = _cycle(law, [effect.name], values, amplitude, frequency, V)
+                last = round(1.0 / frequency / STEP)
+                v, force = np.array(held[1][-last:]), np.array(held[2][-last:])
+                work = float(STEP * np.sum(v * force))
+                scale = amplitude * max(1e-9, float(np.abs(force).max()))
+                if work < -1e-3 * scale:
+                    where = f"{law}, {1e3 * amplitude:g} mm at {frequency:g} Hz, {V:g} V"
+                    said = f"{work:.3g} J at {where}, {values or 'defaults'}"
+                    return Check(asked, False, said)
+    return Check(asked, True)
+
+
+def _building_rests(effect: type[Effect]) -> Check:
+    model = StructureModel(paper_building(), {}, [effect.name])
+    for _ in range(20):
+        model.step(0.002, 0.0, 0.0, 0.0)
+    still = not any(model.x)
+    return Check("a building at rest stays at rest", still or not effect.zero_at_rest)
+
+
+def _building_bounds(effect: type[Effect]) -> Check:
+    asked = "it can be simulated at every bound"
+    for values in _corners(effect):
+        model = StructureModel(paper_building(), values, [effect.name])
+        for k in range(200):
+            model.step(0.002, 4.0 * sin(0.02 * k), 4.0 * sin(0.02 * k + 0.02), 0.0)
+        if not all(isfinite(x) and abs(x) < 10.0 for x in model.x):
+            return Check(asked, False, f"the base leaves 10 m at {values}")
+    return Check(asked, True)
+
+
+def _shows(effect: type[Effect]) -> Check:
+    signal = np.sin(2.0 * pi * 2.0 * np.arange(500) * 0.002)
+    for values in _corners(effect):
+        own = {name.partition(".")[2]: value for name, value in values.items()}
+        if not np.isfinite(shown(effect, own, signal, 0.002)).all():
+            return Check("what it shows is finite at every bound", False, f"{values}")
+    return Check("what it shows is finite at every bound", True)

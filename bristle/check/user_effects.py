@@ -1,0 +1,71 @@
+"""Whether an effect of a user's can be compiled: what Python runs, numba may refuse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from contextlib import suppress
+from math import isclose
+from typing import Any
+
+from ..physics import user
+from ..physics.effect import Effect, Q
+from ..resources import cache_folder
+
+
+def usable(effects: Iterable[user.Loaded]) -> list[user.Loaded]:
+    """Return the same, with those left out, and unregistered, that numba cannot compile.
+
+    All effects of a site are compiled into one function, so a bad one would take the others along.
+    What has passed is remembered in the cache by its digest.
+    """
+    out = []
+    for loaded in effects:
+        flaw = refused(loaded.effect) if loaded.effect is not None else None
+        if flaw is not None and loaded.effect is not None:
+            said = f"{loaded.path}, line {flaw[0]}: {flaw[1]}"
+            user.leave_out(loaded.effect, said)
+            loaded = user.Loaded(loaded.path, None, said)
+        out.append(loaded)
+    return out
+
+
+def refused(effect: type[Effect]) -> tuple[int, str] | None:
+    """Return line and reason why a hook cannot be compiled, None if all can."""
+    from ..jit import compiled, digest
+
+    q = Q(*(0.01 * (1 + k) for k in range(len(Q._fields))))
+    z = effect.State(*(0.01 for _ in effect.states))
+    p = effect.Values(*(float(known.value) for known in effect.parameters.values()))
+    for hook, function in effect.hooks().items():
+        shape = f"{len(effect.states)}_{len(effect.parameters)}"
+        mark = cache_folder() / "numba" / "passed" / f"{digest(function)}_{shape}"
+        if mark.is_file():
+            continue
+        line, plain = function.__code__.co_firstlineno + 1, function(q, z, p)
+        try:
+            found = compiled(function, keep=False)(q, z, p)
+        except Exception as error:  # numba's errors, and what hooks raise, have no base in common
+            return line, f"{hook} cannot be compiled: {_reason(error)}"
+        if not _same(found, plain):
+            return line, f"{hook} gives {found!r} compiled and {plain!r} in Python."
+        with suppress(OSError):  # without a cache it is compiled again next time
+            mark.parent.mkdir(parents=True, exist_ok=True)
+            mark.touch()
+    return None
+
+
+def _same(found: Any, plain: Any) -> bool:
+    first = found if isinstance(found, tuple) else (found,)
+    second = plain if isinstance(plain, tuple) else (plain,)
+    return len(first) == len(second) and all(
+        isclose(a, b, rel_tol=1e-12, abs_tol=1e-300) for a, b in zip(first, second, strict=True)
+    )
+
+
+def _reason(error: Exception) -> str:
+    """Return the line of numba's long text that says what it is about."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    telling = [
+        line for line in lines if not line.startswith(("Failed in", "File ", "During", "->"))
+    ]
+    return (telling[0] if telling else type(error).__name__)[:200]

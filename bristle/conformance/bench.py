@@ -1,0 +1,186 @@
+"""The test bench inside a child process: legal runs, and what they are compared with."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..fmu.archive import library_member
+from ..fmu.description import Value, Variable
+from .native import DISCARD, OK, STATUS, WARNING, BlackBox, Instance, Library
+from .plan import Plan
+from .registry import UnexpectedError
+
+Values = list[Value]
+GOOD = (OK, WARNING)
+NAME = "bench"
+
+
+class Bench:
+    """One FMU, ready to be instantiated, stepped and compared."""
+
+    def __init__(self, plan: Plan, box: BlackBox) -> None:
+        self.plan = plan
+        self.box = box
+        self._library: Library | None = None
+        if plan.description is not None:
+            self.inputs = plan.variables("input", "Real")
+            self.observed = plan.variables("output") or plan.variables("local")
+            self._amplitudes = [_amplitude(v) for v in self.inputs]
+
+    @property
+    def library(self) -> Library:
+        """The FMU's library, loaded at first use."""
+        if self._library is None:
+            file = Path(self.plan.folder) / library_member(self.plan.about.identifier)
+            self._library = Library(file, self.box)
+        return self._library
+
+    def instance(self, *, name: str = NAME, logging: bool = False) -> Instance:
+        """Return a new instance; UnexpectedError if the FMU refuses to make one."""
+        made = self.library.instantiate(
+            name, self.plan.about.guid, self.plan.resources, logging=logging
+        )
+        if made is None:
+            raise UnexpectedError("fmi2Instantiate answered NULL")
+        return made
+
+    def ready(
+        self, instance: Instance | None = None, *, drive: bool | None = None, stop: bool = False
+    ) -> Instance:
+        """Return an instance that has passed initialisation, a new one unless one is given."""
+        instance = instance or self.instance()
+        good(instance.setup(self.plan.start, self.plan.end if stop else None), "SetupExperiment")
+        good(instance.enter(), "EnterInitializationMode")
+        if self.plan.driven if drive is None else drive:
+            self.move(instance, 0)
+        good(instance.leave(), "ExitInitializationMode")
+        return instance
+
+    def move(self, instance: Instance, k: int) -> None:
+        """Set all real inputs to their values of step `k`."""
+        if self.inputs:
+            values = [self.driven(i, k) for i in range(len(self.inputs))]
+            status = instance.set("Real", [v.reference for v in self.inputs], values)
+            good(status, f"SetReal of the inputs at {self._at(k)}")
+
+    def driven(self, i: int, k: float) -> float:
+        """Return the value of input `i` at step `k`: a sine about its start value."""
+        centre, amplitude = self._amplitudes[i]
+        return centre + amplitude * math.sin(0.3 * k + 0.7 * i)
+
+    def time(self, k: float) -> float:
+        """Return the time of communication point `k` in s."""
+        return self.plan.start + k * self.plan.step
+
+    def _at(self, k: float) -> str:
+        return f"t = {self.time(k):g} s"
+
+    def read(self, instance: Instance, variables: Sequence[Variable] | None = None) -> Values:
+        """Return the values of variables, all observed ones if none are given."""
+        variables = self.observed if variables is None else variables
+        found: dict[str, Value] = {}
+        for kind in dict.fromkeys(v.kind for v in variables):
+            some = [v for v in variables if v.kind == kind]
+            status, values = instance.get(kind, [v.reference for v in some])
+            good(status, f"Get{kind} of {len(some)} variables ({some[0].name} ...)")
+            found.update(zip((v.name for v in some), values, strict=True))
+        return [found[v.name] for v in variables]
+
+    def run(
+        self, instance: Instance, first: int = 0, last: int | None = None, drive: bool | None = None
+    ) -> list[Values]:
+        """Step from communication point `first` to `last` and return the outputs after each."""
+        rows = []
+        for k in range(first, self.plan.steps if last is None else last):
+            if self.plan.driven if drive is None else drive:
+                self.move(instance, k)
+            self.step(instance, self.time(k), self.plan.step)
+            rows.append(self.read(instance))
+        return rows
+
+    def step(self, instance: Instance, time: float, step: float) -> None:
+        """Step once; UnexpectedError unless the FMU answers OK or Warning."""
+        status = instance.step(time, step)
+        if status in GOOD:
+            return
+        wish = ", and it wants the run to end" if self._ends(instance, status) else ""
+        raise UnexpectedError(f"fmi2DoStep at t = {time:g} s answered {STATUS[status]}{wish}")
+
+    def _ends(self, instance: Instance, status: int) -> bool:
+        return status == DISCARD and instance.wants_to_end()
+
+    def whole_run(self, instance: Instance | None = None) -> list[Values]:
+        """Return the outputs of a legal run from initialisation on, as the reference holds them."""
+        instance = self.ready(instance)
+        return [self.read(instance), *self.run(instance)]
+
+    @property
+    def _file(self) -> Path:
+        return Path(self.plan.work) / "reference.json"
+
+    def keep(self, rows: list[Values]) -> None:
+        """Keep a run as the reference of all later probes."""
+        self._file.write_text(json.dumps(rows))
+
+    def reference(self) -> list[Values]:
+        """Return the run of a fresh process."""
+        rows: list[Values] = json.loads(self._file.read_text())
+        return rows
+
+    def differs(self, rows: Iterable[Values], wanted: Sequence[Values], first: int = 0) -> str:
+        """Return where two runs differ first, in words; "" if they are equal bit by bit.
+
+        `first` is the communication point of the first row.
+        """
+        for k, (row, want) in enumerate(zip(rows, wanted, strict=True), first):
+            for variable, a, b in zip(self.observed, row, want, strict=True):
+                if not _same(a, b):
+                    return f"{variable.name} at {self._at(k)} is {a!r} instead of {b!r}"
+        return ""
+
+
+def good(status: int, function: str) -> None:
+    """Raise UnexpectedError unless a status is OK or Warning."""
+    if status not in GOOD:
+        raise UnexpectedError(f"fmi2{function} answered {status_name(status)}")
+
+
+def status_name(status: int) -> str:
+    """Return a status as the standard spells it."""
+    return STATUS[status] if 0 <= status < len(STATUS) else f"{status}, which is no status"
+
+
+def not_finite(variables: Sequence[Variable], values: Values) -> list[str]:
+    """Return the names of the reals that are not finite, with their values."""
+    pairs = zip(variables, values, strict=True)
+    return [f"{v.name} = {x}" for v, x in pairs if isinstance(x, float) and not math.isfinite(x)]
+
+
+def some(names: Sequence[Any], most: int = 3) -> str:
+    """Return the first few of many names, and how many more there are."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(str(name) for name in names[:most]) + more
+
+
+def _same(a: Value, b: Value) -> bool:
+    return a == b or (a != a and b != b)  # NaN equals NaN here
+
+
+def _amplitude(v: Variable) -> tuple[float, float]:
+    """Return centre and amplitude of a motion that stays inside an input's own bounds."""
+    start = float(v.start) if v.start is not None else 0.0
+    low, high = v.minimum, v.maximum
+    if low is not None and high is not None and math.isfinite(high - low):
+        amplitude = 0.05 * (high - low)
+    else:
+        amplitude = 0.1 * abs(v.nominal) if v.nominal else 0.01 * max(1.0, abs(start))
+    centre = start
+    if low is not None:
+        centre = max(centre, low + amplitude)
+    if high is not None:
+        centre = min(centre, high - amplitude)
+    return centre, amplitude

@@ -1,0 +1,297 @@
+"""The FMI 2.0 functions of a shared library, called bare, so that each status is seen.
+
+Runs in the child process beside code that nobody has vouched for: standard library only.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import mmap
+import sys
+import time
+from collections.abc import Callable, Sequence
+from ctypes import byref, c_char_p, c_double, c_int, c_size_t, c_uint, c_void_p
+from pathlib import Path
+from typing import Any
+
+from ..fmu.description import Value
+from .signatures import OPTIONAL, REQUIRED, RESULTS, TYPES
+
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
+STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
+
+_DO_STEP_STATUS, _TERMINATED = 0, 3
+_MOST_MESSAGES = 1000
+
+_LOGGER = ctypes.CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p)
+_ALLOCATE = ctypes.CFUNCTYPE(c_void_p, c_size_t, c_size_t)
+_FREE = ctypes.CFUNCTYPE(None, c_void_p)
+_FINISHED = ctypes.CFUNCTYPE(None, c_void_p, c_int)
+
+
+class _Callbacks(ctypes.Structure):
+    _fields_ = (
+        ("logger", _LOGGER),
+        ("allocate", _ALLOCATE),
+        ("free", _FREE),
+        ("finished", _FINISHED),
+        ("environment", c_void_p),
+    )
+
+
+class FatalAnswerError(Exception):
+    """The FMU answered Fatal: by the standard, nothing of it may be called any more."""
+
+
+class MissingFunctionError(Exception):
+    """The library does not export a function."""
+
+
+class BlackBox:
+    """Remembers the call under way in a file, where it outlives a crash of this process."""
+
+    SIZE = 256
+
+    def __init__(self, file: Path) -> None:
+        file.write_bytes(bytes(self.SIZE))
+        with file.open("r+b") as stream:
+            self._map = mmap.mmap(stream.fileno(), self.SIZE)
+
+    def note(self, text: str) -> None:
+        """Write what happens next."""
+        self._map[:] = text.encode("ascii", "replace")[: self.SIZE].ljust(self.SIZE, b"\0")
+
+    def text(self) -> str:
+        """Return what was noted last, "" if that is over."""
+        return bytes(self._map[:]).rstrip(b"\0").decode("ascii")
+
+    @staticmethod
+    def read(file: Path) -> str:
+        """Return what was noted last, "" if nothing was."""
+        return file.read_bytes().rstrip(b"\0").decode("ascii") if file.exists() else ""
+
+
+class Library:
+    """A loaded FMU library; `messages` holds what its instances logged."""
+
+    def __init__(self, file: Path, box: BlackBox) -> None:
+        self.box = box
+        self.messages: list[tuple[str, int, str, str]] = []
+        self.bad_messages = 0
+        box.note("loading the library")
+        if sys.platform == "win32":
+            self._dll = ctypes.CDLL(str(file), winmode=0x8)  # finds DLLs beside it
+        else:
+            self._dll = ctypes.CDLL(str(file))
+        box.note("")
+        self._functions: dict[str, Callable[..., Any]] = {}
+        for name, arguments in {**REQUIRED, **OPTIONAL}.items():
+            function = getattr(self._dll, name, None)
+            if function is not None:
+                function.argtypes = list(arguments)
+                function.restype = RESULTS.get(name, c_int)
+                self._functions[name] = function
+        runtime = ctypes.CDLL("msvcrt" if sys.platform == "win32" else None)
+        self._callbacks = _Callbacks(
+            _LOGGER(self._log),
+            ctypes.cast(runtime.calloc, _ALLOCATE),
+            ctypes.cast(runtime.free, _FREE),
+            _FINISHED(0),
+            None,
+        )
+
+    def _log(
+        self, _: int | None, name: bytes | None, status: int, kind: bytes | None, text: bytes | None
+    ) -> None:
+        if name is None or text is None or not OK <= status <= PENDING:
+            self.bad_messages += 1
+        if len(self.messages) < _MOST_MESSAGES:
+            parts = [(part or b"").decode("utf-8", "replace") for part in (name, kind, text)]
+            self.messages.append((parts[0], status, parts[1], parts[2]))
+
+    def missing(self) -> tuple[list[str], list[str]]:
+        """Return the functions that every FMU needs, and the others, that are not exported."""
+        return (
+            [name for name in REQUIRED if name not in self._functions],
+            [name for name in OPTIONAL if name not in self._functions],
+        )
+
+    def call(self, name: str, *arguments: Any) -> Any:
+        """Call one function, noting it first, and return its result as it is."""
+        function = self._functions.get(name)
+        if function is None:
+            raise MissingFunctionError(f"the library does not export {name}")
+        self.box.note(name)
+        result = function(*arguments)
+        self.box.note("")
+        return result
+
+    def status(self, name: str, *arguments: Any) -> int:
+        """Call a function that returns a status; raise FatalAnswerError for Fatal."""
+        status = int(self.call(name, *arguments))
+        if status == FATAL:
+            raise FatalAnswerError(name)
+        return status
+
+    def instantiate(
+        self, name: str, guid: str, resources: str, *, logging: bool = False
+    ) -> Instance | None:  # fmt: skip
+        """Return a new instance for co-simulation, None if the FMU refuses."""
+        handle = self.call(
+            "fmi2Instantiate",
+            name.encode(),
+            1,
+            guid.encode(),
+            resources.encode(),
+            ctypes.addressof(self._callbacks),
+            0,
+            int(logging),
+        )
+        return Instance(self, handle) if handle else None
+
+    def close(self) -> None:
+        """Unload the library."""
+        self.box.note("unloading the library")
+        if sys.platform == "win32":
+            ctypes.windll.kernel32.FreeLibrary(c_void_p(self._dll._handle))
+        else:
+            unload = ctypes.CDLL(None).dlclose
+            unload.argtypes = [c_void_p]
+            unload(self._dll._handle)
+        self.box.note("")
+
+
+class Instance:
+    """One instance. Every method returns the status that the FMU answered."""
+
+    def __init__(self, library: Library, handle: int) -> None:
+        self.library = library
+        self.handle = handle
+
+    def _do(self, name: str, *arguments: Any) -> int:
+        return self.library.status(name, self.handle, *arguments)
+
+    def setup(self, start: float, stop: float | None) -> int:
+        """Call fmi2SetupExperiment without a tolerance; times in s."""
+        return self._do("fmi2SetupExperiment", 0, 0.0, start, int(stop is not None), stop or 0.0)
+
+    def enter(self) -> int:
+        """Call fmi2EnterInitializationMode."""
+        return self._do("fmi2EnterInitializationMode")
+
+    def leave(self) -> int:
+        """Call fmi2ExitInitializationMode."""
+        return self._do("fmi2ExitInitializationMode")
+
+    def terminate(self) -> int:
+        """Call fmi2Terminate."""
+        return self._do("fmi2Terminate")
+
+    def reset(self) -> int:
+        """Call fmi2Reset."""
+        return self._do("fmi2Reset")
+
+    def free(self) -> None:
+        """Call fmi2FreeInstance."""
+        self.library.call("fmi2FreeInstance", self.handle)
+
+    def step(self, time_: float, step: float) -> int:
+        """Call fmi2DoStep (s), and wait where the FMU computes asynchronously."""
+        status = self._do("fmi2DoStep", time_, step, 1)
+        while status == PENDING:  # the time limit of the probe ends an endless wait
+            answer = c_int(PENDING)
+            asked = self._do("fmi2GetStatus", _DO_STEP_STATUS, byref(answer))
+            status = answer.value if asked in (OK, WARNING) else asked
+            if status == FATAL:
+                raise FatalAnswerError("fmi2DoStep")
+            time.sleep(0.001)
+        return status
+
+    def wants_to_end(self) -> bool:
+        """Return whether the FMU says, after Discard, that it wants the run to end."""
+        answer = c_int(0)
+        try:
+            status = self._do("fmi2GetBooleanStatus", _TERMINATED, byref(answer))
+        except (FatalAnswerError, MissingFunctionError):
+            return False
+        return status in (OK, WARNING) and bool(answer.value)
+
+    def get(self, kind: str, references: Sequence[int]) -> tuple[int, list[Value]]:
+        """Return the status and the values of variables of one kind."""
+        kind, count = _base(kind), len(references)
+        values = (TYPES[kind] * count)()
+        status = self._do(f"fmi2Get{kind}", (c_uint * count)(*references), count, values)
+        if kind == "String":
+            return status, [(v or b"").decode("utf-8", "replace") for v in values]
+        return status, [bool(v) for v in values] if kind == "Boolean" else list(values)
+
+    def set(self, kind: str, references: Sequence[int], values: Sequence[Value]) -> int:
+        """Set variables of one kind."""
+        kind, count = _base(kind), len(references)
+        raw = [v.encode() if isinstance(v, str) else v for v in values]
+        array = (TYPES[kind] * count)(*raw)
+        return self._do(f"fmi2Set{kind}", (c_uint * count)(*references), count, array)
+
+    def save(self, state: c_void_p) -> int:
+        """Call fmi2GetFMUstate into `state`."""
+        return self._do("fmi2GetFMUstate", byref(state))
+
+    def restore(self, state: c_void_p) -> int:
+        """Call fmi2SetFMUstate."""
+        return self._do("fmi2SetFMUstate", state)
+
+    def forget(self, state: c_void_p) -> int:
+        """Call fmi2FreeFMUstate."""
+        return self._do("fmi2FreeFMUstate", byref(state))
+
+    def serialise(self, state: c_void_p) -> tuple[int, bytes]:
+        """Return the status and the bytes of a saved state."""
+        size = c_size_t(0)
+        status = self._do("fmi2SerializedFMUstateSize", state, byref(size))
+        if status not in (OK, WARNING):
+            return status, b""
+        buffer = ctypes.create_string_buffer(size.value)
+        return self._do("fmi2SerializeFMUstate", state, buffer, size.value), buffer.raw
+
+    def deserialise(self, data: bytes, state: c_void_p) -> int:
+        """Call fmi2DeSerializeFMUstate into `state`."""
+        return self._do("fmi2DeSerializeFMUstate", data, len(data), byref(state))
+
+    def debug_logging(self, on: bool, categories: Sequence[str] = ()) -> int:
+        """Call fmi2SetDebugLogging."""
+        names = (c_char_p * len(categories))(*(c.encode() for c in categories))
+        return self._do("fmi2SetDebugLogging", int(on), len(categories), names)
+
+    def derivatives(
+        self, unknowns: Sequence[int], knowns: Sequence[int]
+    ) -> tuple[int, list[float]]:  # fmt: skip
+        """Return the status and the directional derivative along the sum of all knowns."""
+        result = (c_double * len(unknowns))()
+        status = self._do(
+            "fmi2GetDirectionalDerivative",
+            (c_uint * len(unknowns))(*unknowns),
+            len(unknowns),
+            (c_uint * len(knowns))(*knowns),
+            len(knowns),
+            (c_double * len(knowns))(*[1.0] * len(knowns)),
+            result,
+        )
+        return status, list(result)
+
+    def input_derivative(self, reference: int, value: float) -> int:
+        """Call fmi2SetRealInputDerivatives with one first derivative."""
+        one = (c_uint * 1)(reference)
+        return self._do(
+            "fmi2SetRealInputDerivatives", one, 1, (c_int * 1)(1), (c_double * 1)(value)
+        )
+
+    def output_derivative(self, reference: int) -> tuple[int, float]:
+        """Return the status and the first derivative of one output."""
+        value = (c_double * 1)()
+        one = (c_uint * 1)(reference)
+        status = self._do("fmi2GetRealOutputDerivatives", one, 1, (c_int * 1)(1), value)
+        return status, value[0]
+
+
+def _base(kind: str) -> str:
+    return "Integer" if kind == "Enumeration" else kind

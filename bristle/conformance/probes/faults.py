@@ -1,0 +1,177 @@
+"""bristle's own rule for faults, on FMUs that follow it: Discard and the output `fault`.
+
+A fault is logged in one line; outputs hold their last finite values; `fault` says which it is;
+every further step answers Discard, until reset or until an earlier state is set back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from ctypes import c_void_p
+
+from ...fmu.description import Variable
+from ..bench import GOOD, Bench, good, not_finite, status_name
+from ..native import DISCARD, Instance
+from ..registry import Finding, UnexpectedError, failed, passed, probe
+
+INPUT, STEP, ORDER, PARAMETER = 1, 2, 3, 5
+_RULE = (
+    "bristle's rule, since this is a bristle FMU (FMI leaves it open): one line of log, Discard, "
+    "fault = {}, outputs finite, until reset or an earlier state"
+)
+
+
+def _check(bench: Bench, instance: Instance, code: int, what: str) -> None:
+    """Raise UnexpectedError unless the instance shows a fault as the rule says."""
+    outputs = bench.plan.variables("output")
+    values = bench.read(instance, outputs)
+    bad = not_finite(outputs, values)
+    fault = dict(zip((v.name for v in outputs), values, strict=True))["fault"]
+    if fault != code or bad:
+        raise UnexpectedError(f"{what}: fault = {fault}, outputs {bad or 'finite'}")
+
+
+def _faulted(bench: Bench, act: Callable[[Instance], int], code: int, what: str) -> Instance:
+    """Return an instance after two steps, a fault and a step that must be discarded."""
+    instance = bench.instance(logging=True)
+    bench.ready(instance)
+    bench.run(instance, 0, 2)
+    before = len(bench.library.messages)
+    status = act(instance)
+    if status != DISCARD:
+        raise UnexpectedError(f"{what}: answered {status_name(status)}")
+    _check(bench, instance, code, what)
+    bench.move(instance, 3)
+    status = instance.step(bench.time(3), bench.plan.step)
+    if status != DISCARD:
+        raise UnexpectedError(f"the step after {what}: answered {status_name(status)}")
+    _check(bench, instance, code, f"the step after {what}")
+    lines = len(bench.library.messages) - before
+    if lines != 1:
+        raise UnexpectedError(f"{what}: {lines} lines in the log")
+    return instance
+
+
+def _mended(bench: Bench, instance: Instance, what: str) -> None:
+    good(instance.reset(), f"Reset after {what}")
+    difference = bench.differs(bench.whole_run(instance), bench.reference())
+    if difference:
+        raise UnexpectedError(f"reset after {what}: {difference}")
+    instance.free()
+
+
+def _feed(bench: Bench, v: Variable, value: float) -> Callable[[Instance], int]:
+    def act(instance: Instance) -> int:
+        status = instance.set("Real", [v.reference], [value])
+        if status not in GOOD:
+            return status
+        return instance.step(bench.time(2), bench.plan.step)
+
+    return act
+
+
+@probe(
+    "fault: input",
+    tried="each real input set to NaN and to infinity, a step, another step, reset",
+    standard=_RULE.format(INPUT),
+    house=True,
+)
+def fault_input(bench: Bench) -> Finding:
+    """Feed what is not finite."""
+    for v in bench.inputs:
+        for value in (math.nan, math.inf, -math.inf):
+            what = f"{v.name} = {value}"
+            _mended(bench, _faulted(bench, _feed(bench, v, value), INPUT, what), what)
+    return passed(f"{len(bench.inputs)} inputs, three values each")
+
+
+@probe(
+    "fault: step",
+    tried="steps of 0, -h, NaN and infinity, another step, reset",
+    standard=_RULE.format(STEP),
+    house=True,
+)
+def fault_step(bench: Bench) -> Finding:
+    """Step by what is no step."""
+    for step in (0.0, -bench.plan.step, math.nan, math.inf):
+
+        def act(instance: Instance, step: float = step) -> int:
+            return instance.step(bench.time(2), step)
+
+        _mended(bench, _faulted(bench, act, STEP, f"a step of {step}"), f"a step of {step}")
+    return passed("four steps that are none")
+
+
+@probe(
+    "fault: order",
+    tried="fmi2DoStep before initialisation, inside it and after fmi2Terminate",
+    standard=_RULE.format(ORDER),
+    house=True,
+)
+def fault_order(bench: Bench) -> Finding:
+    """Step where stepping is not allowed."""
+    plan = bench.plan
+    for when in ("before initialisation", "in initialisation", "after terminate"):
+        instance = bench.instance()
+        if when == "after terminate":
+            bench.ready(instance)
+            bench.run(instance, 0, 2)
+            good(instance.terminate(), "Terminate")
+        if when == "in initialisation":
+            good(instance.setup(plan.start, None), "SetupExperiment")
+            good(instance.enter(), "EnterInitializationMode")
+        status = instance.step(plan.start, plan.step)
+        if status != DISCARD:
+            raise UnexpectedError(f"a step {when}: answered {status_name(status)}")
+        _check(bench, instance, ORDER, f"a step {when}")
+        _mended(bench, instance, f"a step {when}")
+    return passed("three steps out of order")
+
+
+@probe(
+    "fault: parameter",
+    tried="each real parameter set to NaN before initialisation, one step, reset",
+    standard=_RULE.format(PARAMETER) + "; real outputs are 0 from initialisation on",
+    house=True,
+)
+def fault_parameter(bench: Bench) -> Finding:
+    """Initialise with a parameter that is not finite."""
+    parameters = bench.plan.variables("parameter", "Real")
+    for v in parameters:
+        what = f"{v.name} = nan"
+        instance = bench.instance()
+        good(instance.set("Real", [v.reference], [math.nan]), f"SetReal of {v.name}")
+        bench.ready(instance)
+        _check(bench, instance, PARAMETER, what)
+        reals = bench.plan.variables("output", "Real")
+        if any(bench.read(instance, reals)):
+            return failed(f"{what}: real outputs are not 0")
+        status = instance.step(bench.time(0), bench.plan.step)
+        if status != DISCARD:
+            return failed(f"the first step with {what}: answered {status_name(status)}")
+        _mended(bench, instance, what)
+    return passed(f"{len(parameters)} parameters")
+
+
+@probe(
+    "fault: earlier state",
+    tried="a state copied, a fault, the state set back, on to the end",
+    standard=_RULE.format("0 again"),
+    house=True,
+)
+def fault_earlier_state(bench: Bench) -> Finding:
+    """Go back before the fault and run on."""
+    half = bench.plan.steps // 2
+    instance = bench.ready()
+    rows = [bench.read(instance), *bench.run(instance, 0, half)]
+    state = c_void_p()
+    good(instance.save(state), "GetFMUstate")
+    status = instance.step(bench.time(half), math.nan)
+    if status != DISCARD:
+        return failed(f"a step of NaN: answered {status_name(status)}")
+    good(instance.restore(state), "SetFMUstate")
+    rows += bench.run(instance, half)
+    if difference := bench.differs(rows, bench.reference()):
+        return failed(difference)
+    return passed("the run goes on as if nothing had been")

@@ -1,0 +1,227 @@
+"""Instances after, beside and instead of each other, and the memory they leave."""
+
+from __future__ import annotations
+
+import mmap
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+
+from ...fmu.archive import extract
+from ..bench import GOOD, Bench, Values, good
+from ..native import FatalAnswerError, Instance
+from ..registry import Finding, UnexpectedError, failed, noted, passed, probe, unless_single
+
+
+@probe(
+    "reset",
+    tried="a run, fmi2Reset in mid-run and after terminate, and the run again each time",
+    standard="FMI 2.0 section 2.1.6: after fmi2Reset the FMU is in the state it has after "
+    "fmi2Instantiate; all variables have their default values",
+)
+def reset(bench: Bench) -> Finding:
+    """Hold an instance that was reset against a fresh one."""
+    instance = bench.instance()
+    changed = _disturb_parameters(bench, instance)
+    with suppress(UnexpectedError):  # the changed parameters may make no run; reset mends that too
+        bench.whole_run(instance)
+    for situation in ("in mid-run", "after fmi2Terminate"):
+        if situation != "in mid-run":
+            good(instance.terminate(), "Terminate")
+        good(instance.reset(), f"Reset {situation}")
+        difference = bench.differs(bench.whole_run(instance), bench.reference())
+        if difference:
+            return judged(bench, f"reset {situation}: {difference}")
+    return passed(f"equal to a fresh instance, twice ({changed} parameters changed before)")
+
+
+def _disturb_parameters(bench: Bench, instance: Instance) -> int:
+    """Change real parameters slightly where that is legal; return how many took it."""
+    taken = 0
+    for v in bench.plan.variables("parameter", "Real"):
+        value = 1.01 * float(v.start or 0.0)
+        low, high = v.minimum, v.maximum
+        if (low is None or value >= low) and (high is None or value <= high):
+            taken += instance.set("Real", [v.reference], [value]) in GOOD
+    return taken
+
+
+def judged(bench: Bench, difference: str) -> Finding:
+    if bench.plan.repeatable:
+        return failed(difference)
+    return noted(f"cannot be judged, since no two runs are equal: {difference}")
+
+
+@probe(
+    "many instances",
+    tried="instantiate, initialise, three steps, terminate, free; again and again",
+    standard="FMI 2.0 section 2.1.5: fmi2Instantiate returns a new instance each time; "
+    "fmi2FreeInstance gives back everything",
+    unless=unless_single,
+)
+def many_instances(bench: Bench) -> Finding:
+    """Live many lives one after the other; the last run equals the first."""
+    steps = min(3, bench.plan.steps)
+    for _ in range(bench.plan.instances):
+        instance = bench.ready()
+        bench.run(instance, 0, steps)
+        good(instance.terminate(), "Terminate")
+        instance.free()
+    difference = bench.differs(bench.whole_run(), bench.reference())
+    if difference:
+        return judged(bench, f"after {bench.plan.instances} instances: {difference}")
+    return passed(f"{bench.plan.instances} instances, the last run equals the first")
+
+
+@probe(
+    "two instances",
+    tried="two live instances stepped in turn, the second with other inputs and parameters",
+    standard="FMI 2.0 section 2.1.5: instances are independent of each other unless "
+    "canBeInstantiatedOnlyOncePerProcess",
+    unless=unless_single,
+)
+def two_instances(bench: Bench) -> Finding:
+    """Let a second instance live beside the first, and hold the first against the reference."""
+    first = bench.instance(name="first")
+    second = bench.instance(name="second")
+    _disturb_parameters(bench, second)
+    bench.ready(first)
+    try:
+        bench.ready(second)
+    except UnexpectedError:  # the changed parameters make no run
+        second.free()
+        second = bench.ready(bench.instance(name="third"))
+    rows: list[Values] = [bench.read(first)]
+    for k in range(bench.plan.steps):
+        rows += bench.run(first, k, k + 1)
+        if bench.plan.driven:
+            bench.move(second, k + 11)
+        second.step(bench.time(k), bench.plan.step)
+    second.free()
+    difference = bench.differs(rows, bench.reference())
+    if difference:
+        return judged(bench, f"beside another instance: {difference}")
+    return passed("the first runs as if it were alone")
+
+
+@probe(
+    "two libraries",
+    tried="the same FMU unpacked and loaded a second time from another folder",
+    standard="No clause on copies; each is a legal FMU of its own unless "
+    "canBeInstantiatedOnlyOncePerProcess.",
+    unless=unless_single,
+)
+def two_libraries(bench: Bench) -> Finding:
+    """Run a copy from another folder, then the FMU itself beside it."""
+    copy = Path(bench.plan.work) / "copy"
+    extract(bench.plan.fmu, copy)
+    return _beside(bench, _bench_of(bench, copy), companion_first=True)
+
+
+@probe(
+    "another FMU before",
+    tried="another FMU loaded and running in the same process, then this one",
+    standard="No clause; a co-simulation has several FMUs in one process, so no FMU may take what "
+    "another one needs (module names, symbols, settings of the process).",
+    unless=lambda plan: None if plan.beside else "there is no other FMU at hand",
+)
+def another_before(bench: Bench) -> Finding:
+    """Load the companion first."""
+    assert bench.plan.beside is not None
+    return _beside(bench, Bench(bench.plan.beside, bench.box), companion_first=True)
+
+
+@probe(
+    "another FMU after",
+    tried="this FMU running, then another one loaded and run in the same process",
+    standard="No clause; an FMU that comes later must not change one that is already running.",
+    unless=lambda plan: None if plan.beside else "there is no other FMU at hand",
+)
+def another_after(bench: Bench) -> Finding:
+    """Load the companion second."""
+    assert bench.plan.beside is not None
+    return _beside(bench, Bench(bench.plan.beside, bench.box), companion_first=False)
+
+
+def _bench_of(bench: Bench, folder: Path) -> Bench:
+    return Bench(replace(bench.plan, folder=str(folder)), bench.box)
+
+
+def _beside(bench: Bench, other: Bench, *, companion_first: bool) -> Finding:
+    """Step two FMUs in turn and hold this one against its reference."""
+    if companion_first:
+        companion = other.ready(drive=False)
+    mine = bench.ready()
+    if not companion_first:
+        companion = other.ready(drive=False)
+    rows = [bench.read(mine)]
+    for k in range(bench.plan.steps):
+        if k < 10:
+            try:
+                other.run(companion, k, k + 1, drive=False)
+            except UnexpectedError as error:
+                return failed(f"the other FMU, {other.plan.about.name}: {error}")
+        rows += bench.run(mine, k, k + 1)
+    companion.free()
+    name = "its copy" if other.plan.fmu == bench.plan.fmu else other.plan.about.name
+    difference = bench.differs(rows, bench.reference())
+    if difference:
+        return judged(bench, f"beside {name}: {difference}")
+    return passed(f"runs beside {name} as if it were alone")
+
+
+@probe(
+    "bare interpreter",
+    tried="a run in an interpreter without installed packages",
+    standard="No clause. For FMUs that carry Python code: what they import beyond the standard "
+    "library is missing elsewhere, although needsExecutionTool is not claimed.",
+    unless=lambda plan: (
+        "needsExecutionTool is claimed" if plan.claims("needsExecutionTool") else None
+    ),
+    bare=True,
+)
+def bare_interpreter(bench: Bench) -> Finding:
+    """Run where nothing but the standard library can be imported."""
+    try:
+        difference = bench.differs(bench.whole_run(), bench.reference())
+    except UnexpectedError as error:
+        return noted(f"needs something that is installed here: {error}")
+    except FatalAnswerError as error:
+        return noted(f"needs something that is installed here: {error} answered Fatal")
+    if difference:
+        return judged(bench, f"without installed packages: {difference}")
+    return passed("needs nothing that is installed here")
+
+
+@probe(
+    "memory",
+    tried="resident memory over instantiate, three steps, free",
+    standard="FMI 2.0 section 2.1.5: fmi2FreeInstance frees all memory. A few kilobytes may be the "
+    "allocator's, so growth is a note.",
+    unless=unless_single,
+)
+def memory(bench: Bench) -> Finding:
+    """Measure growth per life once the first lives have warmed up."""
+    if not Path("/proc/self/statm").exists():
+        return noted("not measured: this platform does not tell")
+    lives = max(3, bench.plan.instances)
+    for _ in range(lives // 2):
+        _life(bench)
+    before = _resident()
+    for _ in range(lives):
+        _life(bench)
+    growth = (_resident() - before) / lives / 1024
+    seen = f"{growth:.0f} KiB per instance over {lives} instances"
+    return noted(seen) if growth > 64 else passed(seen)
+
+
+def _life(bench: Bench) -> None:
+    instance = bench.ready()
+    bench.run(instance, 0, min(3, bench.plan.steps))
+    good(instance.terminate(), "Terminate")
+    instance.free()
+
+
+def _resident() -> float:
+    """Return the resident memory of this process in bytes."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * mmap.PAGESIZE

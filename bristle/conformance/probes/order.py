@@ -1,0 +1,268 @@
+"""Calls that the standard forbids the environment, and steps of unusual length.
+
+What an FMU must answer to a forbidden call is left open by FMI 2.0: refusing it with Error (or
+Discard) passes, answering OK is a note. Dying of it fails, since statuses exist to refuse with;
+and a later instance must be unharmed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from ...fmu.description import Variable
+from ..bench import GOOD, Bench, good, not_finite, some, status_name
+from ..native import FatalAnswerError, Instance
+from ..registry import Finding, failed, noted, passed, probe, unless_claimed, unless_single
+
+_ORDER = (
+    "FMI 2.0 section 4.2.4: the environment must not; the answer is left open, Error being the "
+    "status for it."
+)
+
+
+def forbidden(bench: Bench, act: Callable[[], int], instance: Instance) -> Finding:
+    """Judge the answer to a forbidden call, and whether a later instance is unharmed."""
+    try:
+        status = act()
+    except FatalAnswerError as error:
+        return noted(f"refused, but with Fatal by {error}: no instance is usable any more")
+    instance.free()
+    harm = ""
+    if unless_single(bench.plan) is None and bench.plan.repeatable:
+        harm = bench.differs(bench.whole_run(), bench.reference())
+    if harm:
+        return failed(f"answered {status_name(status)}, and a new instance is harmed: {harm}")
+    if status in GOOD:
+        return noted(f"answered {status_name(status)} as if it were allowed; no harm seen")
+    return passed(f"refused with {status_name(status)}")
+
+
+@probe(
+    "wrong guid",
+    tried="fmi2Instantiate with a guid that is not the FMU's",
+    standard="FMI 2.0 section 2.1.5: the guid is there to check that modelDescription.xml and code "
+    "belong together; refusing is not demanded",
+)
+def wrong_guid(bench: Bench) -> Finding:
+    """Instantiate under another guid."""
+    other = "{00000000-0000-0000-0000-000000000000}"
+    instance = bench.library.instantiate("bench", other, bench.plan.resources)
+    if instance is None:
+        return passed("refused")
+    return forbidden(bench, lambda: 0, instance)
+
+
+@probe(
+    "step before initialisation", tried="fmi2DoStep right after fmi2Instantiate", standard=_ORDER
+)
+def step_first(bench: Bench) -> Finding:
+    """Step an instance that was never initialised."""
+    instance = bench.instance()
+    return forbidden(bench, lambda: instance.step(bench.plan.start, bench.plan.step), instance)
+
+
+@probe(
+    "step in initialisation",
+    tried="fmi2DoStep between entering and leaving initialisation mode",
+    standard=_ORDER,
+)
+def step_in_initialisation(bench: Bench) -> Finding:
+    """Step an instance in initialisation mode."""
+    instance = bench.instance()
+    good(instance.setup(bench.plan.start, None), "SetupExperiment")
+    good(instance.enter(), "EnterInitializationMode")
+    return forbidden(bench, lambda: instance.step(bench.plan.start, bench.plan.step), instance)
+
+
+@probe("step after terminate", tried="fmi2DoStep after fmi2Terminate", standard=_ORDER)
+def step_last(bench: Bench) -> Finding:
+    """Step an instance that was terminated."""
+    instance = bench.ready()
+    bench.run(instance, 0, 2)
+    good(instance.terminate(), "Terminate")
+    return forbidden(bench, lambda: instance.step(bench.time(2), bench.plan.step), instance)
+
+
+@probe("initialise twice", tried="fmi2EnterInitializationMode in mid-run", standard=_ORDER)
+def initialise_twice(bench: Bench) -> Finding:
+    """Enter initialisation mode again without a reset."""
+    instance = bench.ready()
+    bench.run(instance, 0, 2)
+    return forbidden(bench, instance.enter, instance)
+
+
+@probe(
+    "leave what was not entered",
+    tried="fmi2ExitInitializationMode right after fmi2Instantiate",
+    standard=_ORDER,
+)
+def leave_first(bench: Bench) -> Finding:
+    """Leave initialisation mode without having entered it."""
+    instance = bench.instance()
+    return forbidden(bench, instance.leave, instance)
+
+
+def _fixed(bench: Bench) -> Variable | None:
+    fixed = [v for v in bench.plan.variables("parameter") if v.variability in (None, "fixed")]
+    return next((v for v in fixed if v.kind == "Real"), fixed[0] if fixed else None)
+
+
+@probe(
+    "fixed parameter in mid-run",
+    tried="setting a fixed parameter after a step",
+    standard="FMI 2.0 section 2.2.7: a fixed variable does not change after initialisation, so it "
+    "must not be set; the answer is left open",
+)
+def fixed_parameter(bench: Bench) -> Finding:
+    """Set a fixed parameter to another value in step mode."""
+    v = _fixed(bench)
+    if v is None:
+        return passed("not tried: there is no fixed parameter")
+    instance = bench.ready()
+    bench.run(instance, 0, 2)
+    value = v.start if v.start is not None else 0
+    if isinstance(value, float) and not isinstance(value, bool):
+        value = 1.01 * value
+    return forbidden(bench, lambda: instance.set(v.kind, [v.reference], [value]), instance)
+
+
+@probe("setting an output", tried="fmi2SetReal on an output in mid-run", standard=_ORDER)
+def set_output(bench: Bench) -> Finding:
+    """Set a real output."""
+    outputs = bench.plan.variables("output", "Real")
+    if not outputs:
+        return passed("not tried: there is no real output")
+    instance = bench.ready()
+    bench.run(instance, 0, 2)
+    reference = [outputs[0].reference]
+    return forbidden(bench, lambda: instance.set("Real", reference, [12.5]), instance)
+
+
+@probe(
+    "step past the stop time",
+    tried="fmi2DoStep beyond the stop time of fmi2SetupExperiment",
+    standard="FMI 2.0 section 2.1.6: the FMU has to answer Error. Hardly a tool relies on it, and "
+    "many cannot answer it, so going on is a note.",
+)
+def step_past_stop(bench: Bench) -> Finding:
+    """Define a stop time after two steps, and take a third."""
+    plan = bench.plan
+    instance = bench.instance()
+    good(instance.setup(plan.start, bench.time(2)), "SetupExperiment")
+    good(instance.enter(), "EnterInitializationMode")
+    good(instance.leave(), "ExitInitializationMode")
+    bench.run(instance, 0, 2)
+    return forbidden(bench, lambda: instance.step(bench.time(2), plan.step), instance)
+
+
+_STEP = (
+    "FMI 2.0 section 4.2.2: the communication step is greater than zero; the answer to another one "
+    "is left open"
+)
+
+
+def _odd_step(bench: Bench, step: float) -> Finding:
+    instance = bench.ready()
+    bench.run(instance, 0, 2)
+    bad: list[str] = []
+
+    def act() -> int:
+        status = instance.step(bench.time(2), step)
+        if status in GOOD:
+            bad.extend(not_finite(bench.observed, bench.read(instance)))
+        return status
+
+    finding = forbidden(bench, act, instance)
+    if bad and finding.verdict == "note":
+        return noted(f"{finding.seen}; outputs are no longer finite: {some(bad)}")
+    return finding
+
+
+@probe("zero step", tried="fmi2DoStep with a step of 0", standard=_STEP)
+def zero_step(bench: Bench) -> Finding:
+    """Take a step of length zero."""
+    return _odd_step(bench, 0.0)
+
+
+@probe("negative step", tried="fmi2DoStep with a negative step", standard=_STEP)
+def negative_step(bench: Bench) -> Finding:
+    """Take a step back."""
+    return _odd_step(bench, -bench.plan.step)
+
+
+@probe("NaN step", tried="fmi2DoStep with a step that is not a number", standard=_STEP)
+def nan_step(bench: Bench) -> Finding:
+    """Take a step of no length at all."""
+    return _odd_step(bench, math.nan)
+
+
+@probe("infinite step", tried="fmi2DoStep with an infinite step", standard=_STEP)
+def infinite_step(bench: Bench) -> Finding:
+    """Take an endless step; it must end all the same."""
+    return _odd_step(bench, math.inf)
+
+
+_VARIABLE = "canHandleVariableCommunicationStepSize"
+
+
+@probe(
+    "variable steps",
+    tried="steps of 1, 1/2, 1/4, 1 and 3/4 of the default, in turn",
+    standard=f"FMI 2.0 section 4.3.1: {_VARIABLE} promises that steps may differ",
+    unless=unless_claimed(_VARIABLE),
+)
+def variable_steps(bench: Bench) -> Finding:
+    """Step with changing lengths."""
+    instance, at = bench.ready(), 0.0
+    for k in range(bench.plan.steps):
+        if bench.plan.driven:
+            bench.move(instance, k)
+        part = (1.0, 0.5, 0.25, 1.0, 0.75)[k % 5]
+        bench.step(instance, bench.time(at), part * bench.plan.step)
+        at += part
+        bad = not_finite(bench.observed, bench.read(instance))
+        if bad:
+            return failed(f"not finite at t = {bench.time(at):g} s: {some(bad)}")
+    return passed(f"{bench.plan.steps} steps accepted")
+
+
+@probe(
+    "split steps",
+    tried="each step as two halves",
+    standard=f"FMI 2.0 section 4.3.1: {_VARIABLE} promises that shorter steps are taken; section "
+    "4.2.2: an FMU integrates exactly to the end of each. How far results may move is not said.",
+    unless=unless_claimed(_VARIABLE),
+)
+def split_steps(bench: Bench) -> Finding:
+    """Halve each step with inputs held, and say how far the outputs move."""
+    instance = bench.ready()
+    rows = [bench.read(instance)]
+    half = bench.plan.step / 2
+    for k in range(bench.plan.steps):
+        if bench.plan.driven:
+            bench.move(instance, k)
+        bench.step(instance, bench.time(k), half)
+        bench.step(instance, bench.time(k) + half, half)
+        rows.append(bench.read(instance))
+    bad = not_finite(bench.observed, rows[-1])
+    if bad:
+        return failed(f"not finite after two halves: {some(bad)}")
+    name, change = _largest_change(bench, rows)
+    if change > 1e-6:
+        return noted(f"accepted; {name} moves by {100 * change:.2g} % of its largest value")
+    return passed("accepted; the outputs do not depend on it (1e-6)")
+
+
+def _largest_change(bench: Bench, rows: list[list[float | int | bool | str]]) -> tuple[str, float]:
+    """Return the real output that differs most from the reference, relative to its peak."""
+    worst = ("", 0.0)
+    reference = bench.reference()
+    for i, v in enumerate(bench.observed):
+        if v.kind != "Real":
+            continue
+        wanted = [float(row[i]) for row in reference]
+        scale = max(map(abs, wanted)) or 1.0
+        change = max(abs(float(row[i]) - w) for row, w in zip(rows, wanted, strict=True)) / scale
+        worst = max(worst, (v.name, change), key=lambda pair: pair[1])
+    return worst

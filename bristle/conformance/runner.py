@@ -1,0 +1,226 @@
+"""The parent: unpacks the FMU, starts one process per probe, turns every end into a row."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import signal
+import tempfile
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable, Collection
+from pathlib import Path
+from typing import Any
+
+from ..errors import BristleError, FmuError
+from ..fmu.archive import extract
+from ..fmu.description import describe, read_description, read_root
+from ._probe import BOX, FINDING, PLAN
+from .native import BlackBox
+from .plan import Plan
+from .probes import PROBES
+from .registry import Finding, Probe, failed, noted
+from .report import Report, Row
+from .subprocesses import Nursery
+
+_BUNDLE = re.compile(r"bristle_[0-9a-f]{12}")  # the code inside our FMUs, named by its digest
+_LIBRARY, _LEGAL, _REFERENCE, _REPEATABLE = "library", "legal run", "driven run", "repeatable"
+_FIRST = {  # what a probe rests on, by its level
+    "file": set[str](),
+    "library": {_LIBRARY, _LEGAL},
+    "run": {_LIBRARY, _LEGAL, _REFERENCE, _REPEATABLE},
+}
+_DEFAULT_STEPS = 100  # where the FMU names no step
+
+
+def judge(
+    path: Path,
+    timeout: float,
+    only: Collection[str] | None,
+    beside: Path | None,
+    progress: Callable[[str], None] | None,
+) -> Report:
+    """Try all probes, or `only` some; see `bristle.conformance.conform`."""
+    if not 0.0 < timeout < math.inf:
+        raise FmuError(f"the time limit is {timeout} s; it must be positive and finite.")
+    unknown = sorted(set(only or ()) - set(PROBES))
+    if unknown:
+        raise FmuError(f"no probe is named {', '.join(unknown)}. There are: {', '.join(PROBES)}.")
+    root = read_root(path)
+    with tempfile.TemporaryDirectory(prefix="bristle-conform-") as folder:
+        plan = make_plan(path, root, Path(folder), timeout)
+        if beside is not None:
+            read_description(beside)  # which says what is wrong with it
+            plan.beside = make_plan(beside, read_root(beside), Path(folder) / "beside", timeout)
+        elif only is None or any(name.startswith("another FMU") for name in only):
+            plan.beside = _companion(plan, Path(folder))
+        with Nursery(Path(plan.work)) as nursery:
+            return Report(str(path), _Session(plan, nursery, only, progress).rows())
+
+
+def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: float) -> Plan:
+    """Unpack an FMU into `folder`/fmu and plan how to try it."""
+    work = folder / "work"
+    work.mkdir(parents=True)
+    plan = Plan(str(path.resolve()), str(extract(path, folder / "fmu")), str(work), timeout)
+    try:
+        plan.description = describe(root)
+    except FmuError:
+        return plan  # "modelDescription.xml" will say why
+    plan.ours = _ours(plan)
+    plan.categories = [c.get("name", "") for c in root.iterfind("LogCategories/Category")]
+    experiment = root.find("DefaultExperiment")
+    times = {} if experiment is None else experiment.attrib
+    plan.start = _time(times.get("startTime"), -math.inf) or 0.0
+    plan.stop = _time(times.get("stopTime"), plan.start)
+    step = _time(times.get("stepSize"), 0.0)
+    plan.step = step or (plan.end - plan.start) / _DEFAULT_STEPS
+    return plan
+
+
+def _time(text: str | None, above: float) -> float | None:
+    try:
+        value = float(text) if text is not None else math.nan
+    except ValueError:
+        return None  # "default experiment" will say so
+    return value if above < value < math.inf else None
+
+
+def _ours(plan: Plan) -> bool:
+    """Return whether an FMU carries bristle's slave, and with it bristle's rule for faults."""
+    fault = plan.about.variables.get("fault")
+    if fault is None or (fault.kind, fault.causality) != ("Integer", "output"):
+        return False
+    resources = Path(plan.folder) / "resources"
+    names = [p.name for p in resources.iterdir()] if resources.is_dir() else []
+    return any(_BUNDLE.fullmatch(name) for name in names)
+
+
+def _companion(plan: Plan, folder: Path) -> Plan | None:
+    """Return a trivial FMU of our own to stand beside the one in question, None without."""
+    from ..fmu.build import ensure
+
+    mine = plan.description.name if plan.description else ""
+    name = "ConstantVoltage" if mine != "ConstantVoltage" else "SignalSource"
+    try:
+        path = ensure(name)
+        return make_plan(path, read_root(path), folder / "beside", plan.timeout)
+    except BristleError:
+        return None  # the row says that there is none at hand
+
+
+class _Session:
+    """The probes of one FMU in their order, each knowing what those before it found."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        nursery: Nursery,
+        only: Collection[str] | None,
+        progress: Callable[[str], None] | None,
+    ) -> None:
+        self.plan = plan
+        self.nursery = nursery
+        self.only = only
+        self.progress = progress or (lambda name: None)
+        self.reached: set[str] = set()
+        self.stuck = False
+        self.first = set[str]().union(*(_FIRST[PROBES[name].needs] for name in only or ()))
+
+    def rows(self) -> list[Row]:
+        """Try everything that was asked for, and what that needs."""
+        rows = []
+        for probe in PROBES.values():
+            if self.only is None:
+                wanted = self.plan.ours or not probe.house
+            else:
+                wanted = probe.name in self.only
+            if wanted or probe.name in self.first:
+                self.progress(probe.name)
+                finding = self.find(probe)
+                if wanted or finding.verdict == "fail":
+                    row = (probe.name, probe.tried, finding.seen, probe.standard, finding.verdict)
+                    rows.append(Row(*row))
+        return rows
+
+    def find(self, probe: Probe) -> Finding:
+        """Try one probe, unless there is a reason not to."""
+        if probe.needs != "file" and self.plan.description is None:
+            return noted("not tried: modelDescription.xml cannot be read")
+        if probe.needs != "file" and "library" not in self.reached:
+            return noted("not tried: the library does not load")
+        if probe.needs != "file" and self.stuck:
+            return noted("not tried: no life of this FMU comes to its end (see legal run)")
+        if probe.needs == "run" and "run" not in self.reached:
+            return noted("not tried: no legal run")
+        if probe.house and not self.plan.ours:
+            return noted("not tried: this is no FMU of bristle")
+        reason = probe.unless(self.plan)
+        if reason is not None:
+            return noted(f"not tried: {reason}")
+        finding = self.start(probe)
+        if probe.name == _REFERENCE and finding.verdict == "fail":
+            finding = self._at_rest(probe, finding)
+        self._learn(probe, finding)
+        return finding
+
+    def _at_rest(self, probe: Probe, moving: Finding) -> Finding:
+        """Make the reference with inputs at rest where the FMU cannot follow moving ones."""
+        self.plan.driven = False
+        finding = self.start(probe)
+        if finding.verdict == "fail":
+            return finding
+        return noted(f"{finding.seen} only; with inputs moving, {moving.seen}", **finding.data)
+
+    def _learn(self, probe: Probe, finding: Finding) -> None:
+        if probe.name == _LIBRARY and finding.verdict != "fail":
+            self.reached.add("library")
+        if probe.name == _LEGAL:
+            self._pace(finding)
+        if probe.name == _REFERENCE and (Path(self.plan.work) / "reference.json").exists():
+            self.reached.add("run")
+        if probe.name == _REPEATABLE:
+            self.plan.repeatable = finding.verdict == "pass"
+
+    def _pace(self, finding: Finding) -> None:
+        """Shorten later probes for an FMU that ends early, or that takes long."""
+        if "ended" in finding.data:
+            self.stuck = True  # every other probe would crash or hang as well
+        self.plan.steps = min(self.plan.steps, int(finding.data.get("most_steps", 1000)))
+        per_step = float(finding.data.get("per_step", 0.0))
+        per_instance = float(finding.data.get("per_instance", 0.0))
+        limit = self.plan.timeout
+        if per_step > 0.0:
+            most = int(0.05 * limit / per_step)
+            self.plan.steps = max(4, min(self.plan.steps, most))
+        if per_instance > 0.0:
+            most = int(0.3 * limit / (per_instance + 3.0 * per_step))
+            self.plan.instances = max(3, min(self.plan.instances, most))
+
+    def start(self, probe: Probe) -> Finding:
+        """Run a probe in a process of its own and say how that ended."""
+        work = Path(self.plan.work)
+        self.plan.save(work / PLAN)
+        for name in (FINDING, BOX):
+            (work / name).unlink(missing_ok=True)
+        # Forks share a hash seed and a memory layout; what depends on these is found anew.
+        anew = probe.name == _REPEATABLE
+        code = self.nursery.run(probe.name, self.plan.timeout, anew=anew, bare=probe.bare)
+        return _finding(work, code, self.plan.timeout)
+
+
+def _finding(work: Path, code: int | None, timeout: float) -> Finding:
+    """Turn what a process left behind into a finding."""
+    under_way = BlackBox.read(work / BOX)
+    where = f" in {under_way}" if under_way else ""
+    file = work / FINDING
+    told: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
+    after = f" (before that: {told['seen']})" if told else ""
+    if code is None:
+        return failed(f"hung{where}: no answer within {timeout:g} s{after}", ended=True)
+    if code < 0:
+        name = signal.Signals(-code).name if -code in set(signal.Signals) else str(-code)
+        return failed(f"crashed{where}: {name}{after}", ended=True)
+    if code != 0 or not told:
+        return failed(f"left the process{where} with exit code {code}{after}", ended=True)
+    return Finding(told["verdict"], told["seen"], told["data"])

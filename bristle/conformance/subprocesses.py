@@ -1,0 +1,130 @@
+"""Processes for probes: each in one of its own, ended when its time is over.
+
+On Linux a process that has imported the probes, and never an FMU, forks one child per probe:
+starting Python anew each time would take most of the time of a judgement. Elsewhere, and where
+a probe asks for it, Python starts anew.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import subprocess
+import sys
+import threading
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+
+from ..errors import FmuError
+
+# The child takes the package's folder off its path again, and the package out of its modules, so
+# that an FMU cannot lean on the bristle that judges it.
+_BOOT = (
+    "import sys; from pathlib import Path; sys.path.insert(0, sys.argv[1]); "
+    "from bristle.conformance._probe import forget_ourselves, main, serve; "
+    "sys.path.remove(sys.argv[1]); forget_ourselves(); "
+    "main(Path(sys.argv[2]), sys.argv[3]) if sys.argv[3:] else serve(Path(sys.argv[2]))"
+)
+_PACKAGES = str(Path(__file__).parents[2])
+
+
+class Nursery:
+    """Starts a process per probe; used as a context, it leaves none behind."""
+
+    def __init__(self, work: Path) -> None:
+        self._work = work
+        self._count = 0
+        self._living: list[int] = []
+        self._mother: subprocess.Popen[bytes] | None = None
+
+    def __enter__(self) -> Nursery:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for pid in self._living:
+            _kill(pid)
+        if self._mother is not None:
+            _kill(self._mother.pid)
+            self._mother.communicate()
+
+    def run(self, probe: str, timeout: float, *, anew: bool, bare: bool) -> int | None:
+        """Return how a probe's process ended, None if it had to be killed after `timeout` s.
+
+        As in subprocess, an exit code is positive and a signal negative.
+        """
+        self._count += 1
+        folder = self._work / f"cwd{self._count}"
+        folder.mkdir()
+        if anew or bare or sys.platform != "linux":
+            return self._start(probe, folder, timeout, bare)
+        return self._fork(probe, folder, timeout)
+
+    def _command(self, bare: bool, *arguments: str) -> list[str]:
+        flags = ["-I", "-S"] if bare else ["-P"]
+        return [sys.executable, *flags, "-c", _BOOT, _PACKAGES, str(self._work), *arguments]
+
+    def _start(self, probe: str, folder: Path, timeout: float, bare: bool) -> int | None:
+        process = subprocess.Popen(
+            self._command(bare, probe),
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+        # Popen.wait(timeout) would poll every 50 ms.
+        waiter = threading.Thread(target=process.wait, daemon=True)
+        try:
+            waiter.start()
+            waiter.join(timeout)
+            ended = not waiter.is_alive()
+        finally:
+            _kill(process.pid)
+            code = process.wait()
+        return code if ended else None
+
+    def _fork(self, probe: str, folder: Path, timeout: float) -> int | None:
+        if self._mother is None:
+            self._mother = subprocess.Popen(
+                self._command(False),
+                bufsize=0,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                start_new_session=True,
+            )
+        request, answer = self._mother.stdin, self._mother.stdout
+        assert request is not None
+        assert answer is not None
+        request.write(f"{probe}\t{folder}\n".encode())
+        pid = _number(answer.readline())
+        self._living.append(pid)
+        ended = bool(select.select([answer], [], [], timeout)[0])
+        _kill(pid)
+        code = _number(answer.readline())
+        self._living.remove(pid)
+        return code if ended else None
+
+
+def _number(line: bytes) -> int:
+    if not line:
+        raise FmuError("the process that starts the probes has ended unexpectedly.")
+    return int(line)
+
+
+def _kill(pid: int) -> None:
+    """Kill a process and whatever has been started in its session."""
+    with suppress(ProcessLookupError, PermissionError):  # all have ended by themselves
+        if sys.platform == "win32":
+            os.kill(pid, signal.SIGTERM)
+        else:
+            os.killpg(pid, signal.SIGKILL)
+    with suppress(ProcessLookupError, PermissionError):  # it had no session of its own yet
+        os.kill(pid, signal.SIGTERM if sys.platform == "win32" else signal.SIGKILL)

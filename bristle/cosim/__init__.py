@@ -1,1 +1,0 @@
-"""Co-simulation: scenarios as data, checked before a step, and the master that runs them."""

@@ -1,0 +1,1 @@
+"""Checks of measured data: findings about channels, motion and runs, before anything is fitted."""

@@ -1,0 +1,229 @@
+"""Looks at single channels: standing still, clipped, drifting, offset, noisy, sampled how."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..channels import DRIVE
+from ..measurement import Measurement
+from ..noise import Noise, is_switched
+from ..table import Array
+from .finding import Finding, Level
+
+_MOTIONLESS = "Check the cable and the column: is it the right one?"
+_COLOURS = {
+    "low-passed": "it fades towards half the sampling rate: this is its level below",
+    "blue": "it grows towards high frequencies, as after a numerical derivative: an upper limit",
+    "resting": "the channel was low-passed: this is its RMS while at rest",
+    "hidden": "the channel was low-passed and never rests, so that this is a lower limit",
+    "rough": "the channel changes so much from sample to sample that this is an upper limit",
+    "none": "no noise is to be seen",
+}
+
+
+def look_at_channels(run: Measurement, velocity: Array | None) -> Iterator[Finding]:
+    """Yield what is found in each channel of a run.
+
+    Parameters
+    ----------
+    run : Measurement
+    velocity : (n,) m/s, measured or derived, None where nothing moves
+    """
+    for note in run.notes:
+        yield Finding("reading", "note", note, run=run.name)
+    for channel, values in run.channels.items():
+        if np.ptp(values) == 0.0:
+            yield from _still(run, channel, values)
+            continue
+        if channel not in DRIVE:
+            yield from _clipped(run, channel, values, velocity)
+        yield from _noise(run, channel, values)
+    if "displacement" in run.channels and np.ptp(run["displacement"]) > 0.0:
+        yield from _drift(run, run["displacement"], velocity)
+    if "force" in run.channels and velocity is not None and np.ptp(velocity) > 0.0:
+        yield from _force_offset(run, run["force"], velocity)
+
+
+def clipped_share(values: Array, quantum: float) -> tuple[float, float, int]:
+    """Return (share of samples, level, stretches) at an extreme where a channel is cut off.
+
+    A stretch is three or more equal samples at the largest or smallest value, away from the ends of
+    the record. A turning point of a signal written in steps dwells there too, but then almost as
+    long on the next step.
+    """
+    span = float(np.ptp(values))
+    tolerance = max(0.5 * quantum, 1e-9 * span)
+    best = (0.0, 0.0, 0)
+    for extreme in (float(values.max()), float(values.min())):
+        distance = np.abs(values - extreme)
+        flat = (distance <= tolerance).astype(np.int8)
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], flat, [0]]))).reshape(-1, 2)
+        inner = [(a, b) for a, b in edges if b - a >= 3 and a > 0 and b < len(values)]
+        count = sum(b - a for a, b in inner)
+        near = max(quantum, 5e-3 * span) + tolerance
+        beside = int(((distance > tolerance) & (distance <= near)).sum())
+        levels = max(1.0, 5e-3 * span / quantum) if quantum else 1.0
+        # How much longer a round peak dwells on the last step than on each of the next.
+        round_peak = 0.707 * levels / ((levels + 0.5) ** 0.5 - 0.707)
+        often = count >= 5 and (len(inner) > 1 or count >= 10)
+        if often and count > 4.0 * round_peak * beside / levels:
+            share = count / len(values)
+            best = max(best, (share, extreme, len(inner)))
+    return best
+
+
+def _still(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:
+    if channel in DRIVE:
+        return  # a constant voltage is a matter of excitation
+    unit, value = run.units[channel], float(values[0])
+    what = "zero" if value == 0.0 else f"{value:.6g} {unit}"
+    level: Level = "warning" if channel in ("acceleration", "holding_force") else "error"
+    yield Finding(
+        "still", level, f"{channel} is {what} throughout.", _MOTIONLESS, run.name, channel
+    )
+
+
+def _clipped(
+    run: Measurement, channel: str, values: Array, velocity: Array | None
+) -> Iterator[Finding]:
+    facts = run.noise_facts[channel]
+    if is_switched(values):
+        return
+    share, level, stretches = clipped_share(values, facts.quantum if facts else 0.0)
+    if not share:
+        return
+    if channel.endswith("displacement"):
+        if velocity is None or np.ptp(velocity) == 0.0:
+            return
+        flat = np.isclose(values, level, rtol=0.0, atol=1e-9 * float(np.ptp(values)))
+        if float(np.median(np.abs(velocity[flat]))) < 0.05 * float(np.abs(velocity).max()):
+            return  # it stands still there, and is not cut off
+    yield Finding(
+        "clipping",
+        "warning",
+        f"{channel} stays at exactly {level:.6g} {run.units[channel]} in {stretches} stretches, "
+        f"{100.0 * share:.2g} % of the samples: it is cut off by its instrument or amplifier.",
+        "Repeat the run with a larger range, or leave it out: what is cut off is lost.",
+        run.name,
+        channel,
+        share,
+    )
+
+
+def _noise(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:
+    std, facts = run.noise[channel], run.noise_facts[channel]
+    if channel in DRIVE and is_switched(values):
+        return
+    rms = float(np.std(values))
+    share = std / rms if rms else 0.0
+    unit = run.units[channel]
+    if facts is None:
+        text = f"noise of {channel}: {std:.3g} {unit}, as given ({100 * share:.2g} % of its RMS)."
+        yield Finding("noise", "note", text, "", run.name, channel, share)
+        return
+    text = f"noise of {channel}: {std:.3g} {unit}, {100 * share:.2g} % of its RMS"
+    if facts.quantum and facts.quantum > 2.0 * std:
+        text += f"; it is written in steps of {facts.quantum:.3g} {unit}"
+    yield from _coloured(run, channel, text, facts, share)
+
+
+def _coloured(
+    run: Measurement, channel: str, text: str, facts: Noise, share: float
+) -> Iterator[Finding]:
+    if facts.colour == "white":
+        yield Finding("noise", "note", f"{text}.", "", run.name, channel, share)
+        return
+    doubtful = facts.colour in ("hidden", "rough", "blue")
+    yield Finding(
+        "noise",
+        "warning" if doubtful else "note",
+        f"{text}; {_COLOURS[facts.colour]}.",
+        f"Give its standard deviation as noise in [channels.{channel}], from a record at rest."
+        if doubtful
+        else "",
+        run.name,
+        channel,
+        share,
+    )
+
+
+def _drift(run: Measurement, x: Array, velocity: Array | None) -> Iterator[Finding]:
+    """Report a displacement whose middle wanders while it moves, or lies far from zero."""
+    slope, spread = middle_drift(x, velocity) if velocity is not None else (0.0, 0.0)
+    span, middle = float(np.ptp(x)), 0.5 * float(x.max() + x.min())
+    if abs(slope) > max(0.2 * span, 4.0 * spread):
+        yield Finding(
+            "drift",
+            "warning",
+            f"the middle of the displacement drifts by {1e3 * slope:.3g} mm over the run, of "
+            f"{1e3 * span:.3g} mm in all.",
+            "Let the instrument warm up, or say in notes that the motion itself is so.",
+            run.name,
+            "displacement",
+            abs(slope) / span,
+        )
+    if abs(middle) > 0.25 * span:
+        yield Finding(
+            "zero",
+            "note",
+            f"displacement runs from {1e3 * float(x.min()):.4g} to {1e3 * float(x.max()):.4g} mm: "
+            "its zero is not the middle of the motion.",
+            "Effects of position are told from such data only up to that zero.",
+            run.name,
+            "displacement",
+            abs(middle) / span,
+        )
+
+
+def _force_offset(run: Measurement, force: Array, velocity: Array) -> Iterator[Finding]:
+    """Report a force that differs between the two directions at equal speed."""
+    drive = next((run[one] for one in DRIVE if one in run.channels), None)
+    offset, spread = force_offset(force, velocity, drive)
+    rms = float(np.std(force))
+    if rms == 0.0 or abs(offset) < max(0.03 * rms, 4.0 * spread):
+        return
+    yield Finding(
+        "offset",
+        "warning" if abs(offset) > 0.1 * rms else "note",
+        f"force at equal speeds to both sides has a mean of {offset:.4g} N "
+        f"({100 * offset / rms:.3g} % of its RMS): the zero of the load cell, a preload, or an "
+        "asymmetric damper.",
+        "Note the load cell's reading without a damper; asymmetry shows only beside it.",
+        run.name,
+        "force",
+        abs(offset) / rms,
+    )
+
+
+def middle_drift(x: Array, velocity: Array) -> tuple[float, float]:
+    """Return how far the middle between turning points moves over a run, and how that scatters."""
+    least = 0.02 * float(np.abs(velocity).max())
+    fast = np.flatnonzero(np.abs(velocity) > least)
+    turns = fast[1:][np.diff(np.sign(velocity[fast])) != 0.0]
+    if len(turns) < 10:
+        return 0.0, 0.0
+    middles = 0.5 * (x[turns[1:]] + x[turns[:-1]])
+    at = 0.5 * (turns[1:] + turns[:-1]) / len(x)
+    at = at - at.mean()
+    slope = float(at @ middles / (at @ at))
+    left = middles - middles.mean() - slope * at
+    return slope, float(np.std(left) / np.sqrt(at @ at))
+
+
+def force_offset(force: Array, velocity: Array, drive: Array | None = None) -> tuple[float, float]:
+    """Return the part of a force that does not turn with the motion [N], and how it scatters [N].
+
+    What turns is a yield force and a viscous one, both growing with the voltage `drive`.
+    """
+    sign = np.tanh(velocity / (0.1 * float(np.std(velocity))))
+    odd = [sign, velocity, velocity * np.abs(velocity)]
+    if drive is not None and np.ptp(drive) > 0.0:
+        odd += [one * drive for one in odd[:2]]
+    A = np.column_stack([np.ones(len(force)), *odd])
+    A = A / np.maximum(np.abs(A).max(axis=0), 1e-300)  # columns of one size
+    blocks = zip(np.array_split(A, 8), np.array_split(force, 8), strict=True)
+    offset = float(np.linalg.lstsq(A, force, rcond=None)[0][0])
+    parts = [float(np.linalg.lstsq(part, rest, rcond=None)[0][0]) for part, rest in blocks]
+    return offset, float(np.std(parts) / np.sqrt(len(parts)))

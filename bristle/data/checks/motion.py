@@ -1,0 +1,177 @@
+"""Looks at channels together: derivatives, delays, signs, units, and where power goes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import log10
+
+import numpy as np
+
+from ..measurement import Measurement
+from ..relation import (
+    Relation,
+    averaged,
+    band,
+    derivative_relation,
+    differentiated,
+    power_factor,
+    tells_sign,
+)
+from ..table import Array
+from .finding import Finding
+
+_GAIN = 0.02  # share by which two channels may differ in gain
+_DELAY = 0.25  # share of the sampling step by which they may differ in time
+
+
+def velocity_of_run(run: Measurement, level: str = "") -> Array | None:
+    """Return the velocity (n,) [m/s] as measured, else the derivative of the displacement."""
+    before = f"{level}_" if level else ""
+    if f"{before}velocity" in run.channels:
+        return run[f"{before}velocity"]
+    if f"{before}displacement" in run.channels:
+        x = run[f"{before}displacement"]
+        return differentiated(x, run.step, min(band(x, run.step), 0.2 / run.step))
+    return None
+
+
+def look_at_motion(run: Measurement, level: str = "") -> Iterator[Finding]:
+    """Yield what is found between displacement, velocity and acceleration of a level."""
+    before = f"{level}_" if level else ""
+    x, v = f"{before}displacement", f"{before}velocity"
+    if run.has(x, v):
+        own = numerical_derivative(run[x], run[v], run.step)
+        if own:
+            yield Finding(
+                "derived",
+                "note",
+                f"{v} is the numerical derivative of {x} ({own}): it says nothing of its own, and "
+                "its noise is that of the displacement.",
+                f"Take {v} out of [channels], or record it with an instrument of its own.",
+                run.name,
+                v,
+            )
+        else:
+            yield from _related(run, x, v, derivative_relation(run[x], run[v], run.step))
+    yield from _acceleration(run, before, x, v)
+
+
+def _acceleration(run: Measurement, before: str, x: str, v: str) -> Iterator[Finding]:
+    """Hold an acceleration against the velocity, or against the displacement differentiated."""
+    a = f"{before}acceleration" + ("_absolute" if before else "")
+    if not (run.has(a) and (run.has(x) or run.has(v))):
+        return
+    measured = run[a]
+    if before:
+        if not run.has("ground_acceleration"):
+            return
+        measured = measured - run["ground_acceleration"]
+    if run.has(v):
+        yield from _related(run, v, a, derivative_relation(run[v], measured, run.step))
+        return
+    rate = np.gradient(run[x], run.step)
+    found = derivative_relation(rate, averaged(measured), run.step)
+    yield from _related(run, f"d({x})/dt", a, found)
+
+
+def look_at_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
+    """Yield what the power of the force says of its sign."""
+    force = run["force"]
+    if np.ptp(force) == 0.0 or np.ptp(velocity) == 0.0:
+        return
+    share, agree = power_factor(force, velocity)
+    words = f"share of the power that it could dissipate: {share:+.2f}"
+    told = tells_sign(share, agree, len(force))
+    if told and share < 0.0:
+        yield Finding(
+            "sign",
+            "error",
+            f"force drives the motion, for it is positive along it ({words}).",
+            "Turn sign in [channels.force]: a force is positive when it resists motion along +x.",
+            run.name,
+            "force",
+            -share,
+        )
+    elif not told:
+        yield Finding(
+            "sign",
+            "warning",
+            f"force neither resists nor drives the motion ({words}): its sign cannot be told.",
+            "Check that force and motion were recorded together.",
+            run.name,
+            "force",
+            -abs(share),
+        )
+
+
+def numerical_derivative(x: Array, v: Array, step: float) -> str:
+    """Return which difference of x a velocity is, "" if it is none of them."""
+    scale = float(np.std(v))
+    if scale == 0.0 or len(x) < 10:
+        return ""
+    centre = (x[2:] - x[:-2]) / (2.0 * step)
+    one_sided = np.diff(x) / step
+    kinds = {
+        "central differences": (centre, v[1:-1]),
+        "backward differences": (one_sided, v[1:]),
+        "forward differences": (one_sided, v[:-1]),
+    }
+    for name, (made, given) in kinds.items():
+        # What is written with few digits differs by their rounding.
+        if float(np.median(np.abs(made - given))) < 1e-3 * scale:
+            return name
+    return ""
+
+
+def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -> Iterator[Finding]:
+    if found is None:
+        return  # one of the two stands still, which is said elsewhere
+    where = {"run": run.name, "channel": upper}
+    if abs(found.correlation) < 0.9 and found.residual > 0.4:
+        yield Finding(
+            "derivative",
+            "error",
+            f"{upper} is not the derivative of {lower}: their correlation is "
+            f"{found.correlation:.2f}.",
+            "Check the columns: are two exchanged, or is one instrument not connected?",
+            value=1.0 - abs(found.correlation),
+            **where,
+        )
+        return
+    gain = (
+        f"{upper} is {found.gain:.4g} (+-{2 * found.gain_std:.1g}) times the derivative of {lower}"
+    )
+    after = f"; what is left is {100 * found.residual:.2g} % of it"
+    off = abs(found.gain - 1.0)
+    if found.gain < 0.0 or off > 0.25:
+        size = abs(found.gain)
+        doubts = ["sign"] * (found.gain < 0.0) + ["unit"] * (not 0.75 < size < 1.25)
+        yield Finding(
+            "gain",
+            "error",
+            f"{gain}{after}.",
+            f"Check the {' and the '.join(doubts)} of both in study.toml.",
+            value=abs(log10(size)),
+            **where,
+        )
+    else:
+        told = off > max(_GAIN, 4.0 * found.gain_std)
+        yield Finding(
+            "gain",
+            "warning" if told else "note",
+            f"{gain}{after}.",
+            "One of the two instruments is out of calibration." if told else "",
+            value=off,
+            **where,
+        )
+    if abs(found.delay) > max(_DELAY * run.step, 4.0 * found.delay_std):
+        late = "later" if found.delay > 0.0 else "earlier"
+        yield Finding(
+            "delay",
+            "warning",
+            f"{upper} comes {1e3 * abs(found.delay):.3g} ms (+-{2e3 * found.delay_std:.1g}) {late} "
+            f"than {lower}.",
+            "Filters of two instruments differ: use the same on both, or one of the channels.",
+            value=abs(found.delay),
+            **where,
+        )

@@ -1,0 +1,269 @@
+"""Looks at all runs together: what they excite, how they differ, what they cannot tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..channels import DRIVE
+from ..measurement import Measurement
+from ..noise import is_switched
+from ..table import Array
+from .finding import Finding
+from .motion import velocity_of_run
+
+_LEVELS = 12  # at most; a voltage with more moves continuously
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """What a run excites.
+
+    `stroke` peak to peak [m], `speed` the 99th percentile [m/s], `band` the frequencies between
+    which 90 % of the velocity's power lies [Hz], `cycles` of the motion; `drive` "voltage",
+    "current" or ""; `levels` pairs of level [V or A] and seconds there, empty where it moves
+    continuously; `range` its lowest and highest; `resisting` the mean force along the path [N].
+    """
+
+    run: str
+    duration: float
+    stroke: float
+    speed: float
+    band: tuple[float, float]
+    cycles: float
+    drive: str
+    levels: tuple[tuple[float, float], ...]
+    range: tuple[float, float]
+    resisting: float | None
+
+    @property
+    def constant(self) -> bool:
+        """Whether the voltage keeps to one level."""
+        return len(self.levels) == 1
+
+
+def excitation_of(run: Measurement, level: str = "") -> Excitation:
+    """Return what a run excites, seen from its damper (`level` "base" on a structure)."""
+    velocity = velocity_of_run(run, level)
+    displacement = run.channels.get(f"{level}_displacement" if level else "displacement")
+    drive = next((one for one in DRIVE if one in run.channels), "")
+    levels = drive_levels(run[drive], run.step, run.noise[drive]) if drive else ()
+    lowest, highest = (float(run[drive].min()), float(run[drive].max())) if drive else (0.0, 0.0)
+    if velocity is None:
+        return Excitation(
+            run.name, run.duration, 0.0, 0.0, (0.0, 0.0), 0.0, drive, levels, (lowest, highest),
+            None,
+        )  # fmt: skip
+    if displacement is None:
+        displacement = np.cumsum(velocity - velocity.mean()) * run.step
+    resisting = None
+    path = float(np.sum(np.abs(velocity)))
+    if "force" in run.channels and path > 0.0:
+        resisting = float(np.sum(run["force"] * velocity)) / path
+    return Excitation(
+        run.name, run.duration, float(np.ptp(displacement)),
+        float(np.quantile(np.abs(velocity), 0.99)), power_band(velocity, run.step),
+        cycles(velocity), drive, levels, (lowest, highest), resisting,
+    )  # fmt: skip
+
+
+def drive_levels(values: Array, step: float, noise: float) -> tuple[tuple[float, float], ...]:
+    """Return the levels that a voltage keeps to with the seconds at each, none if it keeps to none.
+
+    Values closer together than eight times the noise or 2 % of the range are one level.
+    """
+    span = float(np.ptp(values))
+    width = max(8.0 * noise, 0.02 * float(np.abs(values).max()))
+    if span <= width:
+        return ((float(np.mean(values)), len(values) * step),)
+    ordered = np.sort(values)
+    parts = np.split(ordered, np.flatnonzero(np.diff(ordered) > 0.5 * width) + 1)
+    big = [part for part in parts if len(part) >= 0.01 * len(values)]
+    covered = sum(map(len, big)) / len(values)
+    narrow = all(np.ptp(part) <= width for part in big)
+    some_levels = covered >= 0.95 and narrow and len(big) <= _LEVELS
+    if not (some_levels or is_switched(values)):
+        return ()
+    return tuple((float(np.mean(part)), len(part) * step) for part in big)
+
+
+def power_band(velocity: Array, step: float) -> tuple[float, float]:
+    """Return the frequencies [Hz] between which 90 % of the velocity's power lies."""
+    centred = (velocity - velocity.mean()) * np.hanning(len(velocity))
+    total = np.cumsum(np.abs(np.fft.rfft(centred)) ** 2)
+    if total[-1] <= 0.0:
+        return 0.0, 0.0
+    low, high = np.searchsorted(total / total[-1], (0.05, 0.95))
+    frequency = np.fft.rfftfreq(len(velocity), step)
+    return float(frequency[low]), float(frequency[high])
+
+
+def cycles(velocity: Array) -> float:
+    """Return how often a motion goes forth and back; turns below 2 % of its speed do not count."""
+    least = 0.02 * float(np.abs(velocity).max())
+    signs = np.sign(velocity[np.abs(velocity) > least])
+    return 0.5 * float(np.count_nonzero(np.diff(signs)))
+
+
+def look_at_runs(
+    train: list[Measurement], holdout: list[Measurement], level: str = ""
+) -> tuple[list[Finding], list[Excitation]]:
+    """Return what is found in all runs together, and what each of them excites."""
+    excitations = [excitation_of(run, level) for run in (*train, *holdout)]
+    findings = [
+        *_too_short(excitations),
+        *_drive(excitations),
+        *_beyond(excitations[: len(train)], excitations[len(train) :]),
+        *_two_rigs(excitations),
+        *_steps([*train, *holdout]),
+    ]
+    return findings, excitations
+
+
+def _too_short(runs: list[Excitation]) -> Iterator[Finding]:
+    total = sum(run.cycles for run in runs)
+    if total < 3.0 and any(run.speed > 0.0 for run in runs):
+        seconds = sum(run.duration for run in runs)
+        yield Finding(
+            "short",
+            "error",
+            f"all runs together hold {total:.2g} cycles of motion in {seconds:.3g} s: too few for "
+            "a model to be fitted and judged.",
+            "Record ten cycles or more at several speeds.",
+        )
+        return
+    for run in runs:
+        if run.speed > 0.0 and run.cycles < 2.0:
+            text = f"holds {run.cycles:.2g} cycles of motion in {run.duration:.3g} s."
+            yield Finding(
+                "short", "warning", text, "Record longer runs.", run.run, value=-run.cycles
+            )
+
+
+def _drive(runs: list[Excitation]) -> Iterator[Finding]:
+    driven = [run for run in runs if run.drive]
+    if not driven:
+        yield Finding(
+            "drive",
+            "warning",
+            "neither voltage nor current was recorded: it is taken as constant at an unknown "
+            "level, and coil_lag, remanence and saturation cannot be tested.",
+            "Record the coil's voltage or current.",
+        )
+        return
+    unit = "V" if driven[0].drive == "voltage" else "A"
+    name = driven[0].drive
+    constant = [run for run in driven if run.constant]
+    if len(constant) < len(driven):
+        yield from _moving_drive([run for run in driven if not run.constant], name, unit)
+        return
+    seen = sorted({round(run.levels[0][0], 6) for run in constant})
+    distinct = _distinct(seen)
+    levels = ", ".join(f"{one:.4g}" for one in distinct)
+    if len(distinct) == 1:
+        text = f"{name} is {levels} {unit} in all runs: "
+        text += (
+            "coil_lag, remanence and saturation cannot be tested, nor what it adds to the force."
+        )
+    else:
+        text = f"{name} is constant within each run ({levels} {unit}): coil_lag and remanence "
+        text += "cannot be tested" + (", nor can saturation." if len(distinct) < 3 else ".")
+    yield Finding(
+        "drive", "warning", text, f"Switch the {name} between three levels or more in a run."
+    )
+
+
+def _moving_drive(runs: list[Excitation], name: str, unit: str) -> Iterator[Finding]:
+    low, high = min(run.range[0] for run in runs), max(run.range[1] for run in runs)
+    yield Finding(
+        "drive", "note", f"{name} moves between {low:.4g} and {high:.4g} {unit} within runs."
+    )
+    levels = _distinct(sorted(level for run in runs for level, _ in run.levels))
+    if all(run.levels for run in runs) and len(levels) == 2:
+        yield Finding(
+            "drive levels",
+            "warning",
+            f"{name} has two levels, {levels[0]:.4g} and {levels[1]:.4g} {unit}: saturation cannot "
+            "be told from a force that grows evenly with it.",
+            "Use three levels or more.",
+        )
+
+
+def _distinct(levels: list[float]) -> list[float]:
+    """Return sorted levels without those within 3 % of the largest of the one before."""
+    out: list[float] = []
+    for level in levels:
+        if not out or level - out[-1] > 0.03 * max(map(abs, levels)):
+            out.append(level)
+    return out
+
+
+def _beyond(train: list[Excitation], holdout: list[Excitation]) -> Iterator[Finding]:
+    """Report held-out runs that leave the range of those for training."""
+    if not train or not holdout:
+        return
+    checks: list[tuple[str, Any, str, float]] = [
+        ("speed", lambda run: run.speed, "m/s", 1.0),
+        ("stroke", lambda run: run.stroke, "mm", 1e3),
+        ("voltage", lambda run: run.range[1], "V or A", 1.0),
+    ]
+    for name, value, unit, factor in checks:
+        known = max(map(value, train))
+        for run in holdout:
+            if known > 0.0 and value(run) > 1.15 * known:
+                yield Finding(
+                    "beyond",
+                    "warning",
+                    f"{name} reaches {factor * value(run):.3g} {unit}, and {factor * known:.3g} in "
+                    "the runs for training: the model is judged where it was not fitted.",
+                    "Exchange the roles of two runs in study.toml.",
+                    run.run,
+                    name,
+                    value(run) / known,
+                )
+
+
+def _two_rigs(runs: list[Excitation]) -> Iterator[Finding]:
+    """Report runs that resist far more or less than others at a similar voltage."""
+    known = [run for run in runs if run.resisting is not None and run.resisting > 0.0]
+    top = max((abs(run.range[1]) for run in known), default=0.0)
+    for run in known:
+        alike = [
+            other.resisting
+            for other in known
+            if abs(_mean_level(other) - _mean_level(run)) <= 0.1 * top
+            and 0.3 < other.speed / max(run.speed, 1e-12) < 3.0
+        ]
+        if len(alike) < 3:  # this run counts
+            continue
+        usual = float(np.median([one for one in alike if one is not None]))
+        ratio = float(run.resisting or 0.0) / usual
+        if not 0.4 < ratio < 2.5:
+            yield Finding(
+                "two rigs",
+                "warning",
+                f"force resists with {run.resisting:.4g} N on average, and with {usual:.4g} N in "
+                f"the middle one of {len(alike)} runs of like voltage and speed.",
+                "Is it of another damper, or in another unit? Then keep it in a study of its own.",
+                run.run,
+                "force",
+                abs(np.log(ratio)),
+            )
+
+
+def _mean_level(run: Excitation) -> float:
+    if not run.levels:
+        return 0.5 * (run.range[0] + run.range[1])
+    seconds = sum(time for _, time in run.levels)
+    return sum(level * time for level, time in run.levels) / seconds
+
+
+def _steps(runs: list[Measurement]) -> Iterator[Finding]:
+    rates = sorted({float(f"{run.sampling.rate:.4g}") for run in runs})
+    if len(rates) > 1:
+        yield Finding(
+            "rates", "note", f"runs are sampled at {', '.join(f'{one:g}' for one in rates)} Hz."
+        )

@@ -1,0 +1,274 @@
+"""Measurements: channels in SI at evenly spaced times, whatever the file looked like.
+
+Units are converted here, once. What was done to the samples is in `notes`; no sample is filtered.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordError, UnitError
+from ..units import conversion
+from .channels import DRIVE, channel_unit
+from .noise import Noise, estimate_noise
+from .sampling import Sampling, evenly
+from .table import Array, Table, read_table, table_from_frame
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+_ABSURD = 1e15  # in any SI unit; some recorders write 1e30 where a value is missing
+
+
+@dataclass(frozen=True)
+class ChannelSpec:
+    """Where a channel is in a file, as in `[channels.force]` of study.toml.
+
+    `column` is its title in the file, or its name without the unit; `unit` that of the file, "" to
+    take it from the title; `sign` 1 or -1; `noise` the standard deviation in that unit, None to
+    estimate it. For the time of a file without one, `step` [s] is the sampling step.
+    """
+
+    column: str = ""
+    unit: str = ""
+    sign: int = 1
+    noise: float | None = None
+    step: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """One piece of one run.
+
+    `time` (n,) s, evenly spaced; `channels` name to (n,) in the SI `units`; `measured` (n,) False
+    where a sample was missing and is interpolated, `lost` by channel (n,) True where that one alone
+    says nothing, such as beyond the end of its range; `noise` the standard deviation of each
+    channel in SI, `noise_facts` how it was found (None where it was given); `notes` what was done.
+    """
+
+    name: str
+    time: Array
+    channels: dict[str, Array]
+    units: dict[str, str]
+    measured: NDArray[np.bool_]
+    noise: dict[str, float]
+    noise_facts: dict[str, Noise | None]
+    sampling: Sampling
+    source: str
+    notes: tuple[str, ...] = field(default=())
+    lost: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+
+    @property
+    def step(self) -> float:
+        """Sampling step [s]."""
+        return self.sampling.step
+
+    @property
+    def duration(self) -> float:
+        """Time from the first sample to the last [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    def told(self, *channels: str) -> NDArray[np.bool_]:
+        """Return at which samples (n,) all of these channels say something."""
+        told = self.measured
+        for channel in channels:
+            if channel in self.lost:
+                told = told & ~self.lost[channel]
+        return told
+
+    def has(self, *channels: str) -> bool:
+        """Return whether all of these channels were measured."""
+        return all(channel in self.channels for channel in channels)
+
+    def __getitem__(self, channel: str) -> Array:
+        """Return a channel (n,) in SI; RecordError if it was not measured."""
+        if channel not in self.channels:
+            raise RecordError(
+                f"{self.name}: {channel} was not measured; there are {', '.join(self.channels)}."
+            )
+        return self.channels[channel]
+
+    def part(self, start: int, stop: int, name: str) -> Measurement:
+        """Return the samples from `start` up to `stop` as a measurement of its own."""
+        return replace(
+            self,
+            name=name,
+            time=self.time[start:stop],
+            channels={key: values[start:stop] for key, values in self.channels.items()},
+            measured=self.measured[start:stop],
+            lost={key: flags[start:stop] for key, flags in self.lost.items()},
+        )
+
+    def digest(self) -> str:
+        """Return 12 hex digits that two equal measurements share, whatever their files are."""
+        whole = hashlib.sha256()
+        for key in sorted(self.channels):
+            whole.update(key.encode())
+            whole.update(np.round(self.channels[key], 12).tobytes())
+        return whole.hexdigest()[:12]
+
+
+def read_measurements(
+    paths: Iterable[Path | str], channels: Mapping[str, ChannelSpec] | None = None
+) -> list[Measurement]:
+    """Return the measurements in files, one per file, or one per piece where values are missing.
+
+    Parameters
+    ----------
+    paths : files that `bristle.data.table.read_table` reads
+    channels : where each channel is, the same in all files; None guesses (`guess_channels`), and
+        the notes say what was guessed and why
+
+    Raises
+    ------
+    RecordError
+        If a file cannot be read, a channel is not there or has no unit, or times are not in order.
+    """
+    return [one for path in paths for one in measurements_of(read_table(path), channels)]
+
+
+def read_measurement(
+    path: Path | str, channels: Mapping[str, ChannelSpec] | None = None
+) -> Measurement:
+    """Return the measurement in a file; RecordError if gaps cut it into several pieces."""
+    found = read_measurements([path], channels)
+    if len(found) > 1:
+        raise RecordError(
+            f"{path}: missing values cut it into {len(found)} pieces. Take read_measurements, "
+            "which returns them all."
+        )
+    return found[0]
+
+
+def measurements_of_frame(
+    frame: pd.DataFrame, name: str = "frame", channels: Mapping[str, ChannelSpec] | None = None
+) -> list[Measurement]:
+    """Return the measurements in a pandas frame whose titles or `attrs["units"]` give units."""
+    return measurements_of(table_from_frame(frame, name), channels)
+
+
+def measurements_of(
+    table: Table, channels: Mapping[str, ChannelSpec] | None = None, *, estimate: bool = True
+) -> list[Measurement]:
+    """Return the measurements in a table; see `read_measurements`.
+
+    `estimate` False leaves out noise that is not given.
+    """
+    notes = list(table.notes)
+    if channels is None:
+        from .guess import guess_channels, specs
+
+        guesses = guess_channels(table)
+        notes += [f"guessed: {guess}" for guess in guesses]
+        channels = specs(table, guesses)
+    time = _time(table, channels.get("time"))
+    units, values = {}, {}
+    for channel, spec in channels.items():
+        if channel == "time":
+            continue
+        units[channel] = channel_unit(channel)
+        values[channel] = _in_si(table, channel, spec)
+    if not values:
+        raise RecordError(f"{table.source}: no channel besides time is named. There is nothing.")
+    even = evenly(time, values, table.lines, table.source, table.place)
+    notes += even.notes + _what_is_missing(values)
+    out = []
+    stem = _stem(table.source)
+    for number, (piece, parts, measured) in enumerate(even.pieces, 1):
+        name = stem if len(even.pieces) == 1 else f"{stem} ({number} of {len(even.pieces)})"
+        noise, facts = _noise(table, channels, parts, estimate)
+        out.append(
+            Measurement(
+                name, piece, parts, units, measured, noise, facts, even.sampling, table.source,
+                tuple(notes),
+            )
+        )  # fmt: skip
+    return out
+
+
+def _stem(source: str) -> str:
+    name = Path(source).name
+    return name.removesuffix(".gz").rpartition(".")[0] or name
+
+
+def _time(table: Table, spec: ChannelSpec | None) -> Array:
+    if spec is not None and spec.step is not None:
+        if not spec.step > 0.0:
+            raise RecordError(f"{table.source}: time: step = {spec.step!r} s must be positive.")
+        return np.arange(table.rows, dtype=np.float64) * spec.step
+    if spec is None:
+        raise RecordError(
+            f"{table.source}: no column is the time. Name one in [channels.time], or give the "
+            "sampling step there: step = 0.002  # s"
+        )
+    return _in_si(table, "time", spec)
+
+
+def _in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
+    """Return a column in the channel's SI unit."""
+    column = table.find(spec.column)
+    if column.text in table.words:
+        raise RecordError(
+            f'{table.source}: column "{column.text}" ({channel}): {table.words[column.text]}. Mend '
+            "the file, or leave the field empty where a value is missing."
+        )
+    unit = spec.unit or (column.unit.name if column.unit else "")
+    if not unit:
+        raise RecordError(
+            f'{table.source}: column "{column.text}" ({channel}) has no unit. Say '
+            f'unit = "{channel_unit(channel)}" in [channels.{channel}], or what it is in.'
+        )
+    if spec.sign not in (1, -1):
+        raise RecordError(f"[channels.{channel}]: sign = {spec.sign!r}; 1 or -1 is right.")
+    try:
+        factor, offset = conversion(unit, channel_unit(channel))
+    except UnitError as error:
+        raise RecordError(f'{table.source}: column "{column.text}" ({channel}): {error}') from None
+    si: Array = float(spec.sign) * (factor * table.values[column.text] + offset)
+    beyond = np.flatnonzero(np.abs(si) > _ABSURD)
+    if len(beyond):
+        raise RecordError(
+            f'{table.source}, {table.where(int(beyond[0]))}: "{column.text}" ({channel}) is '
+            f"{si[beyond[0]]:g} {channel_unit(channel)}, which nothing measures. Leave the field "
+            "empty where a value is missing."
+        )
+    return si
+
+
+def _noise(
+    table: Table, channels: Mapping[str, ChannelSpec], parts: dict[str, Array], estimate: bool
+) -> tuple[dict[str, float], dict[str, Noise | None]]:
+    noise: dict[str, float] = {}
+    facts: dict[str, Noise | None] = {}
+    for channel, values in parts.items():
+        spec = channels[channel]
+        if spec.noise is not None:
+            column = table.find(spec.column)
+            unit = spec.unit or (column.unit.name if column.unit else "")
+            noise[channel] = spec.noise * conversion(unit, channel_unit(channel))[0]
+            facts[channel] = None
+        elif estimate:
+            found = estimate_noise(values)
+            noise[channel], facts[channel] = found.std, found
+    return noise, facts
+
+
+def _what_is_missing(values: Mapping[str, Array]) -> list[str]:
+    """Say which channels are absent, for much depends on it."""
+    notes = []
+    x, v = "displacement" in values, "velocity" in values
+    bench = x or v or "force" in values
+    if bench and x and not v:
+        notes.append("no velocity: it follows from the displacement")
+    if bench and v and not x:
+        notes.append("no displacement: it follows from the velocity up to where it begins")
+    if bench and not any(drive in values for drive in DRIVE):
+        notes.append("no voltage and no current: taken as constant at an unknown level")
+    return notes

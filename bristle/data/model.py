@@ -1,0 +1,318 @@
+"""model.toml: a law with its parameters and the effects that were added, each value with a source.
+
+schema = 1
+law = "lugre"
+
+[parameters.sigma_a]
+value = 650.0
+unit = "N/m"
+std = 12.0
+origin = "identified"
+
+[effects.gas_spring]
+parameters = { k = { value = 81.2, unit = "N/m", std = 3.0 } }
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import UnitError
+from ..findings import unknown, written
+from ..lines import KeyPath
+from ..physics.damper import LAWS
+from ..physics.effect import CHOICES, EFFECTS, Parameter
+from ..physics.user import why_left_out
+from ..units import convert
+from .files import Toml, write_whole
+
+STANDARD = {"bingham_standard": "bingham", "lugre_standard": "lugre"}
+"""Laws without the exponential, with the law whose exponent is then 0."""
+LAW_NAMES = (*LAWS, *STANDARD)
+ORIGINS = ("reconstructed", "measured", "assumed", "identified")
+_KEYS = ("schema", "law", "building", "parameters", "effects")
+_VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")
+
+
+@dataclass(frozen=True)
+class Value:
+    """A parameter: `value`, `low`, `high`, `std` in `unit`; whether a fit moves it; its origin."""
+
+    value: float
+    unit: str
+    low: float
+    high: float
+    free: bool = True
+    std: float | None = None
+    origin: str = "assumed"
+
+
+@dataclass(frozen=True)
+class StudyModel:
+    """The content of a model.toml; all parameters of the law and its effects are there.
+
+    `parameters` of the law by name; `effects` name to parameters; `building` the file of the
+    structure, relative to the study, "" on a bench.
+    """
+
+    law: str
+    parameters: dict[str, Value]
+    effects: dict[str, dict[str, Value]] = field(default_factory=dict)
+    building: str = ""
+
+    @property
+    def base_law(self) -> str:
+        """The law as the code knows it: "bingham" or "lugre"."""
+        return STANDARD.get(self.law, self.law)
+
+    def flat(self) -> dict[str, Value]:
+        """Return all parameters by the names of FMUs: "f_c", "gas_spring.k"."""
+        out = dict(self.parameters)
+        for effect, values in self.effects.items():
+            out.update({f"{effect}.{name}": value for name, value in values.items()})
+        return out
+
+    def values(self) -> dict[str, float]:
+        """Return all values in SI by the names of FMUs."""
+        return {
+            name: convert(value.value, value.unit, self.declared(name).unit)
+            for name, value in self.flat().items()
+        }
+
+    def free(self) -> list[str]:
+        """Return the names of the parameters that a fit may move."""
+        return [name for name, value in self.flat().items() if value.free]
+
+    def declared(self, name: str) -> Parameter:
+        """Return the declaration of a parameter: default, SI unit, bounds, text."""
+        effect, _, own = name.rpartition(".")
+        return EFFECTS[effect].parameters[own] if effect else _declared(self.law)[name]
+
+    def with_values(
+        self,
+        values: Mapping[str, float],
+        std: Mapping[str, float] | None = None,
+        origin: str = "identified",
+    ) -> StudyModel:
+        """Return the model with values in SI, and their standard deviations, put in its units."""
+        std = std or {}
+        flat = self.flat()
+        for name, value in values.items():
+            unit = self.declared(name).unit
+            own = flat[name].unit
+            spread = convert(std[name], unit, own) if name in std else None
+            flat[name] = replace(
+                flat[name], value=convert(value, unit, own), std=spread, origin=origin
+            )
+        return replace(
+            self,
+            parameters={name: flat[name] for name in self.parameters},
+            effects={
+                effect: {own: flat[f"{effect}.{own}"] for own in named}
+                for effect, named in self.effects.items()
+            },
+        )
+
+    def with_effect(self, effect: str) -> StudyModel:
+        """Return the model with one more effect, its parameters at their defaults."""
+        return replace(self, effects={**self.effects, effect: _defaults("", effect)})
+
+
+def new_model(law: str = "lugre", effects: tuple[str, ...] = (), building: str = "") -> StudyModel:
+    """Return a model with every parameter at its default."""
+    model = StudyModel(law, _defaults(law), {}, building)
+    for effect in effects:
+        model = model.with_effect(effect)
+    return model
+
+
+def read_model(path: Path, study: Path | None = None) -> StudyModel:
+    """Return the model in a model.toml; what is missing takes the law's values, free.
+
+    A building's file is looked for in the folder `study`, else beside the model.
+
+    Raises
+    ------
+    StudyError
+        With every mistake of the file and its line.
+    """
+    toml = Toml(path)
+    data = toml.data
+    toml.schema()
+    toml.known((), data, _KEYS)
+    law = toml.text((), data, "law")
+    if law not in LAW_NAMES:
+        toml.error(("law",), unknown("law", law, LAW_NAMES))
+        toml.check()
+    parameters = _values(toml, ("parameters",), toml.table((), data, "parameters"), law)
+    effects: dict[str, dict[str, Value]] = {}
+    for name, table in toml.table((), data, "effects").items():
+        found = _effect(toml, name, table, STANDARD.get(law, law))
+        if found is not None:
+            effects[name] = found
+    _exclusions(toml, list(effects))
+    building = toml.text((), data, "building")
+    beside = study or path.parent
+    if building and not (beside / building).is_file():
+        toml.error(("building",), f"there is no file {beside / building}.")
+    toml.check()
+    return StudyModel(law, parameters, effects, building)
+
+
+def write_model(path: Path, model: StudyModel) -> None:
+    """Write a model.toml; comments of the file that it replaces stay."""
+    write_whole(path, model_text(model, path))
+
+
+def model_text(model: StudyModel, beside: Path | None = None) -> str:
+    """Return a model as TOML, on top of an older file's comments where there is one."""
+    import tomlkit
+    from tomlkit.exceptions import TOMLKitError
+
+    document = tomlkit.document()
+    if beside is not None and beside.is_file():
+        try:
+            document = tomlkit.parse(beside.read_text(encoding="utf-8-sig"))
+        except (TOMLKitError, OSError, UnicodeDecodeError):
+            document = tomlkit.document()
+    document["schema"] = 1
+    document["law"] = model.law
+    _set_or_drop(document, "building", model.building)
+    for key in ("parameters", "effects"):
+        if key not in document:
+            document[key] = tomlkit.table(is_super_table=True)
+    _update(document["parameters"], {n: _as_toml(v) for n, v in model.parameters.items()}, False)
+    effects = document["effects"]
+    for name in [name for name in effects if name not in model.effects]:
+        del effects[name]
+    for name, values in model.effects.items():
+        if name not in effects:
+            effects[name] = tomlkit.table()
+        if "parameters" not in effects[name]:
+            effects[name]["parameters"] = tomlkit.inline_table()
+        _update(effects[name]["parameters"], {n: _as_toml(v) for n, v in values.items()}, True)
+    if not model.effects:
+        del document["effects"]
+    return tomlkit.dumps(document)
+
+
+def _update(table: Any, wanted: Mapping[str, dict[str, Any]], inline: bool) -> None:
+    import tomlkit
+
+    for name in [name for name in table if name not in wanted]:
+        del table[name]
+    for name, content in wanted.items():
+        if name not in table:
+            table[name] = tomlkit.inline_table() if inline else tomlkit.table()
+        for key in _VALUE_KEYS:
+            _set_or_drop(table[name], key, content.get(key, ""))
+
+
+def _set_or_drop(table: Any, key: str, value: Any) -> None:
+    if value == "":
+        table.pop(key, None)
+    elif key not in table or table[key] != value:
+        table[key] = value
+
+
+def _as_toml(value: Value) -> dict[str, Any]:
+    found: dict[str, Any] = {"value": value.value, "unit": value.unit}
+    if value.std is not None and value.std == value.std and value.std != float("inf"):
+        found["std"] = value.std
+    return {**found, "low": value.low, "high": value.high, "free": value.free} | {
+        "origin": value.origin
+    }
+
+
+def _declared(law: str, effect: str = "") -> dict[str, Parameter]:
+    """Return the declarations of an effect's parameters, or of a law's."""
+    if effect:
+        return dict(EFFECTS[effect].parameters)
+    declared = dict(LAWS[STANDARD.get(law, law)].parameters)
+    if law in STANDARD:
+        declared["exponent"] = declared["exponent"]._replace(value=0.0)
+    return declared
+
+
+def _defaults(law: str, effect: str = "") -> dict[str, Value]:
+    """Return the parameters of an effect, or of a law, at their defaults."""
+    fixed: tuple[str, ...] = (*CHOICES, *(EFFECTS[effect].assumed if effect else ()))
+    if law in STANDARD and not effect:
+        fixed = (*CHOICES, "v_n")  # without the exponential there is no speed to divide by
+    return {
+        name: Value(p.value, p.unit, *p.bounds, free=name not in fixed)
+        for name, p in _declared(law, effect).items()
+    }
+
+
+def _effect(toml: Toml, name: str, table: Any, law: str) -> dict[str, Value] | None:
+    keys = ("effects", name)
+    if name not in EFFECTS:
+        why = why_left_out(toml.path.parent / "effects" / f"{name}.py")
+        toml.error(keys, why or unknown("effect", name, sorted(EFFECTS)))
+        return None
+    if not isinstance(table, dict):
+        toml.error(keys, f"is {written(table)}; a table is right.")
+        return None
+    if EFFECTS[name].site == "damper" and law not in EFFECTS[name].laws:
+        joins = ", ".join(EFFECTS[name].laws)
+        toml.error(keys, f"{name} cannot join the law {law}; it joins {joins}.")
+    toml.known(keys, table, ("parameters",))
+    own = toml.table(keys, table, "parameters")
+    return _values(toml, (*keys, "parameters"), own, law, name)
+
+
+def _exclusions(toml: Toml, effects: list[str]) -> None:
+    for name in effects:
+        for other in EFFECTS[name].excludes:
+            if other in effects:
+                toml.error(("effects", name), f"{name} and {other} cannot be joined: drop one.")
+
+
+def _values(
+    toml: Toml, keys: KeyPath, table: Mapping[str, Any], law: str, effect: str = ""
+) -> dict[str, Value]:
+    declared, out = _declared(law, effect), _defaults(law, effect)
+    for name, own in table.items():
+        if name not in declared:
+            toml.error((*keys, name), unknown("parameter", name, declared))
+        elif not isinstance(own, dict):
+            toml.error((*keys, name), f"{name} is {written(own)}; {{ value = ... }} is right.")
+        else:
+            out[name] = _value(toml, (*keys, name), own, declared[name], out[name])
+    return out
+
+
+def _value(
+    toml: Toml, keys: KeyPath, table: Mapping[str, Any], declared: Parameter, default: Value
+) -> Value:
+    toml.known(keys, table, _VALUE_KEYS)
+    name = str(keys[-1])
+    unit = toml.text(keys, table, "unit", declared.unit) or "1"
+    try:
+        low, high = (convert(bound, declared.unit, unit) for bound in declared.bounds)
+        value = convert(default.value, declared.unit, unit)
+    except UnitError as error:
+        toml.error((*keys, "unit"), f"{name}: {error}")
+        return default
+    bounds = low, high
+    given = {key: toml.number(keys, table, key) for key in ("value", "low", "high", "std")}
+    value = value if given["value"] is None else given["value"]
+    low = low if given["low"] is None else given["low"]
+    high = high if given["high"] is None else given["high"]
+    slack = 1e-9 * max(abs(bounds[0]), abs(bounds[1]))
+    if low < bounds[0] - slack or high > bounds[1] + slack:
+        allowed = f"{bounds[0]:g} to {bounds[1]:g} {unit}"
+        toml.error(keys, f"{name}: {low:g} to {high:g} leaves what is physical, {allowed}.")
+    if not low <= value <= high:
+        toml.error((*keys, "value"), f"{name} = {value:g} is outside {low:g} to {high:g} {unit}.")
+    free = table.get("free", default.free)
+    if not isinstance(free, bool):
+        toml.error((*keys, "free"), f"free = {written(free)}; true or false is right.")
+    origin = toml.text(keys, table, "origin", "assumed")
+    if origin not in ORIGINS:
+        toml.error((*keys, "origin"), unknown("origin", origin, ORIGINS))
+    return Value(value, unit, low, high, bool(free), given["std"], origin)

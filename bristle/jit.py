@@ -1,0 +1,132 @@
+"""Compiles plain functions with everything that they call, and keeps the machine code.
+
+numba asks for callees that are compiled themselves. Here the globals of a function are walked and
+every plain function among them is compiled, so that the laws stay free of any decorator. numba's
+own cache checks one source file only and would keep an edited effect's old force: so the folder of
+the cache is named by the digest of all functions that are compiled together.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from threading import Lock
+from types import CodeType, FunctionType
+from typing import Any
+
+import numba
+import numpy as np
+
+from .resources import cache_folder
+
+# Python's arrays outlive every call, so compiled code need not count references to them.
+_OPTIONS = {"error_model": "numpy", "_nrt": False}
+
+# Callees are never called from Python.
+_CALLEE = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+_NUMBERS = (bool, int, float, str)
+
+# numba asks for the folder of its cache in a global of its own, more than once per function.
+_FOLDER = Lock()
+
+
+def compiled(
+    function: Callable[..., Any], inline: tuple[str, ...] = (), *, keep: bool = True
+) -> Any:
+    """Return the function compiled by numba, together with all that it calls, cached on disk.
+
+    Parameters
+    ----------
+    function : callable
+        It and its callees take arrays and make none.
+    inline : tuple of str
+        Qualified names of callees that become part of their callers: best for short ones and for
+        those with one caller, which would otherwise be translated by themselves and with it again.
+    keep : bool
+        Whether to keep the machine code on disk.
+    """
+    folder = _folder(function) if keep else None
+    with _FOLDER:
+        before = numba.config.CACHE_DIR
+        numba.config.CACHE_DIR = str(folder or "")
+        try:
+            root = _closed(function, {}, inline)
+            return numba.njit(cache=folder is not None, nogil=True, **_OPTIONS)(root)
+        finally:
+            numba.config.CACHE_DIR = before
+
+
+def _folder(function: Callable[..., Any]) -> Path | None:
+    """Return where machine code is kept, or None where nothing can be written."""
+    folder = cache_folder() / "numba" / digest(function)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK) else None
+
+
+def digest(function: Callable[..., Any]) -> str:
+    """Return the digest of a function and all that it calls, 16 hexadecimal digits."""
+    content = hashlib.sha256()
+    for text in (numba.__version__, np.__version__, sys.version):
+        content.update(text.encode())
+    for reached in _reached(function, set()):
+        # numba's files name the modules of their functions and cannot be read without them.
+        content.update(reached.__module__.encode())
+        for part in _parts(reached.__code__):
+            content.update(part)
+        for name in sorted(_names(reached.__code__)):
+            value = reached.__globals__.get(name)
+            if isinstance(value, _NUMBERS):
+                content.update(f"{name}={value!r}".encode())
+            elif isinstance(value, type):  # a named tuple: its fields decide where numbers are
+                content.update(f"{name}={getattr(value, '_fields', '')!r}".encode())
+    return content.hexdigest()[:16]
+
+
+def _reached(function: Any, seen: set[int]) -> Iterator[FunctionType]:
+    """Yield a function and every plain function among the globals that it names, each once."""
+    seen.add(id(function))
+    yield function
+    for name in sorted(_names(function.__code__)):
+        value = function.__globals__.get(name)
+        if isinstance(value, FunctionType) and id(value) not in seen:
+            yield from _reached(value, seen)
+
+
+def _parts(code: CodeType) -> Iterator[bytes]:
+    yield code.co_code
+    yield repr((code.co_names, code.co_varnames)).encode()
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _parts(constant)
+        else:
+            yield repr(constant).encode()
+
+
+def _closed(function: Any, done: dict[int, Any], inline: tuple[str, ...]) -> FunctionType:
+    """Return a copy of a function in whose globals every plain function is compiled."""
+    namespace = dict(function.__globals__)
+    for name in _names(function.__code__):
+        value = namespace.get(name)
+        if isinstance(value, FunctionType):
+            if id(value) not in done:
+                how = "always" if value.__qualname__ in inline else "never"
+                done[id(value)] = numba.njit(inline=how, **_CALLEE)(_closed(value, done, inline))
+            namespace[name] = done[id(value)]
+    copy = FunctionType(
+        function.__code__, namespace, function.__name__, function.__defaults__, function.__closure__
+    )
+    copy.__module__ = function.__module__
+    copy.__qualname__ = function.__qualname__
+    return copy
+
+
+def _names(code: CodeType) -> set[str]:
+    nested = (constant for constant in code.co_consts if isinstance(constant, CodeType))
+    return set(code.co_names).union(*(_names(inner) for inner in nested))

@@ -1,0 +1,302 @@
+"""The HTML report: one file that opens without a network, images included."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections import Counter
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ... import __version__
+from .claims import NOT, REPRODUCED, UNDECIDABLE, Statement, Verdict
+from .experiment import CONTROLLERS, KAPPA, LAWS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .make import Report
+
+CAPTIONS = {
+    "fig5-stiction": "The structure shaken by a sine, damper at constant voltage.",
+    "fig9-passive-optimum": "El Centro at four intensities, damper at constant voltage.",
+    "fig13-anti-windup": "The strong Northridge case, LPV with three anti-windup rates.",
+    "fig14-accelerations-el-centro": "Acceleration of floor 2 over time, weak and strong.",
+    "fig15-drift-el-centro": "Displacement of the base relative to the table.",
+    "fig16-accelerations-northridge": "As Fig. 14, for the Northridge record at hand.",
+    "fig17-voltages": "Voltage and hysteresis loops of the three controllers.",
+    "summary": "All cases of Tables IV and V at a glance.",
+}
+_SHOWN = (
+    ("base drift", "mm", "{:.1f}", "{:.2f}"),
+    ("floor 1 acceleration", "m/s2", "{:.2f}", "{:.3f}"),
+    ("floor 2 acceleration", "m/s2", "{:.2f}", "{:.3f}"),
+    ("damper force", "N", "{:.2f}", "{:.2f}"),
+    ("voltage", "V", "{:.1f}", "{:.2f}"),
+)
+DOTS = 160
+"""Dots per inch of the images."""
+
+_CLASSES = {REPRODUCED: "yes", NOT: "no", UNDECIDABLE: "open"}
+_TITLES = {"table4": "Table IV: El Centro", "table5": "Table V: Northridge"}
+
+_STYLE = """
+:root { --ink:#1f2328; --grey:#5c636b; --line:#e3e6ea; --pale:#f6f7f9;
+        --yes:#00734f; --no:#b04a00; --open:#5b5f66; --blue:#0072B2; }
+* { box-sizing: border-box; }
+body { margin:0; color:var(--ink); background:#fff; line-height:1.5;
+       font:15px/1.5 system-ui, -apple-system, "Segoe UI", "Helvetica Neue", Arial, sans-serif; }
+main { max-width:1080px; margin:0 auto; padding:40px 28px 64px; }
+h1 { font-size:30px; line-height:1.2; margin:0 0 10px; letter-spacing:-.01em; }
+h2 { font-size:20px; margin:48px 0 12px; padding-top:18px; border-top:1px solid var(--line); }
+h3 { font-size:16px; margin:26px 0 8px; }
+p { margin:0 0 12px; max-width:76ch; }
+.lead { font-size:17px; color:var(--grey); }
+nav { margin:18px 0 0; font-size:14px; } nav a { margin-right:18px; }
+a { color:var(--blue); text-decoration:none; } a:hover { text-decoration:underline; }
+.bar { display:flex; height:34px; margin:22px 0 6px; border-radius:5px; overflow:hidden; }
+.bar span { color:#fff; font-weight:600; padding:6px 12px; white-space:nowrap; font-size:14px; }
+.bar .yes { background:var(--yes); } .bar .no { background:var(--no); }
+.bar .open { background:var(--open); }
+.note { background:var(--pale); border-left:3px solid var(--blue); padding:10px 14px;
+        margin:14px 0; max-width:none; }
+.scroll { overflow-x:auto; }
+table { border-collapse:collapse; width:100%; font-size:14px; }
+th { text-align:left; font-weight:600; color:var(--grey); border-bottom:1px solid #b9bec5;
+     padding:6px 8px; vertical-align:bottom; }
+td { border-bottom:1px solid var(--line); padding:8px; vertical-align:top; }
+.numbers td, .numbers th { text-align:right; padding:4px 8px; white-space:nowrap;
+     font-variant-numeric:tabular-nums; }
+.numbers td:first-child, .numbers th:first-child { text-align:left; }
+.numbers thead tr:first-child th { border-bottom:none; padding-bottom:0; text-align:center; }
+.numbers thead tr:first-child th:first-child { text-align:left; }
+.numbers .group td { background:var(--pale); font-weight:600; text-align:left; padding-top:8px; }
+.numbers .rms { color:var(--grey); } .numbers b { color:var(--ink); }
+.numbers td.first { border-left:1px solid var(--line); }
+.ledger td:first-child { color:var(--grey); text-align:right; width:2.2em; }
+.ledger .what { width:31%; } .ledger small { color:var(--grey); display:block; margin-top:3px; }
+.badge { display:inline-block; padding:1px 9px; border-radius:10px; color:#fff; font-size:12.5px;
+         font-weight:600; white-space:nowrap; }
+.badge.yes { background:var(--yes); } .badge.no { background:var(--no); }
+.badge.open { background:var(--open); }
+figure { margin:30px 0; } figure img { width:100%; height:auto; border:1px solid var(--line);
+         border-radius:4px; display:block; }
+figcaption { color:var(--grey); font-size:14px; margin-top:8px; }
+code { background:var(--pale); padding:1px 5px; border-radius:3px; font-size:13.5px; }
+footer { margin-top:48px; border-top:1px solid var(--line); padding-top:14px; color:var(--grey);
+         font-size:13.5px; }
+@media print { main { max-width:none; padding:0; } figure, tr { break-inside:avoid; }
+               nav { display:none; } }
+"""
+
+
+def page(report: Report) -> str:
+    """Return the report as HTML text that needs no other file."""
+    count = Counter(verdict.verdict for _, verdict in report.ledger)
+    parts = [
+        _head(report, count),
+        _setting(report),
+        _ledger(report.ledger),
+        *(_table(_TITLES[name], name, table) for name, table in report.tables.items()),
+        _figures(report),
+        _designs(report),
+        _foot(report),
+    ]
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        "<title>The paper's comparison of controllers, done anew</title>\n"
+        f"<style>{_STYLE}</style>\n</head>\n<body>\n<main>\n{''.join(parts)}</main>\n</body>\n"
+        "</html>\n"
+    )
+
+
+def _head(report: Report, count: Counter[str]) -> str:
+    total = sum(count.values())
+    bar = "".join(
+        f'<span class="{name}" style="flex:{count[verdict]}">{count[verdict]} {verdict}</span>'
+        for verdict, name in _CLASSES.items()
+        if count[verdict]
+    )
+    tables = "".join(
+        f'<a href="#{name}">{escape(_TITLES[name].partition(":")[0])}</a>' for name in report.tables
+    )
+    return f"""<header>
+<h1>Semi-active control of a base-isolated structure: the paper's comparison, done anew</h1>
+<p class="lead">Of {total} statements in the text of Shirazi, Mohammadpour, Grigoriadis and Song
+(2012), {count[REPRODUCED]} are reproduced, {count[NOT]} are not, and {count[UNDECIDABLE]} cannot be
+decided from what the text tells.</p>
+<div class="bar" role="img" aria-label="verdicts">{bar}</div>
+<nav><a href="#ledger">Ledger</a>{tables}<a href="#figures">Figures</a>
+<a href="#designs">Designs</a></nav>
+</header>
+"""
+
+
+def _setting(report: Report) -> str:
+    rows = "".join(
+        f"<tr><td>{escape(m.name)}</td><td>{', '.join(f'{g:g}' for g in m.intensities)} g</td>"
+        f"<td>{m.window:g} s</td><td>{m.paper_window:g} s</td></tr>"
+        for m in report.comparison.motions
+    )
+    left_out = report.comparison.left_out
+    note = f'<p class="note">Left out. {escape(left_out)}</p>' if left_out else ""
+    laws = ", ".join(LAWS)
+    return f"""<section>
+<h2>What was run</h2>
+<p>A two-storey model on a sliding base with springs, an MR damper with stiction (LuGre law) between
+base and table, and {len(LAWS)} laws for its voltage: {escape(laws)}. Controllers sample at 500 Hz;
+structure, damper and controller are solved as one system. "LPV" has the anti-windup rate
+λ = 200 1/s.</p>
+<p class="note"><b>What is not the paper's own.</b> Its tables and matrices are lost to this
+project: damper parameters, weights of the designs, and the factor {KAPPA:g} on the nominal peak of
+every ground motion are reconstructed so that its text holds as far as it can. Orders and shapes can
+be compared; values cannot.</p>
+<table><thead><tr><th>Ground motion</th><th>Nominal peaks</th><th>RMS over the record of</th>
+<th>The paper runs</th></tr></thead><tbody>{rows}</tbody></table>
+{note}
+</section>
+"""
+
+
+def _ledger(judged: list[tuple[Statement, Verdict]]) -> str:
+    rows = "".join(
+        f"<tr><td>{s.number}</td>"
+        f'<td class="what">{_said(s.text)}<small>Section {escape(s.section)}</small></td>'
+        f'<td><span class="badge {_CLASSES[v.verdict]}">{v.verdict}</span></td>'
+        f"<td>{_said(v.measured)}{_small(v.why)}<small><b>Decided by:</b> {_said(s.rule, False)}."
+        "</small></td></tr>\n"
+        for s, v in judged
+    )
+    return f"""<section>
+<h2 id="ledger">The ledger</h2>
+<p>Each statement of the text, in other words, with the number found here. Verdicts are computed
+from the tables below; "peak y" is the peak absolute acceleration of floor 2. Lists run from the
+weakest to the strongest intensity.</p>
+<div class="scroll"><table class="ledger"><thead><tr><th></th><th>Statement</th><th>Verdict</th>
+<th>Found</th></tr></thead><tbody>
+{rows}</tbody></table></div>
+</section>
+"""
+
+
+def _small(text: str) -> str:
+    return f"<small>{_said(text)}</small>" if text else ""
+
+
+def _said(text: str, sentence: bool = True) -> str:
+    """Return a text as HTML: numbers stay with their units, a sentence begins with a capital."""
+    if sentence:
+        text = text[:1].upper() + text[1:]
+    kept = re.sub(r"(?<=\d) (?=[%VNgs]\b|%|m/s|N/m|1/m|cm|Hz)", "\u00a0", text)
+    return escape(kept.replace("H-infinity", "H\u2011infinity"))
+
+
+def _table(title: str, name: str, table: pd.DataFrame) -> str:
+    """Return a table with peak and RMS side by side, the lowest of the controllers bold."""
+    heads = "".join(
+        f'<th colspan="2">{quantity} [{unit.replace("2", "²")}]</th>'
+        for quantity, unit, _, _ in _SHOWN
+    )
+    unders = "<th>peak</th><th>RMS</th>" * len(_SHOWN)
+    body = []
+    groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
+    for (motion, g), group in groups:
+        body.append(
+            f'<tr class="group"><td colspan="{1 + 2 * len(_SHOWN)}">{escape(motion)}, nominal '
+            f"{g:g} g</td></tr>"
+        )
+        own = group.set_index("law")
+        for law in own.index:
+            cells = "".join(
+                _cell(own, str(law), f"{kind} {quantity} [{unit}]", form, kind)
+                for quantity, unit, *forms in _SHOWN
+                for kind, form in zip(("peak", "rms"), forms, strict=True)
+            )
+            body.append(f"<tr><td>{escape(str(law))}</td>{cells}</tr>")
+    rows = "\n".join(body)
+    return f"""<section>
+<h2 id="{name}">{escape(title)}</h2>
+<p>Bold: the lowest of the three controllers. RMS values are over the record as published.</p>
+<div class="scroll"><table class="numbers"><thead><tr><th></th>{heads}</tr>
+<tr><th>Law</th>{unders}</tr></thead><tbody>
+{rows}
+</tbody></table></div>
+</section>
+"""
+
+
+def _cell(own: Any, law: str, column: str, form: str, kind: str) -> str:
+    value = float(own.loc[law, column])
+    absent = law == "no damper" and ("force" in column or "voltage" in column)
+    text = "-" if absent else form.format(value)
+    others = [form.format(float(own.loc[c, column])) for c in CONTROLLERS if c != law]
+    lowest = law in CONTROLLERS and float(text) < min(map(float, others))
+    name = "first" if kind == "peak" else "rms"
+    return f'<td class="{name}">{f"<b>{text}</b>" if lowest else text}</td>'
+
+
+def _figures(report: Report) -> str:
+    figures = "".join(
+        f'<figure style="max-width:{_width(report, name)}px">'
+        f'<img alt="{escape(number or "Summary")}" src="{_embedded(report, name)}">'
+        f"<figcaption><b>{escape(number or 'Summary')}.</b> {escape(CAPTIONS[name])}</figcaption>"
+        "</figure>\n"
+        for name, number in sorted(report.figures.items(), key=lambda item: item[0] != "summary")
+    )
+    return f"""<section>
+<h2 id="figures">Figures</h2>
+<p>Numbered as in the paper. Of Figs 14 to 17 the text tells only what they are about; the
+arrangement is this project's.</p>
+{figures}</section>
+"""
+
+
+def _width(report: Report, name: str) -> int:
+    """Return the width of an image on the page [px]: letters have one size in all of them."""
+    pixels = int.from_bytes(Path(report.folder, f"{name}.png").read_bytes()[16:20], "big")
+    return round(pixels / DOTS * 104)
+
+
+def _embedded(report: Report, name: str) -> str:
+    image = Path(report.folder, f"{name}.png").read_bytes()
+    return "data:image/png;base64," + base64.b64encode(image).decode("ascii")
+
+
+def _designs(report: Report) -> str:
+    rows = []
+    for kind, words in (("hinf", "H-infinity"), ("lpv", "LPV, X and Y constant")):
+        f = report.numbers.facts["designs"][kind]
+        norm = f["norm"] if "norm" in f else max(f["norms"])
+        slowest = f.get("largest_real_part")
+        if slowest is None:
+            slowest = max(real for real, _ in f["poles"])
+        rows.append(
+            f"<tr><td>{words}</td><td>{f['gamma']:.4f}</td><td>{norm:.4f}</td>"
+            f"<td>{slowest:.3g}</td><td>{f['sampled_loop_modulus']:.6f}</td></tr>"
+        )
+    return f"""<section>
+<h2 id="designs">The designs</h2>
+<p>Made for this report, verified after the solver, and written beside it:
+<code>hinf.json</code> serves the clipped-optimal law and the inverses, <code>lpv.json</code> the
+LPV law.</p>
+<div class="scroll"><table class="numbers"><thead><tr><th>Design</th><th>gamma</th>
+<th>closed-loop norm, computed anew</th><th>largest real part of its poles [1/s]</th>
+<th>largest pole of the sampled loop</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>
+</section>
+"""
+
+
+def _foot(report: Report) -> str:
+    given = any("Newhall" in m.name for m in report.comparison.motions)
+    command = "bristle controllers" + (" --newhall FILE.AT2" if given else "")
+    return f"""<footer>
+<p>bristle {__version__}; <code>{command}</code>; {len(report.comparison.table)} runs of the
+comparison and those behind Figs 5 and 9 in {report.seconds:.0f} s, designs included. Every number
+stands in the CSV files beside this page.</p>
+<p>F. A. Shirazi, J. Mohammadpour, K. M. Grigoriadis, G. Song: Identification and Control of an MR
+Damper With Stiction Effect and its Application in Structural Vibration Mitigation. IEEE
+Transactions on Control Systems Technology 20(5), 2012.</p>
+</footer>
+"""

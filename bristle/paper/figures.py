@@ -1,0 +1,204 @@
+"""The figures of Shirazi et al. (2012) that this project draws anew, each with one call."""
+
+from __future__ import annotations
+
+import logging
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..draw.style import FORMATS, Page, look
+from ..errors import ScenarioError, not_usable
+from ..progress import Progress
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass
+class Runs:
+    """Runs stock scenarios with overrides on one engine, and counts them."""
+
+    engine: str = "compiled"
+    done: Callable[[int], None] = lambda count: None
+    count: int = 0
+
+    def __call__(self, scenario: str, overrides: Mapping[str, object]) -> pd.DataFrame:
+        """Return the frame of a run, as `bristle.run` does."""
+        from ..simulate.run import run
+
+        log = logging.getLogger("bristle")
+        log.addFilter(_not_of_stroke)
+        try:
+            frame = run(scenario, overrides, engine=self.engine)
+        finally:
+            log.removeFilter(_not_of_stroke)
+        self.count += 1
+        self.done(self.count)
+        return frame
+
+
+def _not_of_stroke(record: logging.LogRecord) -> bool:
+    """Let through what a run warns of, but not of the stroke: that the figures show themselves."""
+    return "leaves the stroke" not in record.getMessage()
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawn figure, and tables with the numbers in it, by what their file names end with."""
+
+    page: Page
+    tables: dict[str, pd.DataFrame] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure that can be asked for: its name, the paper's number, a line on it, its runs."""
+
+    name: str
+    number: str
+    about: str
+    runs: int
+    draw: Callable[[Runs], Drawing]
+
+
+def paper_figures() -> dict[str, PaperFigure]:
+    """Return the figures by name, in the order of the paper."""
+    from . import identification, loops, optimum, stiction
+
+    found = (
+        PaperFigure(
+            "loops-voltage",
+            "Figs 3, 4",
+            "force loops of both laws on a test bench at four voltages",
+            2 * len(loops.VOLTAGES),
+            loops.over_voltages,
+        ),
+        PaperFigure(
+            "loops-frequency",
+            "Figs 3, 4",
+            "force loops of both laws on a test bench at four frequencies",
+            2 * len(loops.FREQUENCIES),
+            loops.over_frequencies,
+        ),
+        PaperFigure(
+            "stiction",
+            "Fig. 5",
+            "peaks in the acceleration of the base where its velocity crosses zero",
+            stiction.RUNS,
+            stiction.draw,
+        ),
+        PaperFigure(
+            "identification",
+            "Figs 6-8",
+            "laws with and without the exponential, fitted to the identification experiment",
+            identification.RUNS,
+            identification.draw,
+        ),
+        PaperFigure(
+            "passive-optimum",
+            "Fig. 9",
+            "peak acceleration of the second floor over constant voltage, four intensities",
+            optimum.RUNS,
+            optimum.draw,
+        ),
+    )
+    return {figure.name: figure for figure in found}
+
+
+def find_figure(name: str) -> PaperFigure:
+    """Return the figure of a name.
+
+    Raises
+    ------
+    ScenarioError
+        If there is none; the text names the nearest.
+    """
+    known = paper_figures()
+    if name in known:
+        return known[name]
+    near = get_close_matches(name, known, 1)
+    hint = f' Did you mean "{near[0]}"?' if near else ""
+    raise ScenarioError(f'no figure is named "{name}". There are: {", ".join(known)}, all.{hint}')
+
+
+def make(
+    name: str,
+    folder: Path,
+    *,
+    engine: str = "compiled",
+    format: str = "png",
+    progress: bool = False,
+) -> list[Path]:
+    """Run what a figure needs, draw it, and write it with its numbers into a folder.
+
+    Parameters
+    ----------
+    name : str
+        A name of `paper_figures()`.
+    folder : path
+        Made where it is missing; files of the same names are replaced.
+    engine : str
+        "compiled" or "fmu", as for `bristle.run`.
+    format : str
+        "png" (300 dpi), "svg" or "pdf".
+    progress : bool
+        Show a progress bar, on a terminal only.
+
+    Returns
+    -------
+    list of Path
+        The image first, then the CSV files of what is drawn.
+
+    Raises
+    ------
+    ScenarioError
+        There is no such figure.
+    RunError
+        A run failed; or, with exit code 2, a file cannot be written.
+    """
+    figure = find_figure(name)
+    prepare(folder, format)
+    with Progress(figure.name, figure.runs, progress) as bar, look():
+        drawing = figure.draw(Runs(engine, bar.show))
+        image = folder / f"{name}.{format}"
+        drawing.page.save(image)
+    written = [image]
+    for ending, table in drawing.tables.items():
+        path = folder / f"{name}{ending}.csv"
+        _write(table, path, name, f"{figure.number} of Shirazi et al. (2012) drawn anew", engine)
+        written.append(path)
+    return written
+
+
+def prepare(folder: Path, format: str) -> None:
+    """Refuse a folder or format that cannot be written before anything is run."""
+    if format not in FORMATS:
+        raise not_usable(f'format "{format}" is not known; there are {", ".join(FORMATS)}.')
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except FileExistsError:
+        raise not_usable(f"{folder}: is a file; figures go into a folder.") from None
+    except OSError as error:
+        raise not_usable(
+            f"{folder}: figures cannot be written there: {error.strerror or error}."
+        ) from error
+
+
+def _write(table: pd.DataFrame, path: Path, name: str, what: str, engine: str) -> None:
+    """Write a table as CSV; `# ` lines in front say how it was made."""
+    from .. import __version__
+
+    head = (
+        f"# {what}; bristle {__version__}, engine {engine}, command: bristle figures {name}\n"
+        "# Damper parameters are reconstructed, not those of the paper's tables.\n"
+    )
+    try:
+        path.write_text(head + table.to_csv(index=False, float_format="%.9g"), encoding="utf-8")
+    except OSError as error:
+        raise not_usable(f"{path}: cannot be written: {error.strerror or error}.") from error

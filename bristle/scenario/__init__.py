@@ -1,0 +1,1 @@
+"""Scenarios as data: files read, and checked before a step."""

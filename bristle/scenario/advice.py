@@ -1,0 +1,317 @@
+"""What is allowed but seldom meant: order, coupling steps beyond stability, saturated dampers.
+
+Components are known by their ports, not by their names, so that a structure or a damper of
+somebody else's making gets the same advice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import sqrt
+
+from ..errors import BristleError, PhysicsError
+from ..findings import Findings
+from .connections import Wire
+from .library import Library
+from .parts import Part, Run
+
+_DAMPER_PORTS = frozenset(("displacement", "velocity", "voltage", "force"))
+_STRUCTURE_PORTS = frozenset(("ground_acceleration", "damper_force"))
+_FORCES = ("damper_force", "extra_force")
+_RELATIVE = 1e-3
+"""How far [1] moving_mass may lie from the mass that it stands for."""
+
+
+class Network:
+    """The components and connections of a scenario, for questions about who feeds whom."""
+
+    def __init__(self, parts: Mapping[str, Part], wires: Sequence[Wire]) -> None:
+        self.parts = parts
+        self.order = list(parts)
+        self.wires = [wire for wire in wires if wire.target in parts and wire.source in parts]
+        self.feeding = {(wire.target, wire.input): wire for wire in self.wires}
+
+    def with_ports(self, ports: frozenset[str]) -> list[Part]:
+        return [part for part in self.parts.values() if ports <= part.variables.keys()]
+
+    def source(self, part: Part, name: str) -> tuple[Part, str] | None:
+        """Return the component and output that feed an input."""
+        wire = self.feeding.get((part.name, name))
+        return (self.parts[wire.source], wire.output) if wire else None
+
+    def driven_by(self, damper: Part) -> Part | None:
+        """Return the structure that takes the damper's force and gives it its velocity."""
+        motion = self.source(damper, "velocity")
+        for wire in self.wires:
+            if (wire.source, wire.output) == (damper.name, "force") and wire.input in _FORCES:
+                structure = self.parts[wire.target]
+                if motion and motion[0] is structure:
+                    return structure
+        return None
+
+    def measured_by(self, controller: Part) -> Part | None:
+        """Return the structure whose floor acceleration a controller gets, through sensors too."""
+        part: Part | None = controller
+        for _ in self.order:
+            found = self.source(part, "floor_acceleration") if part else None
+            part = found[0] if found else None
+            if part and part.variables.keys() >= _STRUCTURE_PORTS:
+                return part
+        return None
+
+
+def advise(
+    run: Run, parts: Mapping[str, Part], wires: Sequence[Wire], library: Library, findings: Findings
+) -> None:
+    """Add warnings, notes, and the errors of ports that must be used together."""
+    network = Network(parts, wires)
+    _instances(network, findings)
+    _order(run, network, findings)
+    _loops(network, findings)
+    _designs(network, library, findings)
+    for damper in network.with_ports(_DAMPER_PORTS):
+        _holding(damper, network, findings)
+        _voltage(damper, network, findings)
+    for structure in network.with_ports(_STRUCTURE_PORTS):
+        _coupling(run, structure, network, library, findings)
+
+
+def _instances(network: Network, findings: Findings) -> None:
+    """An FMU that lives once per process cannot be two components."""
+    first: dict[object, str] = {}
+    for part in network.parts.values():
+        once = part.description and part.description.capabilities.get(
+            "canBeInstantiatedOnlyOncePerProcess"
+        )
+        if part.file and once in ("true", "1"):
+            if part.file in first:
+                findings.error(
+                    part.path,
+                    f"[components.{part.name}]: {part.file.name} can live once in a process and is "
+                    f"already [components.{first[part.file]}].",
+                )
+            first.setdefault(part.file, part.name)
+
+
+def _order(run: Run, network: Network, findings: Findings) -> None:
+    """With Gauss-Seidel the ground motion must have moved on before the structure steps."""
+    if run.algorithm != "gauss-seidel":
+        return
+    for structure in network.with_ports(_STRUCTURE_PORTS):
+        ground = network.source(structure, "ground_acceleration")
+        if ground and network.order.index(ground[0].name) > network.order.index(structure.name):
+            findings.warning(
+                ground[0].path,
+                f"[components.{ground[0].name}] stands after [components.{structure.name}], which "
+                "then sees the ground acceleration one step late; put it before, components step "
+                "in the order of the file.",
+            )
+
+
+def _loops(network: Network, findings: Findings) -> None:
+    """Note cycles of outputs that follow their inputs at once: the master does not iterate."""
+    follows: dict[tuple[str, str], list[tuple[str, str]]] = {}
+    for part in network.parts.values():
+        for output in part.variables.values():
+            if output.causality == "output":
+                wires = [
+                    network.feeding[part.name, name]
+                    for name in output.dependencies or ()
+                    if (part.name, name) in network.feeding
+                ]
+                follows[part.name, output.name] = [(wire.source, wire.output) for wire in wires]
+    cycle = _cycle(follows)
+    if cycle:
+        words = " <- ".join(f"{part}.{port}" for part, port in [*cycle, cycle[0]])
+        findings.note(
+            network.parts[cycle[0][0]].path,
+            f"algebraic loop {words}: each follows the next without delay. Nothing iterates; the "
+            "loop is closed with values one step old.",
+        )
+
+
+def _designs(network: Network, library: Library, findings: Findings) -> None:
+    """A designed controller belongs to one building: that whose floor it measures."""
+    for part in network.parts.values():
+        structure = network.measured_by(part)
+        if structure is None or structure.fmu != "Structure":
+            continue
+        try:
+            if part.file:
+                library.check_carried(part.file, structure.building)
+            else:
+                library.check_controller(part.fmu, part.controller, structure.building)
+        except PhysicsError:
+            continue  # the building is no building: its own check has said so
+        except BristleError as error:
+            path = (*part.path, "controller") if part.controller else part.path
+            findings.error(path, f"[components.{part.name}]: {error}")
+
+
+def _cycle(follows: Mapping[tuple[str, str], list[tuple[str, str]]]) -> list[tuple[str, str]]:
+    """Return one cycle of a graph, or nothing."""
+    done: set[tuple[str, str]] = set()
+    for start in follows:
+        trail: list[tuple[str, str]] = []
+        waiting = [(start, 0)]
+        while waiting:
+            node, depth = waiting.pop()
+            del trail[depth:]
+            if node in trail:
+                return trail[trail.index(node) :]
+            if node in done and depth:
+                continue
+            trail.append(node)
+            done.add(node)
+            waiting += [(following, depth + 1) for following in follows.get(node, ())]
+    return []
+
+
+def _holding(damper: Part, network: Network, findings: Findings) -> None:
+    """holding_force and moving_mass work together or not at all."""
+    if not {"holding_force", "moving_mass"} <= damper.variables.keys():
+        return
+    wire = network.feeding.get((damper.name, "holding_force"))
+    fed = wire is not None or "holding_force" in damper.places
+    mass = damper.real("moving_mass") or 0.0
+    where = f"[components.{damper.name}]"
+    if fed and mass == 0.0:
+        findings.error(
+            wire.path if wire else damper.places["holding_force"],
+            f'{where}: holding_force is fed while moving_mass is 0; set "moving_mass" to the mass '
+            "that the damper holds, in kg, or leave holding_force open.",
+        )
+    elif not fed and mass != 0.0:
+        findings.error(
+            damper.places.get("moving_mass", damper.path),
+            f"{where}: moving_mass = {mass:g} kg without holding_force; connect "
+            f'"{damper.name}.holding_force" to the structure\'s holding_force, or leave '
+            "moving_mass at 0.",
+        )
+
+
+def voltage_range(damper: Part, network: Network) -> tuple[float, float] | None:
+    """Return the lowest and highest voltage [V] that a damper is asked for, None if unknown."""
+    if "voltage" in damper.parameters:
+        level = damper.real("voltage")
+        return None if level is None else (level, level)
+    source = network.source(damper, "voltage")
+    if source is None or (source[0].value("kind") or "constant") != "constant":
+        return None
+    level = source[0].real("level")
+    return None if level is None else (level, level)
+
+
+def _voltage(damper: Part, network: Network, findings: Findings) -> None:
+    asked, most = voltage_range(damper, network), damper.real("v_max")
+    if asked is None or most is None or 0.0 <= asked[0] <= asked[1] <= most:
+        return
+    source = network.source(damper, "voltage")
+    path = damper.places.get("voltage", damper.path)
+    if source:
+        path = source[0].places.get("level", source[0].path)
+    findings.warning(
+        path,
+        f"{damper.name}.voltage = {asked[0]:g} V lies outside 0 to {most:g} V (v_max): the damper "
+        f"saturates and feels {min(max(asked[0], 0.0), most):g} V.",
+    )
+
+
+def slopes(damper: Part, voltage: float) -> tuple[float, float]:
+    """Return the slopes of a damper's force as v -> 0: over velocity [N.s/m], over travel [N/m].
+
+    LuGre: sigma_1 + sigma_2 + sigma_b V and sigma_a + sigma_0 V, the bristles; Bingham: c_0 + c_v V
+    and 0, its jump aside. (0, 0) for a law that is neither.
+    """
+    return (
+        _linear(damper, ("sigma_1", "sigma_2"), "sigma_b", voltage)
+        or _linear(damper, ("c_0",), "c_v", voltage),
+        _linear(damper, ("sigma_a",), "sigma_0", voltage),
+    )
+
+
+def _linear(damper: Part, constants: tuple[str, ...], per_volt: str, voltage: float) -> float:
+    """Return the sum of some parameters, one of them per volt; 0 where the law lacks them."""
+    values = [damper.real(name) for name in (*constants, per_volt)]
+    numbers = [value for value in values if value is not None]
+    return sum(numbers[:-1]) + numbers[-1] * voltage if len(numbers) == len(values) else 0.0
+
+
+def longest_step(algorithm: str, mass: float, c: float, k: float) -> float:
+    """Return the step [s] from which the coupling of a mass with a damper is unstable.
+
+    For m v' = -f, f = k z + c v, z' = v, with f held over a step. Jacobi, where f uses the velocity
+    of one step before, has the characteristic equation (s - 1)^2 s + q s + g (s - 1) = 0,
+    Gauss-Seidel (s - 1)(s - 1 + g) + q s = 0, with g = c h/m and q = k h^2/m. Jury's criterion
+    (Jury 1964, Theory and Application of the z-Transform Method) gives q < g (1 - g) and
+    2 g + q < 4. The exact step of the structure leaves its own stiffness out of this.
+
+    Parameters
+    ----------
+    algorithm : str
+        "jacobi" or "gauss-seidel".
+    mass, c, k : float
+        kg; N.s/m, above 0; N/m.
+    """
+    if algorithm == "jacobi":
+        return mass * c / (c * c + k * mass)
+    return 4.0 * mass / (c + sqrt(c * c + 4.0 * k * mass))
+
+
+def _coupling(
+    run: Run, structure: Part, network: Network, library: Library, findings: Findings
+) -> None:
+    """Warn where a damper's mass terms or the step make the explicit coupling unstable."""
+    dampers = [
+        damper
+        for damper in network.with_ports(_DAMPER_PORTS)
+        if network.driven_by(damper) is structure
+    ]
+    if not dampers or structure.fmu != "Structure":
+        return  # the mass behind the ports of another structure is not known
+    try:
+        mass = library.driven_mass(structure.building) + (structure.real("attached_mass") or 0.0)
+    except BristleError:
+        return  # the component's own check has said what is wrong with the building
+    c, k = 0.0, 0.0
+    for damper in dampers:
+        _mass_terms(damper, mass, findings)
+        most = damper.real("v_max") or 0.0
+        asked = voltage_range(damper, network)
+        each = slopes(damper, min(max(asked[1], 0.0), most) if asked else most)
+        c, k = c + each[0], k + each[1]
+    if run.step is None or c <= 0.0:
+        return
+    limit = longest_step(run.algorithm, mass, c, k)
+    if run.step >= limit:
+        findings.warning(
+            ("run", "step"),
+            f"[run] step = {1e3 * run.step:g} ms lies above about {1e3 * limit:.3g} ms, where the "
+            f"{run.algorithm} coupling of {', '.join(damper.name for damper in dampers)} with "
+            f"{structure.name} becomes unstable ({mass:.4g} kg, {c:.4g} N.s/m, {k:.4g} N/m); a "
+            f"shorter step{' or gauss-seidel' if run.algorithm == 'jacobi' else ''} is right.",
+        )
+
+
+def _mass_terms(damper: Part, mass: float, findings: Findings) -> None:
+    """Compare the masses that a damper was given with the mass it moves."""
+    held = damper.real("moving_mass") or 0.0
+    if held and abs(held - mass) > _RELATIVE * mass:
+        findings.warning(
+            damper.places.get("moving_mass", damper.path),
+            f"{damper.name}.moving_mass = {held:.6g} kg; the mass that it moves is {mass:.6g} kg "
+            "(attached_mass included).",
+        )
+    if damper.value("fluid_inertia.on") is not True:
+        return
+    for name, variable in damper.variables.items():
+        value = damper.real(name)
+        if not name.startswith("fluid_inertia.") or variable.unit != "kg" or value is None:
+            continue
+        if value >= 0.5 * mass:
+            findings.warning(
+                damper.places.get(name, damper.path),
+                f"{damper.name}.{name} = {value:.4g} kg is half or more of the moving mass of "
+                f"{mass:.4g} kg: from velocity differences the run diverges near the whole of it; "
+                "put it into attached_mass of the structure.",
+            )

@@ -1,0 +1,100 @@
+"""What a check asks of the rest of bristle: components, records, buildings."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..control.controller import KINDS, Controller, parse_controller
+from ..errors import DesignError
+from ..fmu.description import Description
+
+
+@dataclass(frozen=True)
+class Library:
+    """Where a check looks things up; tests put their own in its place.
+
+    Attributes
+    ----------
+    names
+        () -> names of the built-in components.
+    describe
+        (name, building file or None, controller file or None, files of effects if any) ->
+        Description of a built-in component; raises BristleError where a file is wrong.
+    describe_file
+        (path) -> Description of an FMU file; raises FmuError.
+    read_record
+        (record, folder) -> the ground motion; raises RecordError.
+    check_controller
+        (name, controller file or None, building file or None); raises BristleError where the
+        component carries a design for another building.
+    check_carried
+        (FMU file, building file or None); likewise for the design that a built FMU carries.
+    driven_mass
+        (building file or None) -> mass [kg] that a damper's force acts on; raises PhysicsError.
+    """
+
+    names: Callable[[], Sequence[str]]
+    describe: Callable[..., Description]
+    describe_file: Callable[[Path], Description]
+    read_record: Callable[[str, Path], object]
+    driven_mass: Callable[[Path | None], float]
+    check_controller: Callable[[str, Path | None, Path | None], None]
+    check_carried: Callable[[Path, Path | None], None]
+
+
+def installed() -> Library:
+    """Return the library of what is installed."""
+    from ..data import read_ground_motion
+    from ..fmu import catalogue
+    from ..fmu.description import read_description
+
+    return Library(
+        names=catalogue.component_names,
+        describe=catalogue.describe,
+        describe_file=read_description,
+        read_record=read_ground_motion,
+        driven_mass=driven_mass,
+        check_controller=catalogue.check_controller,
+        check_carried=check_carried,
+    )
+
+
+def driven_mass(building: Path | None) -> float:
+    """Return the mass [kg] that a damper's force acts on: the base, or floor 1 of a fixed base."""
+    from ..physics.building import paper_building, read_building
+
+    return (read_building(building) if building else paper_building()).M[0][0]
+
+
+def check_carried(file: Path, building: Path | None) -> None:
+    """Refuse a building that the controller in an FMU is not designed for.
+
+    An FMU without a design suits any building.
+
+    Raises
+    ------
+    DesignError, PhysicsError
+        Naming both; if the building is wrong.
+    """
+    from ..physics.building import paper_building, read_building
+
+    controller = _controller_in(file)
+    if controller is not None:
+        on = read_building(building) if building else paper_building()
+        controller.check_building(on, f"the design that {file.name} carries")
+
+
+def _controller_in(file: Path) -> Controller | None:
+    """Return the controller that an FMU carries; None where it carries none that can be read."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            for kind in KINDS:
+                name = f"resources/{kind}.json"
+                if name in archive.namelist():
+                    return parse_controller(archive.read(name).decode(), f"{file}: {name}")
+    except (OSError, zipfile.BadZipFile, UnicodeDecodeError, DesignError):
+        return None  # the FMU's own check says what is wrong with it
+    return None

@@ -1,0 +1,162 @@
+"""Checks of a component's parameters: names, types, bounds, and the files that they name."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import PhysicsError, RecordError
+from ..findings import Findings, number, unknown, written
+from ..fmu.description import Value, Variable
+from ..physics.record import read_two_column
+from ..physics.signals import read_steps
+from .document import FILE_PARAMETERS
+from .library import Library
+from .parts import Part, existing_file
+
+_INTEGER_RANGE = (-(2**31), 2**31 - 1)
+_CHOICES = re.compile(r"\bone of:? ((?:[\w-]+, )*[\w-]+)")
+
+
+def check_parameter(
+    part: Part, name: str, value: object, folder: Path, library: Library, findings: Findings
+) -> None:
+    where, place = f"{part.name}.{name}", part.places[name]
+    variable = part.variables.get(name)
+    if variable is None:
+        settable = [v.name for v in part.variables.values() if v.causality == "parameter"]
+        more = f"bristle list ports {part.fmu}"
+        findings.error(
+            place, f"[components.{part.name}]: {unknown('parameter', name, settable, more)}"
+        )
+        return
+    if variable.causality not in ("parameter", "input"):
+        kind = {"output": "an output", "local": "internal"}.get(
+            variable.causality, f"a {variable.causality}"
+        )
+        findings.error(place, f"{where} is {kind}; only parameters and inputs can be set.")
+        return
+    checked = typed(variable, value)
+    if isinstance(checked, Wrong):
+        findings.error(place, f"{where} {checked.words}")
+        return
+    part.parameters[name] = checked
+    if variable.kind == "String" and name in FILE_PARAMETERS:
+        _check_file(part, name, str(checked), folder, library, findings)
+
+
+@dataclass(frozen=True)
+class Wrong:
+    """Why a value does not fit a variable, in words that follow the variable's name."""
+
+    words: str
+
+
+def typed(variable: Variable, value: object) -> Value | Wrong:
+    """Return a value in the type of a variable, within its bounds, or what is wrong with it."""
+    unit = f" {variable.unit}" if variable.unit and variable.unit != "1" else ""
+    if variable.kind == "Boolean":
+        if isinstance(value, bool):
+            return value
+        return Wrong(f"is {written(value)}; true or false is right.")
+    if variable.kind == "String":
+        return _text(variable, value)
+    if variable.kind in ("Integer", "Enumeration"):
+        if isinstance(value, bool) or not isinstance(value, int):
+            return Wrong(f"is {written(value)}; a whole number is right.")
+        least, most = _INTEGER_RANGE
+        if not least <= value <= most:
+            return Wrong(f"is {written(value)}; FMI holds whole numbers from {least} to {most}.")
+        real = float(value)
+    else:
+        found = number(value)
+        if isinstance(found, str):
+            return Wrong(f"{found}; a number{f' in{unit}' if unit else ''} is right.")
+        real = found
+        value = found
+    low, high = variable.minimum, variable.maximum
+    if low is not None and real < low:
+        return Wrong(f"= {real:g}{unit} lies below {low:g}{unit}; {_range(low, high, unit)}.")
+    if high is not None and real > high:
+        return Wrong(f"= {real:g}{unit} lies above {high:g}{unit}; {_range(low, high, unit)}.")
+    return value
+
+
+def _range(low: float | None, high: float | None, unit: str) -> str:
+    if high is None:
+        return f"{low:g}{unit} or more is right"
+    if low is None:
+        return f"{high:g}{unit} or less is right"
+    return f"{low:g} to {high:g}{unit} is right"
+
+
+def choices(variable: Variable) -> tuple[str, ...]:
+    """Return the texts that a String variable takes, where its description lists them.
+
+    FMI 2.0 has no bounds for texts; bristle's components write "one of a, b, c".
+    """
+    match = _CHOICES.search(variable.description)
+    return tuple(match[1].split(", ")) if match else ()
+
+
+def _text(variable: Variable, value: object) -> Value | Wrong:
+    if not isinstance(value, str):
+        return Wrong(f"is {written(value)}; a text in quotes is right.")
+    if "\0" in value:
+        return Wrong("holds a null character, which no FMU can take.")
+    allowed = choices(variable)
+    if allowed and value not in allowed:
+        return Wrong(f'= "{value}": {unknown(variable.name, value, allowed)}')
+    return value
+
+
+def _check_file(
+    part: Part, name: str, value: str, folder: Path, library: Library, findings: Findings
+) -> None:
+    """Check a file that a parameter names: a ground motion is read as the run will read it."""
+    if part.fmu != "GroundMotion" or name != "record":
+        return
+    try:
+        library.read_record(value, folder)
+    except RecordError as error:
+        findings.error(part.places[name], f"{part.name}.{name}: {error}")
+
+
+def check_together(part: Part, folder: Path, findings: Findings) -> None:
+    """Check parameters that need one another: switches of effects, kinds of signals."""
+    for name in part.parameters:
+        switch = f"{name.rpartition('.')[0]}.on"
+        if name != switch and switch in part.variables and part.value(switch) is not True:
+            findings.warning(
+                part.places[name],
+                f"{part.name}.{name} does nothing while {part.name}.{switch} is false.",
+            )
+    kind = part.value("kind")
+    if part.file is None and isinstance(kind, str):
+        if kind == "csv" and "file" in part.variables:
+            _check_csv(part, folder, findings)
+        if kind == "steps" and "steps" in part.variables:
+            _check_steps(part, findings)
+
+
+def _check_csv(part: Part, folder: Path, findings: Findings) -> None:
+    path = part.places.get("file") or part.places.get("kind", part.path)
+    value, where = part.value("file"), f"{part.name}.file"
+    if not value:
+        findings.error(path, f'{where} is missing: kind = "csv" reads a file.')
+        return
+    file = existing_file(str(value), folder, path, where, findings)
+    if file:
+        try:
+            read_two_column(file, header=None)
+        except PhysicsError as error:
+            findings.error(path, f"{where}: {error}")
+
+
+def _check_steps(part: Part, findings: Findings) -> None:
+    try:
+        read_steps(str(part.value("steps") or ""))
+    except PhysicsError as error:
+        path = part.places.get("steps") or part.places.get("kind", part.path)
+        findings.error(path, f"{part.name}.{error}")

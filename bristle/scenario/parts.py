@@ -1,0 +1,73 @@
+"""What a check knows of a scenario while it reads it: the run, the components."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..findings import Findings, nearest
+from ..fmu.description import Description, Value, Variable
+from ..lines import KeyPath
+
+ALGORITHMS = ("gauss-seidel", "jacobi")
+
+
+@dataclass
+class Run:
+    """The run as far as it could be read; None where it could not."""
+
+    stop: float | None = None
+    step: float | None = None
+    algorithm: str = ALGORITHMS[0]
+
+
+@dataclass
+class Part:
+    """A component as far as it could be read; `places` gives the path of each parameter."""
+
+    name: str
+    path: KeyPath
+    fmu: str = ""
+    file: Path | None = None
+    building: Path | None = None
+    effects: tuple[Path, ...] = ()
+    controller: Path | None = None
+    step: float | None = None
+    description: Description | None = None
+    parameters: dict[str, Value] = field(default_factory=dict)
+    places: dict[str, KeyPath] = field(default_factory=dict)
+
+    @property
+    def variables(self) -> dict[str, Variable]:
+        return self.description.variables if self.description else {}
+
+    def value(self, name: str) -> Value | None:
+        """Return a parameter's value as set, else its start value, else None."""
+        variable = self.variables.get(name)
+        return self.parameters.get(name, variable.start if variable else None)
+
+    def real(self, name: str) -> float | None:
+        """Return a parameter's value if it is a number."""
+        value = self.value(name)
+        return float(value) if isinstance(value, int | float) else None
+
+
+def existing_file(
+    value: str, folder: Path, path: KeyPath, where: str, findings: Findings
+) -> Path | None:
+    """Return the absolute path of a file that is there, relative names taken from `folder`."""
+    if "\0" in value:
+        findings.error(path, f"{where}: no file can have a null character in its name.")
+        return None
+    file = (folder / value).absolute()
+    try:
+        if file.is_file():
+            return file
+        # Names are alike by their endings alone, so these are left out.
+        beside = {entry.stem: entry.name for entry in file.parent.glob(f"*{file.suffix}")}
+    except OSError:
+        beside = {}
+    close = nearest(file.stem, beside)
+    hint = f' Did you mean "{Path(value).parent / beside[close[0]]}"?' if close else ""
+    findings.error(path, f'{where}: there is no file "{value}" (looked for {file}).{hint}')
+    return None

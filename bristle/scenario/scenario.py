@@ -1,0 +1,258 @@
+"""A scenario: a run as data, read from TOML and checked before the first step.
+
+Every mistake of a file is found at once, with its line and what would be right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from .. import resources
+from ..errors import ScenarioError
+from ..findings import Finding, Findings, nearest
+from ..fmu.description import Description, Value
+from .advice import advise
+from .checks import check_components, check_run, check_steps, check_top
+from .connections import check_connections
+from .document import (
+    FILE_PARAMETERS,
+    apply_overrides,
+    exists,
+    parse_override,
+    parse_overrides,
+    read_document,
+)
+from .library import Library, installed
+
+__all__ = [
+    "Component",
+    "Connection",
+    "Finding",
+    "Scenario",
+    "check_scenario",
+    "fmu_parameters",
+    "load_scenario",
+    "parse_override",
+    "parse_overrides",
+    "resolve_scenario",
+    "stock_scenarios",
+]
+
+
+@dataclass(frozen=True)
+class Component:
+    """One FMU of a scenario.
+
+    `path` is the file of a foreign FMU, None for a built-in; `building` the data file that a
+    Structure is made from, None for the default; `controller` the controller file of a designed
+    controller, None for the one that it carries; `effects` the files of a user's own effects that a
+    built-in one carries besides the library's; `parameters` the values that the scenario sets,
+    inputs that are held constant included; `step` its own step [s], None for the run's.
+    """
+
+    name: str
+    fmu: str
+    path: Path | None
+    building: Path | None
+    parameters: dict[str, Value]
+    step: float | None
+    description: Description
+    effects: tuple[Path, ...] = ()
+    controller: Path | None = None
+
+
+@dataclass(frozen=True)
+class Connection:
+    """Component and port that take a value, component and port that give it."""
+
+    target: str
+    input: str
+    source: str
+    output: str
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A checked scenario; `stop` [s] is a whole number of steps of `step` [s].
+
+    `algorithm` is "gauss-seidel" (components step in their order) or "jacobi".
+    """
+
+    file: Path
+    title: str
+    stop: float
+    step: float
+    algorithm: str
+    components: tuple[Component, ...]
+    connections: tuple[Connection, ...]
+
+    @property
+    def steps(self) -> int:
+        """Number of communication steps."""
+        return round(self.stop / self.step)
+
+    def component(self, name: str) -> Component:
+        """Return the component of a name."""
+        return next(component for component in self.components if component.name == name)
+
+
+def load_scenario(
+    file: str | Path,
+    overrides: Mapping[str, object] | None = None,
+    *,
+    library: Library | None = None,
+) -> Scenario:
+    """Return a scenario that has been checked.
+
+    Parameters
+    ----------
+    file : path
+        The TOML file, or the name of a stock scenario.
+    overrides : mapping, optional
+        Dotted names with values that take the place of the file's, e.g.
+        `{"damper.f_c": 2.0, "run.step": 1e-3, "damper.fmu": "BinghamDamper"}`.
+    library : Library, optional
+        Where components, records and buildings are looked up; what is installed by default.
+
+    Raises
+    ------
+    ScenarioError
+        If anything is wrong: the text lists every mistake with its line.
+    """
+    path = resolve_scenario(file)
+    scenario, findings = _read(path, overrides or {}, library)
+    errors = [finding for finding in findings if finding.level == "error"]
+    if errors or scenario is None:
+        lines = [worded(file, finding) for finding in errors]
+        if len(lines) == 1:
+            raise ScenarioError(lines[0])
+        raise ScenarioError("\n  ".join([f"{file}: {len(lines)} mistakes", *lines]))
+    return scenario
+
+
+def check_scenario(
+    file: str | Path,
+    overrides: Mapping[str, object] | None = None,
+    *,
+    library: Library | None = None,
+) -> list[Finding]:
+    """Return everything that a check finds in a scenario, by line; nothing is run or written.
+
+    Parameters are those of `load_scenario`. A file that cannot be read is a finding as well.
+    """
+    try:
+        path = resolve_scenario(file)
+    except ScenarioError as error:
+        return [Finding(0, "error", str(error))]
+    return _read(path, overrides or {}, library)[1]
+
+
+def worded(file: str | Path, finding: Finding) -> str:
+    """Return a finding as one line that begins with its place, `FILE:LINE: text`."""
+    place = f"{file}:{finding.line}" if finding.line else str(file)
+    return f"{place}: {finding.text}"
+
+
+def _read(
+    path: Path, overrides: Mapping[str, object], library: Library | None
+) -> tuple[Scenario | None, list[Finding]]:
+    document = read_document(path)
+    if isinstance(document, Finding):
+        return None, [document]
+    library = library or installed()
+    findings = Findings(document.place)
+    apply_overrides(document, overrides, findings)
+    title = check_top(document, findings)
+    run = check_run(document, findings)
+    parts = check_components(document, library, findings)
+    check_steps(run, parts.values(), findings)
+    wires = check_connections(document, parts, findings)
+    advise(run, parts, wires, library, findings)
+    found = findings.in_order()
+    if any(finding.level == "error" for finding in found):
+        return None, found
+    # Without an error every part has been read in full.
+    assert run.stop is not None
+    assert run.step is not None
+    components = tuple(
+        Component(
+            part.name,
+            part.fmu,
+            part.file,
+            part.building,
+            part.parameters,
+            part.step,
+            description,
+            part.effects,
+            part.controller,
+        )
+        for part in parts.values()
+        if (description := part.description) is not None
+    )
+    connections = tuple(Connection(w.target, w.input, w.source, w.output) for w in wires)
+    scenario = Scenario(path, title, run.stop, run.step, run.algorithm, components, connections)
+    return scenario, found
+
+
+def fmu_parameters(component: Component, folder: Path) -> dict[str, Value]:
+    """Return the values that a component's FMU is given: files as absolute paths.
+
+    Parameters
+    ----------
+    component : Component
+    folder : Path
+        The scenario's folder, `scenario.file.parent`: relative paths start there.
+
+    Raises
+    ------
+    RecordError
+        If a ground motion cannot be read. Other formats than a two-column CSV are rewritten as one
+        in the user's cache.
+    """
+    values = dict(component.parameters)
+    for name in FILE_PARAMETERS:
+        value = values.get(name)
+        if not isinstance(value, str) or not value:
+            continue
+        if component.path is None and component.fmu == "GroundMotion" and name == "record":
+            from ..data import ground_motion_file
+
+            values[name] = ground_motion_file(value, folder)
+        elif exists(folder / value):
+            values[name] = str((folder / value).absolute())
+    return values
+
+
+def stock_scenarios() -> list[Path]:
+    """Return the files of the stock scenarios, by name."""
+    return sorted(resources.scenarios_folder().glob("*.toml"))
+
+
+def resolve_scenario(name: str | Path) -> Path:
+    """Return the absolute path of a scenario file, or of the stock scenario of that name.
+
+    Raises
+    ------
+    ScenarioError
+        If neither is there; the text names the nearest.
+    """
+    file = Path(name)
+    if not str(name):
+        raise ScenarioError("the name of the scenario file is empty.")
+    if exists(file):
+        return file.absolute()
+    stock = stock_scenarios()
+    if len(file.parts) == 1:
+        for found in stock:
+            if found.name in (file.name, f"{file.name}.toml"):
+                return found.absolute()
+    beside = [str(entry) for entry in file.parent.glob("*.toml")] if exists(file.parent) else []
+    names = [found.stem for found in stock]
+    # Whole paths are alike by their folders alone, so files are compared by their own names.
+    by_stem = {Path(entry).stem: entry for entry in beside} | {stem: stem for stem in names}
+    close = nearest(file.stem, by_stem)
+    hint = f' Did you mean "{by_stem[close[0]]}"?' if close else ""
+    listed = f" Stock scenarios: {', '.join(names)}." if names else ""
+    raise ScenarioError(f'there is no scenario file "{name}".{hint}{listed}')

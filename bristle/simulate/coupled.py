@@ -1,0 +1,120 @@
+"""Runs a scenario of built-in components as one coupled system; named columns come out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from math import ceil, isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RunError
+from ..jit import compiled
+from ..physics import damper, structure
+from ..scenario.scenario import Scenario
+from . import march
+from .clocks import are_whole
+from .system import System
+
+LONGEST_SUBSTEP = 2e-4
+"""Longest substep [s]; half-sine peaks are then within 0.001 % of a tight integration."""
+
+Array = NDArray[Any]
+
+_serve = march.serve
+_has_clocks = False
+
+
+class StoppedError(RunError):
+    """A march that had to stop; `columns` holds the rows before."""
+
+    def __init__(self, text: str, columns: dict[str, Array]) -> None:
+        super().__init__(text)
+        self.columns = columns
+
+
+def simulate(scenario: Scenario) -> dict[str, Array]:
+    """Return the columns of a run, time [s] first, then every output as `component.port`.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of built-in components only.
+
+    Returns
+    -------
+    dict
+        Name to (steps + 1,) array in SI units; Integer outputs as int32.
+
+    Raises
+    ------
+    ScenarioError
+        Naming a component that cannot be compiled.
+    StoppedError
+        If a value stops being finite, or motion and forces do not agree; the text names the
+        component and the time, `columns` holds the rows before.
+    """
+    system = System(scenario)
+    rows, substeps = scenario.steps, _substeps(scenario.step, system.periods())
+    h = scenario.step / substeps
+    table = np.zeros((rows + 1, len(system.outputs)))
+    slots = np.array(list(system.outputs.values()), dtype=np.int64)
+    filled, unsettled, _ = compiled_march(bool(system.names["sampled"]))(
+        rows, substeps, h, *system.arrays(h), *system.sampled(h),
+        system.start_values(), slots, table,
+    )  # fmt: skip
+    what = ""
+    if unsettled >= 0:
+        name = system.names["damper"][unsettled]
+        what = f"{name} before t = {filled * scenario.step:.9g} s: force and motion do not agree"
+    elif not np.isfinite(table[filled - 1]).all():
+        filled -= 1
+        wrong = [n for n, v in zip(system.outputs, table[filled], strict=True) if not isfinite(v)]
+        component = wrong[0].partition(".")[0]
+        others = f" (as are {', '.join(wrong[1:4])})" if wrong[1:] else ""
+        when = f"at t = {filled * scenario.step:.9g} s"
+        what = f"{component} {when}: {wrong[0]} is not finite{others}"
+    columns = _columns(system, table[:filled], scenario.step)
+    if what:
+        raise StoppedError(
+            f"{what}.\n  A shorter step or parameters within their bounds would be right.", columns
+        )
+    return columns
+
+
+def _columns(system: System, table: Array, step: float) -> dict[str, Array]:
+    columns: dict[str, Array] = {"time": np.arange(len(table)) * step}
+    for j, name in enumerate(system.outputs):
+        integer = system.kinds[name] == "Integer"
+        columns[name] = table[:, j].astype(np.int32) if integer else table[:, j]
+    return columns
+
+
+def _substeps(step: float, periods: list[float]) -> int:
+    """Return into how many substeps a step is cut: at best so that instants fall on their ends."""
+    least = max(1, ceil(step / LONGEST_SUBSTEP - 1e-9))
+    return next((n for n in range(least, 4 * least) if are_whole(periods, step / n)), least)
+
+
+def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int]]:
+    """Return the compiled time march, with sampled components or without.
+
+    The first call on a machine takes seconds, more of them with sampled components. A process that
+    has the march with them uses it for everything: it gives the same numbers.
+    """
+    global _has_clocks
+    _has_clocks = _has_clocks or clocked
+    return _compiled(damper.evaluate, structure.effect_forces, _has_clocks)
+
+
+@cache
+def _compiled(
+    evaluate: Any, effect_forces: Any, clocked: bool
+) -> Callable[..., tuple[int, int, int]]:
+    """Compile the march with these woven functions: there are new ones after a new effect."""
+    march.damper_evaluate = evaluate
+    march.serve = _serve if clocked else march.idle
+    function: Callable[..., tuple[int, int, int]] = compiled(march.march, march.INLINE)
+    return function

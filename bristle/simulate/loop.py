@@ -1,0 +1,173 @@
+"""The macro step as a flat Python function: bare ctypes calls on memory laid out beforehand.
+
+A call through ctypes costs about as much in Python as inside a small FMU. So every argument that
+never changes is converted once, values stay where the FMUs put them (an input is set straight
+from the place where its source was read to), and the row is kept by copying that memory once.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .results import Array
+from .schedule import FAULT, Node, Operation, Port, Read, Schedule, Step, Write, kind_of
+from .session import Instance
+
+_SIZE = {"Real": 8, "Integer": 4, "Boolean": 4, FAULT: 4}
+_FUNCTION = {"Real": "Real", "Integer": "Integer", "Boolean": "Boolean", FAULT: "Integer"}
+_DTYPE = {"Real": "<f8", "Integer": "<i4", "Boolean": "<i4", FAULT: "<i4"}
+
+
+class Memory:
+    """Where every output of every component lies, and room for inputs to be gathered.
+
+    The first `row_size` bytes are the row: Reals, then Integers and Booleans, then all `fault`.
+    """
+
+    def __init__(self, nodes: Sequence[Node], schedule: Schedule) -> None:
+        self.nodes = nodes
+        self.offsets: dict[Port, int] = {}
+        size = 0
+        for kind in _SIZE:
+            for c, name in schedule.layout:
+                if kind_of(nodes[c].outputs[name]) == kind:
+                    self.offsets[c, name] = size
+                    size += _SIZE[kind]
+            if kind == "Boolean":
+                self.faults = size
+        self.row_size = size
+        self._gathered = -(-size // 8) * 8
+        total = self._gathered + sum(8 * len(node.sources) for node in nodes)
+        self._buffer = bytearray(total)
+        self._address = ctypes.addressof((ctypes.c_char * total).from_buffer(self._buffer))
+        view = memoryview(self._buffer)
+        self.row = view[:size]
+        self.views: dict[str, memoryview[Any]] = {"Real": view[: total // 8 * 8].cast("d")}
+        self.views["Integer"] = self.views["Boolean"] = view[: total // 4 * 4].cast("i")
+
+    def place(self, operation: Read | Write) -> tuple[tuple[str, ...], int, list[tuple[int, int]]]:
+        """Return the order of the names in a call, its offset, and the bytes to gather before.
+
+        The copies are (to, from) in units of the kind's size.
+        """
+        node, size = self.nodes[operation.component], _SIZE[operation.kind]
+        if isinstance(operation, Read):
+            ports = [(operation.component, name) for name in operation.names]
+        else:
+            ports = [node.sources[name] for name in operation.names]
+        places = sorted(
+            (self.offsets[port], name) for port, name in zip(ports, operation.names, strict=True)
+        )
+        names = tuple(name for _, name in places)
+        offsets = [offset for offset, _ in places]
+        if all(offset == offsets[0] + i * size for i, offset in enumerate(offsets)):
+            return names, offsets[0], []
+        if isinstance(operation, Read):
+            raise AssertionError(f"outputs of one call are not neighbours: {names}")
+        start = self._gathered
+        self._gathered += 8 * len(names)
+        copies = [((start + i * size) // size, offset // size) for i, offset in enumerate(offsets)]
+        return names, start, copies
+
+    def address(self, offset: int) -> int:
+        """Return the address of an offset."""
+        return self._address + offset
+
+    def value(self, port: Port) -> float | int:
+        """Return what was last read of an output."""
+        kind = kind_of(self.nodes[port[0]].outputs[port[1]])
+        view = self.views[_FUNCTION[kind]]
+        value: float | int = view[self.offsets[port] // _SIZE[kind]]
+        return value
+
+    def put(self, values: Mapping[Port, Any]) -> None:
+        """Store outputs that were read by other means, as after the initialisation."""
+        for port, value in values.items():
+            kind = kind_of(self.nodes[port[0]].outputs[port[1]])
+            self.views[_FUNCTION[kind]][self.offsets[port] // _SIZE[kind]] = value
+
+    def columns(self, rows: Sequence[bytes]) -> dict[Port, Array]:
+        """Return kept rows as one array per output, all of them views of one block."""
+        block = np.frombuffer(b"".join(rows), dtype=np.uint8).reshape(len(rows), self.row_size)
+        found = {}
+        for (c, name), offset in self.offsets.items():
+            kind = kind_of(self.nodes[c].outputs[name])
+            found[c, name] = block[:, offset : offset + _SIZE[kind]].view(_DTYPE[kind])[:, 0]
+        return found
+
+
+def compile_loop(
+    schedule: Schedule,
+    memory: Memory,
+    instances: Sequence[Instance],
+    step: float,
+    rows: list[bytes],
+    fail: Callable[[Operation | None, int], None],
+) -> Callable[[Sequence[float]], None]:
+    """Return a function that makes one macro step from each of the times it is given.
+
+    It appends a row per step to `rows`, and calls `fail` with the operation and its status when
+    a call answers anything but OK, and with (None, 0) when a `fault` is not 0; `fail` raises
+    unless the run may go on.
+    """
+    names: dict[str, Any] = {"fail": fail, "keep": rows.append, "take": memory.row.tobytes}
+    names["real"] = ctypes.c_double.from_param
+    body: list[str] = []
+    for number, operation in enumerate(schedule.operations):
+        names[f"o{number}"] = operation
+        instance = instances[operation.component]
+        if isinstance(operation, Step):
+            substeps = memory.nodes[operation.component].substeps
+            body += _step(number, instance, step, substeps, names)
+        else:
+            body += _transfer(number, operation, instance, memory, names)
+    body += ["row = take()", "keep(row)"]
+    if memory.faults < memory.row_size:
+        names["healthy"] = bytes(memory.row_size - memory.faults)
+        body += ["if not row.endswith(healthy): fail(None, 0)"]
+    head = f"def loop({', '.join(('times', *(f'{name}={name}' for name in names)))}):"
+    source = [head, " for t in times:", "  now = real(t)", *("  " + line for line in body)]
+    exec(compile("\n".join(source), "<macro step>", "exec"), names)
+    made: Callable[[Sequence[float]], None] = names["loop"]
+    return made
+
+
+def _step(
+    number: int, instance: Instance, step: float, substeps: int, names: dict[str, Any]
+) -> list[str]:
+    names[f"f{number}"] = instance.function("fmi2DoStep")
+    names[f"c{number}"] = ctypes.c_void_p.from_param(instance.component)
+    names[f"h{number}"] = ctypes.c_double.from_param(step / substeps)
+    names["past"] = ctypes.c_int.from_param(1)  # the state before this step is not needed again
+    call = f"f{number}(c{number}, now, h{number}, past)"
+    if substeps == 1:
+        return [f"if s := {call}: fail(o{number}, s)"]
+    names[f"d{number}"] = [i * step / substeps for i in range(substeps)]
+    call = call.replace("now", "real(t + d)")
+    return [f"for d in d{number}:", f" if s := {call}: fail(o{number}, s)"]
+
+
+def _transfer(
+    number: int, operation: Read | Write, instance: Instance, memory: Memory, names: dict[str, Any]
+) -> list[str]:
+    order, offset, copies = memory.place(operation)
+    variables = instance.description.variables
+    references = (ctypes.c_uint * len(order))(*(variables[name].reference for name in order))
+    names[f"r{number}"] = references  # kept: its address is used below
+    kind = _FUNCTION[operation.kind]
+    verb = "Get" if isinstance(operation, Read) else "Set"
+    names[f"f{number}"] = instance.function(f"fmi2{verb}{kind}")
+    names[f"c{number}"] = ctypes.c_void_p.from_param(instance.component)
+    names[f"v{number}"] = ctypes.c_void_p.from_param(ctypes.addressof(references))
+    names[f"n{number}"] = ctypes.c_size_t.from_param(len(order))
+    names[f"p{number}"] = ctypes.c_void_p.from_param(memory.address(offset))
+    lines = []
+    if copies:
+        names[f"m{number}"] = memory.views[kind]
+        lines = [f"m{number}[{to}] = m{number}[{source}]" for to, source in copies]
+    call = f"f{number}(c{number}, v{number}, n{number}, p{number})"
+    return [*lines, f"if s := {call}: fail(o{number}, s)"]

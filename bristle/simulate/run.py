@@ -1,0 +1,306 @@
+"""Run a scenario: from a file to a pandas frame with units, and to files that survive a crash."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from .. import __version__
+from ..errors import RunError, not_usable
+from ..fmu.description import Description, read_description
+from ..interrupt import Interrupt
+from ..scenario.scenario import Scenario, fmu_parameters, load_scenario
+from ..scenario.text import scenario_text
+from .output import Output
+from .results import Table, to_frame
+from .rows import make_columns, times
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from .master import Master
+    from .session import Message
+
+ENGINES = ("fmu", "compiled")
+FLUSH = 1.0
+"""Seconds between two writes of a running results file."""
+BLOCK = 0.1
+"""Seconds of steps between two looks at Ctrl-C, progress and clock."""
+
+
+class IncompleteRunError(RunError):
+    """A run that failed on its way; `frame` holds the rows before."""
+
+    def __init__(self, text: str, frame: pd.DataFrame) -> None:
+        super().__init__(text)
+        self.frame = frame
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """A run that Ctrl-C has stopped between two steps; `frame` holds the rows before."""
+
+    def __init__(self, text: str, frame: pd.DataFrame) -> None:
+        super().__init__(text)
+        self.frame = frame
+
+
+def run(
+    scenario: str | Path | Scenario,
+    overrides: Mapping[str, object] | None = None,
+    *,
+    engine: str = "fmu",
+    out: str | Path | None = None,
+    format: str = "csv",
+    progress: bool = False,
+) -> pd.DataFrame:
+    """Run a scenario and return every output at every step.
+
+    Parameters
+    ----------
+    scenario : path or Scenario
+        A scenario file, the name of a stock scenario, or a loaded scenario.
+    overrides : mapping, optional
+        Values that take the place of the file's: `{"damper.f_c": 2.0, "run.stop": 10.0}`.
+    engine : str
+        "fmu" steps FMUs; "compiled" solves built-in components together, without coupling error.
+    out : path, optional
+        Folder for results, log and, on the command line, a figure; without it nothing is written.
+    format : str
+        "csv" grows with the run; "parquet" is written whole at the end.
+    progress : bool
+        Show a progress bar, on a terminal only.
+
+    Returns
+    -------
+    DataFrame
+        Columns "damper.force", index "time" [s], row k at t_k, t = 0 included.
+        `attrs["units"]` maps columns to units, `attrs["made"]` says how the results were made,
+        `attrs["complete"]` is True.
+
+    Raises
+    ------
+    ScenarioError, FmuError, BuildError, RecordError
+        The input is wrong; nothing was run.
+    RunError
+        The run failed on its way (IncompleteRunError: its `frame` holds the rows before), or the
+        results cannot be written.
+    KeyboardInterrupt
+        Ctrl-C (RunInterrupted: its `frame` holds the rows before).
+
+    Examples
+    --------
+    >>> frame = run("half_sine_pulse.toml", {"voltage.level": 8.0})  # doctest: +SKIP
+    >>> frame["damper.force"].abs().max(), frame.attrs["units"]["damper.force"]  # doctest: +SKIP
+    """
+    return execute(scenario, overrides, engine, Output(_folder(out), format), progress)
+
+
+def execute(
+    scenario: str | Path | Scenario,
+    overrides: Mapping[str, object] | None,
+    engine: str,
+    output: Output,
+    progress: bool,
+    end_process: bool = False,
+) -> pd.DataFrame:
+    """Run a scenario as `run` does, into an output that is closed afterwards.
+
+    With `end_process`, a component that hangs after Ctrl-C costs the process, not the results.
+    """
+    try:
+        if engine not in ENGINES:
+            raise not_usable(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}.')
+        if isinstance(scenario, Scenario) and overrides:
+            scenario = scenario.file
+        if not isinstance(scenario, Scenario):
+            scenario = load_scenario(scenario, overrides)
+        job = _Job(scenario, dict(overrides or {}), engine, output)
+        if engine == "compiled":
+            return job.solve()
+        return job.step(progress, end_process)
+    finally:
+        output.close()
+
+
+class _Job:
+    """One run on its way: what it is made of, what it has so far, how it ends."""
+
+    def __init__(
+        self, scenario: Scenario, overrides: dict[str, object], engine: str, output: Output
+    ) -> None:
+        self.scenario = scenario
+        self.output = output
+        self.began = time.perf_counter()
+        self.made: dict[str, Any] = {
+            "version": __version__,
+            "title": scenario.title,
+            "file": str(scenario.file),
+            "overrides": overrides,
+            "algorithm": scenario.algorithm if engine == "fmu" else "coupled",
+            "engine": engine,
+            "step": scenario.step,
+            "stop": scenario.stop,
+            "fmus": {},
+            "scenario": scenario_text(scenario),
+        }
+
+    def solve(self) -> pd.DataFrame:
+        """Solve the scenario with the compiled laws."""
+        from .coupled import StoppedError, simulate
+
+        stopped: RunError | None = None
+        try:
+            values = simulate(self.scenario)
+        except StoppedError as error:
+            stopped, values = error, error.columns
+        columns = make_columns(
+            self.scenario, {c.name: c.description for c in self.scenario.components}
+        )
+        time = times(0, len(values["time"]), self.scenario.step)
+        table = Table(time, columns, {c.name: values[c.name].astype(c.dtype) for c in columns})
+        self.output.begin(table, self.made)
+        return self._end(table, stopped, interrupted=False)
+
+    def step(self, progress: bool, end_process: bool) -> pd.DataFrame:
+        """Step the scenario's FMUs; keep what there is, whatever happens."""
+        paths, descriptions = self._fmus()
+        folder = self.scenario.file.parent
+        parameters = {c.name: fmu_parameters(c, folder) for c in self.scenario.components}
+        from .master import Master
+
+        with Master(self.scenario, paths, descriptions, parameters, self._listen) as master:
+            self._master = master
+            hang = self._end_process if end_process else None
+            stopped: RunError | None = None
+            with Interrupt(hang) as interrupt:
+                try:
+                    self._go(master, interrupt, progress)
+                except RunError as error:
+                    if not master.rows or error.exit_code != 1:
+                        raise
+                    stopped = error
+            table = master.table()
+            return self._end(table, stopped, interrupt.asked and master.rows <= master.steps)
+
+    def _go(self, master: Master, interrupt: Interrupt, progress: bool) -> None:
+        from ..progress import Progress
+
+        try:
+            master.start()
+        finally:
+            if master.rows:
+                self.output.begin(master.table(), self.made)
+        with Progress(self.scenario.title, master.steps, progress) as bar:
+            count, due = 1, time.perf_counter() + FLUSH
+            try:
+                while master.rows <= master.steps and not interrupt.asked:
+                    before = time.perf_counter()
+                    master.advance(count)
+                    now = time.perf_counter()
+                    count = max(1, min(8 * count, int(count * BLOCK / max(now - before, 1e-9))))
+                    bar.show(master.rows - 1)
+                    if now >= due:
+                        self.output.write(master.table(self.output.written))
+                        due = now + FLUSH
+            finally:
+                if self.output.written < master.rows:
+                    self.output.write(master.table(self.output.written))
+
+    def _end(self, table: Table, stopped: RunError | None, interrupted: bool) -> pd.DataFrame:
+        if stopped:
+            self.output.log(f"error: {stopped}")
+        frame = self._finish(table, complete=not (stopped or interrupted))
+        if not (stopped or interrupted):
+            return frame
+        kept = "Rows up to t = {:.9g} s are kept in {}, marked incomplete.".format(
+            table.time[(self.output.written or len(table.time)) - 1],
+            self.output.results or "the frame of this error",
+        )
+        if stopped:
+            raise IncompleteRunError(f"{stopped}\n  {kept}", frame) from stopped
+        raise RunInterrupted(f"interrupted. {kept}", frame)
+
+    def _finish(self, table: Table, complete: bool) -> pd.DataFrame:
+        self.made["wall_time"] = round(time.perf_counter() - self.began, 3)
+        for column in table.columns:
+            if column.name.endswith(".stroke_ratio"):
+                self._judge_stroke(column.name, table)
+        frame = to_frame(table, self.made, complete)
+        self.output.log(
+            f"{'complete' if complete else 'incomplete'}: {len(table.time)} rows up to "
+            f"t = {table.time[-1]:.9g} s in {self.made['wall_time']} s"
+        )
+        self.output.finish(frame)
+        return frame
+
+    def _judge_stroke(self, name: str, table: Table) -> None:
+        ratio = table.values[name]
+        if ratio.max() > 1:
+            first = table.time[(ratio > 1).argmax()]
+            self.output.warn(
+                f"{name.rpartition('.')[0]}: the displacement leaves the stroke: stroke_ratio "
+                f"is above 1 from t = {first:.9g} s on, at most {ratio.max():.4g}"
+            )
+
+    def _fmus(self) -> tuple[dict[str, Path], dict[str, Description]]:
+        """Return each component's FMU file, built where needed, and what it says of itself."""
+        from ..fmu.build import ensure
+
+        paths, descriptions = {}, {}
+        for component in self.scenario.components:
+            path = component.path or ensure(
+                component.fmu, component.building, component.controller, component.effects
+            )
+            # A missing binary is explained when the FMU is loaded, with the way out.
+            description = read_description(path, any_platform=True)
+            paths[component.name], descriptions[component.name] = path, description
+            self.made["fmus"][component.name] = f"{description.name} {description.guid}"
+        return paths, descriptions
+
+    def _listen(self, message: Message) -> None:
+        text = message.text
+        if not text.startswith(f"{message.component}: "):
+            text = f"{message.component}: {text}"
+        if message.status == "OK":
+            self.output.log(f"t = {self._time():.9g} s: {text}")
+        else:
+            self.output.warn(text)
+
+    def _time(self) -> float:
+        return self._master.time if hasattr(self, "_master") else 0.0
+
+    def _end_process(self) -> None:
+        """Save what there is and leave: the main thread is in a component that hangs."""
+        master = self._master
+        if master.rows:
+            self.output.write(master.table(self.output.written))
+            kept = f"Rows up to t = {master.time:.9g} s are kept in {self.output.results}."
+        else:
+            kept = "Nothing was kept."
+        print(f"interrupted; a component does not end its step. {kept}", file=sys.stderr)
+        sys.stderr.flush()
+        master.forget()
+        os._exit(130)
+
+
+def _folder(out: str | Path | None) -> Path | None:
+    return None if out is None else Path(out)
+
+
+class _Run(ModuleType):
+    """This module, called as the function that it is named after.
+
+    Importing a submodule puts it into its package, so `bristle.run` is the function or this
+    module, depending on what was imported before; both can be called.
+    """
+
+    def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
+        return run(*arguments, **named)
+
+
+sys.modules[__name__].__class__ = _Run

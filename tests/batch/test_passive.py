@@ -1,0 +1,140 @@
+"""The best constant voltage against the published table, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bristle.batch.passive import Motion, Passive, optimise_passive
+from bristle.cli import main
+from bristle.errors import BristleError
+
+MODEL = Path(__file__).parents[1] / "reference" / "model.toml"
+
+
+@cache
+def published() -> Passive:
+    """Return the optimum over the first 20 s of El Centro, as the published table."""
+    return optimise_passive(overrides={"run.stop": 20.0})
+
+
+def table() -> dict[str, list[float]]:
+    with MODEL.open("rb") as file:
+        data: dict[str, list[float]] = tomllib.load(file)["passive"]
+    return data
+
+
+def test_the_grid_is_the_published_table() -> None:
+    found = published()
+    assert found.grid[::2].tolist() == table()["voltages"]
+    for values, row in zip(found.values[:, ::2], table()["y"], strict=True):
+        assert values.tolist() == pytest.approx(row, rel=0.002, abs=0.005)
+
+
+def test_the_papers_voltages_are_within_2_percent_of_the_least() -> None:
+    found = published()
+    for best, values, voltage in zip(
+        found.best, found.values, table()["text_optimum"], strict=True
+    ):
+        assert values[found.grid.tolist().index(voltage)] < 1.021 * best.value
+
+
+def test_a_minimum_is_one() -> None:
+    found = published()
+    assert [m.intensity for m in found.motions] == table()["intensities"]
+    for best, values in zip(found.best, found.values, strict=True):
+        assert best.value <= values.min()
+        k = int(values.argmin())
+        assert abs(best.voltage - found.grid[k]) <= 0.5
+    assert [round(best.voltage) for best in found.best] == [2, 3, 5, 8]
+
+
+def test_goals_of_the_set_are_no_worse_than_on_the_grid() -> None:
+    found = published()
+    own = np.array([best.value for best in found.best])
+    on_grid = {
+        "worst": found.values.max(axis=0).min(),
+        "mean": found.values.mean(axis=0).min(),
+        "regret": (found.values / own[:, None]).max(axis=0).min(),
+    }
+    assert set(found.goals) == set(on_grid)
+    for goal, least in on_grid.items():
+        assert found.goals[goal].value <= least
+        assert found.goals[goal].value > 0.98 * least
+    assert found.goals["regret"].value >= 1.0
+    assert found.goals["worst"].value >= own.max()
+
+
+def test_rms_of_another_output() -> None:
+    found = optimise_passive(
+        [Motion("el_centro_1940_ns", 0.4)],
+        overrides={"run.stop": 6.0},
+        output="structure.drift1",
+        statistic="rms",
+        grid=5,
+    )
+    assert found.unit == "m"
+    assert 1.0 < found.best[0].voltage < 8.0
+    assert found.goals["worst"] == found.best[0]
+
+
+def test_a_record_as_recorded_and_another_v_max(tmp_path: Path) -> None:
+    record = tmp_path / "shake.csv"
+    record.write_text("time [s],acceleration [m/s2]\n0.0,0.0\n0.1,1.5\n0.2,0.0\n")
+    found = optimise_passive(
+        [Motion(str(record), 0.0)], overrides={"run.stop": 1.0, "damper.v_max": 2.0}, grid=3
+    )
+    assert found.grid.tolist() == [0.0, 1.0, 2.0]
+    assert found.motions[0].name == "shake"
+
+
+def test_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    command = ["optimise", "passive", "--intensities", "0.2", "0.4", "--grid", "5"]
+    assert main([*command, "--set", "run.stop=5"]) == 0
+    said = capsys.readouterr().out
+    assert "el_centro_1940_ns 0.4 g" in said
+    assert "for all of them" in said
+    for name in ("passive.csv", "passive.png"):
+        assert (tmp_path / "results" / "optimise" / name).stat().st_size > 100
+    assert main([*command, "--set", "run.stop=5", "--json", "--no-figure"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert [round(motion["voltage"]) for motion in answer["motions"]] == [2, 3]
+    assert set(answer["set"]) == {"worst", "mean", "regret"}
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (["--scenario", "no_damper"], "ConstantVoltage"),
+        (["--scenario", "el_centro_0p6g_lpv"], "0 components ConstantVoltage"),
+        (["--scenario", "nothing"], "no scenario file"),
+        (["--motions", "el_centro_1941_ns"], "el_centro_1940_ns"),
+        (["--intensities", "-0.2"], "0 or more"),
+        (["--intensities", "nan"], "0 or more"),
+        (["--output", "structure.floor3_acceleration_absolute"], "no output"),
+        (["--grid", "2"], "too coarse"),
+        (["--set", "damper.sigma_x=2"], "sigma_x"),
+        (["--set", "damper.v_max=0"], "v_max"),
+    ],
+)
+def test_bad_input_is_one_message(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], message: str
+) -> None:
+    assert main(["optimise", "passive", "--out", str(tmp_path), *more]) == 2
+    error = capsys.readouterr().err
+    assert message in error
+    assert "Traceback" not in error
+    assert not list(tmp_path.iterdir())
+
+
+def test_too_coarse_a_grid_is_named() -> None:
+    with pytest.raises(BristleError, match="too coarse"):
+        optimise_passive(grid=1)

@@ -1,0 +1,213 @@
+"""Any FMU against a measurement: ports found or given, errors in units of the noise, failures."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bristle.bridge.fmu import compare_fmu
+from bristle.cli import main
+from bristle.errors import FmuError, RecordError, RunError
+from bristle.fmu.build import ensure
+from bristle.identify.bench import Bench
+
+DT = 0.002
+N = 1500
+
+
+def columns(seed=3, noise=0.01):
+    """Return a bench measurement of a LuGre damper with parameters that are known."""
+    random = np.random.default_rng(seed)
+    t = np.arange(N) * DT
+    f, phase = random.uniform(0.5, 6.0, 8), random.uniform(0.0, 6.28, 8)
+    w = 2.0 * np.pi * f
+    angle = w[:, None] * t + phase[:, None]
+    size = 0.004 / f
+    x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
+    V = np.repeat([0.0, 2.0, 4.0], N // 3)
+    force = Bench("lugre", []).force(x, v, a, V, DT, {})
+
+    def measured(y):
+        return y + noise * np.std(y) * random.standard_normal(N)
+
+    return {
+        "time [s]": t, "displacement [mm]": 1e3 * measured(x), "velocity [m/s]": measured(v),
+        "voltage [V]": V, "force [N]": measured(force),
+    }  # fmt: skip
+
+
+def write(path: Path, data) -> Path:
+    table = np.column_stack(list(data.values()))
+    np.savetxt(path, table, fmt="%.9g", delimiter=",", header=",".join(data), comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory) -> Path:
+    return write(tmp_path_factory.mktemp("rig") / "run.csv", columns())
+
+
+@pytest.fixture(scope="module")
+def lugre() -> Path:
+    return ensure("LuGreDamper")
+
+
+def test_our_own_damper_is_right_within_the_noise_of_its_own_data(rig, lugre):
+    found = compare_fmu(lugre, rig)
+    (force,) = found.outputs
+    assert (force.quantity, force.unit) == ("force", "N")
+    assert force.z == pytest.approx(1.0, abs=0.15)
+    fed = {one.name: one.signal for one in found.ports.inputs}
+    assert fed["displacement"] == "displacement"
+    assert fed["voltage"] == "voltage"
+    # holding_force is in N as the measured force is, but it is not what was measured.
+    assert "holding_force" not in fed
+    assert any("holding_force" in text and "optional" in text for text in found.ports.left)
+    assert force.sentences[0].startswith("In this measurement the model misses the force by")
+
+
+def test_a_wrong_parameter_shows(rig, lugre):
+    (force,) = compare_fmu(lugre, rig, values={"sigma_2": "200"}).outputs
+    assert force.z > 2.0
+    assert {"speed", "velocity"} & {force.first.coordinate, *force.first.alike}
+
+
+def gain_data(tmp_path, factor=2.0, noise=0.02):
+    random = np.random.default_rng(1)
+    t = np.arange(2000) * 0.01
+    u = np.sin(3.0 * t) + 0.5 * np.sin(7.1 * t + 1.0)
+    y = factor * u + noise * random.standard_normal(2000)
+    return write(tmp_path / "gain.csv", {"time [s]": t, "pressure [Pa]": u, "flow [kg/s]": y})
+
+
+def test_a_stranger_is_fed_from_columns_that_we_do_not_know(toys, tmp_path):
+    data = gain_data(tmp_path)
+    with pytest.raises(FmuError, match=r"no output can be held against") as error:
+        compare_fmu(toys["Gain"], data)
+    assert "pressure [Pa]" in str(error.value)
+    assert "--map OUTPUT=CHANNEL" in str(error.value)
+    found = compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "flow"})
+    (flow,) = found.outputs
+    assert flow.z == pytest.approx(1.0, abs=0.15)
+    assert flow.total.numerical < 1e-9  # it follows its input at once
+    assert any("gives no unit" in line for line in found.mapping_lines())
+    (wrong,) = compare_fmu(
+        toys["Gain"], data, maps={"u": "pressure", "y": "flow"}, values={"gain": "2.3"}
+    ).outputs
+    assert wrong.z > 3.0
+    assert wrong.first.coordinate == "pressure"
+
+
+def test_units_are_turned_on_the_way(toys, tmp_path):
+    t = np.arange(2000) * 0.01
+    u = np.sin(3.0 * t)
+    random = np.random.default_rng(2)
+    y = 2.0 * u + 0.02 * random.standard_normal(2000)
+    data = write(tmp_path / "kn.csv", {"time [s]": t, "suction [kPa]": u, "force [kN]": 1e-3 * y})
+    (force,) = compare_fmu(toys["Gain"], data, maps={"u": "suction", "y": "force"}).outputs
+    assert force.unit == "N"
+    assert force.z == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.parametrize(
+    ("how", "kind", "text"),
+    [
+        ("discard", RunError, "answered Discard"),
+        ("raise", RunError, "Fatal"),
+        ("abort", RunError, "ended its process"),
+        ("nan", RecordError, "predicted value is nan at"),
+    ],
+)
+def test_a_stranger_that_fails_is_an_answer(toys, tmp_path, how, kind, text):
+    data = gain_data(tmp_path)
+    with pytest.raises(kind, match=text):
+        compare_fmu(
+            toys["Failing"], data, maps={"u": "pressure", "value": "flow"},
+            values={"how": how, "at": "5"},
+        )  # fmt: skip
+
+
+def test_a_stranger_that_hangs_is_ended(toys, tmp_path):
+    with pytest.raises(RunError, match="took longer than 6 s"):
+        compare_fmu(
+            toys["Failing"], gain_data(tmp_path), maps={"u": "pressure", "value": "flow"},
+            values={"how": "hang", "at": "5"}, timeout=6.0,
+        )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"maps": {"v": "pressure"}}, r'"v"'),
+        ({"maps": {"u": "presure", "y": "flow"}}, r'Did you mean "pressure"'),
+        ({"values": {"gian": "2"}}, r'Did you mean "gain"'),
+        ({"values": {"gain": "two"}}, "gain is Real"),
+        ({"maps": {"u": "pressure"}, "values": {"u": "1"}}, "both set and mapped"),
+    ],
+)
+def test_what_is_given_wrong_is_named(toys, tmp_path, options, text):
+    with pytest.raises(FmuError, match=text):
+        compare_fmu(toys["Gain"], gain_data(tmp_path), **options)
+
+
+def test_units_that_differ_are_refused(lugre, rig):
+    with pytest.raises(FmuError, match=r"voltage is in V, force in N"):
+        compare_fmu(lugre, rig, maps={"voltage": "force"})
+
+
+def test_an_fmu_of_the_other_sign_is_told(toys, tmp_path):
+    data = gain_data(tmp_path, factor=-2.0)
+    found = compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "flow"})
+    assert any("goes against what was measured" in note for note in found.notes)
+
+
+def test_data_without_noise_are_judged_by_a_stated_floor(toys, tmp_path):
+    t = np.arange(500) * 0.01
+    data = write(tmp_path / "clean.csv", {"time [s]": t, "a [Pa]": t, "b [kg]": 2.0 * t})
+    found = compare_fmu(toys["Gain"], data, maps={"u": "a", "y": "b"})
+    assert any("no noise to speak of" in note for note in found.notes)
+    assert found.outputs[0].z < 0.1
+
+
+def command(*arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "bristle.cli", "compare", *map(str, arguments)],
+        capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+
+
+def test_the_command_prints_sentences_and_writes_a_picture(toys, tmp_path):
+    data, picture = gain_data(tmp_path), tmp_path / "out.png"
+    wires = ["--map", "u=pressure", "--map", "y=flow", "--out", picture]
+    done = command("--fmu", toys["Gain"], "--data", data, *wires)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "u [Pa] is fed from pressure: as given" in done.stdout
+    assert "In this measurement the model misses" in done.stdout
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    done = command("--fmu", toys["Gain"], "--data", data, *wires, "--json")
+    answer = json.loads(done.stdout)
+    assert answer["comparisons"][0]["z"] == pytest.approx(1.0, abs=0.15)
+    assert [one["signal"] for one in answer["inputs"]] == ["pressure"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--fmu", "no.fmu", "--data", "no.csv"], "no.fmu"),
+        (["--fmu", "no.fmu"], "--data"),
+        ([], "--fmu and --data"),
+        (["study", "--data", "run.csv"], "--data needs --fmu"),
+        (["study", "--set", "a=1"], "--set needs --fmu"),
+        (["--fmu", "no.fmu", "--data", "no.csv", "--set", "gain"], "NAME=VALUE"),
+        (["nowhere"], "no study"),
+    ],
+)
+def test_the_command_says_what_would_be_right(arguments, text, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert main(["compare", *arguments]) == 2
+    assert text in capsys.readouterr().err

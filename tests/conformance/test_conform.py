@@ -1,0 +1,433 @@
+"""`bristle conform`: a healthy toy passes, and each spoilt one fails the probe it is made for."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from bristle import cli
+from bristle.conformance import conform
+from bristle.conformance.probes import PROBES
+from bristle.conformance.report import Report
+from bristle.errors import FmuError
+from bristle.fmu import build, catalogue
+
+TOY = Path(__file__).with_name("toy_slave.py")
+XML, SCRIPT = "modelDescription.xml", "resources/toy_slave.py"
+
+Spoil = Callable[..., Path]
+
+
+@pytest.fixture(scope="session")
+def healthy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("toy")
+    options = ["--no-external-tool", "--handle-state", "--serialize-state"]
+    command = [sys.executable, "-m", "pythonfmu", "build", "-f", TOY, "-d", folder, *options]
+    subprocess.run(command, check=True, capture_output=True, cwd=folder)
+    return folder / "Toy.fmu"
+
+
+@pytest.fixture
+def spoil(healthy: Path, tmp_path: Path) -> Spoil:
+    """Return a function that writes the toy anew, with texts replaced and members added."""
+
+    def write(*changes: tuple[str, str, str], add: dict[str, str] | None = None) -> Path:
+        path = tmp_path / "Spoilt.fmu"
+        with zipfile.ZipFile(healthy) as source, zipfile.ZipFile(path, "w") as sink:
+            for info in source.infolist():
+                data = source.read(info)
+                for member, old, new in changes:
+                    if member == info.filename:
+                        assert old.encode() in data
+                        data = data.replace(old.encode(), new.encode())
+                sink.writestr(info, data)
+            for name, text in (add or {}).items():
+                sink.writestr(name, text)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def trait(spoil: Spoil) -> Callable[[str], Path]:
+    known = TOY.read_text()
+
+    def write(name: str) -> Path:
+        assert f'TRAIT == "{name}"' in known
+        return spoil((SCRIPT, '"healthy"', f'"{name}"'))
+
+    return write
+
+
+@pytest.fixture(scope="session")
+def full_report(healthy: Path) -> Report:
+    return conform(healthy)
+
+
+def test_healthy_toy_conforms_and_every_probe_has_its_row(full_report: Report) -> None:
+    assert full_report.ok, full_report.to_text()
+    assert [r.probe for r in full_report.rows] == [n for n, p in PROBES.items() if not p.house]
+    assert full_report.counts()["pass"] >= 30
+    for row in full_report.rows:
+        assert row.tried
+        assert row.seen
+        assert row.standard
+        assert row.verdict in ("pass", "note")
+
+
+def test_illegal_calls_that_are_answered_ok_are_notes(full_report: Report) -> None:
+    for name in ("step before initialisation", "zero step", "wrong guid", "initialise twice"):
+        row = full_report.row(name)
+        assert (row.verdict, row.seen) == (
+            "note",
+            "answered OK as if it were allowed; no harm seen",
+        )
+
+
+# What is spoilt, the probe that must fail for it, and a word of what was seen.
+FAILING = [
+    ("abort", "legal run", "crashed in fmi2DoStep: SIGABRT"),
+    ("exit", "legal run", "left the process in fmi2DoStep with exit code 3"),
+    ("hang", "legal run", "hung in fmi2DoStep: no answer within 2 s"),
+    ("crash at instantiation", "legal run", "crashed in fmi2Instantiate: SIGSEGV"),
+    ("hang at terminate", "legal run", "hung in fmi2Terminate"),
+    ("raise", "legal run", "fmi2DoStep answered Fatal"),
+    ("never step", "legal run", "fmi2DoStep at t = 0 s answered Discard"),
+    ("NaN", "legal run", "not finite at t = 0.06 s: y = nan"),
+    ("NaN at the start", "outputs at the start", "y = nan"),
+    ("crash on NaN", "NaN input", "crashed in fmi2DoStep: SIGSEGV"),
+    ("crash before initialisation", "step before initialisation", "crashed in fmi2DoStep"),
+    ("hang on infinity", "infinite step", "hung in fmi2DoStep"),
+    ("one step size", "variable steps", "answered Discard"),
+    ("one step size", "split steps", "answered Discard"),
+    ("hidden state", "state replay", "y at t = 0.31 s"),
+    ("hidden state", "state across reset", "y at"),
+    ("hidden state", "serialised state", "y at"),
+    ("hidden state", "state across processes", "y at"),
+    ("lossy bytes", "serialised state", "y at"),
+    ("crash on restore", "state replay", "crashed in fmi2SetFMUstate: SIGSEGV"),
+    ("shared state", "two instances", "beside another instance: y at"),
+    ("shared state", "many instances", "instances: y at"),
+    ("shared state", "reset", "reset in mid-run: y at"),
+    ("shared state", "zero step", "a new instance is harmed"),
+    ("remember gain", "reset", "reset in mid-run: y at"),
+    ("gain at entry", "parameters in initialisation", "set in initialisation mode, y at"),
+    ("random", "state replay", "y at"),
+    ("forget inputs", "set values stay", "before the step u is"),
+    ("secret dependency", "direct dependencies", "y follows u"),
+    ("crash on infinity", "infinite input", "crashed in fmi2DoStep: SIGSEGV"),
+    ("crash on large numbers", "huge input", "crashed in fmi2DoStep: SIGSEGV"),
+    ("remember NaN", "NaN input", "fmi2Reset does not mend it: y at"),
+    ("count in the process", "two libraries", "beside its copy: y at"),
+    ("look at the path", "another FMU before", "y at"),
+    ("look at the path", "another FMU after", "y at"),
+    ("use numpy if there is one", "bare interpreter", "without installed packages: y at"),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "probe", "seen"), FAILING, ids=[f"{t}-{p}" for t, p, _ in FAILING]
+)
+def test_spoilt_toy_fails(trait: Callable[[str], Path], name: str, probe: str, seen: str) -> None:
+    report = conform(trait(name), timeout=2.0 if "hang" in name else 10.0, only=[probe])
+    assert not report.ok
+    assert report.row(probe).verdict == "fail"
+    assert seen in report.row(probe).seen
+
+
+NOTED = [
+    ("NaN when driven", "driven run", "not finite at t = 0.06 s: y = nan"),
+    ("random", "repeatable", "not repeatable: y at"),
+    ("random", "reset", "cannot be judged"),
+    ("leak", "memory", "KiB per instance"),
+    ("leave a file", "terminate and free", "left.txt"),
+    ("strange category", "logging", "logStrange"),
+    ("need a package", "bare interpreter", "needs something that is installed here"),
+    ("one step size", "zero step", "refused"),
+    ("end early", "legal run", "the FMU ended the run itself at t = 0.1 s"),
+    ("end early", "state replay", "5 steps replayed bit by bit"),
+]
+
+
+@pytest.mark.parametrize(("name", "probe", "seen"), NOTED, ids=[f"{t}-{p}" for t, p, _ in NOTED])
+def test_what_the_standard_leaves_open_is_no_failure(
+    trait: Callable[[str], Path], name: str, probe: str, seen: str
+) -> None:
+    report = conform(trait(name), only=[probe])
+    assert report.ok
+    assert seen in report.row(probe).seen
+
+
+# Changes of modelDescription.xml, the probe that must fail, a word of what was seen.
+BAD_FILES = [
+    ('<Unknown index="2" dependencies=""/>', "", "modelDescription.xml", "Outputs"),
+    ('<Unknown index="2"/>', "", "modelDescription.xml", "InitialUnknowns"),
+    ('<Real start="0" unit="m"/>', '<Real unit="m"/>', "modelDescription.xml", "start"),
+    ('guid="', 'guids="', "modelDescription.xml", "guid"),
+    ('guid="', 'guid="" author="', "guid", "there is none"),
+    ('start="0.3" unit="m"', 'start="0.3" max="0.2"', "start values", "tau = 0.3"),
+    ('start="0.3" unit="m"', 'start="0.3" unit="s"', "units", "not defined: s"),
+    ('valueReference="6"', 'valueReference="5"', "value references", "gain = tau"),
+    ('stopTime="0.5"', 'stopTime="-1.0"', "default experiment", "make no run"),
+    ('start="2"', 'start="3"', "start values in the code", "gain is 2.0, not 3.0"),
+    ('variability="discrete">\n\t\t\t<Integer/>', '>\n\t\t\t<Integer start="x"/>', XML, "'x'"),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "probe", "seen"), BAD_FILES, ids=[f"{p}-{s}" for *_, p, s in BAD_FILES]
+)
+def test_bad_description_fails(spoil: Spoil, old: str, new: str, probe: str, seen: str) -> None:
+    report = conform(spoil((XML, old, new)), only=[probe])
+    assert report.row(probe).verdict == "fail"
+    assert seen in report.row(probe).seen
+
+
+def test_backslash_in_a_member_name_fails(spoil: Spoil) -> None:
+    report = conform(spoil(add={"resources\\extra.txt": "text"}), only=["archive"])
+    assert "resources\\extra.txt" in report.row("archive").seen
+    assert not report.ok
+
+
+def test_library_that_cannot_be_loaded_fails_and_stops_the_rest(
+    spoil: Spoil, healthy: Path
+) -> None:
+    # A library for the right machine that breaks off in its middle.
+    path = spoil()
+    with zipfile.ZipFile(healthy) as source:
+        whole = {n: source.read(n) for n in source.namelist()}
+    with zipfile.ZipFile(path, "w") as sink:
+        for name, data in whole.items():
+            sink.writestr(name, data[:1000] if name.endswith(".so") else data)
+    report = conform(path)
+    assert report.row("library").verdict == "fail"
+    assert report.row("reset").seen == "not tried: the library does not load"
+
+
+def test_failure_of_what_a_probe_rests_on_is_not_hidden_by_only(
+    trait: Callable[[str], Path],
+) -> None:
+    report = conform(trait("abort"), only=["state replay"])
+    assert not report.ok
+    assert report.row("state replay").seen.startswith("not tried: no life of this FMU")
+    assert report.row("legal run").verdict == "fail"
+
+
+def test_fmu_that_cannot_follow_moving_inputs_is_tried_at_rest(spoil: Spoil) -> None:
+    path = spoil(
+        (SCRIPT, "self.steps += 1\n", "self.steps += 1\n        if self.u: return False\n")
+    )
+    report = conform(path, only=["driven run", "reset", "state replay"])
+    assert report.ok
+    assert "inputs at rest only; with inputs moving, fmi2DoStep at t = 0" in report.rows[0].seen
+    assert report.row("state replay").verdict == "pass"
+
+
+def test_slow_fmu_is_tried_with_fewer_steps_not_called_hung(spoil: Spoil) -> None:
+    path = spoil((SCRIPT, "self.steps += 1\n", "self.steps += 1; time.sleep(0.05)\n"))
+    report = conform(path, timeout=4.0, only=["legal run", "many instances", "state replay"])
+    assert report.ok, report.to_text()
+    assert "of 50 steps" in report.row("legal run").seen
+
+
+def test_what_an_fmu_starts_dies_with_its_probe(spoil: Spoil, tmp_path: Path) -> None:
+    mark = tmp_path / "pid"
+    start = f"""import subprocess
+        child = subprocess.Popen(["sleep", "1000"])
+        Path({str(mark)!r}).write_text(str(child.pid))
+        time.sleep(1000.0)
+"""
+    path = spoil((SCRIPT, "self.steps += 1\n", start))
+    report = conform(path, timeout=1.0, only=["legal run"])
+    assert report.row("legal run").seen.startswith("hung in fmi2DoStep")
+    deadline = time.monotonic() + 5.0
+    while time.monotonic() < deadline and _alive(int(mark.read_text())):
+        time.sleep(0.01)
+    assert not _alive(int(mark.read_text()))
+
+
+def _alive(pid: int) -> bool:
+    status = Path(f"/proc/{pid}/stat")
+    try:
+        return status.read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def test_fmu_finds_no_bristle_of_the_judge(spoil: Spoil) -> None:
+    code = "assert 'bristle' not in sys.modules; self.steps += 1\n"
+    path = spoil((SCRIPT, "self.steps += 1\n", code), (SCRIPT, "import os\n", "import os, sys\n"))
+    assert conform(path, only=["legal run"]).ok
+
+
+def test_unknown_probe_and_bad_time_limit_are_refused(healthy: Path) -> None:
+    with pytest.raises(FmuError, match="no probe is named nonsense"):
+        conform(healthy, only=["nonsense"])
+    for limit in (0.0, -1.0, float("nan"), float("inf")):
+        with pytest.raises(FmuError, match="time limit"):
+            conform(healthy, timeout=limit)
+
+
+def test_page_names_every_probe() -> None:
+    page = Path(__file__).parents[2] / "docs" / "conform.md"
+    table = page.read_text().split("## The probes")[1].split("The last group")[0]
+    cells = [line.split("|")[2] for line in table.splitlines() if line.count("|") == 3]
+    named = {name.strip() for cell in cells[2:] for name in cell.split(",")}
+    assert named == set(PROBES)
+
+
+# -- the command
+
+
+def test_command_prints_json_and_exits_0(healthy: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["conform", str(healthy), "--json", "--only", "library"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["ok"] is True
+    assert told["counts"] == {"pass": 1, "fail": 0, "note": 0}
+    assert set(told["rows"][0]) == {"probe", "tried", "seen", "standard", "verdict"}
+
+
+def test_command_prints_a_plain_table_in_a_pipe_and_exits_1(
+    trait: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert cli.main(["conform", str(trait("abort")), "--only", "legal run"]) == 1
+    out = capsys.readouterr().out
+    assert out.startswith("fail  legal run\n      tried     the default experiment")
+    assert "SIGABRT" in out
+    assert "\x1b" not in out
+    assert out.endswith("Spoilt.fmu falls short: 0 passed, 1 failed, 0 noted\n")
+
+
+def test_command_prints_a_table_on_a_terminal(healthy: Path) -> None:
+    pty = pytest.importorskip("pty")
+    mother, child = pty.openpty()
+    arguments = ["conform", str(healthy), "--only", "guid"]
+    code = f"from bristle.cli import main; raise SystemExit(main({arguments}))"
+    environment = {**os.environ, "COLUMNS": "150", "TERM": "xterm"}
+    process = subprocess.Popen(
+        [sys.executable, "-c", code], stdout=child, stderr=child, env=environment
+    )
+    os.close(child)
+    seen = b""
+    while True:
+        try:
+            part = os.read(mother, 65536)
+        except OSError:  # how a terminal ends on Linux
+            break
+        if not part:
+            break
+        seen += part
+    assert process.wait() == 0
+    assert "what the standard says" in seen.decode()
+    assert "guid" in seen.decode()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+def test_interrupted_command_exits_130_and_leaves_nothing_behind(
+    trait: Callable[[str], Path], tmp_path: Path
+) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    arguments = ["conform", str(trait("hang"))]
+    code += f"from bristle.cli import main; raise SystemExit(main({arguments}))"
+    environment = {**os.environ, "TMPDIR": str(temporary)}
+    process = subprocess.Popen(
+        [sys.executable, "-c", code],
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+    )
+    deadline = time.monotonic() + 15.0
+    while not any(b"fmi2DoStep" in box.read_bytes() for box in temporary.glob("*/work/box")):
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    time.sleep(0.3)  # the box also names steps that pass
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=10.0)
+    assert (process.returncode, out, err) == (130, b"", b"interrupted\n")
+    assert list(temporary.iterdir()) == []
+    for entry in Path("/proc").glob("[0-9]*/cmdline"):
+        with suppress(OSError):  # a process that has just ended
+            assert str(temporary).encode() not in entry.read_bytes()
+
+
+@pytest.mark.parametrize("what", ["missing", "text", "folder"])
+def test_command_exits_2_for_what_cannot_be_opened(
+    what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "x.fmu"
+    if what == "text":
+        path.write_text("no zip")
+    elif what == "folder":
+        path.mkdir()
+    assert cli.main(["conform", str(path)]) == 2
+    assert capsys.readouterr().err.startswith(f"FmuError: {path}: ")
+
+
+# -- our own FMUs
+
+
+@pytest.mark.parametrize("name", catalogue.component_names())
+def test_built_in_fmu_conforms(name: str) -> None:
+    report = conform(build.ensure(name))
+    assert report.ok, report.to_text()
+    for probe in ("fault: input", "fault: step", "fault: order", "fault: earlier state"):
+        assert report.row(probe).verdict == "pass"
+    for probe in ("another FMU before", "another FMU after", "repeatable", "bare interpreter"):
+        assert report.row(probe).verdict == "pass"
+
+
+# The line of the bundled slave base that is replaced, by what, the probe that must fail, its words.
+BREAKS_RULES = [
+    ("_stop(NOT_FINITE_INPUT,", "_stop(BAD_STATE,", "fault: input", "fault = 4"),
+    ("_stop(BAD_STEP,", "_stop(BAD_STATE,", "fault: step", "fault = 4"),
+    ('_stop(WRONG_MODE, "doStep', '_stop(BAD_STEP, "doStep', "fault: order", "fault = 2"),
+    ("_stop(BAD_PARAMETER,", "_stop(BAD_STATE,", "fault: parameter", "fault = 4"),
+    (
+        "if self.fault:\n            return False",
+        "pass",
+        "fault: input",
+        "the step after displacement = nan: answered OK",
+    ),
+    (
+        'self._values[:] = state["values"]',
+        'self._values[:-1] = state["values"][:-1]',
+        "fault: earlier state",
+        "Discard",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "probe", "seen"), BREAKS_RULES, ids=[f"{p}-{s}" for *_, p, s in BREAKS_RULES]
+)
+def test_built_in_fmu_that_breaks_a_rule_of_ours_fails(
+    old: str, new: str, probe: str, seen: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "Spoilt.fmu"
+    found = 0
+    with (
+        zipfile.ZipFile(build.ensure("BinghamDamper")) as source,
+        zipfile.ZipFile(path, "w") as sink,
+    ):
+        for name in source.namelist():
+            data = source.read(name)
+            if name.endswith("/fmu/slave.py"):
+                found += data.decode().count(old)
+                data = data.decode().replace(old, new).encode()
+            sink.writestr(name, data)
+    assert found == 1
+    report = conform(path, only=[probe])
+    assert report.row(probe).verdict == "fail"
+    assert seen in report.row(probe).seen

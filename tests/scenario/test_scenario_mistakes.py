@@ -1,0 +1,475 @@
+"""Every mistake that a scenario file can hold: found, on its line, with what would be right."""
+
+import tomllib
+from random import Random
+
+import pytest
+from fake_library import FAKE, VALID
+
+from bristle.errors import ScenarioError
+from bristle.scenario.scenario import check_scenario, load_scenario
+
+DAMPER = 'fmu = "LuGreDamper"'
+PARAMETERS = 'parameters = { "gas_spring.on" = true, "gas_spring.k" = 80.0 }'
+
+
+@pytest.fixture
+def findings(tmp_path):
+    """Write a text and check it: (errors as `LINE: text`, the text's lines)."""
+
+    def of(text, level="error"):
+        file = tmp_path / "my.toml"
+        file.write_bytes(text if isinstance(text, bytes) else text.encode())
+        before = sorted(tmp_path.iterdir())
+        found = check_scenario(file, library=FAKE)
+        assert sorted(tmp_path.iterdir()) == before  # a check writes nothing
+        return [finding for finding in found if finding.level == level]
+
+    return of
+
+
+def where(text, mark):
+    """Return the number of the line that holds a mark."""
+    return next(n for n, line in enumerate(text.splitlines(), 1) if mark in line)
+
+
+# (what, text of the valid file, what stands there instead, the mark of the line, words)
+MISTAKES = [
+    # the file's own keys
+    ("schema missing", "schema = 1\n", "", None, ["write schema = 1"]),
+    ("schema of the future", "schema = 1", "schema = 2", "schema", ["reads schema = 1"]),
+    ("schema true", "schema = 1", "schema = true", "schema", ["schema is true"]),
+    ("title a number", 'title = "El Centro, LuGre damper at 4 V"', "title = 4", "title",
+     ["title is 4; a text in quotes is right"]),
+    ("unknown table", "[run]", "[runn]", "[runn]", ['no key "runn"', 'Did you mean "run"?']),
+    ("run missing", "[run]\nstop = 35.0\nstep = 0.002\nalgorithm = \"gauss-seidel\"\n", "", None,
+     ["[run] is missing"]),
+    ("run no table", "[run]\nstop = 35.0\nstep = 0.002\nalgorithm = \"gauss-seidel\"", "run = 3",
+     "run = 3", ["[run] is 3, not a table"]),
+    ("unknown key of the run", "step = 0.002", "step = 0.002\ntolerance = 1", "tolerance",
+     ['[run]: there is no key "tolerance"', "stop, step, algorithm"]),
+    # times
+    ("stop missing", "stop = 35.0\n", "", "[run]", ["[run] stop is missing"]),
+    ("step missing", "step = 0.002\n", "", "[run]", ["[run] step is missing"]),
+    ("stop zero", "stop = 35.0", "stop = 0.0", "stop", ["stop = 0 s", "above 0 s is right"]),
+    ("stop negative", "stop = 35.0", "stop = -1", "stop", ["stop = -1 s"]),
+    ("stop nan", "stop = 35.0", "stop = nan", "stop", ["nan, not a finite number"]),
+    ("stop inf", "stop = 35.0", "stop = +inf", "stop", ["inf, not a finite number"]),
+    ("stop true", "stop = 35.0", "stop = true", "stop", ["stop is true, not a number"]),
+    ("stop text", "stop = 35.0", 'stop = "35.0"', "stop", ["a number stands without quotes"]),
+    ("stop words", "stop = 35.0", 'stop = "all"', "stop", ['the text "all", not a number']),
+    ("stop a list", "stop = 35.0", "stop = [35.0]", "stop", ["is a list, not a number"]),
+    ("stop a date", "stop = 35.0", "stop = 2020-01-01", "stop", ["not a number"]),
+    ("stop beyond float", "stop = 35.0", "stop = 1" + 400 * "0", "stop", ["beyond all bounds"]),
+    ("step zero", "step = 0.002", "step = 0", "step =", ["step = 0 s"]),
+    ("step negative", "step = 0.002", "step = -0.002", "step =", ["step = -0.002 s"]),
+    ("step nan", "step = 0.002", "step = nan", "step =", ["not a finite number"]),
+    ("step text", "step = 0.002", 'step = "2 ms"', "step =", ['the text "2 ms", not a number']),
+    ("stop no whole number of steps", "stop = 35.0", "stop = 35.001", "stop",
+     ["17500.5", "stop = 35 or 35.002."]),
+    ("step does not fit", "step = 0.002", "step = 0.003", "stop", ["stop = 34.998 or 35.001."]),
+    ("stop shorter than a step", "stop = 35.0", "stop = 0.001", "stop", ["stop = 0.002."]),
+    ("too many steps", "step = 0.002", "step = 1e-9", "step =",
+     ["3.5e+10 steps", "GB of results", "a step from"]),
+    ("steps beyond counting", "step = 0.002", "step = 1e-320", "step =", ["inf steps"]),
+    ("algorithm", '"gauss-seidel"', '"gauss_seidel"', "algorithm",
+     ['no algorithm "gauss_seidel"', 'Did you mean "gauss-seidel"?']),
+    ("algorithm unlike any", '"gauss-seidel"', '"euler"', "algorithm",
+     ["There are: gauss-seidel, jacobi."]),
+    ("algorithm a number", '"gauss-seidel"', "1", "algorithm", ['"gauss-seidel" or "jacobi"']),
+    # components
+    ("components no table", VALID[VALID.index("[components.ground]"):], "[[components]]\n",
+     "components", ["is a list, not a table"]),
+    ("no components", VALID[VALID.index("[components.ground]"):], "[components]\n", "components",
+     ["no components", "[components.NAME]"]),
+    ("component no table", "[connections]", "[components]\nx = 1\n[connections]", "x = 1",
+     ["[components.x] is 1, not a table"]),
+    ("component with a dot", "[connections]",
+     '[components."a.b"]\nfmu = "Structure"\nparameters = { ground_acceleration = 0, '
+     "damper_force = 0 }\n[connections]", '"a.b"', ["cannot be called so"]),
+    ("component called run", "[connections]",
+     '[components.run]\nfmu = "ConstantVoltage"\n[connections]', "[components.run]",
+     ["cannot be called so"]),
+    ("component with no name", "[connections]",
+     '[components.""]\nfmu = "ConstantVoltage"\n[connections]', '""', ["cannot be called so"]),
+    ("fmu missing", f"{DAMPER}\n", "", "[components.damper]", ["fmu is missing"]),
+    ("fmu a number", DAMPER, "fmu = 3", "fmu = 3", ["fmu is 3"]),
+    ("fmu empty", DAMPER, 'fmu = ""', 'fmu = ""', ["a built-in name or the path"]),
+    ("unknown built-in", DAMPER, 'fmu = "LugreDampr"', "LugreDampr",
+     ['no built-in FMU "LugreDampr"', 'Did you mean "LuGreDamper"?']),
+    ("no such FMU file", DAMPER, 'fmu = "my/own.fmu"', "my/own.fmu", ['no file "my/own.fmu"']),
+    ("FMU file with a null", DAMPER, 'fmu = "a\\u0000.fmu"', "a\\u0000", ["null character"]),
+    ("unknown key of a component", DAMPER, f"{DAMPER}\nstepp = 1", "stepp",
+     ['no key "stepp"', 'Did you mean "step"?']),
+    ("parameter beside its table", DAMPER, f"{DAMPER}\nsigma_1 = 4.0", "sigma_1",
+     ['"sigma_1" belongs into its parameters']),
+    ("parameters no table", PARAMETERS, "parameters = 3", "parameters = 3", ["not a table"]),
+    ("building of a damper", DAMPER, f'{DAMPER}\nbuilding = "my.toml"', "building",
+     ['only the built-in "Structure"']),
+    ("building not there", 'fmu = "Structure"', 'fmu = "Structure"\nbuilding = "hous.toml"',
+     "building", ['no file "hous.toml"']),
+    ("building a number", 'fmu = "Structure"', 'fmu = "Structure"\nbuilding = 2', "building",
+     ["building is 2; the path of a TOML file"]),
+    # a component's own step
+    ("component step does not divide", DAMPER, f"{DAMPER}\nstep = 0.0015", "0.0015",
+     ["does not divide", "0.002 or 0.001"]),
+    ("component step longer than the run's", DAMPER, f"{DAMPER}\nstep = 0.004", "0.004",
+     ["does not divide", "0.002 or 0.001"]),
+    ("component step negative", DAMPER, f"{DAMPER}\nstep = -0.001", "-0.001",
+     ["[components.damper] step = -0.001 s"]),
+    ("component step text", DAMPER, f'{DAMPER}\nstep = "0.001"', '"0.001"', ["without quotes"]),
+    ("component step absurd", DAMPER, f"{DAMPER}\nstep = 1e-12", "1e-12", ["at most 10000"]),
+    # parameters
+    ("unknown parameter", '"gas_spring.k"', '"gas_sprng.k"', "gas_sprng",
+     ['no parameter "gas_sprng.k"', 'Did you mean "gas_spring.k"?']),
+    ("parameter of text", '"gas_spring.k" = 80.0', '"gas_spring.k" = "80"', "gas_spring.k",
+     ["damper.gas_spring.k is the text", "without quotes", "in N/m"]),
+    ("parameter true", '"gas_spring.k" = 80.0', '"gas_spring.k" = true', "gas_spring.k",
+     ["is true, not a number"]),
+    ("parameter inf", '"gas_spring.k" = 80.0', '"gas_spring.k" = inf', "gas_spring.k",
+     ["not a finite number"]),
+    ("switch a number", '"gas_spring.on" = true', '"gas_spring.on" = 1', "gas_spring.on",
+     ["true or false is right"]),
+    ("parameter below", '"gas_spring.k" = 80.0', '"gas_spring.k" = -1.0', "gas_spring.k",
+     ["-1 N/m lies below 0 N/m", "0 to 100000 N/m is right"]),
+    ("parameter above", '"gas_spring.k" = 80.0', '"gas_spring.k" = 1e9', "gas_spring.k",
+     ["1e+09 N/m lies above 100000 N/m"]),
+    ("open bound", PARAMETERS, "parameters = { v_max = -8.0 }", "v_max", ["0 V or more is right"]),
+    ("text a number", 'record = "el_centro_1940_ns"', "record = 1940", "record",
+     ["record is 1940; a text in quotes is right"]),
+    ("text with a null", 'record = "el_centro_1940_ns"', 'record = "a\\u0000"', "record",
+     ["null character"]),
+    ("unknown record", "el_centro_1940_ns", "northridge.csv", "record",
+     ['ground.record: record "northridge.csv"']),
+    ("output as parameter", PARAMETERS, "parameters = { force = 1.0 }", "force = 1.0",
+     ["damper.force is an output; only parameters and inputs can be set"]),
+    ("twice, with and without quotes", PARAMETERS,
+     'parameters = { "gas_spring.on" = true, gas_spring.on = true }', "gas_spring.on",
+     ["set twice, with and without quotes"]),
+    # connections
+    ("connections no table", VALID[VALID.index("[connections]"):], "[[connections]]\n",
+     "connections", ["is a list, not a table"]),
+    ("source misspelt", "damper.force", "damper.forc", "damper.forc",
+     ['no output "forc"', 'Did you mean "force"?']),
+    ("target misspelt", '"damper.velocity" =', '"damper.velocty" =', "velocty",
+     ['no input "velocty"', 'Did you mean "velocity"?']),
+    ("component misspelt", '"voltage.voltage"', '"volts.voltage"', "volts",
+     ['no component "volts"', "ground, structure, voltage, damper"]),
+    ("no port", '"voltage.voltage"', '"voltage"', '= "voltage"', ['"voltage" is no port']),
+    ("empty port", '"voltage.voltage"', '"voltage."', '"voltage."', ["is no port"]),
+    ("units differ", '"damper.velocity" = "structure.base_velocity"',
+     '"damper.velocity" = "structure.base_displacement"', "damper.velocity",
+     ['"damper.velocity" [m/s] is fed by "structure.base_displacement" [m]', "another quantity"]),
+    ("output fed by output", '"structure.damper_force" = "damper.force"',
+     '"damper.dissipated_energy" = "damper.force"\n"structure.damper_force" = "damper.force"',
+     "dissipated_energy", ['"damper.dissipated_energy" is an output; an input stands on the left']),
+    ("input fed by input", '"voltage.voltage"', '"structure.extra_force"', "extra_force",
+     ['"structure.extra_force" is an input; an output stands on the right']),
+    ("the wrong way round", '"damper.voltage" = "voltage.voltage"',
+     '"voltage.voltage" = "damper.voltage"', '"voltage.voltage"',
+     ["the wrong way round", '"damper.voltage" = "voltage.voltage"']),
+    ("parameter connected", '"damper.voltage" =',
+     '"damper.v_max" = "voltage.voltage"\n"damper.voltage" =',
+     "v_max", ['"damper.v_max" is a parameter, which cannot be connected']),
+    ("whole number into real", '"voltage.voltage"', '"ground.fault"', "ground.fault",
+     ['"damper.voltage" is Real and "ground.fault" is Integer']),
+    ("two sources in a list", '"voltage.voltage"', '["voltage.voltage", "ground.fault"]',
+     '"damper.voltage"', ["an input has one source", "extra_force"]),
+    ("source a number", '"voltage.voltage"', "4.0", '"damper.voltage"', ["is fed by 4.0"]),
+    ("connected twice, with and without quotes", '"damper.voltage" =',
+     'damper.voltage = "voltage.voltage"\n"damper.voltage" =', '"damper.voltage" =',
+     ['"damper.voltage" has two sources']),
+    ("connected and set", PARAMETERS, "parameters = { voltage = 2.0 }", '"damper.voltage"',
+     ["connected here and set in the parameters of damper"]),
+    ("input open", '"damper.voltage" = "voltage.voltage"\n', "", "[components.damper]",
+     ['"damper.voltage" [V] has no source', '"damper.voltage" = "voltage.voltage"',
+      "or set it in the parameters"]),
+    ("holding force without mass", '"damper.voltage" = "voltage.voltage"',
+     '"damper.voltage" = "voltage.voltage"\n"damper.holding_force" = "structure.holding_force"',
+     "holding_force", ["moving_mass is 0", "in kg"]),
+    ("mass without holding force", PARAMETERS, "parameters = { moving_mass = 1.9693563369446 }",
+     "moving_mass", ["without holding_force", '"damper.holding_force"']),
+    # TOML itself
+    ("no TOML", "step = 0.002", "step == 0.002", "step =", ["not TOML", "step == 0.002"]),
+    ("decimal comma", "step = 0.002", "step = 0,002", "step =", ["not TOML", "one key = value"]),
+    ("no quotes", '"gauss-seidel"', "gauss-seidel", "algorithm", ["text stands in quotes"]),
+    ("broken inline table", '{ "gas_spring.on" = true,', '{ "gas_spring.on" = true,\n',
+     "gas_spring.on", ["stays on one line"]),
+    ("backslash", "el_centro_1940_ns", "C:\\my\\rec.csv", "record", ["single quotes"]),
+    ("key twice", "stop = 35.0", "stop = 35.0\nstop = 36.0", "stop = 36.0",
+     ['"run.stop" is written twice, first in line 5']),
+    ("component twice", "[connections]", "[components.damper] # again\nfmu = 'x'\n[connections]",
+     "# again", ['"components.damper" is written twice, first in line 20']),
+    ("connection twice", '"damper.voltage" =',
+     '"damper.voltage" = "ground.fault"\n"damper.voltage" =',
+     '"voltage.voltage"', ['"connections.damper.voltage" is written twice']),
+    ("cut off", VALID[VALID.index('"damper.voltage"'):], '"damper.voltage', '"damper.voltage',
+     ["not TOML"]),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "mark", "words"), [case[1:] for case in MISTAKES], ids=[c[0] for c in MISTAKES]
+)
+def test_a_mistake_is_found_on_its_line_with_what_would_be_right(findings, old, new, mark, words):
+    assert old in VALID
+    text = VALID.replace(old, new, 1)
+    errors = findings(text)
+    line = where(text, mark) if mark else 0
+    told = [f"{error.line}: {error.text}" for error in errors]
+    assert any(
+        error.line == line and all(word in error.text for word in words) for error in errors
+    ), told
+
+
+@pytest.mark.parametrize(
+    ("raw", "line", "words"),
+    [
+        (VALID.encode("utf-16"), 1, "not UTF-8"),
+        (VALID.replace("El Centro", "Él Centro").encode("latin-1"), 2, "not UTF-8"),
+        (b"\0" * 100, 1, "not TOML"),
+        (b"", 0, "schema is missing"),
+        (VALID.encode() + b"\n# " + b"x" * 10_000_000, 0, "larger than 1000 kB"),
+        (b"a = " + b"[" * 100_000, 0, "nested too deeply"),
+        (b"a = " + b"9" * 5_000, 1, "not TOML"),
+        (VALID.replace("\n", "\r").encode(), 1, "not TOML"),
+        (b"\xef\xbb\xbf\xef\xbb\xbf" + VALID.encode(), 1, "not TOML"),
+    ],
+    ids=["UTF-16", "Latin-1", "nulls", "empty", "10 MB", "deep", "digits", "CR", "two BOMs"],
+)
+def test_a_file_that_is_no_scenario_is_refused_in_one_finding(findings, raw, line, words):
+    found = findings(raw)
+    assert words in found[0].text
+    assert found[0].line == line
+
+
+def test_a_folder_and_a_missing_file_are_findings(tmp_path):
+    assert "is a folder" in check_scenario(tmp_path, library=FAKE)[0].text
+    missing = check_scenario(tmp_path / "none.toml", library=FAKE)
+    assert [finding.level for finding in missing] == ["error"]
+    assert "there is no scenario file" in missing[0].text
+
+
+def test_a_file_that_may_not_be_read_is_a_finding(tmp_path, monkeypatch):
+    file = tmp_path / "my.toml"
+    file.write_text(VALID)
+
+    def refuse(*_, **__):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("pathlib.Path.open", refuse)  # root may read anything: chmod is no test
+    (finding,) = check_scenario(file, library=FAKE)
+    assert finding == (0, "error", "cannot be read: Permission denied.")
+
+
+def test_all_mistakes_of_a_file_are_told_at_once(tmp_path):
+    text = VALID
+    wrong = [
+        ("stop = 35.0", "stop = -1.0"),
+        ('"gauss-seidel"', '"gaus-seidel"'),
+        ("peak = 5.886", "peek = 5.886"),
+        ("level = 4.0", 'level = "4.0"'),
+        ('fmu = "Structure"', 'fmu = "Struktur"'),
+        ('"gas_spring.k" = 80.0', '"gas_spring.k" = -80.0'),
+        ('"damper.voltage" = "voltage.voltage"', '"damper.voltage" = "voltage.fault"'),
+        ('"damper.velocity" = "structure.base_velocity"\n', ""),
+    ]
+    for old, new in wrong:
+        text = text.replace(old, new)
+    file = tmp_path / "my.toml"
+    file.write_text(text)
+    with pytest.raises(ScenarioError) as raised:
+        load_scenario(file, library=FAKE)
+    head, *told = str(raised.value).splitlines()
+    assert head == f"{file}: 8 mistakes"
+    words = [
+        "stop = -1",
+        "gaus-seidel",
+        "peek",
+        "Struktur",
+        "level",
+        '"damper.velocity"',
+        "-80",
+        "fault",
+    ]
+    assert len(told) == len(words)
+    lines = []
+    for line, word in zip(told, words, strict=True):
+        assert line.strip().startswith(f"{file}:")
+        assert word in line
+        lines.append(int(line.split(":")[1]))
+    assert lines == sorted(lines)
+
+
+def test_one_mistake_is_one_line(tmp_path):
+    file = tmp_path / "my.toml"
+    file.write_text(VALID.replace("level", "levle"))
+    with pytest.raises(ScenarioError) as raised:
+        load_scenario(file, library=FAKE)
+    assert str(raised.value) == (
+        f'{file}:18: [components.voltage]: there is no parameter "levle". '
+        'Did you mean "level"? There are: level.'
+    )
+
+
+WITHOUT_RUN = "run = 1\n" + VALID.replace(
+    VALID[VALID.index("[run]") : VALID.index("[components")], ""
+)
+WITHOUT_CONNECTIONS = "connections = 1\n" + VALID[: VALID.index("[connections]")]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        VALID.replace(DAMPER, 'fmu = "Dampr"'),
+        VALID.replace('"damper.velocity" =', '"damper.velocty" ='),
+        VALID.replace(
+            '"damper.voltage" = "voltage.voltage"', '"voltage.voltage" = "damper.voltage"'
+        ),
+        WITHOUT_RUN,
+    ],
+    ids=["component", "misspelt", "wrong way round", "run"],
+)
+def test_what_follows_from_a_mistake_is_not_told_again(findings, text):
+    assert len(findings(text)) == 1
+
+
+def test_connections_that_are_no_table_are_told_once(findings):
+    assert [error.text for error in findings(WITHOUT_CONNECTIONS)] == [
+        "[connections] is 1, not a table."
+    ]
+
+
+def test_a_wrong_building_is_named_with_its_file(findings, tmp_path):
+    (tmp_path / "wrong.toml").write_text("x")
+    text = VALID.replace('fmu = "Structure"', 'fmu = "Structure"\nbuilding = "wrong.toml"')
+    (error,) = findings(text)
+    assert error.line == where(text, "building")
+    assert str(tmp_path / "wrong.toml") in error.text
+    assert "must be positive" in error.text
+
+
+def test_a_building_of_another_name_is_suggested(findings, tmp_path):
+    (tmp_path / "house.toml").write_text("x")
+    text = VALID.replace('fmu = "Structure"', 'fmu = "Structure"\nbuilding = "hous.toml"')
+    assert 'Did you mean "house.toml"?' in findings(text)[0].text
+
+
+TOKENS = """[ [[ ] { } = . , " ' \"\"\" # 1 -1 1e400 nan true [] {} "" a.b run damper é \\ \0"""
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_no_damage_to_a_file_breaks_the_check(findings, seed):
+    """What is no TOML is one finding with its line; the rest is checked to the end."""
+    random = Random(seed)
+    text = VALID
+    for _ in range(random.randint(1, 3)):
+        at = random.randrange(len(text))
+        cut = random.choice((0, 0, 1, 5))
+        text = text[:at] + random.choice([*TOKENS.split(" "), "\n"]) + text[at + cut :]
+    try:
+        tomllib.loads(text)
+    except tomllib.TOMLDecodeError:
+        (error,) = findings(text)
+        assert 1 <= error.line <= len(text.splitlines()) + 1
+    else:
+        lines = [error.line for error in findings(text)]
+        assert lines == sorted(lines)
+        assert all(0 <= line <= len(text.splitlines()) for line in lines)
+
+
+# Signals
+
+SIGNAL = 'fmu = "SignalSource"\nparameters = { KEYS }'
+
+
+def with_signal(keys):
+    text = VALID.replace(
+        'fmu = "ConstantVoltage"\nparameters = { level = 4.0 }', SIGNAL.replace("KEYS", keys)
+    )
+    return text.replace('"voltage.voltage"', '"voltage.value"')
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ('kind = "sin"', 'voltage.kind = "sin"; Did you mean "sine"? There are: constant, sine'),
+        ("kind = 1", "voltage.kind is 1; a text in quotes is right"),
+        ('kind = "csv"', 'voltage.file is missing: kind = "csv" reads a file'),
+        ('kind = "csv", file = "nix.csv"', 'voltage.file: there is no file "nix.csv"'),
+        ('kind = "csv", file = "bad.csv"', "bad.csv"),
+        ('kind = "steps", steps = "0:0 1"', 'voltage.steps: "1" is not TIME:VALUE'),
+        ('kind = "steps", steps = "0:0 0:1"', "voltage.steps: the time 0 s does not follow 0 s"),
+        ('kind = "steps", steps = ""', "voltage.steps: no pair"),
+        ("seed = 1.0", "voltage.seed is 1.0; a whole number is right"),
+        ("seed = -1", "voltage.seed = -1 lies below 0; 0 or more is right"),
+        ("seed = 4294967296", "FMI holds whole numbers from -2147483648 to 2147483647"),
+        ("seed = true", "voltage.seed is true; a whole number is right"),
+    ],
+)  # fmt: skip
+def test_wrong_signals(findings, tmp_path, keys, words):
+    (tmp_path / "bad.csv").write_text("time [s],value\n0,0\n1,one\n")
+    text = with_signal(keys)
+    errors = findings(text)
+    assert len(errors) == 1
+    for word in words.split("; "):
+        assert word in errors[0].text
+    assert errors[0].line == where(text, "parameters = { " + keys)
+
+
+def test_a_right_signal_leaves_one_note_on_its_unit(findings, tmp_path):
+    (tmp_path / "signal.csv").write_text("time [s],value [V]\n0,0\n1,4\n2,0\n")
+    for keys in ('kind = "csv", file = "signal.csv"', 'kind = "steps", steps = "0:0 1:2.5 3:4"'):
+        assert findings(with_signal(keys)) == []
+        (note,) = findings(with_signal(keys), "note")
+        assert note.text == '"voltage.value" has no unit; "damper.voltage" takes its values as [V].'
+
+
+# Foreign FMUs
+
+
+@pytest.fixture
+def foreign(findings, tmp_path):
+    def of(name, level="error", extra=""):
+        (tmp_path / name).write_text("the fake library goes by names")
+        text = VALID.replace(
+            "[connections]", f'[components.mine]\nfmu = "./{name}"\n\n[connections]\n{extra}'
+        )
+        return [finding.text for finding in findings(text, level)]
+
+    return of
+
+
+FORCE = '"structure.extra_force" = "mine.force"\n'
+
+
+def test_an_fmu_that_cannot_be_opened_is_named(foreign):
+    (error,) = foreign("broken.fmu")
+    assert "[components.mine]" in error
+    assert "no zip archive" in error
+
+
+def test_another_unit_of_the_same_quantity_is_refused(foreign):
+    (error,) = foreign("kilonewton.fmu", extra=FORCE)
+    assert '"structure.extra_force" [N] is fed by "mine.force" [kN]' in error
+    assert "nothing converts it" in error
+
+
+def test_an_unknown_unit_is_a_warning(foreign):
+    assert foreign("furlong.fmu", extra=FORCE) == []
+    (warning,) = foreign("furlong.fmu", "warning", extra=FORCE)
+    assert '"furlong" is not known here' in warning
+
+
+def test_an_input_without_unit_takes_anything_and_says_so(foreign):
+    extra = '"mine.u" = "damper.force"\n'
+    assert foreign("once.fmu", extra=extra) == []
+    assert foreign("once.fmu", "note", extra=extra) == [
+        '"mine.u" names no unit; it takes "damper.force" in [N] as it comes.'
+    ]
+
+
+def test_an_fmu_that_lives_once_cannot_be_two_components(foreign):
+    again = '"structure.extra_force" = "mine.force"\n[components.twin]\nfmu = "once.fmu"\n[x]\n'
+    errors = foreign("once.fmu", extra=again)
+    assert any("once.fmu can live once in a process" in error for error in errors)

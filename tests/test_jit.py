@@ -1,0 +1,97 @@
+"""Compiled code is kept on disk, and never outlives the source that it was made from."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+import bristle
+from bristle.jit import digest
+
+PACKAGE = Path(bristle.__file__).resolve().parent
+OLD = "return p.preload + q.x * (p.k + q.x * (p.k_2 + q.x * p.k_3))"
+NEW = "return p.preload + 3.0 * q.x * p.k"
+
+# The force is called through a function in another file than its own, as the march does.
+PROGRAM = """
+import json
+from collections import namedtuple
+from pathlib import Path
+
+from bristle.jit import compiled, digest
+from bristle.simulate.march import march
+from bristle.physics.effects.gas_spring import GasSpring
+
+Motion = namedtuple("Motion", "x")
+Values = namedtuple("Values", "preload k k_2 k_3")
+spring = GasSpring.force
+
+
+def pull(x):
+    return spring(Motion(x), 0.0, Values(1.0, 80.0, 0.0, 0.0))
+
+
+fast = compiled(pull)
+force = fast(0.01)
+hits = sum(fast.stats.cache_hits.values())
+file = digest.__code__.co_filename
+print(json.dumps({"force": force, "hits": hits, "march": digest(march), "file": file}))
+"""
+
+
+@pytest.fixture
+def edited(tmp_path: Path) -> Any:
+    """Return a function that runs the program on a copy of the package with an effect replaced."""
+    copy = tmp_path / "library" / "bristle"
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(PACKAGE, copy, ignore=ignored)
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM, encoding="utf-8")
+    effect = copy / "physics" / "effects" / "gas_spring.py"
+    original = effect.read_text(encoding="utf-8")
+    assert OLD in original
+    environment = {
+        **os.environ, "PYTHONPATH": str(copy.parent), "PYTHONDONTWRITEBYTECODE": "1",
+        "BRISTLE_CACHE": str(tmp_path / "cache"),
+    }  # fmt: skip
+
+    def run(line: str) -> dict[str, Any]:
+        effect.write_text(original.replace(OLD, line), encoding="utf-8")
+        done = subprocess.run(
+            [sys.executable, str(program)], env=environment, capture_output=True, text=True,
+            check=True,
+        )  # fmt: skip
+        told: dict[str, Any] = json.loads(done.stdout)
+        assert Path(told["file"]).is_relative_to(copy)
+        return told
+
+    return run
+
+
+def test_an_edited_effect_gives_its_new_force(edited: Any) -> None:
+    first, again, other, back = (edited(line) for line in (OLD, OLD, NEW, OLD))
+    assert first["force"] == pytest.approx(1.0 + 80.0 * 0.01)
+    assert other["force"] == pytest.approx(1.0 + 3.0 * 80.0 * 0.01)
+    assert again["force"] == back["force"] == first["force"]
+    # The march carries every effect, so its folder changes with them.
+    assert first["march"] == again["march"] == back["march"] != other["march"]
+    # And what was compiled once is not compiled again.
+    assert [told["hits"] for told in (first, again, other, back)] == [0, 1, 0, 1]
+
+
+def test_the_same_code_in_another_module_has_machine_code_of_its_own() -> None:
+    text = "def twice(x):\n    return 2.0 * x\n"
+    found = []
+    for name in ("of_one_folder.effect", "of_another.effect", "of_one_folder.effect"):
+        module = ModuleType(name)
+        exec(text, module.__dict__)
+        found.append(digest(module.twice))
+    assert found[0] == found[2] != found[1]
