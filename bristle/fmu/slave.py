@@ -31,6 +31,7 @@ from pythonfmu import (
 from pythonfmu.enums import Fmi2Status
 
 from .. import units
+from ..component import OVER_STEP
 from ..physics.effect import Parameter, effects_of
 
 BAKED = "baked.json"
@@ -45,7 +46,7 @@ FAULTS = {
     BAD_PARAMETER: "a parameter or record is wrong",
 }
 
-_INSTANTIATED, _INITIALISING, _STEPPING, _TERMINATED = range(4)
+_INSTANTIATED, _INITIALISING, STEPPING, _TERMINATED = range(4)
 
 
 class _Slot:
@@ -86,6 +87,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._bounds: dict[str, tuple[float | None, float | None, float | None]] = {}
         self._depends: dict[str, tuple[str, ...]] = {}
         self._optional: list[str] = []
+        self._over_step: dict[str, str] = {}
         self._inputs: list[int] = []
         self._outputs: list[int] = []
         self._parameters: set[int] = set()
@@ -137,9 +139,22 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     # -- declaring
 
     def add_input(
-        self, name: str, unit: str, text: str, *, start: float = 0.0, optional: bool = False
+        self,
+        name: str,
+        unit: str,
+        text: str,
+        *,
+        over_step: str,
+        start: float = 0.0,
+        optional: bool = False,
     ) -> None:
-        """Declare a Real input; an optional one may stay unconnected."""
+        """Declare a Real input; an optional one may stay unconnected.
+
+        `over_step` says how it is taken over a step, one of `component.OVER_STEP`.
+        """
+        if over_step not in OVER_STEP:
+            raise TypeError(f"{name}: {over_step!r} is none of {', '.join(OVER_STEP)}.")
+        self._over_step[name] = over_step
         if optional:
             self._optional.append(name)
         self._inputs.append(
@@ -223,11 +238,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """Return the value of a variable by its full name ("gas_spring.k")."""
         return self._values[self._index[name]]
 
-    @property
-    def stepping(self) -> bool:
-        """Whether initialisation is over."""
-        return self._mode == _STEPPING
-
     def was_set(self, name: str) -> bool:
         """Return whether the host has ever set this variable."""
         return self._index[name] in self._set
@@ -255,7 +265,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             return
         self._unbuilt = self._stale = True
         self._follow(final=True)
-        self._mode = _STEPPING
+        self._mode = STEPPING
 
     def terminate(self) -> None:
         self._mode = _TERMINATED
@@ -263,7 +273,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def do_step(self, current_time: float, step_size: float) -> bool:
         if self.fault:
             return False
-        if self._mode != _STEPPING:
+        if self._mode != STEPPING:
             return self._stop(WRONG_MODE, "doStep belongs between initialisation and terminate.")
         if not (step_size > 0.0 and isfinite(step_size) and isfinite(current_time)):
             return self._stop(BAD_STEP, f"time {current_time!r} s, step {step_size!r} s.")
@@ -353,7 +363,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def _put(self, index: int, value: Any) -> None:
         if index in self._parameters:
-            if self._mode in (_STEPPING, _TERMINATED):
+            if self._mode in (STEPPING, _TERMINATED):
                 if value != self._values[index]:
                     kept = f"{self.vars[index].name} keeps {self._values[index]!r}"
                     self.warn_once(f"{kept}: it is fixed after initialisation.")
@@ -400,7 +410,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return [str(self._values[vr]) for vr in self._known(vrs)]
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        if self._mode == _STEPPING:
+        if self._mode == STEPPING:
             inputs, store = self._inputs, self._values
             for vr, value in zip(vrs, values):
                 if vr in inputs:

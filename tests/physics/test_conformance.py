@@ -19,7 +19,7 @@ from bristle import units
 from bristle.errors import ScenarioError
 from bristle.physics.building import paper_building
 from bristle.physics.effect import EFFECTS, HOOKS, SITES, Effect, Q, effects_of
-from bristle.physics.structure import StructureModel
+from bristle.component.structure import StructureModel
 from bristle.scenario.scenario import load_scenario
 from bristle.simulate.run import run
 

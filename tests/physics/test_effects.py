@@ -16,7 +16,7 @@ from bristle.physics import damper
 from bristle.physics.building import paper_building
 from bristle.physics.damper import DamperModel, advances, moving_states
 from bristle.physics.effect import EFFECTS, Effect, Parameter, Q, effects_of
-from bristle.physics.structure import StructureModel
+from bristle.component.structure import StructureModel
 
 both_laws = pytest.mark.parametrize("law", LAWS)
 

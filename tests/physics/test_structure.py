@@ -16,7 +16,8 @@ from scipy.linalg import eigh, expm
 
 from bristle.physics import structure
 from bristle.physics.building import Building, from_data, modes, paper_building
-from bristle.physics.structure import StructureModel, matrices, step_matrices
+from bristle.component.structure import StructureModel
+from bristle.physics.structure import matrices, step_matrices
 
 STEPS = [1e-5, 5e-4, 2e-3, 1e-2, 0.1]
 
