@@ -15,15 +15,15 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 if __package__ in (None, ""):  # `python benchmarks/blind.py` finds only this folder
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from benchmarks import peers
 from benchmarks._blind import plan, record, table, work
+from benchmarks._blind.plan import CASES
 from benchmarks._rows import Row
 
-CASES = 480
 BUILDINGS = 40
 MARK = "<!-- measured -->"
 
@@ -77,8 +77,8 @@ def main(given: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt:
             code = 130
     times = _times(path, measure=arguments.times)
-    rows = table.figures(_lines(path, tasks, "diagnosis"), times)
-    rows += peer_figures(path, tasks)
+    rows = table.figures(work.finished(path, tasks, "diagnosis"), times)
+    rows += peers.figures(work.finished(path, tasks, "peers"))
     table.show(rows)
     conditions = {"seed": seed, "cases": len(tasks), "digests": work.digests()}
     if arguments.json:
@@ -114,11 +114,6 @@ def advance(tasks: list[plan.Task], path: Path, arguments: argparse.Namespace) -
             print(f"\r{number}/{len(jobs)}, {left / 60:.0f} min left  ", end="", file=sys.stderr)
 
 
-def _lines(path: Path, tasks: list[plan.Task], part: str) -> list[dict[str, Any]]:
-    done = record.finished(path, work.digests())[part]
-    return [done[task.key] for task in tasks if task.key in done]
-
-
 def _times(path: Path, measure: bool) -> dict[str, float]:
     """Return the times of fresh processes, kept in the record with the diagnoser's digest."""
     digest = work.digests()["diagnosis"]
@@ -132,13 +127,6 @@ def _times(path: Path, measure: bool) -> dict[str, float]:
     return dict(kept[""]["times"]) if "" in kept else {}
 
 
-def peer_figures(path: Path, tasks: list[plan.Task]) -> list[table.Figure]:
-    """Return the same figures for the methods that users would otherwise try."""
-    from benchmarks import peers
-
-    return peers.figures(_lines(path, tasks, "peers"))
-
-
 def run() -> list[Row]:
     """Return the rows of the last record for `python -m benchmarks`; it runs nothing, for hours."""
     seed = record.newest()
@@ -146,7 +134,7 @@ def run() -> list[Row]:
         return [Row("hidden effects found", "not run yet: python benchmarks/blind.py")]
     tasks = chosen(seed, CASES, BUILDINGS)
     path = record.path_of(seed)
-    lines = _lines(path, tasks, "diagnosis")
+    lines = work.finished(path, tasks, "diagnosis")
     rows = table.figures(lines, _times(path, measure=False))
     return [
         Row(row.name, f"{row.text()} ({row.counts})", row.goal, row.ratio)

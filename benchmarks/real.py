@@ -21,7 +21,8 @@ from numpy.typing import NDArray
 if __package__ in (None, ""):  # `python benchmarks/real.py` finds only this folder
     sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from bristle.data.measurement import ChannelSpec, Measurement, read_measurement, read_measurements
+from bristle.data.channels import ChannelSpec
+from bristle.data.measurement import Measurement, read_measurement, read_measurements
 from bristle.diagnose import Diagnosis, diagnose
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.mended import mended

@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from .batch import ensemble as ensemble
+    from .batch.execute import ensemble as ensemble
     from .simulate.run import run as run
 
-_LAZY = {"ensemble": "batch", "run": "simulate.run"}
+_LAZY = {"ensemble": "batch.execute", "run": "simulate.run"}
 
 __all__ = ["__version__", "ensemble", "run"]
 
@@ -24,3 +24,7 @@ def __getattr__(name: str) -> object:
     if name in _LAZY:
         return getattr(import_module(f".{_LAZY[name]}", __name__), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 from scipy.signal import butter, lfilter
 
-from bristle.data.channels import channel_unit
-from bristle.data.measurement import ChannelSpec, measurements_of_frame
+from bristle.data.channels import ChannelSpec, channel_unit
+from bristle.data.measurement import measurements_of_frame
 from bristle.physics.building import from_data
 from bristle.physics.structure import matrices, step_matrices
 

@@ -11,12 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import blind, peers
+from benchmarks import blind
 from benchmarks._blind import (
     building,
     cases,
     forms,
     inseparable,
+    methods,
     plan,
     record,
     score,
@@ -401,19 +402,19 @@ def test_stlsq_finds_the_terms_that_are_there():
     rng = np.random.default_rng(2)
     columns = rng.standard_normal((500, 6))
     target = 0.8 * columns[:, 1] - 0.3 * columns[:, 4] + 0.01 * rng.standard_normal(500)
-    theta = peers.stlsq(columns, target, 0.1)
+    theta = methods.stlsq(columns, target, 0.1)
     assert np.flatnonzero(theta).tolist() == [1, 4]
     assert theta[[1, 4]] == pytest.approx([0.8, -0.3], abs=0.01)
-    assert not np.any(peers.stlsq(columns, target, 10.0))
+    assert not np.any(methods.stlsq(columns, target, 10.0))
 
 
 def test_correlations_of_white_noise_stay_inside_the_textbook_bounds():
     rng = np.random.default_rng(3)
     n = 20000
-    found = peers.correlations(rng.standard_normal(n), [rng.standard_normal(n)])
+    found = methods.correlations(rng.standard_normal(n), [rng.standard_normal(n)])
     assert np.mean(np.abs(found) > 2.58 / np.sqrt(n)) <= 0.06
     walk = np.cumsum(rng.standard_normal(n))
-    assert peers.correlations(walk, [])[0] > 0.9
+    assert methods.correlations(walk, [])[0] > 0.9
 
 
 @pytest.mark.parametrize(

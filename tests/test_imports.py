@@ -15,24 +15,21 @@ from bristle.fmu.build import _library_files
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "bristle"
 
-# Each layer imports from those above it in this list, or from beside it, never from below.
-LAYERS = (
+# A base, two columns that do not see each other, and a roof over both. Within each of them a layer
+# imports from those before it in its list, never from beside it or from behind it.
+BASE = (
     {"errors", "resources", "interrupt", "progress"},
-    {"units"},
-    {"physics", "control"},
-    {"fmu", "records", "design"},
-    {"results", "cosim"},
-    {"compiled", "output"},
-    {"identify"},
-    {"compare"},
-    {"diagnose"},
-    {"study"},
-    {"run"},
-    {"ensemble", "optimise"},
-    {"report"},
-    {"cli"},
+    {"units", "lines"},
+    {"physics", "findings"},
+    {"control", "data", "jit"},
+    {"component"},
+    {"draw", "check"},
 )
-PLAIN = ("physics", "control", "units", "errors")
+SIMULATE = ({"fmu"}, {"scenario", "conformance", "design"}, {"simulate"}, {"batch"})
+MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
+ROOF = ({"study"}, {"bridge"}, {"report"}, {"paper"}, {"cli"})
+STOREYS: tuple[tuple[tuple[set[str], ...], ...], ...] = ((BASE,), (SIMULATE, MEASURE), (ROOF,))
+PLAIN = ("physics", "control", "component", "units", "errors")
 """What imports the standard library alone."""
 
 SKIPPED = {".git", "fmus", "__pycache__", "build", "dist", "results", "node_modules", "site"}
@@ -45,8 +42,7 @@ def sources(folder: Path) -> list[Path]:
 
 def imported(path: Path, *, types: bool = False) -> Iterator[str]:
     """Yield the full names of imported modules; those for type checkers alone only with `types`."""
-    inside = PACKAGE in path.parents
-    package = [PACKAGE.name, *path.relative_to(PACKAGE).parts[:-1]] if inside else []
+    package = list(path.relative_to(ROOT).parts[:-1])
     tree = ast.parse(path.read_text(encoding="utf-8"))
     checked = {
         id(node)
@@ -63,10 +59,15 @@ def imported(path: Path, *, types: bool = False) -> Iterator[str]:
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else []
             stem = ".".join([*base, *(node.module or "").split(".")]).strip(".")
-            if stem == PACKAGE.name:  # from . import units
-                yield from (f"{stem}.{alias.name}" for alias in node.names)
-            else:
-                yield stem
+            for alias in node.names:  # from . import units; from ..physics import damper
+                name = f"{stem}.{alias.name}"
+                yield name if is_module(name) else stem
+
+
+def is_module(name: str) -> bool:
+    """Return whether a full name is that of a module or package of ours."""
+    path = ROOT.joinpath(*name.split("."))
+    return path.with_suffix(".py").is_file() or (path / "__init__.py").is_file()
 
 
 def unit_of(name: str) -> str | None:
@@ -75,38 +76,85 @@ def unit_of(name: str) -> str | None:
     return parts[1] if parts[0] == PACKAGE.name and len(parts) > 1 else None
 
 
+def modules(folder: Path = PACKAGE) -> dict[str, set[str]]:
+    """Return which module of a package imports which others of it, by full names."""
+    edges: dict[str, set[str]] = {}
+    for path in sorted(folder.rglob("*.py")):
+        parts = path.relative_to(folder.parent).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        edges[name] = {other for other in imported(path) if other != name}
+    return {name: others & set(edges) for name, others in edges.items()}
+
+
 def graph() -> dict[str, set[str]]:
     """Return which part of the package imports which."""
     edges: dict[str, set[str]] = {}
-    for path in sorted(PACKAGE.rglob("*.py")):
-        part = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
-        if part != "__init__":
-            found = {unit_of(name) for name in imported(path)}
-            edges.setdefault(part, set()).update(found - {None, part, "__version__"})
+    for name, others in modules().items():
+        part = unit_of(name)
+        if part:
+            found = {unit_of(other) for other in others}
+            edges.setdefault(part, set()).update({other for other in found if other} - {part})
     return edges
 
 
-def test_imports_follow_the_layers() -> None:
-    rank = {part: i for i, layer in enumerate(LAYERS) for part in layer}
-    upward = [
-        f"{part} imports {other}"
-        for part, others in graph().items()
-        for other in others
-        if part in rank and other in rank and rank[other] > rank[part]
-    ]
-    assert not upward
+def places() -> dict[str, tuple[int, int, int]]:
+    """Return where each part is: its storey, its column there, its layer in the column."""
+    return {
+        part: (storey, column, layer)
+        for storey, columns in enumerate(STOREYS)
+        for column, layers in enumerate(columns)
+        for layer, parts in enumerate(layers)
+        for part in parts
+    }
 
 
-def test_no_parts_of_the_package_import_each_other() -> None:
-    edges = graph()
+def in_circles(edges: dict[str, set[str]]) -> list[str]:
+    """Return the nodes from which a way leads back to themselves."""
 
-    def reach(part: str, seen: set[str]) -> set[str]:
-        for other in edges.get(part, set()) - seen:
+    def reach(name: str, seen: set[str]) -> set[str]:
+        for other in edges.get(name, set()) - seen:
             seen.add(other)
             reach(other, seen)
         return seen
 
-    assert not [part for part in edges if part in reach(part, set())]
+    return [name for name in edges if name in reach(name, set())]
+
+
+def may_import(here: tuple[int, int, int], there: tuple[int, int, int]) -> bool:
+    return there[0] < here[0] or (here[:2] == there[:2] and there[2] < here[2])
+
+
+def test_every_part_has_its_place() -> None:
+    assert set(graph()) - {"__init__"} == set(places())
+
+
+def test_imports_follow_the_map() -> None:
+    place = places()
+    wrong = [
+        f"{name} imports {other}"
+        for name, others in modules().items()
+        for other in others
+        if (here := unit_of(name)) and (there := unit_of(other)) and here != there
+        if not may_import(place[here], place[there])
+    ]
+    assert not wrong
+
+
+def test_columns_do_not_see_each_other() -> None:
+    place = places()
+    assert not may_import(place["identify"], place["simulate"])
+    assert not may_import(place["batch"], place["identify"])
+    assert may_import(place["study"], place["batch"])
+    assert may_import(place["fmu"], place["physics"])
+
+
+def test_no_modules_import_each_other() -> None:
+    assert not in_circles(modules())
+    assert in_circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == ["a", "b", "c"]
+
+
+def test_the_benchmarks_import_in_no_circle() -> None:
+    assert not in_circles(modules(ROOT / "benchmarks"))
 
 
 @pytest.mark.parametrize("part", PLAIN)
@@ -134,7 +182,8 @@ def test_what_fmus_carry_imports_pythonfmu_and_the_standard_library() -> None:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "components").glob("*.py")), ids=lambda p: p.stem)
 def test_components_lean_on_what_fmus_carry(path: Path) -> None:
-    files = [name.removesuffix(".py").replace("/", ".") for name, _ in _library_files()]
+    names = [name.removesuffix(".py") for name, _ in _library_files()]
+    files = [name.removesuffix("/__init__").replace("/", ".") for name in names]
     carried = {f"{PACKAGE.name}.{file}" for file in files}
     for name in imported(path):
         assert name in carried or name.split(".")[0] in sys.stdlib_module_names, name

@@ -15,6 +15,8 @@ from tests.independent.rigs import LAWS, draw_rig
 
 from .forms import is_same
 
+CASES = 480
+"""Cases on a bench that the published table counts."""
 STRENGTHS = (0.15, 0.40, 0.05)
 RIGS = ("bench_10N", "bench_2kN")
 BLOCK = (

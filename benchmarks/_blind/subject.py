@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from bristle.data.measurement import ChannelSpec, Measurement, measurements_of_frame
+from bristle.data.channels import ChannelSpec
+from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.diagnose import Diagnosis, diagnose
 from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
@@ -30,10 +31,10 @@ KEPT = 8  # rows of the ranking that a record keeps
 
 def digest() -> str:
     """Return the digest of all code that a verdict rests on."""
-    folders = ("diagnose", "identify", "compare", "compiled", "physics", "records")
+    folders = ("diagnose", "identify", "compare", "check", "data", "physics")
     package = ROOT / "bristle"
-    files = [p for f in folders if (package / f).is_dir() for p in (package / f).rglob("*.py")]
-    return digest_of(files)
+    files = [path for folder in folders for path in (package / folder).rglob("*.py")]
+    return digest_of([*files, package / "jit.py"])
 
 
 def unit_of(channel: str) -> str:

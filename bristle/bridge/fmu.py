@@ -14,9 +14,8 @@ from ..compare.comparison import Comparison, compare_held
 from ..compare.coordinates import coordinates_of
 from ..compare.held import Held, between
 from ..compare.scale import rms
-from ..data.channels import DRIVE, MOTION, is_channel
-from ..data.measurement import ChannelSpec
-from ..data.table import read_table
+from ..data.channels import DRIVE, MOTION, ChannelSpec, is_channel
+from ..data.read import read_table
 from ..errors import FmuError
 from ..fmu.description import Description, Value, read_description
 from ..units import conversion

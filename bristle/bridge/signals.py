@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.channels import DRIVE, PLAIN, channel_unit
+from ..data.channels import DRIVE, PLAIN, ChannelSpec, channel_unit
 from ..data.guess import guess_channels, specs
-from ..data.measurement import ChannelSpec
 from ..data.noise import estimate_noise
 from ..data.sampling import evenly
 from ..data.table import Table

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..study.new import Created
+    from ..study.create import Created
 
 HELP = "studies of measurements: new, first-look, auto"
 
@@ -75,10 +75,11 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 
 def _new(arguments: argparse.Namespace) -> int:
-    from ..data.measurement import ChannelSpec
+    from ..data.channels import ChannelSpec
     from ..data.model import LAW_NAMES
     from ..errors import StudyError
-    from ..study.new import create_study, parse_channel
+    from ..study.create import create_study
+    from ..study.new import parse_channel
 
     if arguments.law not in LAW_NAMES:
         raise StudyError(f'--law "{arguments.law}"; there are: {", ".join(LAW_NAMES)}.')

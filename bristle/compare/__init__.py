@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from .comparison import Comparison, RunError, compare, compare_held
+from .comparison import Comparison, compare, compare_held
+from .errors import RunError, SiteError
 from .held import Held, held_runs
-from .sites import SiteError, compare_sites
+from .sites import compare_sites
 from .where import Place, organised
 
 __all__ = [

@@ -4,55 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordError
 from ..identify.fit import Fit, Model, Problem
-from ..identify.search import HUBER_AT_ONE, losses, z_scale
 from .bands import Spectrum, spectrum
+from .errors import (
+    CLOSE,
+    RunError,
+    SiteError,
+    interval_of_z,
+    judged,
+    place_dict,
+    refuse,
+    run_dict,
+    run_error,
+)
 from .held import Held, held_runs
 from .regimes import Regime, regimes
-from .scale import rms
 from .where import FLIPS, Finder, Place
-
-if TYPE_CHECKING:
-    from .sites import SiteError
+from .words import sentences
 
 Array = NDArray[np.float64]
-
-CLOSE = 1.1
-"""z up to which an error is what noise explains."""
-FEWEST = 100
-"""Samples that a run of a comparison has at the least, beside those that are skipped."""
-
-
-@dataclass(frozen=True)
-class RunError:
-    """The error on one run.
-
-    `z` RMS(residual)/noise expected of a true model, by a robust scale; `numerical_z` the same of
-    what half the step changes. `rms`, `noise`, `numerical`, `signal` [unit]: plain RMS of the
-    residual, of the noise expected, of what half the step changes, of the measured output;
-    `noise_own` that of the channel's own noise.
-    """
-
-    name: str
-    samples: int
-    z: float
-    rms: float
-    noise: float
-    noise_own: float
-    numerical: float
-    numerical_z: float
-    signal: float
-
-    @property
-    def share(self) -> float:
-        """RMS of the residual over that of the measured output [1]."""
-        return self.rms / self.signal if self.signal > 0.0 else float("nan")
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,9 +146,6 @@ def compare_held(
 
     `others` are the errors at the other sites of a building.
     """
-    from .sites import judged, site_of
-    from .words import sentences
-
     refuse(held)
     normalised = [one.normalised for one in held]
     along = [one.along() for one in held]
@@ -196,64 +168,9 @@ def compare_held(
     return replace(comparison, sentences=sentences(comparison, finder))
 
 
-def refuse(held: Sequence[Held]) -> None:
-    """Raise RecordError where runs are too few, too short, not finite or without noise."""
-    if not held:
-        raise RecordError("there is no run to compare with.")
-    for one in held:
-        if len(one.measured) <= one.skip + FEWEST:
-            raise RecordError(
-                f"{one.name}: {len(one.measured)} samples; a comparison needs {one.skip + FEWEST}."
-            )
-        for what, values in (("predicted", one.predicted), ("measured", one.measured)):
-            bad = np.flatnonzero(~np.isfinite(values))
-            if len(bad):
-                raise RecordError(
-                    f"{one.name}: the {what} {one.quantity} is {values[bad[0]]} at "
-                    f"{one.time[bad[0]]:g} s. Look at the model's values there."
-                )
-        if not np.min(one.sigma) > 0.0:
-            raise RecordError(
-                f"{one.name}: the noise of the {one.quantity} is zero: nothing tells what error "
-                f"is large. Give one in study.toml, noise = ... in [channels.{one.quantity}]."
-            )
-
-
-def run_error(name: str, held: Sequence[Held]) -> RunError:
-    """Return the error over some runs."""
-    residual = np.concatenate([one.residual for one in held])
-    sigma = np.concatenate([one.sigma[one.skip :] for one in held])
-    own = np.concatenate([np.full(len(one.residual), one.noise) for one in held])
-    tried = [one.numerical[one.skip :] for one in held if one.numerical is not None]
-    moved = np.concatenate(tried) if len(tried) == len(held) else np.full(1, np.nan)
-    return RunError(
-        name, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
-        rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
-        rms(np.concatenate([one.measured[one.skip :] for one in held])),
+def site_of(comparison: Comparison) -> SiteError:
+    """Return the site that is compared at length as one among the others."""
+    return SiteError(
+        comparison.site, comparison.quantity, comparison.unit, comparison.runs, comparison.total,
+        comparison.z_interval, comparison.first,
     )  # fmt: skip
-
-
-def interval_of_z(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
-    """Return the 95 % interval of z over all runs, by the scatter of the loss over blocks."""
-    loss = losses(np.concatenate(list(normalised)))
-    blocks = finder.blocks
-    counts = np.bincount(blocks.label)
-    means = np.bincount(blocks.label, weights=loss) / np.maximum(counts, 1)
-    mean = float(loss.mean())
-    std = float(np.std(means)) / np.sqrt(max(len(means) - 1, 1))
-    low, high = max(mean - 1.96 * std, 0.0), mean + 1.96 * std
-    return float(np.sqrt(low / HUBER_AT_ONE)), float(np.sqrt(high / HUBER_AT_ONE))
-
-
-def run_dict(run: RunError) -> dict[str, Any]:
-    """Return an error as JSON has it."""
-    return {**asdict(run), "share": run.share}
-
-
-def place_dict(place: Place) -> dict[str, Any]:
-    """Return a place as JSON has it."""
-    found = asdict(place)
-    for key in ("centre", "low", "high", "mean", "std"):
-        found[key] = [float(value) for value in found[key]]
-    del found["raw"], found["chance"]
-    return {**found, "alike": list(place.alike), "significant": place.significant}

@@ -10,6 +10,9 @@ from math import ceil, floor
 
 from ..physics.linear import Row
 
+ORIGIN, COMING = -2, -1
+"""What the state of a sampled component holds last: time of sample 0 [s], number of the next."""
+
 ROUNDING = 1e-6
 """Share of a sample period by which a step's end may miss an instant."""
 

@@ -25,7 +25,7 @@ from ..control.sensing import (
 )
 from ..control.switching import applied_signed, clipped_voltage, signed_voltage
 from ..physics.linear import Row
-from .clock import first_sample, last_sample, measure, step_code
+from .clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
 
 FLOOR_ACCELERATION, BASE_DISPLACEMENT, BASE_VELOCITY, DAMPER_FORCE = range(4)
 VOLTAGE, COMMAND_RAW, SCHEDULING = range(3)
@@ -34,8 +34,8 @@ CLIPPED, INVERSE, SIGNED, CLIPPED_LQG, SKYHOOK_SWITCH, SKYHOOK_INVERSE = range(6
 """Kinds of controllers."""
 
 REMEMBERED = 7
-ORIGIN, COMING, LOW, X_BEFORE, DEFLECTION, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, 0)
-"""What the state holds behind that of the state-space law: counted from its end."""
+LOW, X_BEFORE, DEFLECTION, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, -2)
+"""What the state holds behind that of the state-space law, before `ORIGIN` and `COMING`."""
 
 
 class Constants(NamedTuple):

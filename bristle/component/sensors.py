@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ..control.noise import standard_normal
 from ..control.sensing import low_passed
 from ..physics.linear import Row
-from .clock import first_sample, last_sample, measure, step_code
+from .clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
 
 FINEST = 1e15
 """Readings of more steps than this are not quantised: floats are no finer there."""
@@ -30,10 +30,6 @@ class Channel(NamedTuple):
     quantisation: float = 0.0
     delay: float = 0.0
     cut_off: float = 0.0
-
-
-ORIGIN, COMING = -2, -1
-"""What the state holds last: the time of sample 0 [s], the number of the next."""
 
 
 class Constants(NamedTuple):

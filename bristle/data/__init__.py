@@ -1,4 +1,7 @@
-"""Ground motions: built in, from an extra package, or from the user's AT2 and CSV files."""
+"""What was measured: ground motions, measurements, the checks of both, and a study's model file.
+
+Ground motions are built in, come from an extra package, or from the user's AT2 and CSV files.
+"""
 
 from __future__ import annotations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import NamedTuple
 
@@ -160,3 +161,19 @@ def _words(name: str) -> list[str]:
                     break
         out += [part for part in parts if part]
     return out
+
+
+@dataclass(frozen=True)
+class ChannelSpec:
+    """Where a channel is in a file, as in `[channels.force]` of study.toml.
+
+    `column` is its title in the file, or its name without the unit; `unit` that of the file, "" to
+    take it from the title; `sign` 1 or -1; `noise` the standard deviation in that unit, None to
+    estimate it. For the time of a file without one, `step` [s] is the sampling step.
+    """
+
+    column: str = ""
+    unit: str = ""
+    sign: int = 1
+    noise: float | None = None
+    step: float | None = None

@@ -16,31 +16,17 @@ from numpy.typing import NDArray
 
 from ..errors import RecordError, UnitError
 from ..units import conversion
-from .channels import DRIVE, channel_unit
+from .channels import DRIVE, ChannelSpec, channel_unit
+from .guess import guess_channels, specs
 from .noise import Noise, estimate_noise
+from .read import read_table
 from .sampling import Sampling, evenly
-from .table import Array, Table, read_table, table_from_frame
+from .table import Array, Table, table_from_frame
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _ABSURD = 1e15  # in any SI unit; some recorders write 1e30 where a value is missing
-
-
-@dataclass(frozen=True)
-class ChannelSpec:
-    """Where a channel is in a file, as in `[channels.force]` of study.toml.
-
-    `column` is its title in the file, or its name without the unit; `unit` that of the file, "" to
-    take it from the title; `sign` 1 or -1; `noise` the standard deviation in that unit, None to
-    estimate it. For the time of a file without one, `step` [s] is the sampling step.
-    """
-
-    column: str = ""
-    unit: str = ""
-    sign: int = 1
-    noise: float | None = None
-    step: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +108,7 @@ def read_measurements(
 
     Parameters
     ----------
-    paths : files that `bristle.data.table.read_table` reads
+    paths : files that `bristle.data.read.read_table` reads
     channels : where each channel is, the same in all files; None guesses (`guess_channels`), and
         the notes say what was guessed and why
 
@@ -163,8 +149,6 @@ def measurements_of(
     """
     notes = list(table.notes)
     if channels is None:
-        from .guess import guess_channels, specs
-
         guesses = guess_channels(table)
         notes += [f"guessed: {guess}" for guess in guesses]
         channels = specs(table, guesses)

@@ -7,6 +7,7 @@ Apkarian & Adams (1998), IEEE TCST 6(1), with Dh = 0: no direct path from y to u
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -154,10 +155,8 @@ def _problem(
         Y = unknowns["Y0"] + r * unknowns["Y1"]
         hats = [unknowns[name][k] for name in ("Ah", "Bh", "Ch")]
         for sign in (1.0, -1.0) if x_varies or y_varies else (0.0,):
-            blocks = _blocks(
-                plant, unknowns["gamma"], X, sign * rate * unknowns["X1"], Y,
-                sign * rate * unknowns["Y1"], *hats,
-            )  # fmt: skip
+            dX, dY = sign * rate * unknowns["X1"], sign * rate * unknowns["Y1"]
+            blocks = _blocks(plant, unknowns["gamma"], (X, dX), (Y, dY), hats)
             full = cp.bmat(blocks)  # type: ignore[attr-defined]
             size = full.shape[0]
             constraints.append(0.5 * (full + full.T) << -strict * np.eye(size))
@@ -172,9 +171,13 @@ def _problem(
 
 
 def _blocks(
-    p: Plant, gamma: Any, X: Any, dX: Any, Y: Any, dY: Any, Ah: Any, Bh: Any, Ch: Any
+    p: Plant, gamma: Any, X_rate: tuple[Any, Any], Y_rate: tuple[Any, Any], hats: Sequence[Any]
 ) -> list[list[Any]]:
-    """Return the blocks of the synthesis LMI; numbers or cvxpy expressions alike."""
+    """Return the blocks of the synthesis LMI; numbers or cvxpy expressions alike.
+
+    `X_rate`, `Y_rate` are X and Y with their rates, `hats` the controller's transformed A, B, C.
+    """
+    (X, dX), (Y, dY), (Ah, Bh, Ch) = X_rate, Y_rate, hats
     first = X @ p.A + Bh @ p.C2
     second = p.A @ Y + p.B2 @ Ch
     cross = Ah + p.A.T
@@ -227,7 +230,7 @@ def eigenvalues(s: Solution, plants: list[Plant], r: Array, gamma: float) -> tup
         dX, dY = sign * s.rate * s.X1, sign * s.rate * s.Y1
         full = np.array(
             [
-                np.block(_blocks(p, gamma, X[k], dX, Y[k], dY, *(hat[k] for hat in hats)))
+                np.block(_blocks(p, gamma, (X[k], dX), (Y[k], dY), [hat[k] for hat in hats]))
                 for k, p in enumerate(plants)
             ]
         )

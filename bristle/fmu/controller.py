@@ -82,7 +82,7 @@ class ControllerSlave(SampledSlave):
     `law`.
     """
 
-    functions = controller
+    functions: ClassVar[Any] = controller
     law_kind: ClassVar[int]
     command_unit: ClassVar[str] = "N"
 

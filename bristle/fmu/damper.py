@@ -13,7 +13,7 @@ class DamperSlave(ComponentSlave):
     """A damper of one law, from motion and voltage to the force that resists it."""
 
     law: ClassVar[str] = ""
-    functions = damper
+    functions: ClassVar[Any] = damper
     texts: ClassVar[dict[int, str]] = {
         damper.SATURATED: "the voltage left 0 .. {v_max:g} V; the damper saturates."
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 from ..component import source
 from ..physics.record import read_two_column
@@ -13,7 +13,7 @@ from .component import ComponentSlave
 class SourceSlave(ComponentSlave):
     """A component whose outputs depend on time alone."""
 
-    functions = source
+    functions: ClassVar[Any] = source
 
     def advance(self, time: float, step: float) -> None:
         """Keep nothing: what a step would show, `refresh` does."""

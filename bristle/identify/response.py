@@ -22,7 +22,7 @@ from ..errors import RecordError
 from ..physics.building import Building
 from .drive import smooth_steps
 from .prepare import SHORTEST
-from .response_kernels import smooth_level
+from .response_kernels import compiled_smooth_level
 from .smooth import random_motion
 
 Array = NDArray[np.float64]
@@ -181,7 +181,7 @@ def _level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
     added = jumps(y[:, 2], dt) if have[2] else np.zeros(n)
     state, cov = np.zeros((n, 3)), np.zeros(3)
     jerk = looser * _likeliest(y, r, have, dt, added)
-    smooth_level(y, r, have, dt, jerk + added, True, state, cov)
+    compiled_smooth_level()(y, r, have, dt, jerk + added, True, state, cov)
     std = np.sqrt(np.maximum(cov, 0.0))
     return {"state": state, "std": std, "jerk": jerk, "r": r, "have": have}
 
@@ -209,7 +209,7 @@ def _likeliest(
 
     def cost(exponent: float) -> float:
         jerk = 10.0**exponent + added
-        return float(smooth_level(y, r, have, dt, jerk, False, spare, cov))
+        return float(compiled_smooth_level()(y, r, have, dt, jerk, False, spare, cov))
 
     grid = np.arange(top - 12.0, top + 2.1, 1.5)
     best = grid[int(np.argmin([cost(exponent) for exponent in grid]))]
@@ -232,7 +232,7 @@ def _draws(n: int, runs: list[dict[str, Any]], dt: float, draws: int, seed: int)
     for d in range(draws):
         path = random_motion(generator, total, dt, jerk)
         y = path + generator.standard_normal((total, 3)) * np.sqrt(r)
-        smooth_level(y, r, have, dt, np.full(total, jerk), True, state, cov)
+        compiled_smooth_level()(y, r, have, dt, np.full(total, jerk), True, state, cov)
         out[d] = (path - state)[lead : lead + n]
     return out
 

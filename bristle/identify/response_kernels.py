@@ -6,7 +6,6 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +19,6 @@ contact_force = structure.contact_force
 advance_effects = structure.advance_effects
 
 
-@numba.njit(cache=True)
 def _gain(P, B, h1, h2, A, G):  # type: ignore[no-untyped-def]
     """Fill G with P F^T B^-1, B symmetric and positive; A is room to work."""
     for i in range(3):
@@ -40,7 +38,6 @@ def _gain(P, B, h1, h2, A, G):  # type: ignore[no-untyped-def]
         G[i, 2] = (a0 * i02 + a1 * i12 + a2 * i22) * s2
 
 
-@numba.njit(cache=True)
 def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no-untyped-def]
     """Kalman filter and smoother for [x, v, a] under white jerk; return -log likelihood.
 
@@ -115,7 +112,7 @@ def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no
         for j in range(3):
             P[i, j] = covs[n - 1, i, j]
     for k in range(n - 2, -1, -1):
-        _gain(covs[k], predicted_covs[k + 1], h1, h2, A, G)
+        _gain(covs[k], predicted_covs[k + 1], h1, h2, A, G)  # type: ignore[no-untyped-call]
         for i in range(3):
             state[k, i] = means[k, i]
             for j in range(3):
@@ -133,6 +130,15 @@ def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no
             for i in range(3):
                 cov[i] = P[i, i]
     return total
+
+
+@cache
+def compiled_smooth_level() -> Callable[..., float]:
+    """Return the compiled `smooth_level`; the first call on a machine takes seconds."""
+    from ..jit import compiled
+
+    function: Callable[..., float] = compiled(smooth_level, allocates=True)
+    return function
 
 
 def forces_along(

@@ -117,7 +117,7 @@ def descend(
         weight = np.minimum(1.0, HUBER / np.maximum(np.abs(r), 1e-12))
         weighted = J * weight[:, None]
         normal, gradient = weighted.T @ J, weighted.T @ r
-        tried = _try(residuals, theta, cost, normal, gradient, damping, low, high, not secants)
+        tried = _try(residuals, (theta, cost), normal, gradient, damping, (low, high), not secants)
         damping = tried.damping
         if tried.moved:
             gain, promised = cost - tried.cost, tried.promised / len(r)
@@ -148,10 +148,14 @@ class _Tried:
 
 
 def _try(
-    residuals: Callable[[Array], Array], theta: Array, cost: float, normal: Array,
-    gradient: Array, damping: float, low: Array, high: Array, patient: bool,
+    residuals: Callable[[Array], Array], here: tuple[Array, float], normal: Array, gradient: Array,
+    damping: float, bounds: tuple[Array, Array], patient: bool,
 ) -> _Tried:  # fmt: skip
-    """Return the first damped step that lowers the cost; one try only where not `patient`."""
+    """Return the first damped step that lowers the cost; one try only where not `patient`.
+
+    `here` is theta and its cost, `bounds` the lowest and highest values of theta (p,).
+    """
+    (theta, cost), (low, high) = here, bounds
     for _ in range(8 if patient else 1):
         step = _step(normal, gradient, damping, theta, low, high)
         trial = np.clip(theta - step, low, high)

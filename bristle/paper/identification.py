@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..draw.style import BLUE, GREY, INK, RECONSTRUCTED, VERMILION, Page, label, zero_lines
 from ..identify.fit import Model, Problem, Run
 from ..identify.table import CUTOFF, LawError, error_table, low_pass
-from .figures import Drawing, Runs
+from .runs import Drawing, Runs
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -7,7 +7,7 @@ from math import pi
 from typing import TYPE_CHECKING, Any
 
 from ..draw.style import GREY, RECONSTRUCTED, Page, label, ramp, zero_lines
-from .figures import Drawing, Runs
+from .runs import Drawing, Runs
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..draw.style import INK, RECONSTRUCTED, Page, label, ramp
-from .figures import Drawing, Runs
+from .runs import Drawing, Runs
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..draw.style import BLUE, GREY, PALE, RECONSTRUCTED, VERMILION, Page, label
-from .figures import Drawing, Runs
+from .runs import Drawing, Runs
 
 if TYPE_CHECKING:
     import pandas as pd

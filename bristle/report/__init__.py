@@ -1,1 +1,1 @@
-"""Pictures and numbers of a run."""
+"""Figures, tables and HTML pages of runs and studies."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..compare.comparison import CLOSE
+from ..compare.errors import CLOSE
 from ..compare.names import name_of, place_name
 from ..compare.words import FAINT
 from ..draw.style import BLUE, FLOOR, GREY, INK, VERMILION, Page, look, short_z
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..compare.comparison import Comparison
-    from ..compare.sites import SiteError
+    from ..compare.errors import SiteError
 
 _TICKS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
 

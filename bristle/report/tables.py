@@ -9,8 +9,8 @@ from ..compare.words import FAINT, begin
 from ..draw.style import percent, short_z
 
 if TYPE_CHECKING:
-    from ..compare.comparison import Comparison, RunError
-    from ..compare.sites import SiteError
+    from ..compare.comparison import Comparison
+    from ..compare.errors import RunError, SiteError
     from ..compare.where import Place
 
 Table = tuple[str, list[str], list[list[str]]]

@@ -7,7 +7,6 @@ import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
@@ -290,17 +289,3 @@ class _Job:
 
 def _folder(out: str | Path | None) -> Path | None:
     return None if out is None else Path(out)
-
-
-class _Run(ModuleType):
-    """This module, called as the function that it is named after.
-
-    Importing a submodule puts it into its package, so `bristle.run` is the function or this
-    module, depending on what was imported before; both can be called.
-    """
-
-    def __call__(self, *arguments: Any, **named: Any) -> pd.DataFrame:
-        return run(*arguments, **named)
-
-
-sys.modules[__name__].__class__ = _Run

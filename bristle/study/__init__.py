@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from ..data.model import StudyModel, Value, new_model, read_model, write_model
 from ..errors import StudyError
+from .create import Created, create_study
 from .history import Step
-from .new import Created, create_study
 from .settings import RunFile, Settings
 from .study import Runs, Study
 

@@ -264,8 +264,8 @@ def measurements_of_frames(
     frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame], stem: str
 ) -> list[Measurement]:
     """Return the measurements in frames whose columns are named by channel."""
-    from ..data.channels import channel_unit, is_channel
-    from ..data.measurement import ChannelSpec, measurements_of_frame
+    from ..data.channels import ChannelSpec, channel_unit, is_channel
+    from ..data.measurement import measurements_of_frame
 
     named = (
         dict(frames)

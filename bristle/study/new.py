@@ -1,4 +1,4 @@
-"""A new study from files: channels guessed with reasons, runs kept for training or held out."""
+"""A new study's folder from files: channels guessed with reasons, runs to train on or held out."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..data.channels import channel_unit
+from ..data.channels import ChannelSpec, channel_unit
 from ..data.guess import Guess, guess_channels, left_out
-from ..data.measurement import ChannelSpec, measurements_of
+from ..data.measurement import measurements_of
 from ..data.model import model_text, new_model
-from ..data.table import Table, read_table
+from ..data.read import read_table
+from ..data.table import Table
 from ..errors import BristleError, StudyError, UnitError
 from ..physics.building import read_building
 from ..units import canonical
 from .history import History, Step
 from .settings import RunFile, Settings, write_settings
-from .study import Study
 
 _WORDS = {
     "train": "train training ident identification fit estimation est calibration cal",
@@ -30,17 +30,16 @@ _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<un
 
 
 @dataclass(frozen=True)
-class Created:
-    """A study that was made: what was guessed, what was left out, and what to know."""
+class Made:
+    """A study's folder that was made: what was guessed, what was left out, and what to know."""
 
-    study: Study
     guesses: tuple[Guess, ...]
     unused: tuple[str, ...]
     notes: tuple[str, ...]
 
 
-def create_study(
-    folder: Path | str,
+def make_folder(
+    folder: Path,
     files: Sequence[Path | str],
     *,
     rig: str = "bench",
@@ -48,32 +47,8 @@ def create_study(
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
     law: str = "lugre",
-) -> Created:
-    """Make a study's folder from files; it appears when it is whole.
-
-    Parameters
-    ----------
-    folder : path
-        The folder to make; it must not exist.
-    files : paths
-        One run each, with the same columns.
-    rig : {"bench", "structure"}
-        Motion prescribed and force measured, or ground motion in and response out.
-    building : path
-        The data file of the structure.
-    channels : mapping
-        Channels that are known; the others are guessed from the first file.
-    title, law : str
-        Title of the study, and the law that its model begins with.
-
-    Raises
-    ------
-    StudyError
-        If the folder exists, a needed channel or its unit cannot be told, or files differ.
-    RecordError
-        If a file cannot be read.
-    """
-    folder = Path(folder)
+) -> Made:
+    """Make a study's folder from files; see `bristle.study.create.create_study`."""
     if folder.exists():
         raise StudyError(f"{folder}: is there already. Take another name, or remove it.")
     if not files:
@@ -99,7 +74,7 @@ def create_study(
     unused = tuple(
         text for text in left_out(tables[0], guesses) if text not in {g.column for g in guesses}
     )
-    return Created(Study(folder), tuple(guesses), unused, tuple(notes))
+    return Made(tuple(guesses), unused, tuple(notes))
 
 
 def parse_channel(text: str) -> tuple[str, ChannelSpec]:

@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..data.channels import PLAIN, channel_unit, is_channel
+from ..data.channels import PLAIN, ChannelSpec, channel_unit, is_channel
 from ..data.files import Toml, write_whole
-from ..data.measurement import ChannelSpec
 from ..errors import RecordError, UnitError
 from ..findings import unknown, written
 from ..units import same_dimension

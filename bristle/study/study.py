@@ -19,6 +19,7 @@ from ..errors import StudyError
 from ..identify.prepare import SHORTEST
 from ..physics.user import Loaded, load_effects
 from .history import History, Step
+from .new import make_folder
 from .settings import ROLES, Settings, read_settings
 
 PATIENCE = 10.0
@@ -86,9 +87,8 @@ class Study:
     @classmethod
     def create(cls, folder: Path | str, files: Sequence[Path | str], **choices: Any) -> Study:
         """Make a study's folder from files; see `bristle.study.create_study` for the choices."""
-        from .new import create_study
-
-        return create_study(folder, files, **choices).study
+        make_folder(Path(folder), files, **choices)
+        return cls(folder)
 
     @property
     def name(self) -> str:

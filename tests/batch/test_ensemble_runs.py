@@ -330,8 +330,6 @@ def test_fmus_give_nearly_the_same(write: Write) -> None:
     assert stepped[PEAK].tolist() != compiled[PEAK].tolist()
 
 
-def test_an_ensemble_can_be_called_as_a_module() -> None:
-    import bristle.batch.execute
-
+def test_an_ensemble_is_a_function_of_the_package() -> None:
     assert isinstance(bristle.ensemble("el_centro_damper_and_building", runs=1), Ensemble)
     assert load_scenario("half_sine_pulse").stop > 0.5

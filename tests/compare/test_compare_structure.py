@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bristle import run
 from bristle.compare.held import held_runs
 from bristle.identify.model import Model
 from bristle.identify.structure import StructureProblem, structure_run
-from bristle.simulate import run
 from bristle.study import create_study
 from bristle.study.comparison import compare_study
 

@@ -6,8 +6,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bristle.data.channels import ChannelSpec
 from bristle.data.derived import derived_velocity
-from bristle.data.measurement import ChannelSpec, measurements_of_frame
+from bristle.data.measurement import measurements_of_frame
 from bristle.diagnose.mended import mended
 from bristle.diagnose.sensors import sensor_faults
 from bristle.identify.prepare import prepare

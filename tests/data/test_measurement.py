@@ -9,8 +9,8 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
+from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import (
-    ChannelSpec,
     measurements_of,
     measurements_of_frame,
     read_measurement,

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import gzip
+import sys
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.data.table import Table, read_table, table_from_frame
+from bristle.data import formats
+from bristle.data.read import read_table
+from bristle.data.table import Table, table_from_frame
 from bristle.errors import RecordError
 
 TIME = np.arange(80) * 0.002
@@ -140,7 +143,7 @@ def test_what_is_no_table_is_refused(tmp_path: Path, text: str | bytes, told: st
 def test_large_files_are_refused_before_they_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("bristle.data.table.LARGEST", 1000)
+    monkeypatch.setattr("bristle.data.read.LARGEST", 1000)
     text = "time [s],x [mm],F [kN]\n" + body(",")
     with pytest.raises(RecordError, match="limit"):
         read(tmp_path, text)
@@ -189,3 +192,45 @@ def test_frame_with_units_in_attrs() -> None:
     table = table_from_frame(frame)
     units = [column.unit.name for column in table.columns if column.unit]
     assert units == ["s", "N"]
+
+
+READER = '''
+"""Pairs: a format of this test, one pair of numbers a line after a mark."""
+
+import numpy as np
+
+from bristle.data.table import from_arrays
+
+
+def recognises(content, suffix):
+    return content.startswith(b"PAIRS") or suffix == ".pairs"
+
+
+def read(content, name):
+    rows = [line.split(b"|") for line in content.splitlines()[1:]]
+    time, force = np.array(rows, dtype=float).T
+    return from_arrays({"time [s]": time, "force [N]": force}, name)
+'''
+
+
+@pytest.fixture
+def another_format(tmp_path, monkeypatch):
+    """Put a file of one more format beside the others."""
+    folder = tmp_path / "formats"
+    folder.mkdir()
+    (folder / "pairs.py").write_text(READER, encoding="utf-8")
+    monkeypatch.setattr(formats, "__path__", [*formats.__path__, str(folder)])
+    formats.formats.cache_clear()
+    yield
+    formats.formats.cache_clear()
+    sys.modules.pop(f"{formats.__name__}.pairs", None)
+
+
+def test_a_format_is_one_file(tmp_path, another_format):
+    path = tmp_path / "run.txt"
+    path.write_text("PAIRS\n0|1.5\n0.1|-2\n", encoding="utf-8")
+    table = read_table(path)
+    assert [column.text for column in table.columns] == ["time [s]", "force [N]"]
+    np.testing.assert_array_equal(table.values["force [N]"], [1.5, -2.0])
+    path.write_text("time [s],force [N]\n0,1.5\n0.1,-2\n0.2,1\n", encoding="utf-8")
+    np.testing.assert_array_equal(read_table(path).values["force [N]"], [1.5, -2.0, 1.0])

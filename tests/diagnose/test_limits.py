@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.data.measurement import ChannelSpec, measurements_of_frame
+from bristle.data.channels import ChannelSpec
+from bristle.data.measurement import measurements_of_frame
 from bristle.diagnose.decision import GAIN
 from bristle.diagnose.limits import detectable, untestable
 from bristle.identify.bench import Bench

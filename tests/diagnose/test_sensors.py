@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
-from bristle.data.measurement import ChannelSpec, measurements_of_frame
+from bristle.data.channels import ChannelSpec
+from bristle.data.measurement import measurements_of_frame
 from bristle.diagnose.mended import mended
 from bristle.diagnose.sensors import sensor_faults
 

@@ -36,7 +36,7 @@ from bristle.paper.comparison.experiment import (
 )
 from bristle.paper.comparison.identification import NOISE, errors, gain
 from bristle.paper.comparison.make import Report
-from bristle.paper.figures import Runs
+from bristle.paper.runs import Runs
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "ground_motion"
 AT_NEWHALL = DATA / "northridge_1994_newhall_360_peer_rsn1044.csv"

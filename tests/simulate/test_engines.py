@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bristle import run
 from bristle.scenario.scenario import load_scenario
-from bristle.simulate import run
 from bristle.simulate.coupled import simulate
 from bristle.simulate.results import read_results
 from bristle.simulate.run import IncompleteRunError

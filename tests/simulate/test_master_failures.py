@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from toys import Maker
 
+from bristle import run
 from bristle.errors import FmuError, RunError
-from bristle.simulate import run
 from bristle.simulate.run import IncompleteRunError
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from toys import Maker
 
+from bristle import run
 from bristle.errors import ScenarioError
-from bristle.simulate import run
 
 H = 0.1
 T = np.arange(11) / 10

@@ -161,7 +161,7 @@ def test_loaded_scenario_runs_with_and_without_overrides(fine: Path) -> None:
 def test_package_runs_as_a_function_whatever_was_imported(fine: Path) -> None:
     assert bristle.run(fine).equals(run(fine))
     code = "import bristle, sys; print(len(bristle.run(sys.argv[1])))"
-    for before in ("", "import bristle.run; ", "from bristle.run import run; "):
+    for before in ("", "import bristle.simulate.run; ", "from bristle.simulate.run import run; "):
         done = subprocess.run(
             [sys.executable, "-c", before + code, str(fine)],
             env=ENVIRONMENT, capture_output=True, text=True, timeout=60,

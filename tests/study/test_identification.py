@@ -14,8 +14,8 @@ from bristle.cli import identify as command
 from bristle.cli import main
 from bristle.errors import RecordError, StudyError
 from bristle.identify.bench import Bench
+from bristle.study.create import create_study
 from bristle.study.identification import identify_frames, identify_study
-from bristle.study.new import create_study
 from bristle.study.study import Study
 
 DT, N = 0.004, 2000

@@ -12,9 +12,9 @@ from bristle.cli import main
 from bristle.diagnose import Diagnosis
 from bristle.errors import StudyError
 from bristle.study import learning
+from bristle.study.create import create_study
 from bristle.study.identification import identify_study
 from bristle.study.learning import add_effects, diagnose_frames, diagnose_study, learn
-from bristle.study.new import create_study
 from bristle.study.study import Study
 from tests.independent.generate import make_case
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from made import write_runs
 
+from bristle.data.channels import ChannelSpec
 from bristle.data.files import read_json, write_json, write_whole
-from bristle.data.measurement import ChannelSpec
 from bristle.study import StudyError, create_study, new_model, read_model, write_model
 from bristle.study.settings import RunFile, Settings, read_settings, write_settings
 

@@ -12,7 +12,7 @@ import pytest
 
 from bristle.data.guess import guess_channels, left_out
 from bristle.data.measurement import read_measurements
-from bristle.data.table import read_table
+from bristle.data.read import read_table
 from bristle.study import create_study
 from bristle.study.first_look import first_look
 

@@ -12,8 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...units import parse as parse_unit
-from ..channels import meaning, quantity_of_unit
-from ..measurement import ChannelSpec
+from ..channels import ChannelSpec, meaning, quantity_of_unit
 from ..table import Table
 from .bench import bench_guesses
 from .candidates import Search, candidate_of

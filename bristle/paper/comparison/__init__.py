@@ -2,7 +2,7 @@
 
 experiment      the runs: motions, intensities, laws; peak and RMS of each
 identification  how well each damper law fits a damper that is known
-ledger          what the paper's text states, each with a verdict by the numbers
+claims          what the paper's text states, each with a verdict by the numbers
 pictures        its figures
 page            one HTML file with everything
 """

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...physics.lugre import LuGre
-from ..figures import Runs
+from ..runs import Runs
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -20,12 +20,14 @@ from ...draw.style import Page, look
 from ...errors import DesignError, not_usable
 from ...progress import Progress
 from .. import optimum, stiction
-from ..figures import Drawing, Runs, prepare
+from ..figures import prepare
+from ..runs import Drawing, Runs
 from . import identification
 from . import page as page_of
-from .claims import Numbers, Statement, Verdict, ledger
+from .claims import Statement, ledger
 from .experiment import Comparison, cases, compare, motions, published_table
 from .facts import facts
+from .numbers import Numbers, Verdict
 from .pictures import FIGURES
 
 if TYPE_CHECKING:

@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ... import __version__
-from .claims import NOT, REPRODUCED, UNDECIDABLE, Statement, Verdict
+from .claims import Statement
 from .experiment import CONTROLLERS, KAPPA, LAWS
+from .numbers import NOT, REPRODUCED, UNDECIDABLE, Verdict
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordError
-from ..physics.record import shortened
-from .table import Array
+from ...errors import RecordError
+from ...physics.record import shortened
+from ..table import Array
 
 _MISSING = frozenset(
     ("", "-", "--", "nan", "-nan", "nan(ind)", "na", "n/a", "#n/a", "null", "none", "1.#qnan")

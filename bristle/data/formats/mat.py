@@ -9,14 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import RecordError
-from .table import Table, from_arrays
+from ...errors import RecordError
+from ..table import Table, from_arrays
 
 _STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step")
 _RATES = ("fs", "rate", "samplerate", "sample_rate", "sampling_rate", "fsample", "f_s")
 
 
-def read_mat(content: bytes, name: str) -> Table:
+def recognises(content: bytes, suffix: str) -> bool:
+    """Return whether a file is MAT, by its first bytes or its ending."""
+    return content.startswith(b"MATLAB 5.0") or suffix == ".mat"
+
+
+def read(content: bytes, name: str) -> Table:
     """Return the table in a MAT file.
 
     Vectors of the commonest length are the columns; a matrix of that many rows gives `name_1`,

@@ -14,19 +14,26 @@ from itertools import islice
 
 import numpy as np
 
-from ..errors import RecordError
-from ..physics.record import shortened
-from ..units import parse as parse_unit
-from .columns import Column
-from .rows import Body, Layout, is_comment, read_fast, read_slow, state_of
-from .table import Table
-from .titles import is_unit_row, titles
+from ...errors import RecordError
+from ...physics.record import shortened
+from ...units import parse as parse_unit
+from ..columns import Column
+from ..table import Table
+from ..titles import is_unit_row, titles
+from ._rows import Body, Layout, is_comment, read_fast, read_slow, state_of
+
+ORDER = 2
 
 _TOKEN = re.compile(r'"[^"]*"|\S+(?: ?[\[(][^\])]*[\])])?')  # a title and its unit in brackets
 _RIGHT = 'Titles with units are, for example, "time [s];force [kN]".'
 
 
-def read_delimited(content: bytes, name: str) -> Table:
+def recognises(content: bytes, suffix: str) -> bool:
+    """Return True: what is left is text, or refused with a reason."""
+    return True
+
+
+def read(content: bytes, name: str) -> Table:
     """Return the table in a delimited text.
 
     Columns are parted by commas, semicolons, tabs or blanks; decimals have points, or commas

@@ -1,0 +1,174 @@
+"""How wrong a prediction is on a run and at a site, and which sites fail."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass, replace
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordError
+from ..identify.search import HUBER_AT_ONE, losses, z_scale
+from .held import Held
+from .scale import rms
+from .where import LEVEL, Finder, Place
+
+Array = NDArray[np.float64]
+
+CLOSE = 1.1
+"""z up to which an error is what noise explains."""
+FEWEST = 100
+"""Samples that a run of a comparison has at the least, beside those that are skipped."""
+
+
+@dataclass(frozen=True)
+class RunError:
+    """The error on one run.
+
+    `z` RMS(residual)/noise expected of a true model, by a robust scale; `numerical_z` the same of
+    what half the step changes. `rms`, `noise`, `numerical`, `signal` [unit]: plain RMS of the
+    residual, of the noise expected, of what half the step changes, of the measured output;
+    `noise_own` that of the channel's own noise.
+    """
+
+    name: str
+    samples: int
+    z: float
+    rms: float
+    noise: float
+    noise_own: float
+    numerical: float
+    numerical_z: float
+    signal: float
+
+    @property
+    def share(self) -> float:
+        """RMS of the residual over that of the measured output [1]."""
+        return self.rms / self.signal if self.signal > 0.0 else float("nan")
+
+
+@dataclass(frozen=True)
+class SiteError:
+    """How wrong a model is at one site of a building.
+
+    `site` is "damper", "layer", "storey1" ...; `quantity`, `unit` what is compared there; `runs`
+    the error of each run, `total` over all; `z_interval` the 95 % interval of the total z; `place`
+    the coordinate that organises the error most, None where chance explains all. `fails`: the
+    error is more than noise, and chance is no fair explanation of that, all sites together.
+    """
+
+    site: str
+    quantity: str
+    unit: str
+    runs: tuple[RunError, ...]
+    total: RunError
+    z_interval: tuple[float, float]
+    place: Place | None
+    fails: bool = False
+
+    @property
+    def z(self) -> float:
+        """RMS(residual)/noise expected of a true model, over all runs; NaN without a sample."""
+        return self.total.z
+
+    @property
+    def told(self) -> bool:
+        """Whether there are samples to tell it by: a base that hardly slides leaves too few."""
+        return self.z == self.z
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the error as JSON has it."""
+        return {
+            "site": self.site,
+            "quantity": self.quantity,
+            "unit": self.unit,
+            "z": self.z,
+            "z_interval": list(self.z_interval),
+            "fails": self.fails,
+            "total": run_dict(self.total),
+            "runs": [run_dict(run) for run in self.runs],
+            "place": place_dict(self.place) if self.place else None,
+        }
+
+
+def refuse(held: Sequence[Held]) -> None:
+    """Raise RecordError where runs are too few, too short, not finite or without noise."""
+    if not held:
+        raise RecordError("there is no run to compare with.")
+    for one in held:
+        if len(one.measured) <= one.skip + FEWEST:
+            raise RecordError(
+                f"{one.name}: {len(one.measured)} samples; a comparison needs {one.skip + FEWEST}."
+            )
+        for what, values in (("predicted", one.predicted), ("measured", one.measured)):
+            bad = np.flatnonzero(~np.isfinite(values))
+            if len(bad):
+                raise RecordError(
+                    f"{one.name}: the {what} {one.quantity} is {values[bad[0]]} at "
+                    f"{one.time[bad[0]]:g} s. Look at the model's values there."
+                )
+        if not np.min(one.sigma) > 0.0:
+            raise RecordError(
+                f"{one.name}: the noise of the {one.quantity} is zero: nothing tells what error "
+                f"is large. Give one in study.toml, noise = ... in [channels.{one.quantity}]."
+            )
+
+
+def run_error(name: str, held: Sequence[Held]) -> RunError:
+    """Return the error over some runs."""
+    residual = np.concatenate([one.residual for one in held])
+    sigma = np.concatenate([one.sigma[one.skip :] for one in held])
+    own = np.concatenate([np.full(len(one.residual), one.noise) for one in held])
+    tried = [one.numerical[one.skip :] for one in held if one.numerical is not None]
+    moved = np.concatenate(tried) if len(tried) == len(held) else np.full(1, np.nan)
+    return RunError(
+        name, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
+        rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
+        rms(np.concatenate([one.measured[one.skip :] for one in held])),
+    )  # fmt: skip
+
+
+def interval_of_z(normalised: Sequence[Array], finder: Finder) -> tuple[float, float]:
+    """Return the 95 % interval of z over all runs, by the scatter of the loss over blocks."""
+    loss = losses(np.concatenate(list(normalised)))
+    blocks = finder.blocks
+    counts = np.bincount(blocks.label)
+    means = np.bincount(blocks.label, weights=loss) / np.maximum(counts, 1)
+    mean = float(loss.mean())
+    std = float(np.std(means)) / np.sqrt(max(len(means) - 1, 1))
+    low, high = max(mean - 1.96 * std, 0.0), mean + 1.96 * std
+    return float(np.sqrt(low / HUBER_AT_ONE)), float(np.sqrt(high / HUBER_AT_ONE))
+
+
+def run_dict(run: RunError) -> dict[str, Any]:
+    """Return an error as JSON has it."""
+    return {**asdict(run), "share": run.share}
+
+
+def place_dict(place: Place) -> dict[str, Any]:
+    """Return a place as JSON has it."""
+    found = asdict(place)
+    for key in ("centre", "low", "high", "mean", "std"):
+        found[key] = [float(value) for value in found[key]]
+    del found["raw"], found["chance"]
+    return {**found, "alike": list(place.alike), "significant": place.significant}
+
+
+def judged(sites: Iterable[SiteError]) -> tuple[SiteError, ...]:
+    """Return sites of which it is known which ones fail, those first, then by z.
+
+    Of twenty storeys one has a large z by chance: a site fails if the chance of its z is small for
+    the largest of all of them (Bonferroni), by the scatter that its interval states.
+    """
+    sites = list(sites)
+    far = NormalDist().inv_cdf(1.0 - LEVEL / max(len(sites), 1)) / 1.96
+
+    def fails(one: SiteError) -> bool:
+        high = one.z_interval[1]
+        return one.z > CLOSE and one.z**2 - far * (high**2 - one.z**2) > 1.0
+
+    found = [replace(one, fails=fails(one)) for one in sites]
+    return tuple(sorted(found, key=lambda one: (not one.fails, -one.z if one.told else 0.0)))

@@ -1,0 +1,45 @@
+"""File formats of measurements, one module each, found by standing in this folder.
+
+A module has two functions: `recognises(content, suffix)` says whether a file's bytes, or the ending
+of its name (".mat"), are of its format; `read(content, name)` returns the `Table` in it, or raises
+RecordError with `name`, the place in the file and what would be right. The first module that
+recognises a file reads it, in the order of `ORDER` (0 where a module has none) and of their names:
+formats that are known and not read come behind those that are (`unread`, 1), delimited text last
+(2), for it takes whatever is left. A helper's name begins with an underscore.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+
+from ..table import Table
+
+
+@cache
+def formats() -> tuple[ModuleType, ...]:
+    """Return the modules of the formats in the order in which they are asked."""
+    names = [one.name for one in pkgutil.iter_modules(__path__) if not one.name.startswith("_")]
+    modules = [import_module(f"{__name__}.{name}") for name in sorted(names)]
+    return tuple(sorted(modules, key=lambda module: int(getattr(module, "ORDER", 0))))
+
+
+def read(content: bytes, suffix: str, name: str) -> Table:
+    """Return the table in a file's bytes.
+
+    Parameters
+    ----------
+    content : the file, decompressed
+    suffix : the ending of its name in lower case, with the dot
+    name : what messages call it
+
+    Raises
+    ------
+    RecordError
+        If the file is damaged or of a format that is not read.
+    """
+    module = next(one for one in formats() if one.recognises(content, suffix))
+    table: Table = module.read(content, name)
+    return table

@@ -1,0 +1,44 @@
+"""Parquet: a column a channel, its unit in the field's metadata."""
+
+from __future__ import annotations
+
+from ...errors import RecordError
+from ..table import Table, from_arrays
+from ..titles import unit_or_none
+
+
+def recognises(content: bytes, suffix: str) -> bool:
+    """Return whether a file is Parquet, by its first bytes."""
+    return content.startswith(b"PAR1")
+
+
+def read(content: bytes, name: str) -> Table:
+    """Return the table in a Parquet file.
+
+    Raises
+    ------
+    RecordError
+        If the file is damaged or holds no samples.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        read = pq.read_table(pa.BufferReader(content))
+    except (pa.ArrowException, OSError, ValueError) as error:
+        raise RecordError(f"{name}: no Parquet file, or damaged ({error}).") from None
+    units = {}
+    for one in read.schema:
+        stated = (one.metadata or {}).get(b"unit", b"").decode()
+        units[one.name] = stated if unit_or_none(stated) is not None else None
+    data = {
+        column: read[column].to_numpy()
+        for column in read.column_names
+        if not column.startswith("__index")
+    }
+    if not data or not len(read):
+        raise RecordError(f"{name}: the file holds no samples.")
+    notes: tuple[str, ...] = ()
+    if b'"complete": false' in (read.schema.metadata or {}).get(b"bristle", b""):
+        notes = ("the run that wrote this file did not come to its end",)
+    return from_arrays(data, name, units, notes)

@@ -1,0 +1,58 @@
+"""Tables from any file that a laboratory hands over.
+
+CSV and other delimited text (also gzip-compressed), Parquet, MAT up to version 7, results of
+bristle itself: see `formats`. Nothing is converted here; see `measurement`.
+"""
+
+from __future__ import annotations
+
+import gzip
+import zlib
+from pathlib import Path
+
+from ..errors import RecordError
+from . import formats
+from .table import Table
+
+LARGEST = 256 * 1024**2
+"""Largest content that is read, after decompression [bytes]: about 3 million rows of 8 columns."""
+
+
+def read_table(path: Path | str) -> Table:
+    """Return the table in a file, whatever its format.
+
+    Raises
+    ------
+    RecordError
+        If the file cannot be read, is too large, or is of a format that is not read: with the
+        file, the line where there is one, and what would be right.
+    """
+    path = Path(path)
+    name = str(path)
+    content = _content(path, name)
+    return formats.read(content, path.suffix.lower(), name)
+
+
+def _content(path: Path, name: str) -> bytes:
+    """Return a file's bytes, decompressed, after refusing what is too large."""
+    try:
+        if not path.is_file():
+            what = "this is a folder" if path.is_dir() else "there is no such file"
+            raise RecordError(f"{name}: {what}. A measurement is one file.")
+        size = path.stat().st_size
+        content = path.read_bytes() if size <= LARGEST else b""
+        if content[:2] == b"\x1f\x8b":
+            with gzip.open(path) as stream:
+                content = stream.read(LARGEST + 1)
+            size = len(content)
+    except (OSError, EOFError, zlib.error, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise RecordError(f"{name}: the file cannot be read ({reason}).") from None
+    if size > LARGEST:
+        raise RecordError(
+            f"{name}: {size / 1024**2:.0f} MB are more than the limit of {LARGEST // 1024**2} MB "
+            "for one measurement. Cut it, or sample it more coarsely."
+        )
+    if not content.strip():
+        raise RecordError(f"{name}: the file is empty. A measurement has titles and numbers.")
+    return content

@@ -1,0 +1,62 @@
+"""A new study from files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..data.channels import ChannelSpec
+from ..data.guess import Guess
+from .new import make_folder
+from .study import Study
+
+
+@dataclass(frozen=True)
+class Created:
+    """A study that was made: what was guessed, what was left out, and what to know."""
+
+    study: Study
+    guesses: tuple[Guess, ...]
+    unused: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def create_study(
+    folder: Path | str,
+    files: Sequence[Path | str],
+    *,
+    rig: str = "bench",
+    building: Path | str | None = None,
+    channels: Mapping[str, ChannelSpec] | None = None,
+    title: str = "",
+    law: str = "lugre",
+) -> Created:
+    """Make a study's folder from files; it appears when it is whole.
+
+    Parameters
+    ----------
+    folder : path
+        The folder to make; it must not exist.
+    files : paths
+        One run each, with the same columns.
+    rig : {"bench", "structure"}
+        Motion prescribed and force measured, or ground motion in and response out.
+    building : path
+        The data file of the structure.
+    channels : mapping
+        Channels that are known; the others are guessed from the first file.
+    title, law : str
+        Title of the study, and the law that its model begins with.
+
+    Raises
+    ------
+    StudyError
+        If the folder exists, a needed channel or its unit cannot be told, or files differ.
+    RecordError
+        If a file cannot be read.
+    """
+    made = make_folder(
+        Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law
+    )
+    return Created(Study(folder), made.guesses, made.unused, made.notes)
