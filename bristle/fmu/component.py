@@ -7,7 +7,37 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from .slave import STEPPING, EffectSlave
+from ..physics.effect import Parameter, effects_of
+from .slave import STEPPING, Slave
+
+
+class EffectSlave(Slave):
+    """A component that offers the effects of its site, each with a switch and its parameters."""
+
+    def add_effects(self, site: str, law: str = "") -> None:
+        """Declare `EFFECT.on`, `EFFECT.PARAMETER`, `EFFECT.STATE_0` for the effects of a site."""
+        own = self.baked.get("own", [])  # a user's, in this process; an FMU's are its library's
+        self._effects = tuple(e for e in effects_of(site, law) if not e.own or e.name in own)
+        for effect in self._effects:
+            self.add_parameter(effect.name + ".on", False, None, effect.first_line())
+            for name, parameter in effect.parameters.items():
+                self.add_physical(effect.name + "." + name, parameter)
+            for name, unit in effect.states.items():
+                text = f"start value of the state {name}"
+                self.add_parameter(f"{effect.name}.{name}_0", 0.0, unit, text)
+
+    def add_physical(self, name: str, parameter: Parameter) -> None:
+        """Declare a parameter of a law or effect."""
+        self.add_parameter(name, parameter.value, parameter.unit, parameter.text, parameter.bounds)
+
+    def effects_on(self) -> list[str]:
+        """Return the names of the effects that are switched on."""
+        return [effect.name for effect in self._effects if self[effect.name + ".on"]]
+
+    def numbers(self) -> dict[str, float]:
+        """Return every Real parameter by its full name."""
+        names = ((self.vars[index].name, self._values[index]) for index in self._parameters)
+        return {name: value for name, value in names if isinstance(value, float)}
 
 
 class ComponentSlave(EffectSlave):
