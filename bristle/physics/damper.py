@@ -385,6 +385,17 @@ def step_law(
     )
 
 
+def force_at(
+    law: int, x: float, v: float, a: float, V: float, dt: float, energy: float, halt: float,
+    halts: bool, z: Row, p: Row, on: Row, work: Row,
+) -> tuple[float, float]:  # fmt: skip
+    """Return force and friction [N] at a state, as `evaluate` does; nothing moves on.
+
+    `work` holds as many floats as `z`, or more.
+    """
+    return evaluate(law, x, v, a, V, dt, energy, halt, halts, z, p, on, work, work)  # type: ignore[no-any-return]
+
+
 def jump(
     law: int, x: float, v: float, a: float, V: float, dt: float, energy: float, z: Row, p: Row,
     on: Row, work: Row,
@@ -424,9 +435,9 @@ def jump(
 lugre_advance = LuGre.advance
 
 
-def work_size() -> int:
-    """Return how many floats `step` needs as room to work."""
-    size = LAYOUT.z_size
+def work_size(more: int = 0) -> int:
+    """Return how many floats `step` needs as room to work, where states have so many `more`."""
+    size = LAYOUT.z_size + more
     return 7 * size + 2 * size * size
 
 

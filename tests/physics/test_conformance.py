@@ -16,10 +16,10 @@ import pytest
 from rigs import LAWS, NO_LAW, Bench, force_at, loop_energy, sine
 
 from bristle import units
+from bristle.component.structure import StructureModel
 from bristle.errors import ScenarioError
 from bristle.physics.building import paper_building
 from bristle.physics.effect import EFFECTS, HOOKS, SITES, Effect, Q, effects_of
-from bristle.physics.structure import StructureModel
 from bristle.scenario.scenario import load_scenario
 from bristle.simulate.run import run
 
