@@ -39,8 +39,8 @@ def conditions(cases: list[Stored], seed: int) -> str:
     codes = len({case.code for case in cases})
     more = f" They were made by {codes} versions of the code." if codes > 1 else ""
     return (
-        f"Seed {seed}: {bench} cases on the bench and {buildings} buildings, whose sites count one "
-        f"by one.{more} Today's value stands in bold."
+        f"Seed {seed}: cases on the bench {bench}, buildings {buildings}, whose sites count one by "
+        f"one.{more} Today's value stands in bold."
     )
 
 
