@@ -172,6 +172,15 @@ def test_the_table_goes_between_the_marks_of_a_page(tmp_path: Path) -> None:
         page.write(file, block)
 
 
+def test_a_table_that_moves_nowhere_says_that_it_tells_nothing() -> None:
+    far = case("effect", "gas_spring", 3.0, trial(1.01, "gas_spring"))
+    assert "neither support today's values" in page.sensitivity(replay.traded([far], BENCH))
+    weak = case("effect", "gas_spring", 1.05, trial(1.02, "gas_spring"))
+    said = page.sensitivity(replay.traded([weak], BENCH))
+    assert said.startswith("Counts change with `gain`")
+    assert "neither support" not in said
+
+
 def test_the_docs_tell_every_field_as_it_is() -> None:
     text = calibrate.PAGE.read_text(encoding="utf-8")
     assert page.every_field() in text
