@@ -161,7 +161,7 @@ def test_what_is_not_stored_is_left_out_and_told() -> None:
 def test_the_table_goes_between_the_marks_of_a_page(tmp_path: Path) -> None:
     weak = case("effect", "gas_spring", 1.05, trial(1.02, "gas_spring"))
     block = page.text(replay.both([weak]), [weak], 0)
-    assert "1 cases on the bench" in block
+    assert "cases on the bench 1, buildings 0" in block
     assert "| `gain` | 0.005 / 0.01 / **0.02** / 0.03 / 0.05 | 0 / 0 / **0** / 1 / 1 |" in block
     file = tmp_path / "page.md"
     file.write_text(f"head\n{page.BEGIN}\nold\n{page.END}\ntail\n")
@@ -170,6 +170,15 @@ def test_the_table_goes_between_the_marks_of_a_page(tmp_path: Path) -> None:
     file.write_text("none")
     with pytest.raises(ValueError, match=r"page\.md: no"):
         page.write(file, block)
+
+
+def test_a_table_that_moves_nowhere_says_that_it_tells_nothing() -> None:
+    far = case("effect", "gas_spring", 3.0, trial(1.01, "gas_spring"))
+    assert "neither support today's values" in page.sensitivity(replay.traded([far], BENCH))
+    weak = case("effect", "gas_spring", 1.05, trial(1.02, "gas_spring"))
+    said = page.sensitivity(replay.traded([weak], BENCH))
+    assert said.startswith("Counts change with `gain`")
+    assert "neither support" not in said
 
 
 def test_the_docs_tell_every_field_as_it_is() -> None:

@@ -28,7 +28,7 @@ def text(rows: dict[str, list[Traded]], cases: list[Stored], seed: int) -> str:
     """Return the block of the docs in Markdown."""
     out = [conditions(cases, seed)]
     for name, found in rows.items():
-        out += [f"### {TITLES[name]}", table(found, RULES[name])]
+        out += [f"### {TITLES[name]}", sensitivity(found), table(found, RULES[name])]
     return "\n\n".join([*out, "### All fields", every_field()])
 
 
@@ -39,9 +39,30 @@ def conditions(cases: list[Stored], seed: int) -> str:
     codes = len({case.code for case in cases})
     more = f" They were made by {codes} versions of the code." if codes > 1 else ""
     return (
-        f"Seed {seed}: {bench} cases on the bench and {buildings} buildings, whose sites count one "
-        f"by one.{more} Today's value stands in bold."
+        f"Seed {seed}: cases on the bench {bench}, buildings {buildings}, whose sites count one by "
+        f"one.{more} Today's value stands in bold."
     )
+
+
+def sensitivity(rows: list[Traded]) -> str:
+    """Return which fields these cases can say anything about: those that move a count at all."""
+    fields = list(dict.fromkeys(row.field for row in rows))
+    moved = [name for name in fields if _moves([row for row in rows if row.field == name])]
+    if not moved:
+        return (
+            "**No value of any field changes a count here. These cases lie too far from every "
+            "border to tell one value from another: they neither support today's values nor show "
+            "that values do not matter.**"
+        )
+    still = len(fields) - len(moved)
+    return (
+        f"Counts change with {', '.join(f'`{name}`' for name in moved)}. Of the other {still} "
+        "fields these cases say nothing: none lies near their borders."
+    )
+
+
+def _moves(rows: list[Traded]) -> bool:
+    return len({tuple(of(row) for of in COLUMNS.values()) for row in rows}) > 1
 
 
 def table(rows: list[Traded], base: DecisionRule) -> str:
