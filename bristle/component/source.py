@@ -38,8 +38,8 @@ def step(
 
 def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
     """Show the signal."""
-    t = time - c.delay
-    outputs[0] = c.scale * value(c.kind, t, c.p, c.times, c.samples)
-    if c.rated:
-        outputs[1] = c.scale * rate(c.kind, t, c.p, c.times, c.samples)
+    kind, p, times, samples, scale, delay, rated = c
+    outputs[0] = scale * value(kind, time - delay, p, times, samples)
+    if rated:
+        outputs[1] = scale * rate(kind, time - delay, p, times, samples)
     return 0

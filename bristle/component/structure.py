@@ -199,8 +199,10 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
         force += resting_contact(
             n, c.isolated, c.stiffnesses, state, stick, state[2 * n : end], c.p, c.on
         )
+    m_inverse, at = c.m_inverse, 2
     for i in range(n):
-        outputs[PER_LEVEL * i + 2] = state[end + i] - c.m_inverse[i * n] * force
+        outputs[at] = state[end + i] - m_inverse[i * n] * force
+        at += PER_LEVEL
     drifts = n - 1 if c.isolated else n
     outputs[PER_LEVEL * n + drifts] = hold - inputs[EXTRA_FORCE]
     return 0
