@@ -21,10 +21,11 @@ class HinfInverse(LinearSlave):
 
     def rest(self):
         super().rest()
-        self.state.append(0.0)  # the bristle deflection, after the linear law's states
+        self.state += DamperInverse.at_rest()  # after the linear law's states
 
     def act(self, y, v, f):
         u = self.command(v)
-        voltage, applied, self.state[-1] = self.inverted(u, v, self.state[-1])
+        n = self.controller.n
+        voltage, applied, self.state[n:] = self.inverted(u, v, self.state[n:])
         self.move(y, self.anti_windup * (applied - u))
         return voltage, u

@@ -27,15 +27,16 @@ class Skyhook(ControllerSlave):
 
     def rest(self):
         super().rest()
-        self.state = [0.0, 0.0, 0.0]  # absolute velocity, acceleration before, bristle deflection
+        # Absolute velocity, acceleration before, states of the law.
+        self.state = [0.0, 0.0, *DamperInverse.at_rest()]
 
     def act(self, y, v, f):
-        absolute, before, z = self.state
+        absolute, before, *z = self.state
         corner = 2.0 * pi * self.integral_corner
         absolute = leaky_integral(absolute, before, y, corner, self.sample_period)
         u = skyhook_command(absolute, self.gain)
         voltage, _, z = self.inverted(u, v, z)
-        self.state = [absolute, y, z]
+        self.state = [absolute, y, *z]
         if self.kind == "switch":
             voltage = skyhook_switch(absolute, v, self.v_max)
         return voltage, u

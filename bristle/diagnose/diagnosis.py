@@ -14,6 +14,7 @@ from ..data.measurement import Measurement
 from ..identify.fit import Model, Problem, identify, settled
 from ..identify.prepare import SHORTEST, prepare
 from ..identify.search_context import is_rough, refine
+from ..physics.laws import DEFAULT
 from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .decision import decide
 from .experiments import Experiment, separating
@@ -111,7 +112,7 @@ def diagnose(
     train: Sequence[Measurement],
     holdout: Sequence[Measurement],
     *,
-    law: str = "lugre",
+    law: str = DEFAULT,
     effects: Sequence[str] = (),
     values: Mapping[str, float] | None = None,
     held: Sequence[str] = (),
@@ -123,7 +124,7 @@ def diagnose(
     Parameters
     ----------
     train, holdout : measurements to fit to, and those that decide
-    law : {"bingham", "lugre"}
+    law : a damper's law, such as "bingham"
     effects : the effects that the model has already
     values : its parameters where they were identified before, by name in SI; else they are
         identified here

@@ -17,13 +17,12 @@ from ..identify.line import fit_line
 from ..identify.model import Model, Problem, Run
 from ..identify.start_grid import starts
 from ..identify.structure import (
-    LinearLayer,
-    LinearStorey,
     StructureProblem,
     StructureRun,
     thinned,
 )
 from ..physics.effect import EFFECTS, effects_of
+from ..physics.law import law_of_part
 from .candidates import Trial, judge
 from .evidence import paired
 
@@ -85,7 +84,7 @@ def look_at(
 
     `present` holds the effects that the model has at this site already, with their values.
     """
-    linear = LinearLayer if site == "layer" else LinearStorey
+    linear = law_of_part(site)
     hook = "force" if site == "layer" else "spring"
     base = fit_line(train, linear.name)
     taken: set[str] = set()

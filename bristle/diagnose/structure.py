@@ -17,6 +17,7 @@ from ..identify.placed import at_site, on_time
 from ..identify.response import Response, responses
 from ..identify.structure import StructureProblem, problems_of
 from ..physics.building import Building
+from ..physics.laws import DEFAULT
 from .candidates import judge
 from .decision import excess
 from .known_building import as_known, told
@@ -37,8 +38,8 @@ BLURRED = (*INSTRUMENT, "delay", "derived")
 without them, and what is left of a delay would be held against the law at each reversal."""
 
 BLIND = 1.25
-"""z that a true Bingham law may read where the base's velocity had to be left out: its jumps come
-when the velocity changes sign, which then is told by displacement and accelerometer alone."""
+"""z that a true law whose friction jumps may read where the base's velocity had to be left out: it
+jumps when the velocity changes sign, which then displacement and accelerometer alone tell."""
 
 _NOTHING = Finding("", "none", (), 1.0, 1.0, 0.0, 0.0)
 
@@ -51,7 +52,7 @@ def diagnose_structure(
     holdout: list[Measurement],
     building: Building,
     *,
-    law: str = "lugre",
+    law: str = DEFAULT,
     present: Model | None = None,
     say: Say | None = None,
 ) -> StructureDiagnosis:

@@ -17,8 +17,9 @@ from ..control import inverse, linear
 from ..control.controller import Controller, read_controller
 from ..control.sensing import filtered_velocity, low_passed
 from ..errors import BristleError
-from ..physics.bingham import Bingham
-from ..physics.lugre import LuGre
+from ..physics import damper
+from ..physics.law import LAWS, Law, law_code, laws_of
+from ..physics.laws import DEFAULT
 from .slave import Slave
 
 MEASURED = {
@@ -241,11 +242,17 @@ def declare_anti_windup(slave: Slave, rate: float) -> None:
     slave.add_parameter("anti_windup", rate, "1/s", text, (0.0, 1e4))
 
 
+def invertible() -> list[type[Law]]:
+    """Return the laws that can be inverted, the default first."""
+    found = [law for law in laws_of("damper") if law.affine() and law.exact()]
+    return sorted(found, key=lambda law: law.name != DEFAULT)
+
+
 class DamperInverse:
     """The voltage of a commanded force, by a law's inverse, as parameters of a component.
 
-    Parameters are named `lugre.sigma_a`, `bingham.f_c` ...; `z` is the LuGre deflection [m] that
-    the controller estimates.
+    Parameters are named `lugre.sigma_a`, `bingham.f_c` ...; `z` are the law's states that the
+    controller estimates, as `at_rest` begins them.
     """
 
     def __init__(self, slave: Slave) -> None:
@@ -254,9 +261,10 @@ class DamperInverse:
     @staticmethod
     def declare(slave: Slave) -> None:
         """Declare the parameters."""
-        text = "the law that is inverted, one of lugre, bingham"
-        slave.add_parameter("inverse", "lugre", None, text)
-        for law in (LuGre, Bingham):
+        laws = invertible()
+        text = f"the law that is inverted, one of {', '.join(law.name for law in laws)}"
+        slave.add_parameter("inverse", DEFAULT, None, text)
+        for law in laws:
             for name, p in law.parameters.items():
                 slave.add_parameter(f"{law.name}.{name}", p.value, p.unit, p.text, p.bounds)
         text = "no voltage below this speed"
@@ -264,22 +272,27 @@ class DamperInverse:
         text = "least force per volt that is divided by"
         slave.add_parameter("least_slope", inverse.LEAST_SLOPE, "N/V", text, (1e-9, 1e9))
 
+    @staticmethod
+    def at_rest() -> list[float]:
+        """Return the states before the first sample, as many as the largest law has."""
+        return [0.0] * damper.SLOTS.law_states
+
     def configure(self) -> None:
         """Read the parameters; ValueError where the law is not known."""
         chosen = self.slave["inverse"]
-        laws: dict[str, Any] = {"lugre": LuGre, "bingham": Bingham}
-        if chosen not in laws:
-            raise ValueError(f"inverse {chosen!r} is neither lugre nor bingham.")
-        self.lugre = chosen == "lugre"
-        self.p = [self.slave[f"{chosen}.{name}"] for name in laws[chosen].parameters]
+        names = [law.name for law in invertible()]
+        if chosen not in names:
+            raise ValueError(f"inverse {chosen!r} is neither {' nor '.join(names)}.")
+        self.law = law_code(chosen)
+        self.p = [self.slave[f"{chosen}.{name}"] for name in LAWS[chosen].parameters]
         self.limits = tuple(self.slave[name] for name in ("still", "least_slope", "v_max"))
 
-    def __call__(self, command: float, v: float, z: float) -> tuple[float, float, float]:
-        """Return voltage [V], the force [N] it gives by the law, and z [m] a sample later."""
-        if not self.lugre:
-            voltage = inverse.bingham_voltage(command, v, self.p, *self.limits)
-            return voltage, inverse.bingham_force(v, voltage, self.p), z
-        voltage = inverse.lugre_voltage(command, v, z, self.p, *self.limits)
-        applied = inverse.lugre_force(z, v, voltage, self.p)
-        period = self.slave["sample_period"]
-        return voltage, applied, inverse.estimated_deflection(z, v, period, self.p[6])
+    def __call__(
+        self, command: float, v: float, z: list[float]
+    ) -> tuple[float, float, list[float]]:
+        """Return voltage [V], the force [N] it gives by the law, and the states a sample later."""
+        voltage = inverse.voltage_of_law(self.law, self.p, command, v, z, *self.limits)
+        applied = inverse.force_of_law(self.law, self.p, v, voltage, z)
+        later = list(z)
+        inverse.estimate_states(self.law, self.p, v, voltage, self.slave["sample_period"], later)
+        return voltage, applied, later

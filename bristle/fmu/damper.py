@@ -5,7 +5,8 @@ from __future__ import annotations
 from math import inf, isfinite
 from typing import Any, ClassVar
 
-from ..physics.damper import LAWS, DamperModel
+from ..physics.damper import DamperModel
+from ..physics.law import LAWS
 from .slave import EffectSlave
 
 
@@ -35,9 +36,9 @@ class DamperSlave(EffectSlave):
         self.add_parameter("v_max", 8.0, "V", "largest voltage; the damper saturates", (0.0, 1e4))
         text = "mass that the damper moves; 0: no holding force, sliding law"
         self.add_parameter("moving_mass", 0.0, "kg", text, (0.0, 1e9))
-        if self.law == "lugre":
-            text = "start value of the bristle deflection"
-            self.add_parameter("bristle_deflection_0", 0.0, "m", text)
+        for name, unit in LAWS[self.law].states.items():
+            text = f"start value of the {name.replace('_', ' ')}"
+            self.add_parameter(f"{name}_0", 0.0, unit, text)
         self.add_effects("damper", self.law)
 
     def configure(self) -> None:

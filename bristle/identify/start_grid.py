@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.effect import EFFECTS
+from ..physics.law import LAWS, laws_of
 from .fit import Model, Problem
 from .search import HUBER, loss
 from .search_context import Expected, Search, residuals
@@ -33,11 +34,9 @@ NET: dict[str, dict[str, tuple[float, ...]]] = {
 }
 """The values looked at, as factors on an effect's defaults scaled to the rig."""
 
-FALL = {"bingham": ("c_0", "c_v"), "lugre": ("sigma_2", "sigma_b")}
-"""The parts of the laws that fall with speed: a fit without an effect of speed inflates them."""
-
 RELAXED = ((0.3, 2.0), (0.05, 10.0))
-"""Size and width of that part, as factors, where a start makes room for an effect of speed."""
+"""Size and width, as factors, of the part of a law that falls with speed, where a start makes room
+for an effect of speed: a fit without it inflates that part."""
 
 THIN = 6
 """Of what has no memory every so many samples suffice for a search."""
@@ -59,7 +58,7 @@ def _contact(own: dict[str, float], problem: Problem) -> None:
 
 def _share_of_yield(own: dict[str, float], _problem: Problem) -> None:
     """Take an excess near rest out of the yield force, which holds part of it in its mean."""
-    for name in ("f_c", "f_v", "sigma_a", "sigma_0"):
+    for name in {name for law in laws_of("damper") for name in law.yield_parameters()}:
         if name in own:
             own[name] /= 1.0 + 0.5 * own["stribeck.rise"]
 
@@ -81,10 +80,11 @@ def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
         name: problem.scaled(base.law, f"{effect}.{name}") for name in EFFECTS[effect].parameters
     }
     bases = [dict(base.values)]
-    if EFFECTS[effect].needs == ("v",) and not {*FALL[base.law], "v_n"} & set(base.held):
+    falling, over = base.law_class.falling()
+    if EFFECTS[effect].needs == ("v",) and over and not {*falling, over} & set(base.held):
         for size, width in RELAXED:
-            relaxed = {name: size * base.value(name) for name in FALL[base.law]}
-            bases.append({**base.values, **relaxed, "v_n": width * base.value("v_n")})
+            relaxed = {name: size * base.value(name) for name in falling}
+            bases.append({**base.values, **relaxed, over: width * base.value(over)})
     factors = NET.get(effect, {})
     out = []
     for own in bases:
@@ -137,7 +137,7 @@ def _kind(effects: Sequence[str], law: str) -> str:
     joined = [EFFECTS[name] for name in effects]
     if any(effect.joint for effect in joined):
         return "joint"
-    if law != "bingham" or any(effect.states or effect.site == "sensor" for effect in joined):
+    if LAWS[law].states or any(effect.states or effect.site == "sensor" for effect in joined):
         return "memory"
     return "none"
 

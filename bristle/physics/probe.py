@@ -8,7 +8,8 @@ from itertools import product
 from math import copysign, inf, isfinite
 from typing import Any, Callable
 
-from .effect import CHOICES, Effect, Q
+from .effect import Effect, Q
+from .parameter import CHOICES
 
 """Parameters that are choices of a form: they may make a hook jump."""
 
@@ -89,7 +90,7 @@ def _call(
     """Return what a hook gives, as a tuple; FlawError if that is not right."""
     function: Callable[..., Any] = getattr(effect, hook)
     line = function.__code__.co_firstlineno + 1
-    p = effect.Values(**values)
+    p = effect.values_of(values)
     try:
         found = function(q, z, p)
     except Exception as error:

@@ -80,7 +80,7 @@ def load_effects(folder: Path) -> list[Loaded]:
         found.append(loaded)
         changed = changed or new
     if changed:
-        _reweave()
+        _regenerate()
     return found
 
 
@@ -96,7 +96,7 @@ def load_effect(path: Path) -> type[Effect]:
         raise PhysicsError(f"{path}: there is no such file with an effect.")
     loaded, new = _load(path.resolve(), path)
     if new:
-        _reweave()
+        _regenerate()
     if loaded.effect is None:
         raise PhysicsError(loaded.error)
     return loaded.effect
@@ -120,19 +120,19 @@ def leave_out(effect: type[Effect], why: str) -> None:
         if loaded.effect is effect:
             _forget(path)
             _known[path] = digest, Loaded(loaded.path, None, why)
-    _reweave()
+    _regenerate()
 
 
 def unload_effects() -> None:
     """Take every effect of a user's out of the library: it is as it came."""
     gone = [_forget(path) for path in list(_known)]
     if any(gone):
-        _reweave()
+        _regenerate()
 
 
-def _reweave() -> None:
-    damper.reweave()
-    structure.reweave()
+def _regenerate() -> None:
+    damper.regenerate()
+    structure.regenerate()
 
 
 def _forget(path: Path) -> bool:

@@ -67,7 +67,7 @@ class Clocks:
             record["anti_windup"] = slave["anti_windup"]
         if kind in (INVERSE, SKYHOOK):
             law = slave.inverted
-            record["lugre"], record["p"][: len(law.p)] = law.lugre, law.p
+            record["law"], record["p"][: len(law.p)] = law.law, law.p
             record["still"], record["least_slope"], _ = law.limits
         if kind == SKYHOOK:
             record["gain"], record["switches"] = slave["gain"], slave["kind"] == "switch"

@@ -113,7 +113,7 @@ def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int]]
 def _compiled(
     evaluate: Any, effect_forces: Any, clocked: bool
 ) -> Callable[..., tuple[int, int, int]]:
-    """Compile the march with these woven functions: there are new ones after a new effect."""
+    """Compile the march with these generated functions: there are new ones after a new effect."""
     march.damper_evaluate = evaluate
     march.serve = _serve if clocked else march.idle
     function: Callable[..., tuple[int, int, int]] = compiled(march.march, march.INLINE)

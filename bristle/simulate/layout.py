@@ -12,7 +12,6 @@ import numpy as np
 from ..fmu.controller import MEASURED
 from ..physics import damper, structure
 from ..physics.building import MAX_FLOORS
-from ..physics.lugre import LuGre
 from ..physics.signals import PARAMETERS
 
 LEVELS = MAX_FLOORS + 1
@@ -50,8 +49,8 @@ def damper_record() -> np.dtype[np.void]:
 
     `sharing` dampers bring the first level of structure `on_structure` to rest together.
     """
-    size, effects = damper.LAYOUT.z_size, len(damper.LAYOUT.effects)
-    integers = ("law", "n_moving", "n_states", "on_structure")
+    size, effects = damper.SLOTS.z_size, len(damper.SLOTS.effects)
+    integers = ("law", "n_moving", "n_own", "n_states", "on_structure")
     slots = ("x", "v", "a", "V", "force", "friction", "energy", "stroke_ratio")
     begin = ("x0", "v0", "a0", "V0", "force0")
     forces = ("smooth", "smooth_1", "smooth_2", "found", "tried", "excess")
@@ -59,9 +58,9 @@ def damper_record() -> np.dtype[np.void]:
         [
             *((name, _INT) for name in (*integers, *slots)),
             *((name, _FLOAT) for name in ("v_max", "stroke", "sharing", *begin, *forces)),
-            *((name, _FLAG) for name in ("active", "advances", "halts")),
+            *((name, _FLAG) for name in ("active", "advances", "signed", "halts")),
             *((name, _FLOAT, (size,)) for name in ("z", "z1", "spare")),
-            ("p", _FLOAT, (damper.LAYOUT.p_size,)),
+            ("p", _FLOAT, (damper.SLOTS.p_size,)),
             ("moving", _INT, (size,)),
             ("on", _SWITCH, (max(1, effects),)),
             ("work", _FLOAT, (damper.work_size(),)),
@@ -81,7 +80,7 @@ def structure_record() -> np.dtype[np.void]:
     than its motion. `gain` is the velocity of the first level per force held over the substep.
     """
     n = LEVELS
-    lay = structure.LAYOUT
+    lay = structure.SLOTS
     slots = ("ground", "force", "extra", "friction", "extra_friction", "first_output", "holding")
     return np.dtype(
         [
@@ -114,20 +113,21 @@ def sampled_record() -> np.dtype[np.void]:
     and `noise` are places in memory and constants (noise: -1 without any).
     """
     channels = len(MEASURED)
-    laws = ("kind", "n", "rows", "A", "B", "W", "C", "state")
+    laws = ("kind", "law", "n", "rows", "A", "B", "W", "C", "state")
     numbers = ("v_max", "f_min", "anti_windup", "v_top", "velocity_corner", "still", "least_slope")
     hook = ("gain", "integral_corner", "absolute", "y_before")
-    moving = ("low", "x_before", "deflection")
+    moving = ("low", "x_before")
     own = ("own_gain", "bias", "quantisation", "corner", "share", "channel_low", "channel_before")
     return np.dtype(
         [
             *((name, _INT) for name in (*laws, "next", "last")),
             *((name, _FLOAT) for name in ("period", *numbers, *hook, *moving)),
-            *((name, _FLAG) for name in ("aligned", "filtered", "lugre", "switches")),
+            *((name, _FLAG) for name in ("aligned", "filtered", "switches")),
             *((name, _INT, (channels,)) for name in ("inputs", "ring", "length", "noise")),
             *((name, _FLOAT, (channels,)) for name in ("now", "before", *own)),
             ("outputs", _INT, (channels,)),
-            ("p", _FLOAT, (len(LuGre.parameters),)),
+            ("p", _FLOAT, (damper.SLOTS.law_parameters,)),
+            ("z", _FLOAT, (max(1, damper.SLOTS.law_states),)),
         ],
         align=True,
     )

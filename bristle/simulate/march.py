@@ -15,6 +15,8 @@ from __future__ import annotations
 from math import inf, isfinite
 
 from ..physics import damper, signals, structure
+from ..physics.inputs import Inputs, Setup
+from ..physics.law import laws_of
 from . import sampled as clocks
 
 damper_step = damper.step
@@ -35,10 +37,10 @@ TOLERANCE = 1e-6
 MAX_SWEEPS = 40
 
 INLINE = (
-    *("play", "start", "begin", "move", "resist", "end", "show_motion", "felt_voltage"),
+    *("play", "start", "begin", "move", "resist", "end", "show_motion", "felt_voltage", "setup"),
     *("due", "sample", "act"),
-    *("step", "free_step", "add_force", "evaluate_law"),
-    *("LuGre.advance", "LuGre.viscous", "LuGre.bristle", "falling"),
+    *("step", "free_step", "add_force", "step_law", "falling"),
+    *(hook.__qualname__ for law in laws_of("damper") for hook in law.hooks().values()),
 )
 """What becomes part of its caller: it is short or has one caller. Saves time, twice."""
 
@@ -124,10 +126,8 @@ def start(dampers, structures, s):
             d.a0 = s[d.a] if d.a >= 0 else 0.0
             resting = d.halts and s[d.v] == 0.0
             halt = s[structures[d.on_structure].holding] / d.sharing if resting else 0.0
-            s[d.force] = damper_evaluate(
-                d.law, s[d.x], s[d.v], d.a0, felt_voltage(d, s), inf, 0.0, halt, resting,
-                d.z[:], d.p, d.on, d.z1[:], d.spare[:],
-            )[0]  # fmt: skip
+            now = Inputs(s[d.x], s[d.v], d.a0, felt_voltage(d, s), inf, 0.0, halt, resting)
+            s[d.force] = damper_evaluate(setup(d), now, d.z[:], d.z1[:], d.spare[:])[0]
             d.smooth = d.smooth_1 = d.smooth_2 = s[d.force]
             s[d.stroke_ratio] = abs(s[d.x]) / d.stroke
 
@@ -178,10 +178,10 @@ def resist(d, structures, sweep, h, s):
     halt = 0.0
     if d.halts:
         halt = tried - v1 / (structures[d.on_structure].gain * d.sharing)
-    d.found, s[d.friction] = damper_step(
-        d.law, d.x0, d.v0, d.a0, d.V0, s[d.x], v1, a1, felt_voltage(d, s), h, s[d.energy], halt,
-        d.halts, d.z[:], d.p, d.on, d.moving, d.n_moving, d.advances, d.z1[:], d.work[:], d.active,
-    )  # fmt: skip
+    energy = s[d.energy]
+    before = Inputs(d.x0, d.v0, d.a0, d.V0, h, energy, halt, d.halts)
+    now = Inputs(s[d.x], v1, a1, felt_voltage(d, s), h, energy, halt, d.halts)
+    d.found, s[d.friction] = damper_step(setup(d), before, now, d.z[:], d.z1[:], d.work[:])
     excess, slope = d.found - tried, -1.0
     if sweep > 0 and tried != d.tried and s[d.friction] == friction:
         slope = min((excess - d.excess) / (tried - d.tried), -0.5)
@@ -244,10 +244,8 @@ def respond(dampers, structures, h, s):
             halt = 0.0
             if d.halts:
                 halt = s[d.force] - s[d.v] / (structures[d.on_structure].gain * d.sharing)
-            s[d.force], s[d.friction] = damper_evaluate(
-                d.law, s[d.x], s[d.v], d.a0, V, h, s[d.energy], halt, d.halts, d.z[:], d.p, d.on,
-                d.z1[:], d.spare[:],
-            )  # fmt: skip
+            now = Inputs(s[d.x], s[d.v], d.a0, V, h, s[d.energy], halt, d.halts)
+            s[d.force], s[d.friction] = damper_evaluate(setup(d), now, d.z[:], d.z1[:], d.spare[:])
             jump = s[d.force] - s[d.friction] - d.smooth
             d.smooth += jump
             d.smooth_1 += jump
@@ -292,6 +290,11 @@ def show_rest(b, x, z, s):
         s[at] = x[i] - (x[i - 1] if i > 0 else 0.0)
         at += 1
     s[b.holding] = hold - s[b.extra]
+
+
+def setup(d):
+    """Return what a damper's functions need of its record."""
+    return Setup(d.law, d.p, d.on, d.moving, d.n_moving, d.advances, d.n_own, d.signed, d.active)
 
 
 def felt_voltage(d, s):

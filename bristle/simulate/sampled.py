@@ -29,9 +29,8 @@ ROUNDING = 1e-6
 table_row, command, advance = linear.table_row, linear.command, linear.advance
 clipped_voltage = switching.clipped_voltage
 signed_voltage, applied_signed = switching.signed_voltage, switching.applied_signed
-lugre_voltage, lugre_force = inverse.lugre_voltage, inverse.lugre_force
-bingham_voltage, bingham_force = inverse.bingham_voltage, inverse.bingham_force
-estimated_deflection = inverse.estimated_deflection
+voltage_of_law, force_of_law = inverse.voltage_of_law, inverse.force_of_law
+estimate_states = inverse.estimate_states
 low_passed, filtered_velocity = sensing.low_passed, sensing.filtered_velocity
 leaky_integral, skyhook_command = sensing.leaky_integral, sensing.skyhook_command
 skyhook_switch = sensing.skyhook_switch
@@ -123,14 +122,11 @@ def designed(c, y, v, f, constants, memory):
 def inverted(c, u, v):
     """Return the voltage [V] for the commanded force, and the force [N] that it gives by the law.
 
-    Moves the estimated bristle deflection on.
+    Moves the estimated states of the law on.
     """
-    if not c.lugre:
-        voltage = bingham_voltage(u, v, c.p, c.still, c.least_slope, c.v_max)
-        return voltage, bingham_force(v, voltage, c.p)
-    voltage = lugre_voltage(u, v, c.deflection, c.p, c.still, c.least_slope, c.v_max)
-    applied = lugre_force(c.deflection, v, voltage, c.p)
-    c.deflection = estimated_deflection(c.deflection, v, c.period, c.p[6])
+    voltage = voltage_of_law(c.law, c.p, u, v, c.z, c.still, c.least_slope, c.v_max)
+    applied = force_of_law(c.law, c.p, v, voltage, c.z)
+    estimate_states(c.law, c.p, v, voltage, c.period, c.z)
     return voltage, applied
 
 

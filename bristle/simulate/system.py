@@ -12,7 +12,6 @@ from ..data import ground_motion_file
 from ..errors import ScenarioError
 from ..fmu import catalogue
 from ..fmu.slave import Slave
-from ..physics.damper import BINGHAM
 from ..physics.signals import CONSTANT, CSV, PARAMETERS
 from ..physics.structure import step_matrices
 from ..scenario.scenario import Component, Scenario
@@ -154,15 +153,14 @@ class System:
             record["friction"] = self.friction[name, "force"]
             given = (name, "acceleration") in self.source_of or slave.was_set("acceleration")
             record["a"] = self.slots[name, "acceleration"] if given else -1
-            record["law"], record["advances"] = model.law, model.advances
-            record["active"] = any(model.on)
-            record["n_moving"] = len(model.moving)
-            record["n_states"] = len(model.z) if any(model.on) else 1
+            for field in ("law", "n_moving", "advances", "n_own", "signed", "active"):
+                record[field] = getattr(model.setup, field)
+            record["n_states"] = len(model.z) if model.active else model.setup.n_own
             record["v_max"], record["stroke"] = slave["v_max"], slave["stroke"]
             record["on_structure"] = self._pushed_by(name)
             _fill(record, z=model.z, z1=model.z, p=model.p, on=model.on, moving=model.moving)
         records["halts"] = records["on_structure"] >= 0
-        sticking = records["on_structure"][records["law"] == BINGHAM]
+        sticking = records["on_structure"][records["signed"]]
         for record in records:
             together = int(np.count_nonzero(sticking == record["on_structure"]))
             record["sharing"] = max(1, together)

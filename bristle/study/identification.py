@@ -10,12 +10,14 @@ import numpy as np
 
 from ..data.channels import DRIVE
 from ..data.measurement import Measurement
-from ..data.model import LAW_NAMES, STANDARD, StudyModel, new_model
+from ..data.model import StudyModel, new_model
 from ..errors import StudyError
 from ..identify.fit import Fit, Model, Problem, identify
 from ..identify.fit import fit as fit_model
 from ..identify.prepare import prepare, saturated
 from ..identify.table import LawError, error_rms, error_table, force_rms
+from ..physics.law import LAWS, base_and_variant, law_names
+from ..physics.laws import DEFAULT
 from ..units import convert
 from .history import Step
 from .judged import robust_z
@@ -196,7 +198,7 @@ def identify_building(
     rows: list[LawError] = []
     site = "damper" if "damper" in held else next(iter(held))
     drawn, (train, holdout) = held[site]
-    if table and site == "damper" and model.base_law == "lugre":
+    if table and site == "damper" and not LAWS[model.base_law].has("sign"):
         rows = error_table(train, holdout, cutoff, starts=min(starts, _TABLE_STARTS))
     show(4)
     notes += [*found.notes(), _by_site(held), *_weighing(rows, model, after)]
@@ -228,7 +230,7 @@ IDENTIFIERS: dict[
 
 def identify_frames(
     frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame],
-    law: str = "lugre",
+    law: str = DEFAULT,
     *,
     effects: tuple[str, ...] = (),
     holdout: Mapping[str, pd.DataFrame] | list[pd.DataFrame] | None = None,
@@ -254,7 +256,7 @@ def identify_frames(
     held = measurements_of_frames(holdout, "held out") if holdout else []
     if not train:
         raise StudyError("no frame is given; one run or more is right.")
-    model = _of_law(new_model(law, effects) if law in LAW_NAMES else new_model(), law)
+    model = _of_law(new_model(law, effects) if law in law_names() else new_model(), law)
     notes = () if held else ("No run is held out: errors are those of the fit itself.",)
     runs = Runs(train, held, notes)
     return _identify(runs, model, cutoff, starts, table, lambda done: None)
@@ -289,13 +291,17 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
     """Return the model with another law, its effects kept where they can join."""
     if law is None or law == model.law:
         return model
-    if law not in LAW_NAMES:
-        raise StudyError(f'law "{law}"; there are: {", ".join(LAW_NAMES)}.')
+    if law not in law_names():
+        raise StudyError(f'law "{law}"; there are: {", ".join(law_names())}.')
     from ..physics.effect import EFFECTS
 
     other = new_model(law, (), model.building)
-    base = STANDARD.get(law, law)
-    unfit = [name for name in model.effects if base not in EFFECTS[name].laws]
+    base, _ = base_and_variant(law)
+    unfit = [
+        name
+        for name in model.effects
+        if EFFECTS[name].site == base.site and not EFFECTS[name].joins(base)
+    ]
     if unfit:
         raise StudyError(f'{", ".join(unfit)} cannot join the law "{law}": undo the step first.')
     return replace(other, effects=dict(model.effects))

@@ -12,7 +12,9 @@ from ..diagnose.faults import SensorFault
 from ..diagnose.structure import diagnose_structure
 from ..diagnose.structure_verdict import StructureDiagnosis
 from ..errors import StudyError
-from ..physics.effect import EFFECTS
+from ..physics.effect import EFFECTS, laws_joined
+from ..physics.law import LAWS
+from ..physics.laws import DEFAULT
 from .history import Step
 from .identification import Identified, as_model, errors_of, identify_study
 from .study import Study, split_in_time
@@ -164,9 +166,9 @@ def _refuse(model: StudyModel, name: str) -> None:
     effect = EFFECTS[name]
     if name in model.effects:
         raise StudyError(f"{name} is in the model already.")
-    if effect.site == "damper" and model.base_law not in effect.laws:
+    if effect.site == "damper" and not effect.joins(LAWS[model.base_law]):
         raise StudyError(
-            f"{name} cannot join the law {model.law}; it joins {', '.join(effect.laws)}."
+            f"{name} cannot join the law {model.law}; it joins {', '.join(laws_joined(effect))}."
         )
     for other in model.effects:
         if other in effect.excludes or name in EFFECTS[other].excludes:
@@ -228,7 +230,7 @@ def learn(
 
 def diagnose_frames(
     frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame],
-    law: str = "lugre",
+    law: str = DEFAULT,
     *,
     effects: tuple[str, ...] = (),
     holdout: Mapping[str, pd.DataFrame] | list[pd.DataFrame] | None = None,
