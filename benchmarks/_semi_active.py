@@ -20,7 +20,7 @@ from bristle.control import inverse, linear, switching
 from bristle.control.controller import read_controller
 from bristle.jit import compiled
 from bristle.physics.building import paper_building
-from bristle.physics.law import law_code
+from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
 
 Array = NDArray[np.float64]

@@ -21,7 +21,7 @@ from bristle.cli.effects import tell
 from bristle.fmu import catalogue
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
-from bristle.physics.law import LAWS
+from bristle.physics.laws import LAWS
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig

@@ -20,7 +20,7 @@ from bristle.identify.structure import StructureProblem
 from bristle.identify.structure import structure_problems as problems
 from bristle.physics.building import Building, from_data
 from bristle.physics.effect import EFFECTS
-from bristle.physics.law import law_of_part
+from bristle.physics.laws import law_of_part
 
 from . import cases, inseparable
 from .cases import Recorded

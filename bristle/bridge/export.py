@@ -24,7 +24,7 @@ from ..identify.instruments import true_motion
 from ..identify.prepare import prepare
 from ..physics.building import paper_building, read_building
 from ..physics.effect import EFFECTS
-from ..physics.law import LAWS
+from ..physics.laws import LAWS
 from ..physics.user import own_effects
 from ..study.identification import as_model
 from ..study.study import Study

@@ -131,7 +131,7 @@ def _errors(found: Identified) -> list[str]:
 
 def _laws(found: Identified, folder: Path) -> list[str]:
     """Return the table of laws, as a section of the paper has it, and which one would do better."""
-    from ..physics.law import base_and_variant
+    from ..physics.laws import base_and_variant
 
     lines = [
         f"  {'law':18} {'training':>11} {'held out':>11} {'of force':>9} {'|v| > 1 mm/s':>13} "

@@ -77,8 +77,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 def _new(arguments: argparse.Namespace) -> int:
     from ..data.channels import ChannelSpec
     from ..errors import StudyError
-    from ..physics.law import law_names
-    from ..physics.laws import DEFAULT
+    from ..physics.laws import DEFAULT, law_names
     from ..study.create import create_study
     from ..study.new import parse_channel
 

@@ -24,8 +24,7 @@ from ..errors import UnitError
 from ..findings import unknown, written
 from ..lines import KeyPath
 from ..physics.effect import EFFECTS, laws_joined
-from ..physics.law import LAWS, base_and_variant, law_names
-from ..physics.laws import DEFAULT
+from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..physics.user import why_left_out
 from ..units import convert
@@ -222,7 +221,11 @@ def _update(
     for name, content in wanted.items():
         if isinstance(content, list):
             if name not in table or table[name] != content:
-                table[name] = tomlkit.item(content)
+                table[name] = tomlkit.array()
+                for row in content:
+                    entry = tomlkit.inline_table()
+                    entry.update(row)
+                    table[name].append(entry)
             continue
         if name not in table:
             table[name] = tomlkit.inline_table() if inline else tomlkit.table()

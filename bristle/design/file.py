@@ -40,8 +40,7 @@ from typing import Any, TypeVar
 from ..errors import BristleError, DesignError, UnitError
 from ..physics.building import paper_building, read_building
 from ..physics.effect import EFFECTS, Effect
-from ..physics.law import Law, base_and_variant, law_names
-from ..physics.laws import DEFAULT_OF_DESIGN
+from ..physics.laws import DEFAULT_OF_DESIGN, Law, base_and_variant, law_names
 from ..physics.parameter import fields_of
 from ..units import convert
 from .sliding import Damper

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from ..errors import DesignError
 from ..physics.damper import DamperModel
 from ..physics.effect import EFFECTS, effects_of
-from ..physics.law import LEAST, Law, base_and_variant, law_names
-from ..physics.laws import DEFAULT_OF_DESIGN
+from ..physics.laws import DEFAULT_OF_DESIGN, LEAST, Law, base_and_variant, law_names
 
 Array = NDArray[np.float64]
 

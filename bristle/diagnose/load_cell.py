@@ -12,7 +12,7 @@ from ..identify.placed import corrected
 from ..identify.response import Response
 from ..identify.structure import StructureProblem, layer_run
 from ..physics.building import Building
-from ..physics.law import law_of_part
+from ..physics.laws import law_of_part
 from .candidates import judge
 from .sites import CLEAN, GAIN, SHARE, Finding, detectable
 

@@ -22,7 +22,7 @@ from ..identify.structure import (
     thinned,
 )
 from ..physics.effect import EFFECTS, effects_of
-from ..physics.law import law_of_part
+from ..physics.laws import law_of_part
 from .candidates import Trial, judge
 from .evidence import paired
 

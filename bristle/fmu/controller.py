@@ -18,8 +18,7 @@ from ..control.controller import Controller, read_controller
 from ..control.sensing import filtered_velocity, low_passed
 from ..errors import BristleError
 from ..physics import damper
-from ..physics.law import LAWS, Law, law_code, laws_of
-from ..physics.laws import DEFAULT
+from ..physics.laws import DEFAULT, LAWS, Law, law_code, laws_of
 from .slave import Slave
 
 MEASURED = {

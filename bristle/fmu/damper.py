@@ -6,7 +6,7 @@ from math import inf, isfinite
 from typing import Any, ClassVar
 
 from ..physics.damper import DamperModel
-from ..physics.law import LAWS
+from ..physics.laws import LAWS
 from .slave import EffectSlave
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.effect import EFFECTS
-from ..physics.law import LAWS
+from ..physics.laws import LAWS
 from .model import (
     Model,
     Problem,

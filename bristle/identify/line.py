@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.inputs import Inputs
-from ..physics.law import LAWS, Law
+from ..physics.laws import LAWS, Law
 from .fit import Fit
 from .model import Model, Run
 from .structure import StructureProblem

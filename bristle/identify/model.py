@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.effect import EFFECTS
-from ..physics.law import LAWS, Law
+from ..physics.laws import LAWS, Law
 from ..physics.parameter import CHOICES, Parameter
 from .bench import Bench
 from .instruments import earlier, pure_delay, shown_force, true_motion

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..physics.effect import EFFECTS
-from ..physics.law import law_of_part
+from ..physics.laws import law_of_part
 from .model import Model
 from .response import Response
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.effect import EFFECTS
-from ..physics.law import LAWS, laws_of
+from ..physics.laws import LAWS, laws_of
 from .fit import Model, Problem
 from .search import HUBER, loss
 from .search_context import Expected, Search, residuals

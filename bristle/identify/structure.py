@@ -19,8 +19,7 @@ from ..errors import RecordError
 from ..physics.building import Building
 from ..physics.effect import EFFECTS
 from ..physics.inputs import Inputs
-from ..physics.law import base_and_variant
-from ..physics.laws import DEFAULT
+from ..physics.laws import DEFAULT, base_and_variant
 from .model import Model, Problem, Run
 from .response import Response, base_equilibrium, responses, shear
 from .response_kernels import Along

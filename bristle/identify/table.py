@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
-from ..physics.law import base_and_variant, law_names
+from ..physics.laws import base_and_variant, law_names
 from .model import Model, Problem, Run, steady, without
 from .search import descend
 from .starts import start_models

@@ -101,8 +101,8 @@ class Effect:
         Parts of a law (`law.PARTS`) that it must have for the effect to join, beside those that the
         effect's hooks act on (`ACTS_ON`).
     kind
-        What it is a case of, such as "spring": a law that contains one is not offered another. Its
-        own name where nothing is said.
+        What it is a case of: "spring", "lag", "series element", "inertia" ... A law that contains
+        one is not offered another. Its own name where nothing is said.
     laws
         Read from files of before laws had parts: the laws that the effect joins, if not all.
     starts

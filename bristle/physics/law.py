@@ -48,6 +48,10 @@ LEAST = 1e-12
 """Speed [m/s] and travel [m] at which a law's slopes at rest are read."""
 
 
+MOST = 1e6
+"""Voltage [V] at which everything that a voltage moves has moved."""
+
+
 class Shape(NamedTuple):
     """A parameter in which a law is not linear: where fits look for it, and what it shapes.
 
@@ -149,9 +153,9 @@ class Law:
         cls.parameters = all_parameters(cls.parameters, cls.tables)
         if any(not isinstance(form, Constant) for form in cls.command.values()):
             cls.parts = tuple(dict.fromkeys((*cls.parts, "command")))
+        _check(cls)
         cls.State = named("State", tuple(cls.states))
         cls.Values = named("Values", cls.seen())
-        _check(cls)
         LAWS[cls.name] = cls
 
     @classmethod
@@ -286,7 +290,7 @@ def _moves(law: type[Law], name: str, hooks: tuple[str, ...]) -> bool:
     q = Inputs(1e-3, 0.02, 0.1, 1.0, 1e-3, 0.0, 0.0, False)
     z = law.State(*(1e-4 for _ in law.states)) if law.states else ()
     none = dict.fromkeys(law.linear(), 0.0)
-    p = law.at({**none, name: 1.0}, 1.0)
+    p = law.at({**none, name: 1.0}, MOST)  # beyond all knots of a table over the voltage
     return any(function(q, z, p) for hook in hooks if (function := law.hook(hook)))
 
 

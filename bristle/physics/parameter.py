@@ -64,10 +64,8 @@ def climb(x: float, knots: tuple[float, ...], rises: tuple[float, ...]) -> float
 def entries(name: str, table: Table) -> dict[str, Parameter]:
     """Return the parameters that a table stands for: `name[1]`, `name[2]` ..."""
     return {
-        f"{name}[{k}]": Parameter(
-            value, table.unit, table.bounds, f"{table.text}, at {table.knots[k - 1]:g}"
-        )
-        for k, value in enumerate(table.values, 1)
+        f"{name}[{k}]": Parameter(value, table.unit, table.bounds, f"{table.text}, at {knot:g}")
+        for k, (knot, value) in enumerate(zip(table.knots, table.values), 1)
     }
 
 

@@ -140,6 +140,8 @@ def _at_signal(
 
 
 def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> None:
+    moving: dict[str, bool] = {}
+    field_of = {name: field for field, names in effect.fields().items() for name in names}
     for name, parameter in effect.parameters.items():
         low, high = parameter.bounds
         if not (low > 0.0 and high > 100.0 * low):  # near the default: bounds may be far away
@@ -153,9 +155,12 @@ def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> Non
                 moved = moved or given(0.0) != given(1.0)
             else:
                 moved = _refuse_jump(effect, hook, given, 0.0, 1.0, f"p.{name}", 24) or moved
+        # Of a table some knots may lie where no signal of this small rig comes.
+        moving[field_of[name]] = moving.get(field_of[name], False) or moved
+    for field, moved in moving.items():
         if not moved:
             line = getattr(effect, next(iter(effect.hooks()))).__code__.co_firstlineno
-            raise FlawError(f"p.{name} moves nothing: no measurement could tell it.", line)
+            raise FlawError(f"p.{field} moves nothing: no measurement could tell it.", line)
 
 
 def _at_parameter(

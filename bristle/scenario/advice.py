@@ -11,8 +11,7 @@ from math import sqrt
 
 from ..errors import BristleError, PhysicsError
 from ..findings import Findings
-from ..physics.law import laws_of
-from ..physics.parameter import CHOICES
+from ..physics.laws import laws_of
 from .connections import Wire
 from .library import Library
 from .parts import Part, Run
@@ -227,7 +226,7 @@ def slopes(damper: Part, voltage: float) -> tuple[float, float]:
     for law in laws_of("damper"):
         values = {name: damper.real(name) for name in law.parameters}
         given = {name: value for name, value in values.items() if value is not None}
-        if all(name in given or name in CHOICES for name in law.parameters):
+        if given and all(name in given for name in law.linear()):
             return law.slopes_at_rest(given, voltage)
     return 0.0, 0.0
 

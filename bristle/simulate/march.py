@@ -16,7 +16,7 @@ from math import inf, isfinite
 
 from ..physics import damper, signals, structure
 from ..physics.inputs import Inputs, Setup
-from ..physics.law import laws_of
+from ..physics.laws import laws_of
 from . import sampled as clocks
 
 damper_step = damper.step

@@ -16,8 +16,7 @@ from ..identify.fit import Fit, Model, Problem, identify
 from ..identify.fit import fit as fit_model
 from ..identify.prepare import prepare, saturated
 from ..identify.table import LawError, error_rms, error_table, force_rms
-from ..physics.law import LAWS, base_and_variant, law_names
-from ..physics.laws import DEFAULT
+from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..units import convert
 from .history import Step
 from .judged import robust_z

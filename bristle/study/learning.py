@@ -13,8 +13,7 @@ from ..diagnose.structure import diagnose_structure
 from ..diagnose.structure_verdict import StructureDiagnosis
 from ..errors import StudyError
 from ..physics.effect import EFFECTS, laws_joined
-from ..physics.law import LAWS
-from ..physics.laws import DEFAULT
+from ..physics.laws import DEFAULT, LAWS
 from .history import Step
 from .identification import Identified, as_model, errors_of, identify_study
 from .study import Study, split_in_time

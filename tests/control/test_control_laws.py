@@ -16,7 +16,7 @@ from scipy.integrate import quad
 import bristle.control
 from bristle.control import inverse, linear, sensing, switching
 from bristle.jit import compiled
-from bristle.physics.law import law_code
+from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
 
 P = [parameter.value for parameter in LuGre.parameters.values()]

@@ -22,7 +22,7 @@ from bristle.control.controller import Controller
 from bristle.data import read_ground_motion
 from bristle.jit import compiled
 from bristle.physics.building import paper_building
-from bristle.physics.law import law_code
+from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from bristle.fmu.controller import MEASURED
 from bristle.fmu.description import extract, read_description
 from bristle.fmu.slave import Slave
 from bristle.physics.building import paper_building
-from bristle.physics.law import law_code
+from bristle.physics.laws import law_code
 from bristle.physics.laws.lugre import LuGre
 from bristle.scenario.scenario import load_scenario
 from bristle.scenario.text import scenario_text

@@ -16,7 +16,7 @@ from fresh import fresh
 from bristle import units
 from bristle.fmu import build, catalogue
 from bristle.physics.effect import effects_of
-from bristle.physics.law import LAWS
+from bristle.physics.laws import LAWS
 
 DAMPERS = ["BinghamDamper", "LuGreDamper"]
 CONTROLLERS = ["ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped", "Skyhook"]

@@ -14,7 +14,7 @@ from bristle.identify.drive import smooth_steps
 from bristle.identify.fit import Model, Problem, Run, fit, identify
 from bristle.identify.prepare import prepare
 from bristle.identify.smooth import posterior_draws, smooth
-from bristle.physics.law import LAWS, laws_of
+from bristle.physics.laws import LAWS, laws_of
 
 DT, N = 0.002, 4000
 T = np.arange(N) * DT

@@ -9,7 +9,7 @@ from bristle.errors import RecordError
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Problem, Run
 from bristle.identify.table import error_table, low_pass
-from bristle.physics.law import law_names
+from bristle.physics.laws import law_names
 
 DT, N = 0.004, 3000
 T = np.arange(N) * DT

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...physics.building import frequencies, paper_building
-from ...physics.law import law_code
+from ...physics.laws import law_code
 from ...physics.laws.lugre import LuGre
 from .experiment import Motion
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...control.inverse import estimate_states
-from ...physics.law import law_code
+from ...physics.laws import law_code
 from ...physics.laws.lugre import LuGre
 from ..runs import Runs
 
