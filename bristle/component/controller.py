@@ -8,13 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ..control.inverse import (
-    bingham_force,
-    bingham_voltage,
-    estimated_deflection,
-    lugre_force,
-    lugre_voltage,
-)
+from ..control.inverse import estimate_states, force_of_law, voltage_of_law
 from ..control.linear import advance, command, table_row
 from ..control.sensing import (
     filtered_velocity,
@@ -33,9 +27,10 @@ VOLTAGE, COMMAND_RAW, SCHEDULING = range(3)
 CLIPPED, INVERSE, SIGNED, CLIPPED_LQG, SKYHOOK_SWITCH, SKYHOOK_INVERSE = range(6)
 """Kinds of controllers."""
 
-REMEMBERED = 7
-LOW, X_BEFORE, DEFLECTION, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, -2)
-"""What the state holds behind that of the state-space law, before `ORIGIN` and `COMING`."""
+REMEMBERED = 6
+LOW, X_BEFORE, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, -2)
+"""What the state holds behind that of the state-space law and the estimated states of the inverted
+law, before `ORIGIN` and `COMING`."""
 
 
 class Constants(NamedTuple):
@@ -43,8 +38,9 @@ class Constants(NamedTuple):
 
     `n`, `rows`, `v_top`, `A`, `B`, `W`, `C` are those of `control.controller.Controller`;
     `velocity_corner` [rad/s] is that of the low-passed displacement whose rate is the velocity, 0:
-    the velocity is measured; `lugre` and `p` say which law is inverted, `still` and `least_slope`
-    how; `gain` and `integral_corner` [rad/s] belong to skyhook.
+    the velocity is measured; `law` and `p` say which damper's law is inverted, `estimated` how many
+    states of it are, `still` and `least_slope` how; `gain` and `integral_corner` [rad/s] belong to
+    skyhook.
     """
 
     kind: int
@@ -60,7 +56,8 @@ class Constants(NamedTuple):
     C: Row
     f_min: float
     anti_windup: float
-    lugre: bool
+    law: int
+    estimated: int
     p: Row
     still: float
     least_slope: float
@@ -70,8 +67,8 @@ class Constants(NamedTuple):
 
 NOTHING: dict[str, Any] = {
     "velocity_corner": 0.0, "n": 0, "rows": 1, "v_top": 0.0, "A": [], "B": [], "W": [], "C": [],
-    "f_min": 0.0, "anti_windup": 0.0, "lugre": True, "p": [], "still": 0.0, "least_slope": 1.0,
-    "gain": 0.0, "integral_corner": 0.0,
+    "f_min": 0.0, "anti_windup": 0.0, "law": 0, "estimated": 0, "p": [], "still": 0.0,
+    "least_slope": 1.0, "gain": 0.0, "integral_corner": 0.0,
 }  # fmt: skip
 """What a kind does not need."""
 
@@ -79,9 +76,9 @@ NOTHING: dict[str, Any] = {
 def setup(time: float, **values: Any) -> tuple[Constants, list[float], int]:
     """Return constants, state and size of work, given what differs from `NOTHING`."""
     c = Constants(**{**NOTHING, **values})
-    state = [0.0] * (c.n + REMEMBERED)
+    state = [0.0] * (c.n + c.estimated + REMEMBERED)
     state[ORIGIN] = time
-    return c, state, c.n + 4
+    return c, state, c.n + c.estimated + 4
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
@@ -104,7 +101,8 @@ def step(
     code = step_code(dt, c.period, last - coming)
     if code < 0:
         return code
-    measured = work[c.n : c.n + 4]
+    room = c.n + c.estimated
+    measured = work[room : room + 4]
     for k in range(first_sample(time, c.period, origin, coming), last + 1):
         measure(origin + k * c.period - time, dt, c.period, before, now, measured)
         sample(k, measured, c, new_state, outputs, work)
@@ -128,7 +126,7 @@ def sample(k: int, measured: Row, c: Constants, state: Row, outputs: Row, spare:
         state[LOW], state[X_BEFORE] = low, x
         v = filtered_velocity(low, x, c.velocity_corner)
     if c.kind >= SKYHOOK_SWITCH:
-        voltage, u = skyhook(y, v, c, state)
+        voltage, u = skyhook(y, v, c, state, spare)
     else:
         voltage, u = designed(y, v, measured[DAMPER_FORCE], c, state, spare)
     outputs[VOLTAGE], outputs[COMMAND_RAW], outputs[SCHEDULING] = voltage, u, v
@@ -141,7 +139,7 @@ def designed(
     row = table_row(v, c.v_top, c.rows) if c.rows > 1 else 0
     u = command(c.n, c.C, row, state)
     if c.kind == INVERSE:
-        voltage, applied = inverted(u, v, c, state)
+        voltage, applied = inverted(u, v, c, state, spare)
         second = c.anti_windup * (applied - u)
     elif c.kind == SIGNED:
         voltage = signed_voltage(u, v, c.v_max)
@@ -153,21 +151,24 @@ def designed(
     return voltage, u
 
 
-def inverted(u: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
+def inverted(u: float, v: float, c: Constants, state: Row, spare: Row) -> tuple[float, float]:
     """Return the voltage [V] of the commanded force and the force [N] that it gives by the law.
 
-    Moves the estimated bristle deflection on.
+    Moves the estimated states of the law on.
     """
-    if not c.lugre:
-        voltage = bingham_voltage(u, v, c.p, c.still, c.least_slope, c.v_max)
-        return voltage, bingham_force(v, voltage, c.p)
-    z = state[DEFLECTION]
-    voltage = lugre_voltage(u, v, z, c.p, c.still, c.least_slope, c.v_max)
-    state[DEFLECTION] = estimated_deflection(z, v, c.period, c.p[6])
-    return voltage, lugre_force(z, v, voltage, c.p)
+    n, m = c.n, c.estimated
+    z = spare[n : n + m]
+    for i in range(m):
+        z[i] = state[n + i]
+    voltage = voltage_of_law(c.law, c.p, u, v, z, c.still, c.least_slope, c.v_max)
+    applied = force_of_law(c.law, c.p, v, voltage, z)
+    estimate_states(c.law, c.p, v, voltage, c.period, z)
+    for i in range(m):
+        state[n + i] = z[i]
+    return voltage, applied
 
 
-def skyhook(y: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
+def skyhook(y: float, v: float, c: Constants, state: Row, spare: Row) -> tuple[float, float]:
     """Return voltage [V] and command [N] of the skyhook law, and move its integral on."""
     total, before = state[ABSOLUTE], state[Y_BEFORE]
     absolute = leaky_integral(total, before, y, c.integral_corner, c.period)
@@ -175,4 +176,4 @@ def skyhook(y: float, v: float, c: Constants, state: Row) -> tuple[float, float]
     u = skyhook_command(absolute, c.gain)
     if c.kind == SKYHOOK_SWITCH:
         return skyhook_switch(absolute, v, c.v_max), u
-    return inverted(u, v, c, state)[0], u
+    return inverted(u, v, c, state, spare)[0], u

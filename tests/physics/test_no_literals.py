@@ -8,14 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from bristle.physics.damper import LAWS
 from bristle.physics.effect import EFFECTS
+from bristle.physics.laws import law_names
 
 PACKAGE = Path(__file__).resolve().parents[2] / "bristle"
 EXEMPT = ("physics", "paper")
 """Where laws and effects are at home, and where a published model is rebuilt by name."""
 
-KINDS = {"effects": EFFECTS, "laws": LAWS}
+KINDS = {
+    "effects": set(EFFECTS),
+    "laws": {*law_names("damper"), *law_names("structure")},
+}
 ELSEWHERE = {
     ("data/checks/motion.py", "delay"): "a kind of finding: a channel that comes late",
     ("diagnose/corrected.py", "delay"): "a kind of sensor fault",
@@ -23,8 +26,8 @@ ELSEWHERE = {
     ("diagnose/model_based_faults.py", "delay"): "a kind of sensor fault",
     ("diagnose/sensors.py", "delay"): "a kind of sensor fault",
     ("diagnose/equilibrium.py", "delay"): "a kind of sensor fault",
-    ("simulate/layout.py", "delay"): "a field of the engine's record: a sensor's parameter",
-    ("simulate/system.py", "delay"): "a field of the engine's record: a sensor's parameter",
+    ("simulate/records.py", "delay"): "a field of the engine's record: a source's parameter",
+    ("simulate/system.py", "delay"): "a field of the engine's record: a source's parameter",
 }
 """Files in which such a word means something else, and what."""
 
@@ -49,9 +52,9 @@ def selections(names: set[str]) -> list[tuple[str, int, str]]:
     ]
 
 
-@pytest.mark.parametrize("kind", ["effects"])
+@pytest.mark.parametrize("kind", ["effects", "laws"])
 def test_no_literal_selects_by_name(kind: str) -> None:
-    found = selections(set(KINDS[kind]))
+    found = selections(KINDS[kind])
     assert not [place for place in found if (place[0], place[2]) not in ELSEWHERE]
 
 
