@@ -52,9 +52,14 @@ def options() -> argparse.ArgumentParser:
 def seed_of(arguments: argparse.Namespace) -> int:
     """Return the seed to run: given, or of the last record, or fresh from the system."""
     if arguments.seed is not None:
+        if not 0 <= arguments.seed < plan.RESERVED:
+            raise SystemExit(
+                f"--seed {arguments.seed}: from {plan.RESERVED} on seeds are calibration's; from 0 "
+                "to that is right."
+            )
         return int(arguments.seed)
     last = None if arguments.fresh else record.newest()
-    return secrets.randbelow(2**31) if last is None else last
+    return secrets.randbelow(plan.RESERVED) if last is None else last
 
 
 def chosen(seed: int, cases: int, buildings: int, only: str = "") -> list[plan.Task]:

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from bristle.component.damper import VOLTAGE
 from bristle.scenario.scenario import load_scenario
-from bristle.simulate.coupled import LONGEST_SUBSTEP, compiled_march, simulate
-from bristle.simulate.march import MAX_SWEEPS, TOLERANCE
+from bristle.simulate.coupled import LONGEST_SUBSTEP, compiled_loop, simulate
 from bristle.simulate.system import System
+from bristle.simulate.time_loop import MAX_SWEEPS, TOLERANCE
 
 from ._published import DRIFT, SECOND_FLOOR, half_sine, passive, peak_errors, symbol
 from ._rows import Row, interleave, ratio_of
@@ -120,25 +121,25 @@ def passive_peaks() -> Row:
 
 
 class _Ours:
-    """The compiled march, run again and again into the same memory."""
+    """The compiled time loop, run again and again into the same memory."""
 
     def __init__(self, system: System, rows: int, substeps: int) -> None:
         self.system, self.rows, self.substeps = system, rows, substeps
         self.sweeps = 0
         self._slots = np.array(list(system.outputs.values()), dtype=np.int64)
         self._table = np.zeros((rows + 1, len(system.outputs)))
-        self._march = compiled_march()
+        self._loop = compiled_loop()
 
     def run(self, h: float) -> float:
-        """Run once from the start; return the seconds of the march alone."""
+        """Run once from the start; return the seconds of the loop alone."""
         system = self.system
-        clocked = system.sampled(h, self.rows * self.substeps)
+        clocked = system.sampled(h)
         arguments = (*system.arrays(h), *clocked, system.start_values(), self._slots, self._table)
         before = time.perf_counter()
-        filled, _, self.sweeps = self._march(self.rows, self.substeps, h, *arguments)
+        filled, _, self.sweeps = self._loop(self.rows, self.substeps, h, *arguments)
         seconds = time.perf_counter() - before
         if filled <= self.rows:
-            raise RuntimeError(f"the march stopped at row {filled}")
+            raise RuntimeError(f"the loop stopped at row {filled}")
         return seconds
 
     def columns(self) -> dict[str, np.ndarray]:
@@ -171,17 +172,17 @@ class _Record(ctypes.Structure):
 
 
 class Peer:
-    """The C program, given the same numbers as the compiled march."""
+    """The C program, given the same numbers as the compiled time loop."""
 
     def __init__(self, library: ctypes.CDLL, system: System, rows: int, substeps: int) -> None:
-        self._march = library.march
-        self._march.restype = ctypes.c_long
+        self._loop = library.time_loop
+        self._loop.restype = ctypes.c_long
         self.system, self.rows, self.substeps = system, rows, substeps
         self.sweeps = 0
         self._table = np.zeros((rows + 1, len(COLUMNS)))
 
     def run(self, h: float) -> float:
-        """Run once from the start; return the seconds of the march alone."""
+        """Run once from the start; return the seconds of the loop alone."""
         sources, times, samples, dampers, structures = self.system.arrays(h)
         kept: list[np.ndarray] = []
 
@@ -190,9 +191,12 @@ class Peer:
             return kept[-1].ctypes.data_as(_DOUBLES)
 
         (b,), (d,), (g,) = structures, dampers, sources
-        flat = (address(b[name]) for name in ("phi", "held", "ramp", "m_inverse", "c", "k"))
+        flat = (
+            address(b[name])
+            for name in ("phi", "held", "ramp", "m_inverse", "damping", "stiffness")
+        )
         structure = _Structure(int(b["n"]), *flat, float(b["mass"]))
-        voltage = self.system.start_values()[int(d["V"])]
+        voltage = self.system.start_values()[int(d["inputs"][VOLTAGE])]
         damper = _Damper(*map(float, d["p"][:7]), float(voltage), float(d["stroke"]))
         part = slice(int(g["begin"]), int(g["end"]))
         size = part.stop - part.start
@@ -204,7 +208,7 @@ class Peer:
             ctypes.byref(record), address(self._table), ctypes.c_long(len(COLUMNS)),
         )  # fmt: skip
         before = time.perf_counter()
-        self.sweeps = self._march(*arguments)
+        self.sweeps = self._loop(*arguments)
         seconds = time.perf_counter() - before
         if self.sweeps < 0:
             raise MemoryError("the C program found no memory")

@@ -1,4 +1,4 @@
-/* The time march of bristle/simulate/march.py written in C, for one building and one LuGre damper:
+/* The time loop of bristle/simulate/time_loop.py written in C, for one building and one LuGre damper:
  * what compiled Python is measured against. Same scheme, same order of operations; the building may
  * have any number of levels; effects, other laws and other wirings are left out. */
 
@@ -114,7 +114,7 @@ static void write_row(const Structure *b, const Damper *d, const double *x, doub
 /* Fill `table` (rows + 1, width); return how many sweeps were taken, or -1 without memory.
  * In each substep of h [s] the force at its end is extrapolated, then corrected until motion and
  * force agree to `tolerance`, a share of the largest force so far. */
-long march(long rows, long substeps, double h, double tolerance, long max_sweeps,
+long time_loop(long rows, long substeps, double h, double tolerance, long max_sweeps,
            const Structure *b, const Damper *d, const Record *record, double *table, long width)
 {
     long n = b->n, size = 2 * n, sweeps = 0;

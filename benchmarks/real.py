@@ -23,12 +23,11 @@ if __package__ in (None, ""):  # `python benchmarks/real.py` finds only this fol
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import Measurement, read_measurement, read_measurements
-from bristle.diagnose import Diagnosis, diagnose
+from bristle.diagnose import Diagnosis, diagnose, diagnose_rig
 from bristle.diagnose.candidates import Trial
-from bristle.diagnose.mended import mended
-from bristle.diagnose.structure import diagnose_structure
+from bristle.diagnose.corrected import corrected
 from bristle.identify.building import equilibrium, identify_structure
-from bristle.identify.model import Problem
+from bristle.identify.model import Model, Problem
 from bristle.identify.prepare import prepare
 from bristle.identify.table import error_table
 from bristle.physics.building import Building, from_data
@@ -104,7 +103,7 @@ def bench_row(
     row.after, row.z_after = after.rms / size, after.z
     row.after_with = " + ".join(after.effects) + ("" if named else ", the best single one")
     problems = [
-        Problem([prepare(m) for m in mended(part, found.sensors)]) for part in (train, held)
+        Problem([prepare(m) for m in corrected(part, found.sensors)]) for part in (train, held)
     ]
     row.least_squares = error_table(*problems, 0.0, laws=(row.law,), starts=2)[0].share
     row.reference = told(after)
@@ -119,7 +118,7 @@ def verdict_of(found: Diagnosis) -> str:
     """Return kind, effects, coordinate and sensor faults of a diagnosis."""
     text = found.kind + (f": {', '.join(found.effects)}" if found.effects else "")
     if found.coordinate:
-        sure = bool(found.places) and found.places[0].significant
+        sure = bool(found.patterns) and found.patterns[0].significant
         text += f", along {found.coordinate}" + ("" if sure else " (not significant)")
     for fault in found.sensors:
         text += f"; {fault.channel}: {fault.fault}"
@@ -293,7 +292,7 @@ def shake_table(folder: Path, law: str) -> Row:
     row.before, row.z_before = float(before.share[0]), float(before.z[0])
     row.after, row.z_after = float(after.share[0]), float(after.z[0])
     row.after_with = "identified building; shares are those of the base shear"
-    verdict = diagnose_structure(train, held, found.building)
+    verdict = diagnose_rig(train, held, Model("lugre"), found.building)
     row.seconds = time.monotonic() - begun
     row.verdict = verdict.kind + (f": {', '.join(verdict.effects)}" if verdict.effects else "")
     row.verdict += f", along {verdict.coordinate}" if verdict.coordinate else ""

@@ -65,8 +65,9 @@ def compiled(
     function : callable
         It and its callees take arrays and make none, unless it `allocates`.
     inline : tuple of str
-        Qualified names of callees that become part of their callers: best for short ones and for
-        those with one caller, which would otherwise be translated by themselves and with it again.
+        Callees that become part of their callers, each as MODULE.NAME with the module's last name:
+        best for short ones and for those with one caller, which would otherwise be translated by
+        themselves and with it again.
     keep : bool
         Whether to keep the machine code on disk.
     allocates : bool
@@ -140,7 +141,8 @@ def _closed(function: Any, done: dict[int, Any], inline: tuple[str, ...]) -> Fun
         value = namespace.get(name)
         if isinstance(value, FunctionType):
             if id(value) not in done:
-                how = "always" if value.__qualname__ in inline else "never"
+                short = f"{value.__module__.rpartition('.')[2]}.{value.__qualname__}"
+                how = "always" if short in inline else "never"
                 done[id(value)] = numba.njit(inline=how, **_CALLEE)(_closed(value, done, inline))
             namespace[name] = done[id(value)]
         elif value is _MAKES_TUPLE:

@@ -1,14 +1,16 @@
 """FMU: the same voltage all the time."""
 
-from bristle.fmu.slave import Slave
+from bristle.component import source
+from bristle.fmu.source import SourceSlave
+from bristle.physics.signals import CONSTANT
 
 
-class ConstantVoltage(Slave):
+class ConstantVoltage(SourceSlave):
     """Constant voltage for a damper, the simplest of all controllers."""
 
     def declare(self):
         self.add_parameter("level", 4.0, "V", "the voltage", (-1e3, 1e3))
         self.add_output("voltage", "V", "voltage for the damper")
 
-    def refresh(self):
-        self.voltage = self.level
+    def setup(self):
+        return source.Constants(CONSTANT, [self.level], [0.0], [0.0]), [], 0

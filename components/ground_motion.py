@@ -1,12 +1,14 @@
 """FMU: the ground shakes as recorded."""
 
-from bristle.fmu.slave import Slave
-from bristle.physics.record import Motion, read_two_column
+from bristle.component import source
+from bristle.fmu.source import SourceSlave
+from bristle.physics.record import read_two_column
+from bristle.physics.signals import CSV
 
 BUILT_IN = ("el_centro_1940_ns",)
 
 
-class GroundMotion(Slave):
+class GroundMotion(SourceSlave):
     """Ground acceleration from a record, scaled to a peak and by a factor."""
 
     files = ("data/ground_motions/el_centro_1940_ns.csv",)
@@ -25,14 +27,14 @@ class GroundMotion(Slave):
             "ground_acceleration", "m/s2", "acceleration of the ground, positive along +x"
         )
 
-    def configure(self):
+    def setup(self):
         record = self.record
         baked = (*BUILT_IN, self.baked.get("record"))
-        path = self.resource(record + ".csv") if record in baked else record
-        self.motion = Motion(*read_two_column(path))
-        if self.peak > 0.0 and self.motion.peak == 0.0:
+        times, values = read_two_column(
+            self.resource(record + ".csv") if record in baked else record
+        )
+        peak = max(map(abs, values))
+        if self.peak > 0.0 and peak == 0.0:
             raise ValueError(f"record {record!r} is zero all along and has no peak to scale.")
-        self.scale = self.factor * (self.peak / self.motion.peak if self.peak > 0.0 else 1.0)
-
-    def refresh(self):
-        self.ground_acceleration = self.scale * self.motion(self.time - self.start)
+        scale = self.factor * (self.peak / peak if self.peak > 0.0 else 1.0)
+        return source.Constants(CSV, [], times, values, scale, self.start), [], 0

@@ -1,6 +1,6 @@
 """FMU: the controller that is scheduled by the base velocity."""
 
-from bristle.control.switching import applied_signed, signed_voltage
+from bristle.component.controller import SIGNED
 from bristle.fmu.controller import LinearSlave, declare_anti_windup
 
 
@@ -8,6 +8,7 @@ class Lpv(LinearSlave):
     """Linear parameter-varying controller: a signed voltage, scheduled by the base velocity."""
 
     design = "lpv"
+    law_kind = SIGNED
     command_unit = "V"
     files = ("control/data/lpv.json",)
 
@@ -15,8 +16,5 @@ class Lpv(LinearSlave):
         super().declare_law()
         declare_anti_windup(self, 200.0)
 
-    def act(self, y, v, f):
-        w = self.command(v)
-        voltage = signed_voltage(w, v, self.v_max)
-        self.move(y, self.anti_windup * (applied_signed(voltage, v) - w))
-        return voltage, w
+    def law(self):
+        return {**super().law(), "anti_windup": self.anti_windup}

@@ -1,21 +1,19 @@
 """FMU: the clipped-optimal switch on an LQG command."""
 
-from bristle.control.switching import clipped_voltage
-from bristle.fmu.controller import LinearSlave
+from bristle.component.controller import CLIPPED_LQG
+from bristle.fmu.controller import LinearSlave, declare_force_threshold
 
 
 class LqgClipped(LinearSlave):
     """Clipped LQG controller: an optimal regulator on an estimate that knows the damper's force."""
 
     design = "lqg"
+    law_kind = CLIPPED_LQG
     files = ("control/data/lqg.json",)
 
     def declare_law(self):
         super().declare_law()
-        text = "commands of this size or less are not answered"
-        self.add_parameter("f_min", 0.5, "N", text, (0.0, 1e9))
+        declare_force_threshold(self)
 
-    def act(self, y, v, f):
-        u = self.command(v)
-        self.move(y, f)
-        return clipped_voltage(u, f, self.f_min, self.v_max), u
+    def law(self):
+        return {**super().law(), "f_min": self.f_min}

@@ -1,11 +1,14 @@
 """FMU: what instruments make of the signals that a controller gets."""
 
-from bristle.control.instrument import Instrument
+from bristle.component import sensors
+from bristle.component.sensors import Channel
 from bristle.fmu.controller import MEASURED, SampledSlave
 
 
 class Sensors(SampledSlave):
     """Sensors: bias, gain, noise, quantisation, delay and cut-off on each measured channel."""
+
+    functions = sensors
 
     def declare(self):
         self.declare_measured()
@@ -24,24 +27,8 @@ class Sensors(SampledSlave):
             text = "corner of a first-order low-pass before sampling; 0: none"
             self.add_parameter(name + ".cut_off", 0.0, "Hz", text, (0.0, 1e6))
 
-    def configure(self):
-        super().configure()
-        keys = ("gain", "bias", "noise_density", "quantisation", "delay", "cut_off")
-        self.instruments = [
-            Instrument(i, self.seed, self.sample_period, *(self[f"{name}.{key}"] for key in keys))
-            for i, name in enumerate(MEASURED)
+    def setup(self):
+        channels = [
+            Channel(*(self[f"{name}.{key}"] for key in Channel._fields)) for name in MEASURED
         ]
-
-    def rest(self):
-        for instrument in self.instruments:
-            instrument.rest()
-
-    def sample(self, k, measured):
-        return [reading(k, value) for reading, value in zip(self.instruments, measured)]
-
-    def get_law(self):
-        return [instrument.get_state() for instrument in self.instruments]
-
-    def set_law(self, state):
-        for instrument, own in zip(self.instruments, state):
-            instrument.set_state(own)
+        return sensors.setup(self.time, self.sample_period, self.seed, channels)

@@ -2,8 +2,8 @@
 
 from math import pi
 
-from bristle.control.sensing import leaky_integral, skyhook_command, skyhook_switch
-from bristle.fmu.controller import ControllerSlave, DamperInverse
+from bristle.component.controller import SKYHOOK_INVERSE, SKYHOOK_SWITCH
+from bristle.fmu.controller import ControllerSlave, declare_inverse, inverse_law
 
 
 class Skyhook(ControllerSlave):
@@ -16,27 +16,12 @@ class Skyhook(ControllerSlave):
         self.add_parameter("gain", 50.0, "N.s/m", "the dashpot's coefficient", (0.0, 1e9))
         text = "the velocity is the acceleration's integral above this frequency"
         self.add_parameter("integral_corner", 0.2, "Hz", text, (1e-4, 1e4))
-        DamperInverse.declare(self)
+        declare_inverse(self)
 
-    def configure(self):
-        super().configure()
-        if self.kind not in ("switch", "inverse"):
+    def law(self):
+        kinds = {"switch": SKYHOOK_SWITCH, "inverse": SKYHOOK_INVERSE}
+        if self.kind not in kinds:
             raise ValueError(f"kind {self.kind!r} is neither switch nor inverse.")
-        self.inverted = DamperInverse(self)
-        self.inverted.configure()
-
-    def rest(self):
-        super().rest()
-        # Absolute velocity, acceleration before, states of the law.
-        self.state = [0.0, 0.0, *DamperInverse.at_rest()]
-
-    def act(self, y, v, f):
-        absolute, before, *z = self.state
         corner = 2.0 * pi * self.integral_corner
-        absolute = leaky_integral(absolute, before, y, corner, self.sample_period)
-        u = skyhook_command(absolute, self.gain)
-        voltage, _, z = self.inverted(u, v, z)
-        self.state = [absolute, y, *z]
-        if self.kind == "switch":
-            voltage = skyhook_switch(absolute, v, self.v_max)
-        return voltage, u
+        numbers = {"kind": kinds[self.kind], "gain": self.gain, "integral_corner": corner}
+        return {**inverse_law(self), **numbers}

@@ -22,13 +22,14 @@ BASE = (
     {"units", "lines"},
     {"physics", "findings"},
     {"control", "data", "jit"},
+    {"component"},
     {"draw", "check"},
 )
 SIMULATE = ({"fmu"}, {"scenario", "conformance", "design"}, {"simulate"}, {"batch"})
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
 ROOF = ({"study"}, {"bridge"}, {"report"}, {"paper"}, {"cli"})
 STOREYS: tuple[tuple[tuple[set[str], ...], ...], ...] = ((BASE,), (SIMULATE, MEASURE), (ROOF,))
-PLAIN = ("physics", "control", "units", "errors")
+PLAIN = ("physics", "control", "component", "units", "errors")
 """What imports the standard library alone."""
 
 SKIPPED = {".git", "fmus", "__pycache__", "build", "dist", "results", "node_modules", "site"}
@@ -181,7 +182,8 @@ def test_what_fmus_carry_imports_pythonfmu_and_the_standard_library() -> None:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "components").glob("*.py")), ids=lambda p: p.stem)
 def test_components_lean_on_what_fmus_carry(path: Path) -> None:
-    files = [name.removesuffix(".py").replace("/", ".") for name, _ in _library_files()]
+    names = [name.removesuffix(".py") for name, _ in _library_files()]
+    files = [name.removesuffix("/__init__").replace("/", ".") for name in names]
     carried = {f"{PACKAGE.name}.{file}" for file in files}
     for name in imported(path):
         assert name in carried or name.split(".")[0] in sys.stdlib_module_names, name

@@ -20,14 +20,14 @@ PACKAGE = Path(bristle.__file__).resolve().parent
 OLD = "return p.preload + q.x * (p.k + q.x * (p.k_2 + q.x * p.k_3))"
 NEW = "return p.preload + 3.0 * q.x * p.k"
 
-# The force is called through a function in another file than its own, as the march does.
+# The force is called through a function in another file than its own, as the time loop does.
 PROGRAM = """
 import json
 from collections import namedtuple
 from pathlib import Path
 
 from bristle.jit import compiled, digest
-from bristle.simulate.march import march
+from bristle.simulate.time_loop import integrate
 from bristle.physics.effects.gas_spring import GasSpring
 
 Motion = namedtuple("Motion", "x")
@@ -43,7 +43,7 @@ fast = compiled(pull)
 force = fast(0.01)
 hits = sum(fast.stats.cache_hits.values())
 file = digest.__code__.co_filename
-print(json.dumps({"force": force, "hits": hits, "march": digest(march), "file": file}))
+print(json.dumps({"force": force, "hits": hits, "loop": digest(integrate), "file": file}))
 """
 
 
@@ -81,8 +81,8 @@ def test_an_edited_effect_gives_its_new_force(edited: Any) -> None:
     assert first["force"] == pytest.approx(1.0 + 80.0 * 0.01)
     assert other["force"] == pytest.approx(1.0 + 3.0 * 80.0 * 0.01)
     assert again["force"] == back["force"] == first["force"]
-    # The march carries every effect, so its folder changes with them.
-    assert first["march"] == again["march"] == back["march"] != other["march"]
+    # The time loop carries every effect, so its folder changes with them.
+    assert first["loop"] == again["loop"] == back["loop"] != other["loop"]
     # And what was compiled once is not compiled again.
     assert [told["hits"] for told in (first, again, other, back)] == [0, 1, 0, 1]
 

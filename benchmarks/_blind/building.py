@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bristle.data.measurement import Measurement
+from bristle.diagnose import Diagnosis, diagnose_rig
 from bristle.diagnose.sites import try_effect
-from bristle.diagnose.structure import diagnose_structure
-from bristle.diagnose.structure_verdict import StructureDiagnosis
 from bristle.identify.fit import Model, identify
 from bristle.identify.line import fit_line
 from bristle.identify.search_context import refine
@@ -48,7 +47,7 @@ def ask(case: Recorded) -> dict[str, Any]:
     holdout = measurements(case.part("holdout"), case.channels)
     building = file_of(case)
     begun, spent = time.perf_counter(), time.process_time()
-    found = diagnose_structure(train, holdout, building, law=case.task.law)
+    found = diagnose_rig(train, holdout, Model(case.task.law), building)
     said = found.as_dict()
     answer = packed(said) | {
         "sites": said["sites"], "force": said["force"],
@@ -57,7 +56,7 @@ def ask(case: Recorded) -> dict[str, Any]:
     return answer | follow_up(case, answer, found)
 
 
-def follow_up(case: Recorded, answer: dict[str, Any], found: StructureDiagnosis) -> dict[str, Any]:
+def follow_up(case: Recorded, answer: dict[str, Any], found: Diagnosis) -> dict[str, Any]:
     """Return how well noise-free runs part the rivals of a class from the hidden effect."""
     hidden = [one["effect"] for one in case.truth["effects"]]
     if answer["kind"] != "class" or len(hidden) != 1 or hidden[0] not in answer["effects"]:
@@ -67,9 +66,9 @@ def follow_up(case: Recorded, answer: dict[str, Any], found: StructureDiagnosis)
     return {"resolved": resolve(case, hidden[0], rivals, site) if rivals and site else {}}
 
 
-def _site(true: str, rivals: list[str], found: StructureDiagnosis) -> str:
+def _site(true: str, rivals: list[str], found: Diagnosis) -> str:
     """Return the site at which all of a class can act, "" where they act at different ones."""
-    for site in found.problems:
+    for site in found.findings:
         if all(_acts(name, site, found.reconstructed) for name in (true, *rivals)):
             return site
     return ""

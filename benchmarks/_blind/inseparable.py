@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bristle.diagnose.candidates import begin
+from bristle.diagnose.candidates import short_search
 from bristle.identify.fit import Model, Problem, Run, identify
 from bristle.identify.prepare import prepare
 from bristle.identify.search_context import refine
-from bristle.identify.start_grid import Ground, ranked
+from bristle.identify.start_grid import SearchContext, ranked_guesses
 
 from . import cases, separate, subject
 from .cases import Recorded
@@ -91,9 +91,9 @@ def resolve(case: Recorded, made: Any, rivals: list[str]) -> dict[str, float]:
 
 def best_of(name: str, base: Model, train: Problem) -> Model:
     """Return a model with one more effect, searched as a diagnosis does and refined."""
-    ground = Ground(base, train)
-    begun = begin(name, ground, ranked(name, ground))
-    return refine(begun.model, train, sweeps=24)
+    context = SearchContext(base, train)
+    guesses = short_search(name, context, ranked_guesses(name, context))
+    return refine(guesses.model, train, sweeps=24)
 
 
 def _left(model: Model, problem: Problem) -> list[Array]:

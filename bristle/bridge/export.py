@@ -72,7 +72,7 @@ def export_study(study: Study, out: Path | None = None) -> Exported:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         fmu = _damper(study, model, measurement, folder, notes)
-        write = _structure if study.settings.rig == "structure" else _bench
+        write = _structure if study.settings.has_building else _bench
         scenario, files = write(study, model, measurement, fmu, folder, notes)
     except OSError as error:
         raise StudyError(
@@ -89,6 +89,12 @@ def _one_run(study: Study) -> Measurement:
 
 def _of_site(model: StudyModel, site: str) -> list[str]:
     return [name for name in model.effects if EFFECTS[name].site == site]
+
+
+def _masses(model: StudyModel) -> list[str]:
+    """Return the parameters of the damper's effects that are a mass which moves with the rod."""
+    effects = _of_site(model, "damper")
+    return [f"{name}.{EFFECTS[name].mass}" for name in effects if EFFECTS[name].mass]
 
 
 def _damper(
@@ -265,15 +271,16 @@ def _structure(
     }
     damper: dict[str, float | bool] = {}
     mass = building.M[0][0]
-    if "fluid_inertia" in model.effects and values.get("fluid_inertia.m_f", 0.0) > 0.0:
-        moved = values["fluid_inertia.m_f"]
-        own["attached_mass"] = moved
-        damper["fluid_inertia.m_f"] = 0.0
-        mass += moved
-        notes.append(
-            f"fluid_inertia.m_f = {moved:g} kg is structure.attached_mass in the scenario: from "
-            "differences of velocity it would diverge near the mass that it moves."
-        )
+    for name in _masses(model):
+        moved = values.get(name, 0.0)
+        if moved > 0.0:
+            own["attached_mass"] = float(own.get("attached_mass", 0.0)) + moved
+            damper[name] = 0.0
+            mass += moved
+            notes.append(
+                f"{name} = {moved:g} kg is structure.attached_mass in the scenario: from "
+                "differences of velocity it would diverge near the mass that it moves."
+            )
     wires = {
         "structure.ground_acceleration": "ground.ground_acceleration",
         "structure.damper_force": "damper.force",

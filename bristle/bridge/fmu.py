@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compare.comparison import Comparison, compare_held
+from ..compare.comparison import Comparison, compare_predictions
 from ..compare.coordinates import coordinates_of
-from ..compare.held import Held, between
+from ..compare.prediction import RunPrediction, between
 from ..compare.scale import rms
 from ..data.channels import DRIVE, MOTION, ChannelSpec, is_channel
 from ..data.read import read_table
@@ -103,8 +103,8 @@ def compare_fmu(
     ports = map_ports(description, pieces[0].units, maps or {}, given)
     job, passes = _job(path, pieces, ports, given)
     found = step_through(job, passes, timeout)
-    held = _held(pieces, ports, found, notes)
-    outputs = tuple(compare_held(runs, seen=None) for runs in held.values())
+    predictions = _predictions(pieces, ports, found, notes)
+    outputs = tuple(compare_predictions(runs, seen=None) for runs in predictions.values())
     notes += _turned(outputs)
     if pieces[0].derived:
         notes.append(f"{', '.join(pieces[0].derived)}: from the other channels of the motion")
@@ -149,26 +149,26 @@ def _job(
     return Job(str(path.resolve()), dict(given), names, outputs, tuple(steps)), passes
 
 
-def _held(
+def _predictions(
     pieces: list[Signals], ports: PortMap, found: list[dict[str, Array]], notes: list[str]
-) -> dict[str, list[Held]]:
+) -> dict[str, list[RunPrediction]]:
     """Return per output the pieces held against it."""
     per = 3 + DRAWS
-    held: dict[str, list[Held]] = {port.name: [] for port in ports.outputs}
+    out: dict[str, list[RunPrediction]] = {port.name: [] for port in ports.outputs}
     for k, piece in enumerate(pieces):
         mine = found[per * k : per * (k + 1)]
         for port in ports.outputs:
             si = piece.units[port.signal]
             factor, offset = conversion(port.unit, si)
             rows = [factor * one[port.name] + offset for one in mine]
-            held[port.name].append(_one(piece, port.name, port.signal, si, rows, ports, notes))
-    return held
+            out[port.name].append(_one(piece, port.name, port.signal, si, rows, ports, notes))
+    return out
 
 
 def _one(
     piece: Signals, name: str, signal: str, unit: str, rows: list[Array], ports: PortMap,
     notes: list[str],
-) -> Held:  # fmt: skip
+) -> RunPrediction:  # fmt: skip
     predicted, coarser = rows[0][:: 2**HALVINGS], rows[1][:: 2 ** (HALVINGS - 1)]
     middle, draws = rows[2], np.array(rows[3:])
     measured = piece.raw[signal] if signal in piece.raw else piece.values[signal]
@@ -182,7 +182,7 @@ def _one(
     spread = draws - middle
     bias = spread.mean(axis=0)
     sigma = np.sqrt(noise**2 + spread.var(axis=0, ddof=1))
-    return Held(
+    return RunPrediction(
         piece.name, piece.dt, measured, predicted + bias, sigma, noise, spread - bias,
         _coordinates(piece, signal, ports), predicted - coarser, name, unit,
     )  # fmt: skip
@@ -232,8 +232,8 @@ def _turned(outputs: tuple[Comparison, ...]) -> list[str]:
     """Say which outputs go against what was measured."""
     notes = []
     for one in outputs:
-        y = np.concatenate([held.measured for held in one.held])
-        p = np.concatenate([held.predicted for held in one.held])
+        y = np.concatenate([run.measured for run in one.predictions])
+        p = np.concatenate([run.predicted for run in one.predictions])
         if np.std(y) > 0.0 and np.std(p) > 0.0 and float(np.corrcoef(y, p)[0, 1]) < -0.5:
             notes.append(
                 f"{one.quantity} goes against what was measured: signs may differ; --channel "

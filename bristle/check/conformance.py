@@ -9,10 +9,10 @@ from math import cos, inf, isfinite, pi, sin
 
 import numpy as np
 
+from ..component.structure import StructureModel
 from ..physics.building import paper_building
 from ..physics.damper import DamperModel
 from ..physics.effect import Effect, laws_joined
-from ..physics.structure import StructureModel
 from .channel import shown
 from .user_effects import refused
 

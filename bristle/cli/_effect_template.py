@@ -42,6 +42,10 @@ class {cls}(Effect):
         "v_s": Parameter(2e-3, "m/s", (1e-5, 1.0), "speed over which it builds up"),
     }}
 
+    # Where a search begins, as factors on the values: start_grid = {{"v_s": (0.3, 1.0, 3.0)}}. What
+    # else the search and the verdict may know of it (lookalikes, family, mimics, ...) is told by
+    # the text of bristle.physics.effect.Effect.
+
     # Memory, if there is any, is a state: states = {{"heat": "J"}}, read as z.heat. It moves by
     #     rate(q, z, p)     its derivative, as a tuple: (q.force * q.v - z.heat / p.tau,)
     # or  advance(q, z, p)  its value after q.dt, as a tuple, where that is known exactly.

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..study.learning import Verdict
+    from ..diagnose import Diagnosis
 
 HELP = "what a study's model is missing, how sure, what else it could be"
 
@@ -55,7 +55,7 @@ TITLES = {
 }
 
 
-def text(found: Verdict, folder: Path) -> str:
+def text(found: Diagnosis, folder: Path) -> str:
     """Return the verdict as text."""
     from ..physics.effect import EFFECTS
 
@@ -86,7 +86,7 @@ def text(found: Verdict, folder: Path) -> str:
     return "\n".join([*lines, *_next(found, folder)])
 
 
-def _next(found: Verdict, folder: Path) -> list[str]:
+def _next(found: Diagnosis, folder: Path) -> list[str]:
     if found.kind in ("effect", "class"):
         names = " ".join(found.effects) if found.kind == "effect" else found.effects[0]
         return ["", f"Next:  bristle add {folder} {names}"]

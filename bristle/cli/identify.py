@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..study.identification import Identified
+    from ..study.identified import Identified
 
 HELP = "fit a study's model: parameters with intervals, what the data cannot tell, errors of laws"
 

@@ -170,7 +170,7 @@ def _first_look(arguments: argparse.Namespace) -> int:
     total = len(study.settings.runs)
     with Progress("looking at the runs", total, not arguments.json) as progress:
         look = first_look(study, progress.show)
-    level = damper_level(list(look.runs)) if study.settings.rig == "structure" else ""
+    level = damper_level(list(look.runs)) if study.settings.has_building else ""
     picture = study.write_report("first_look.png", first_look_png(list(look.runs), level))
     if arguments.json:
         import json

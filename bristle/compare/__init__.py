@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from .comparison import Comparison, compare, compare_held
+from .comparison import Comparison, compare, compare_predictions
 from .errors import RunError, SiteError
-from .held import Held, held_runs
+from .patterns import ResidualPattern, dependence
+from .prediction import RunPrediction, run_predictions
 from .sites import compare_sites
-from .where import Place, organised
 
 __all__ = [
     "Comparison",
-    "Held",
-    "Place",
+    "ResidualPattern",
     "RunError",
+    "RunPrediction",
     "SiteError",
     "compare",
-    "compare_held",
+    "compare_predictions",
     "compare_sites",
-    "held_runs",
-    "organised",
+    "dependence",
+    "run_predictions",
 ]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..identify.search import z_scale
 
 if TYPE_CHECKING:
-    from .held import Held
+    from .prediction import RunPrediction
 
 Array = NDArray[np.float64]
 
@@ -52,19 +52,19 @@ class Spectrum:
     bands: tuple[Band, ...]
 
 
-def spectrum(held: Sequence[Held]) -> Spectrum:
+def spectrum(predictions: Sequence[RunPrediction]) -> Spectrum:
     """Return the spectrum of residual, expected noise and measured output over all runs."""
     from scipy.signal import csd, welch
 
-    size = min(1024, *(len(one.residual) for one in held))
-    rate = 1.0 / held[0].dt
+    size = min(1024, *(len(one.residual) for one in predictions))
+    rate = 1.0 / predictions[0].dt
     lines = None
-    limit = _SPIKE * max(1.0, z_scale(np.concatenate([one.normalised for one in held])))
-    errors = [np.clip(one.normalised, -limit, limit) * one.sigma[one.skip :] for one in held]
-    total = sum(len(one.residual) for one in held)
+    limit = _SPIKE * max(1.0, z_scale(np.concatenate([one.normalised for one in predictions])))
+    errors = [np.clip(one.normalised, -limit, limit) * one.sigma[one.skip :] for one in predictions]
+    total = sum(len(one.residual) for one in predictions)
     sums = np.zeros((4, size // 2 + 1))
     cross = np.zeros(size // 2 + 1, dtype=complex)
-    for one, error in zip(held, errors, strict=True):
+    for one, error in zip(predictions, errors, strict=True):
         weight = len(error) / total
         options = {"fs": 1.0 / one.dt, "nperseg": size}
         lines, residual = welch(error, **options)
@@ -80,7 +80,7 @@ def spectrum(held: Sequence[Held]) -> Spectrum:
     assert lines is not None
     with np.errstate(invalid="ignore", divide="ignore"):
         coherence = np.nan_to_num(np.abs(cross) ** 2 / (sums[0] * sums[3]))
-    bands = _bands(held, errors, rate, lines, coherence, sums[0])
+    bands = _bands(predictions, errors, rate, lines, coherence, sums[0])
     return Spectrum(lines, sums[0], sums[1], sums[2], bands)
 
 
@@ -96,7 +96,7 @@ def edges(rate: float, duration: float) -> Array:
 
 
 def _bands(
-    held: Sequence[Held],
+    predictions: Sequence[RunPrediction],
     errors: Sequence[Array],
     rate: float,
     lines: Array,
@@ -106,14 +106,14 @@ def _bands(
     """Return the bands, from one tapered periodogram per run: its lines are nearly independent."""
     from scipy.stats import chi2
 
-    cuts = edges(rate, min(len(one.residual) * one.dt for one in held))
+    cuts = edges(rate, min(len(one.residual) * one.dt for one in predictions))
     found, expected, freedom = (np.zeros(len(cuts) - 1) for _ in range(3))
-    for one, error in zip(held, errors, strict=True):
+    for one, error in zip(predictions, errors, strict=True):
         f, mine = _periodogram(error, one.dt)
         white = np.full(len(f), 2.0 * one.noise**2 * one.dt)
         noise = white + np.mean([_periodogram(d, one.dt)[1] for d in one.carried], axis=0)
         width = f[1] - f[0]
-        weight = len(one.residual) / sum(len(other.residual) for other in held)
+        weight = len(one.residual) / sum(len(other.residual) for other in predictions)
         label = np.clip(np.searchsorted(cuts, f, side="right") - 1, 0, len(cuts) - 2)
         found += weight * np.bincount(label, weights=mine, minlength=len(cuts) - 1) * width
         expected += weight * np.bincount(label, weights=noise, minlength=len(cuts) - 1) * width

@@ -16,16 +16,16 @@ from .errors import (
     RunError,
     SiteError,
     interval_of_z,
-    judged,
-    place_dict,
+    pattern_dict,
     refuse,
     run_dict,
     run_error,
+    with_failures,
 )
-from .held import Held, held_runs
+from .patterns import FLIPS, Finder, ResidualPattern
+from .prediction import RunPrediction, run_predictions
 from .regimes import Regime, regimes
-from .where import FLIPS, Finder, Place
-from .words import sentences
+from .sentences import sentences
 
 Array = NDArray[np.float64]
 
@@ -35,9 +35,9 @@ class Comparison:
     """A prediction held against measured runs.
 
     `runs` the error of each, `total` over all; `z_interval` the 95 % interval of the total z;
-    `places` where the residual lives, the most telling coordinate first; `second` the most
+    `patterns` where the residual lives, the most telling coordinate first; `second` the most
     telling one of what is left after that, None where chance explains the rest; `spectrum` the
-    residual's against the noise's; `regimes` classes of speed and voltage; `held` the runs
+    residual's against the noise's; `regimes` classes of speed and voltage; `predictions` the runs
     themselves; `sentences` what an engineer would say; `seen` whether the runs were those of the
     fit, None where nobody knows; `sites` the errors of a building's sites, the worst first, of
     which this is the comparison of one, `site`.
@@ -48,11 +48,11 @@ class Comparison:
     runs: tuple[RunError, ...]
     total: RunError
     z_interval: tuple[float, float]
-    places: tuple[Place, ...]
-    second: Place | None
+    patterns: tuple[ResidualPattern, ...]
+    second: ResidualPattern | None
     spectrum: Spectrum
     regimes: tuple[Regime, ...]
-    held: tuple[Held, ...] = field(repr=False)
+    predictions: tuple[RunPrediction, ...] = field(repr=False)
     sentences: tuple[str, ...] = ()
     seen: bool | None = False
     sites: tuple[SiteError, ...] = ()
@@ -60,7 +60,7 @@ class Comparison:
     @property
     def site(self) -> str:
         """The site of a building that is compared, "" on a bench."""
-        return self.held[0].site
+        return self.predictions[0].site
 
     @property
     def z(self) -> float:
@@ -75,15 +75,15 @@ class Comparison:
         return self.z <= CLOSE
 
     @property
-    def first(self) -> Place | None:
+    def first(self) -> ResidualPattern | None:
         """The coordinate that organises the residual most, None where chance explains all."""
-        return self.places[0] if self.places and self.places[0].significant else None
+        return self.patterns[0] if self.patterns and self.patterns[0].significant else None
 
     @property
-    def worst(self) -> Held:
+    def worst(self) -> RunPrediction:
         """The run with the largest z."""
         name = max(self.runs, key=lambda run: run.z).name
-        return next(one for one in self.held if one.name == name)
+        return next(one for one in self.predictions if one.name == name)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as JSON has it, without the samples."""
@@ -98,10 +98,10 @@ class Comparison:
             "z_interval": list(self.z_interval),
             "total": run_dict(self.total),
             "runs": [run_dict(run) for run in self.runs],
-            "places": [place_dict(one) for one in self.places],
-            "second": place_dict(self.second) if self.second else None,
+            "places": [pattern_dict(one) for one in self.patterns],
+            "second": pattern_dict(self.second) if self.second else None,
             "bands": [asdict(band) for band in self.spectrum.bands],
-            "regimes": [{**asdict(one), "right": one.right} for one in self.regimes],
+            "regimes": [one.as_dict() for one in self.regimes],
         }
 
 
@@ -131,11 +131,11 @@ def compare(
         If there is no run, or a residual is not finite.
     """
     chosen = model.model if isinstance(model, Fit) else model
-    return compare_held(held_runs(problem, chosen, draws), seen=seen, seed=seed)
+    return compare_predictions(run_predictions(problem, chosen, draws), seen=seen, seed=seed)
 
 
-def compare_held(
-    held: Sequence[Held],
+def compare_predictions(
+    predictions: Sequence[RunPrediction],
     *,
     seen: bool | None = False,
     seed: int = 0,
@@ -146,11 +146,11 @@ def compare_held(
 
     `others` are the errors at the other sites of a building.
     """
-    refuse(held)
-    normalised = [one.normalised for one in held]
-    along = [one.along() for one in held]
-    runs = tuple(run_error(one.name, [one]) for one in held)
-    finder = Finder(normalised, [one.residual for one in held], along, flips, seed)
+    refuse(predictions)
+    normalised = [one.normalised for one in predictions]
+    along = [one.along() for one in predictions]
+    runs = tuple(run_error(one.name, [one]) for one in predictions)
+    finder = Finder(normalised, [one.residual for one in predictions], along, flips, seed)
     found = finder.ranked(finder.normalised)
     second = None
     if found and found[0].significant:
@@ -159,12 +159,12 @@ def compare_held(
         rest = finder.ranked(left, raw, [found[0].coordinate])
         second = rest[0] if rest and rest[0].significant else None
     comparison = Comparison(
-        held[0].quantity, held[0].unit, runs, run_error("all runs", held),
-        interval_of_z(normalised, finder), tuple(found), second, spectrum(held),
-        tuple(regimes(normalised, along)), tuple(held), seen=seen,
+        predictions[0].quantity, predictions[0].unit, runs, run_error("all runs", predictions),
+        interval_of_z(normalised, finder), tuple(found), second, spectrum(predictions),
+        tuple(regimes(normalised, along)), tuple(predictions), seen=seen,
     )  # fmt: skip
     if others:
-        comparison = replace(comparison, sites=judged([site_of(comparison), *others]))
+        comparison = replace(comparison, sites=with_failures([site_of(comparison), *others]))
     return replace(comparison, sentences=sentences(comparison, finder))
 
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from ..errors import RecordError
 from ..identify.search import HUBER_AT_ONE, losses, z_scale
-from .held import Held
+from .patterns import LEVEL, Finder, ResidualPattern
+from .prediction import RunPrediction
 from .scale import rms
-from .where import LEVEL, Finder, Place
 
 Array = NDArray[np.float64]
 
@@ -55,9 +55,9 @@ class SiteError:
     """How wrong a model is at one site of a building.
 
     `site` is "damper", "layer", "storey1" ...; `quantity`, `unit` what is compared there; `runs`
-    the error of each run, `total` over all; `z_interval` the 95 % interval of the total z; `place`
-    the coordinate that organises the error most, None where chance explains all. `fails`: the
-    error is more than noise, and chance is no fair explanation of that, all sites together.
+    the error of each run, `total` over all; `z_interval` the 95 % interval of the total z;
+    `pattern` that of the error, None where chance explains all of it. `fails`: the error is more
+    than noise, and chance is no fair explanation of that, all sites together.
     """
 
     site: str
@@ -66,7 +66,7 @@ class SiteError:
     runs: tuple[RunError, ...]
     total: RunError
     z_interval: tuple[float, float]
-    place: Place | None
+    pattern: ResidualPattern | None
     fails: bool = False
 
     @property
@@ -75,7 +75,7 @@ class SiteError:
         return self.total.z
 
     @property
-    def told(self) -> bool:
+    def identifiable(self) -> bool:
         """Whether there are samples to tell it by: a base that hardly slides leaves too few."""
         return self.z == self.z
 
@@ -90,15 +90,15 @@ class SiteError:
             "fails": self.fails,
             "total": run_dict(self.total),
             "runs": [run_dict(run) for run in self.runs],
-            "place": place_dict(self.place) if self.place else None,
+            "place": pattern_dict(self.pattern) if self.pattern else None,
         }
 
 
-def refuse(held: Sequence[Held]) -> None:
+def refuse(predictions: Sequence[RunPrediction]) -> None:
     """Raise RecordError where runs are too few, too short, not finite or without noise."""
-    if not held:
+    if not predictions:
         raise RecordError("there is no run to compare with.")
-    for one in held:
+    for one in predictions:
         if len(one.measured) <= one.skip + FEWEST:
             raise RecordError(
                 f"{one.name}: {len(one.measured)} samples; a comparison needs {one.skip + FEWEST}."
@@ -117,17 +117,17 @@ def refuse(held: Sequence[Held]) -> None:
             )
 
 
-def run_error(name: str, held: Sequence[Held]) -> RunError:
+def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunError:
     """Return the error over some runs."""
-    residual = np.concatenate([one.residual for one in held])
-    sigma = np.concatenate([one.sigma[one.skip :] for one in held])
-    own = np.concatenate([np.full(len(one.residual), one.noise) for one in held])
-    tried = [one.numerical[one.skip :] for one in held if one.numerical is not None]
-    moved = np.concatenate(tried) if len(tried) == len(held) else np.full(1, np.nan)
+    residual = np.concatenate([one.residual for one in predictions])
+    sigma = np.concatenate([one.sigma[one.skip :] for one in predictions])
+    own = np.concatenate([np.full(len(one.residual), one.noise) for one in predictions])
+    tried = [one.numerical[one.skip :] for one in predictions if one.numerical is not None]
+    moved = np.concatenate(tried) if len(tried) == len(predictions) else np.full(1, np.nan)
     return RunError(
         name, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
         rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
-        rms(np.concatenate([one.measured[one.skip :] for one in held])),
+        rms(np.concatenate([one.measured[one.skip :] for one in predictions])),
     )  # fmt: skip
 
 
@@ -148,16 +148,16 @@ def run_dict(run: RunError) -> dict[str, Any]:
     return {**asdict(run), "share": run.share}
 
 
-def place_dict(place: Place) -> dict[str, Any]:
-    """Return a place as JSON has it."""
-    found = asdict(place)
+def pattern_dict(pattern: ResidualPattern) -> dict[str, Any]:
+    """Return a pattern as JSON has it."""
+    found = asdict(pattern)
     for key in ("centre", "low", "high", "mean", "std"):
         found[key] = [float(value) for value in found[key]]
     del found["raw"], found["chance"]
-    return {**found, "alike": list(place.alike), "significant": place.significant}
+    return {**found, "alike": list(pattern.alike), "significant": pattern.significant}
 
 
-def judged(sites: Iterable[SiteError]) -> tuple[SiteError, ...]:
+def with_failures(sites: Iterable[SiteError]) -> tuple[SiteError, ...]:
     """Return sites of which it is known which ones fail, those first, then by z.
 
     Of twenty storeys one has a large z by chance: a site fails if the chance of its z is small for
@@ -171,4 +171,6 @@ def judged(sites: Iterable[SiteError]) -> tuple[SiteError, ...]:
         return one.z > CLOSE and one.z**2 - far * (high**2 - one.z**2) > 1.0
 
     found = [replace(one, fails=fails(one)) for one in sites]
-    return tuple(sorted(found, key=lambda one: (not one.fails, -one.z if one.told else 0.0)))
+    return tuple(
+        sorted(found, key=lambda one: (not one.fails, -one.z if one.identifiable else 0.0))
+    )

@@ -23,19 +23,19 @@ def name_of(coordinate: str, site: str = "") -> str:
     return NAMES.get(coordinate, coordinate.replace("_", " "))
 
 
-def place_name(site: str) -> str:
+def site_name(site: str) -> str:
     """Return a site as it is named in a sentence: "the isolation layer", "storey 2"."""
     if site.startswith("storey"):
         return f"storey {site.removeprefix('storey')}"
     return {"layer": "the isolation layer"}.get(site, f"the {site}")
 
 
-def place_names(sites: Sequence[str]) -> str:
+def site_names(sites: Sequence[str]) -> str:
     """Return sites as they are named together: "the damper and storeys 1 to 9"."""
     numbers = sorted(
         int(site.removeprefix("storey")) for site in sites if site.startswith("storey")
     )
-    names = sorted(place_name(site) for site in sites if not site.startswith("storey"))
+    names = sorted(site_name(site) for site in sites if not site.startswith("storey"))
     spans: list[str] = []
     for _, group in itertools.groupby(enumerate(numbers), lambda pair: pair[1] - pair[0]):
         row = [number for _, number in group]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,9 @@ _FEWEST = 200  # samples of a regime that says something
 
 @dataclass(frozen=True)
 class Regime:
-    """A part of the samples by speed, voltage or both: `words` as in "at low speed and 0 V"."""
+    """A part of the samples by speed, voltage or both: `text` as in "at low speed and 0 V"."""
 
-    words: str
+    text: str
     speed: str
     voltage: str
     z: float
@@ -32,6 +33,13 @@ class Regime:
     def right(self) -> bool:
         """Whether the model is right within its noise there."""
         return self.z <= RIGHT
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the regime as JSON has it."""
+        return {
+            "words": self.text, "speed": self.speed, "voltage": self.voltage, "z": self.z,
+            "samples": self.samples, "right": self.right,
+        }  # fmt: skip
 
 
 def regimes(

@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from .comparison import Comparison, compare_held
+from .comparison import Comparison, compare_predictions
 from .errors import (
     FEWEST,
     RunError,
     SiteError,
     interval_of_z,
-    judged,
     refuse,
     run_error,
+    with_failures,
 )
-from .held import Held
-from .where import Finder
+from .patterns import Finder
+from .prediction import RunPrediction
 
 FLIPS = 299
 """Patterns of signs at a site that is not compared at length: enough for a chance of 1 %."""
 
 
 def compare_sites(
-    held: Mapping[str, Sequence[Held]],
+    predictions: Mapping[str, Sequence[RunPrediction]],
     site: str = "",
     *,
     seen: bool | None = False,
@@ -32,7 +32,7 @@ def compare_sites(
 
     Parameters
     ----------
-    held : mapping
+    predictions : mapping
         Site to its runs.
     site : str
         The one to compare at length; "" for that of the largest z.
@@ -40,37 +40,39 @@ def compare_sites(
     Raises
     ------
     RecordError
-        As `compare_held`.
+        As `compare_predictions`.
     """
-    errors = site_errors(held, seed)
+    errors = site_errors(predictions, seed)
     site = site or errors[0].site
     others = [one for one in errors if one.site != site]
-    return compare_held(usable(held[site]), seen=seen, seed=seed, others=others)
+    return compare_predictions(usable(predictions[site]), seen=seen, seed=seed, others=others)
 
 
-def site_errors(held: Mapping[str, Sequence[Held]], seed: int = 0) -> tuple[SiteError, ...]:
+def site_errors(
+    predictions: Mapping[str, Sequence[RunPrediction]], seed: int = 0
+) -> tuple[SiteError, ...]:
     """Return how wrong a model is at every site, the worst one first."""
-    return judged([site_error(runs, seed) for runs in held.values()])
+    return with_failures([site_error(runs, seed) for runs in predictions.values()])
 
 
-def usable(held: Sequence[Held]) -> list[Held]:
+def usable(predictions: Sequence[RunPrediction]) -> list[RunPrediction]:
     """Return the runs that are long enough; of a base that hardly slides little is left."""
-    return [one for one in held if len(one.measured) > one.skip + FEWEST]
+    return [one for one in predictions if len(one.measured) > one.skip + FEWEST]
 
 
-def site_error(held: Sequence[Held], seed: int = 0) -> SiteError:
+def site_error(predictions: Sequence[RunPrediction], seed: int = 0) -> SiteError:
     """Return how wrong a model is at a site, and along what, without the rest of a comparison."""
-    first, held, nothing = held[0], usable(held), float("nan")
-    if not held:
+    first, predictions, nothing = predictions[0], usable(predictions), float("nan")
+    if not predictions:
         total = RunError("all runs", 0, *[nothing] * 7)
         return SiteError(first.site, first.quantity, first.unit, (), total, (nothing,) * 2, None)
-    refuse(held)
-    runs = tuple(run_error(one.name, [one]) for one in held)
-    normalised = [one.normalised for one in held]
-    residuals, along = [one.residual for one in held], [one.along() for one in held]
+    refuse(predictions)
+    runs = tuple(run_error(one.name, [one]) for one in predictions)
+    normalised = [one.normalised for one in predictions]
+    residuals, along = [one.residual for one in predictions], [one.along() for one in predictions]
     finder = Finder(normalised, residuals, along, FLIPS, seed)
     found = finder.ranked(finder.normalised)
-    place = found[0] if found and found[0].significant else None
+    pattern = found[0] if found and found[0].significant else None
     interval = interval_of_z(normalised, finder)
-    total = run_error("all runs", held)
-    return SiteError(first.site, first.quantity, first.unit, runs, total, interval, place)
+    total = run_error("all runs", predictions)
+    return SiteError(first.site, first.quantity, first.unit, runs, total, interval, pattern)

@@ -10,7 +10,9 @@ def sign(value: float) -> float:
 
 def limited(value: float, low: float, high: float) -> float:
     """Return the value within [low, high]."""
-    return min(max(value, low), high)
+    if value < low:
+        return low
+    return high if value > high else value
 
 
 def clipped_voltage(command: float, force: float, f_min: float, v_max: float) -> float:

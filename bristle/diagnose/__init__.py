@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
-from .diagnosis import Diagnosis, diagnose
+from .diagnosis import diagnose, diagnose_rig
+from .verdict import Diagnosis
 
-__all__ = ["Diagnosis", "diagnose"]
+__all__ = ["Diagnosis", "diagnose", "diagnose_rig"]

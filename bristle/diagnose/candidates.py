@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from os import cpu_count
@@ -11,15 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem
+from ..identify.residuals import Expected, errors, residuals
 from ..identify.search import loss, losses, z_of, z_scale
-from ..identify.search_context import Expected, Search, is_rough, refine, residuals
-from ..identify.start_grid import Begun, Ground, ranked
+from ..identify.search_context import Search, is_rough, refine
+from ..identify.start_grid import Candidate, SearchContext, ranked_guesses
 from ..physics.effect import EFFECTS, effects_of
 
 Array = NDArray[np.float64]
 
-GLANCE = 3
-"""Jacobians of the look that decides which effects are searched as a second one."""
+SCREENING = 3
+"""Jacobians of the screening that decides which effects are searched as a second one."""
 
 QUICK = 8
 """Jacobians of the first, short search from each start."""
@@ -38,6 +39,9 @@ SECONDS = 4
 
 WORTH = 0.005
 """Share of the loss that a candidate must gain at least to be refined."""
+
+SHOWN = ("force",)
+"""Channels whose instrument's effects are tried where nothing else is known of them."""
 
 PROMISING = 0.4
 """Share of the best gain on the training runs below which a candidate is not refined."""
@@ -76,7 +80,7 @@ def judge(
     fitted, expected = noise or (train.expectation(model), held_out.expectation(model))
     z = residuals(held_out, model, expected)
     own = residuals(train, model, fitted)
-    raw = np.concatenate(list(_raw(held_out, model, expected)))
+    raw = np.concatenate(errors(held_out, model, expected))
     lost = losses(z)
     return Trial(
         model, z_scale(own), z_of(float(np.mean(lost))),
@@ -84,22 +88,17 @@ def judge(
     )  # fmt: skip
 
 
-def _raw(problem: Problem, model: Model, expected: Expected) -> Iterable[Array]:
-    for run, (bias, _, _) in zip(problem.runs, expected, strict=True):
-        yield (run.force - problem.predict(model, run) - bias)[run.skip :]
-
-
-def joinable(base: Model, instruments: Sequence[str] = ("delay",)) -> list[str]:
+def joinable(base: Model, shown: Sequence[str] = SHOWN) -> list[str]:
     """Return the effects that can join a model on a test bench, the slow ones first.
 
-    `instruments` are the sensor effects that no redundancy of the channels has judged already.
+    `shown` are the channels whose instruments no redundancy of the channels has judged already.
     """
     taken = set(base.effects)
     for name in base.effects:
         taken |= set(EFFECTS[name].excludes)
     able = [
         *effects_of("damper", base.law),
-        *(effect for effect in effects_of("sensor") if effect.name in instruments),
+        *(effect for effect in effects_of("sensor") if effect.shows in shown),
     ]
     names = [
         effect.name
@@ -109,21 +108,25 @@ def joinable(base: Model, instruments: Sequence[str] = ("delay",)) -> list[str]:
     return sorted(names, key=lambda name: not EFFECTS[name].joint)
 
 
-def glanced(effect: str, ground: Ground, begun: Sequence[Begun]) -> list[Begun]:
+def screened(effect: str, context: SearchContext, guesses: Sequence[Candidate]) -> list[Candidate]:
     """Return starts with what a very short search from the best one has led to in front.
 
     One step is not enough where the present model's parameters hold each other: a fall with speed
     that went to its bound moves only together with what is to take its place. A joint is too dear.
     """
-    light = ground.light(effect)
-    search = Search(light.problem, begun[0].model, light.expected, begun[0].model.free())
+    screening = context.screening(effect)
+    search = Search(
+        screening.problem, guesses[0].model, screening.expected, guesses[0].model.free()
+    )
     if search.rough:
-        return list(begun)
-    model, ended = search.run(GLANCE)
-    return [Begun(model, ended.cost), *begun]
+        return list(guesses)
+    model, ended = search.run(SCREENING)
+    return [Candidate(model, ended.cost), *guesses]
 
 
-def begin(effect: str, ground: Ground, begun: Sequence[Begun], fewer: bool = False) -> Begun:
+def short_search(
+    effect: str, context: SearchContext, guesses: Sequence[Candidate], fewer: bool = False
+) -> Candidate:
     """Search shortly from the best starts, from half as many `fewer`; return the best of the ends.
 
     Its loss is that on the training runs.
@@ -132,55 +135,59 @@ def begin(effect: str, ground: Ground, begun: Sequence[Begun], fewer: bool = Fal
     Where impacts make the way rough the first step says little of a start: all go a short way, and
     those that came farthest go on.
     """
-    light = ground.light(effect)
+    screening = context.screening(effect)
 
-    def searched(one: Begun, sweeps: int) -> Begun:
-        search = Search(light.problem, one.model, light.expected, one.model.free())
+    def searched(one: Candidate, sweeps: int) -> Candidate:
+        search = Search(screening.problem, one.model, screening.expected, one.model.free())
         model, ended = search.run(sweeps)
-        return Begun(model, ended.cost)
+        return Candidate(model, ended.cost)
 
-    some = begun[: max(1, light.kept // 2) if fewer else light.kept]
-    if is_rough(begun[0].model):
+    some = guesses[: max(1, screening.kept // 2) if fewer else screening.kept]
+    if is_rough(guesses[0].model):
         first = sorted((searched(one, OUTSET) for one in some), key=lambda one: one.cost)
         found = [searched(one, ROUGH) for one in first[: 1 if fewer else CARRIED]]
     else:
         found = [searched(one, QUICK) for one in some]
     best = min(found, key=lambda one: one.cost).model
-    return Begun(best, float(np.mean(loss(residuals(ground.train, best, ground.expected)))))
+    return Candidate(best, float(np.mean(loss(residuals(context.train, best, context.expected)))))
 
 
 def try_all(
     base: Model,
     train: Problem,
     held_out: Problem,
-    instruments: Sequence[str] = ("delay",),
+    shown: Sequence[str] = SHOWN,
     most: int | None = None,
 ) -> list[Trial]:
     """Try every effect that can join the model, on all cores; best on the held-out runs first.
 
     Every effect is searched shortly from its best starts; those that gain a fair share of what the
     best one gains on the training runs are refined. With `most`, only so many are searched, those
-    that a glance promises most of, from fewer starts: for a second effect.
+    that a screening promises most of, from fewer starts: for a second effect.
     """
-    ground = Ground(base, train)
+    context = SearchContext(base, train)
     there = held_out.expectation(base)
-    names = joinable(base, instruments)
+    names = joinable(base, shown)
     with ThreadPoolExecutor(cpu_count()) as pool:
-        begun = dict(zip(names, pool.map(lambda name: ranked(name, ground), names), strict=True))
+        guesses = dict(
+            zip(names, pool.map(lambda name: ranked_guesses(name, context), names), strict=True)
+        )
         if most is not None:
-            looked = pool.map(lambda name: glanced(name, ground, begun[name]), names)
-            begun = dict(zip(names, looked, strict=True))
-            best = sorted(names, key=lambda name: begun[name][0].cost)[:most]
+            looked = pool.map(lambda name: screened(name, context, guesses[name]), names)
+            guesses = dict(zip(names, looked, strict=True))
+            best = sorted(names, key=lambda name: guesses[name][0].cost)[:most]
             names = [name for name in names if name in best]
         fewer = most is not None
-        found = list(pool.map(lambda name: begin(name, ground, begun[name], fewer), names))
-        gained = max(ground.cost - one.cost for one in found)
-        least = max(PROMISING * gained, WORTH * ground.cost)
+        found = list(
+            pool.map(lambda name: short_search(name, context, guesses[name], fewer), names)
+        )
+        gained = max(context.cost - one.cost for one in found)
+        least = max(PROMISING * gained, WORTH * context.cost)
 
-        def finish(one: Begun) -> Trial:
-            if ground.cost - one.cost >= least:
+        def finish(one: Candidate) -> Trial:
+            if context.cost - one.cost >= least:
                 return judge(refine(one.model, train, LONG), train, held_out)
-            return judge(one.model, train, held_out, (ground.expected, there))
+            return judge(one.model, train, held_out, (context.expected, there))
 
         trials = list(pool.map(finish, found))
     return sorted(trials, key=lambda trial: trial.z)

@@ -7,22 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.checks.clipping import stands_at_top
 from ..data.measurement import Measurement
 from .faults import SensorFault
+from .rule import SENSOR, DecisionRule
 
 Array = NDArray[np.float64]
-
-LONGEST = 5
-"""Samples in a row at the very same extreme that no noisy signal shows."""
-
-CROWDED = 8.0
-"""How many times more samples stand at a cut than at a step of a coarse instrument below it."""
 
 BESIDE = 4.0
 """Noises inside the end of a range within which a sample may have been cut."""
 
 
-def clipped(runs: Sequence[Measurement]) -> list[SensorFault]:
+def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
     """Return the channels that repeat an extreme: their range ends before the motion does."""
     found = []
     for channel in ("force", "displacement", "velocity", "voltage", "current"):
@@ -31,7 +27,7 @@ def clipped(runs: Sequence[Measurement]) -> list[SensorFault]:
             for run in runs
             if run.has(channel)
             and _may_be_clipped(run, channel)
-            and (limit := _limit(run[channel])) is not None
+            and (limit := _limit(run[channel], rule)) is not None
         ]
         if limits:
             level = max(limits)
@@ -65,17 +61,19 @@ def _is_noisy(run: Measurement, channel: str) -> bool:
     return 1e-4 * top < run.noise.get(channel, 0.0) < 0.2 * top
 
 
-def _limit(values: Array) -> float | None:
-    """Return the level at which a signal is cut off, on either side, None where it is not.
-
-    At a cut the very same number comes many times in a row; a noisy signal never does that. One in
-    coarse steps does at its turns, but not many times more often than one step below.
-    """
-    cut = [abs(float(np.max(way * values))) for way in (1.0, -1.0) if _stands_at_top(way * values)]
+def _limit(values: Array, rule: DecisionRule) -> float | None:
+    """Return the level at which a signal is cut off, on either side, None where it is not."""
+    cut = [
+        abs(float(np.max(way * values)))
+        for way in (1.0, -1.0)
+        if _stands_at_top(way * values, rule)
+    ]
     return max(cut) if cut else None
 
 
-def beyond_range(values: Array, noise: float, level: float) -> NDArray[np.bool_]:
+def beyond_range(
+    values: Array, noise: float, level: float, rule: DecisionRule = SENSOR
+) -> NDArray[np.bool_]:
     """Return which samples (n,) of a signal may have been cut off.
 
     What is cut may get its `noise` behind the cut: then it stands a little inside of it, too.
@@ -85,7 +83,7 @@ def beyond_range(values: Array, noise: float, level: float) -> NDArray[np.bool_]
     for way in (1.0, -1.0):
         turned = way * values
         top, near = float(turned.max()), _rounding(values)
-        if _stands_at_top(turned) or abs(top - level) <= near:
+        if _stands_at_top(turned, rule) or abs(top - level) <= near:
             lost |= turned >= top - near - BESIDE * noise
     return lost
 
@@ -94,12 +92,5 @@ def _rounding(values: Array) -> float:
     return 1e-9 * float(np.max(np.abs(values)))
 
 
-def _stands_at_top(values: Array) -> bool:
-    at_end = values >= values.max() - _rounding(values)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], at_end.astype(int), [0]])))
-    stays, often = edges[1::2] - edges[::2], int(at_end.sum())
-    # Once may be a rest before or after the test, at that end of the stroke.
-    if np.count_nonzero(stays >= LONGEST) < 2 or often < 2 * LONGEST:
-        return False
-    _, below = np.unique(values[~at_end], return_counts=True)
-    return bool(len(below)) and often > CROWDED * float(np.mean(below[-LONGEST:]))
+def _stands_at_top(values: Array, rule: DecisionRule) -> bool:
+    return stands_at_top(values, _rounding(values), rule.longest, rule.crowded)

@@ -10,57 +10,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from ..physics.effect import EFFECTS
 from .candidates import Trial
 from .evidence import paired
-
-GAIN = 0.02
-"""Smallest share by which an effect must lower z to be missing."""
-
-MOST_RMS = 1.1
-"""What an effect may leave of the plain error, for its weights are not those of z."""
-
-CLEAN = 1.15
-"""z of a base model above which something is missing, whether an effect explains it or not."""
-
-LOUD = 0.9
-"""z of a base model below which the noise was estimated too high to judge anything by it."""
-
-ADEQUATE = 1.08
-"""z up to which a model with an effect leaves nothing that matters."""
-
-SHARE = 0.75
-"""Share of the excess that an effect must explain where its model is not adequate: its form may
-differ from ours, and then the name is right and a residual remains."""
-
-FIRST = 0.2
-"""Share of the excess that the first effect of a pair must explain by itself."""
-
-PAIR_LEFT = 0.5
-"""What a second effect may leave, as a share of the excess that the first one leaves."""
-
-PAIR_PART = 0.05
-"""Smallest part of the first excess that the lesser effect of a pair must account for: a misfit of
-form is lowered by many effects."""
-
-COMPLETE = 1.04
-"""z up to which a pair counts whatever its lesser effect accounts for, where the best one leaves
-more than `CLEAN`: no effect closes a misfit of another one's form."""
-
-REST = 0.03
-"""Share of what the first effect leaves that may remain for the same where a pair is adequate."""
-
-RIVAL = 1.25
-"""Where the best model is not adequate, others rival it up to this many times its excess: a misfit
-of form cannot decide between what is nearly as wrong."""
-
-CLOSE = 0.004
-"""Share of z within which two adequate models are equal whatever the statistics say."""
-
-MOST = 3
-"""Most members of a class."""
-
-FAMILY = ("presliding", "mount_compliance", "backlash")
-"""Series elements before the sliding: at small travel they are one and the same."""
+from .rule import BENCH, DecisionRule
 
 
 @dataclass(frozen=True)
@@ -79,17 +32,13 @@ class Decision:
     reasons: tuple[str, ...]
 
 
-def excess(trial: Trial) -> float:
-    """Return z^2 - 1, never below a hundredth: noise is not known better."""
-    return max(trial.z**2 - 1.0, 0.01)
-
-
 def decide(
     before: Trial,
     trials: Sequence[Trial],
     grow: Callable[[Trial], list[Trial]],
     organised: bool = False,
     reduce: Callable[[Trial], list[Trial]] | None = None,
+    rule: DecisionRule = BENCH,
 ) -> Decision:
     """Return the decision that the trials of single effects lead to.
 
@@ -102,27 +51,27 @@ def decide(
     organised : whether a coordinate organises the residual of `before` strongly
     reduce : returns the trials of a pair's members alone, searched from the pair's values: a search
         of their own may have ended in a lesser minimum
+    rule : the numbers that decide
     """
     ranked = sorted(trials, key=lambda trial: trial.z)
-    if not ranked or not missing(before, ranked[0]):
-        return _without_effect(before, ranked, organised)
+    if not ranked or not missing(before, ranked[0], rule):
+        return _without_effect(before, ranked, organised, rule)
     best = ranked[0]
-    if before.z < LOUD:
+    if before.z < rule.loud:
         return _too_loud(before, best)
-    explained = 1.0 - excess(best) / excess(before)
-    single = best.z <= ADEQUATE or explained >= SHARE
-    if best.z > ADEQUATE:
-        pair = _pair(before, ranked, grow, single)
+    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    if best.z > rule.adequate:
+        pair = _pair(before, ranked, grow, rule)
         if pair is not None and reduce is not None:
             alone = min(reduce(pair.best), key=lambda trial: trial.z)
             if alone.z < best.z:
                 rest = [trial for trial in ranked if trial.effects != alone.effects]
-                again = decide(before, [alone, *rest], lambda _first: [], organised)
-                if not _needed(alone, pair.best):
+                again = decide(before, [alone, *rest], lambda _first: [], organised, rule=rule)
+                if not _needed(alone, pair.best, rule):
                     return again
         if pair is not None:
             return pair
-    if not single:
+    if not _suffices(before, best, rule):
         return Decision(
             "unknown", (), before, explained,
             (
@@ -130,21 +79,29 @@ def decide(
                 f"{explained:.0%} of what is missing and leaves z = {best.z:.2f}.",
             ),
         )  # fmt: skip
-    return _effect_or_class(before, best, ranked[1:], explained)
+    return _effect_or_class(before, best, ranked[1:], rule)
 
 
-def missing(before: Trial, after: Trial) -> bool:
+def _suffices(before: Trial, best: Trial, rule: DecisionRule) -> bool:
+    """Return whether one effect is enough, be its form another one."""
+    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    return best.z <= rule.adequate or explained >= rule.share
+
+
+def missing(before: Trial, after: Trial, rule: DecisionRule = BENCH) -> bool:
     """Return whether an effect lowers the held-out error by enough, and beyond chance.
 
     An effect that serves the many samples near rest at the cost of all others is none.
     """
-    if 1.0 - after.z / before.z < GAIN or after.rms > MOST_RMS * before.rms:
+    if 1.0 - after.z / before.z < rule.gain or after.rms > rule.most_rms * before.rms:
         return False
-    return paired(before.losses, after.losses).low > 0.0
+    return paired(before.losses, after.losses, rule.chance).low > 0.0
 
 
-def _without_effect(before: Trial, ranked: Sequence[Trial], organised: bool) -> Decision:
-    if before.z <= CLEAN and not organised:
+def _without_effect(
+    before: Trial, ranked: Sequence[Trial], organised: bool, rule: DecisionRule
+) -> Decision:
+    if before.z <= rule.clean and not organised:
         reason = f"On runs it has not seen the model errs by {before.z:.2f} times the noise"
         if ranked:
             gain = max(0.0, 1.0 - ranked[0].z / before.z)
@@ -152,7 +109,7 @@ def _without_effect(before: Trial, ranked: Sequence[Trial], organised: bool) -> 
         return Decision("none", (), before, 0.0, (reason + ".",))
     return Decision(
         "unknown", (), before, 0.0,
-        (f"z = {before.z:.2f}, and no effect of the library lowers it by {GAIN:.0%}.",),
+        (f"z = {before.z:.2f}, and no effect of the library lowers it by {rule.gain:.0%}.",),
     )  # fmt: skip
 
 
@@ -169,30 +126,37 @@ def _too_loud(before: Trial, best: Trial) -> Decision:
 
 
 def _pair(
-    before: Trial, ranked: Sequence[Trial], grow: Callable[[Trial], list[Trial]], single: bool
+    before: Trial,
+    ranked: Sequence[Trial],
+    grow: Callable[[Trial], list[Trial]],
+    rule: DecisionRule,
 ) -> Decision | None:
     """Return the decision for two effects, None where two do not explain it much better."""
     best = ranked[0]
+    single = _suffices(before, best, rule)
     alone = {_new(trial, before)[0]: trial for trial in ranked}
     grown: list[Trial] = []
     for first in ranked[: 1 if single else 2]:
-        if missing(before, first) and excess(first) <= (1.0 - FIRST) * excess(before):
+        if missing(before, first, rule) and rule.excess(first.z) <= (
+            1.0 - rule.first
+        ) * rule.excess(before.z):
             grown += grow(first)
     if not grown:
         return None
     pair = min(grown, key=lambda trial: trial.z)
     names = _new(pair, before)
-    if not _needed(best, pair):
+    if not _needed(best, pair, rule):
         return None
     without = [alone[name] for name in names if name in alone]
-    parts = [(excess(other) - excess(pair)) / excess(before) for other in without]
-    explained = 1.0 - excess(pair) / excess(before)
-    closes = best.z > CLEAN and (
-        pair.z <= COMPLETE or (pair.z <= ADEQUATE and excess(pair) <= REST * excess(best))
-    )
-    if min(parts, default=0.0) < PAIR_PART and not closes:
+    parts = [
+        (rule.excess(other.z) - rule.excess(pair.z)) / rule.excess(before.z) for other in without
+    ]
+    explained = 1.0 - rule.excess(pair.z) / rule.excess(before.z)
+    nearly = pair.z <= rule.adequate and rule.excess(pair.z) <= rule.rest * rule.excess(best.z)
+    closes = best.z > rule.clean and (pair.z <= rule.complete or nearly)
+    if min(parts, default=0.0) < rule.pair_part and not closes:
         return None
-    if pair.z > ADEQUATE and explained < SHARE:
+    if not _suffices(before, pair, rule):
         return None
     return Decision(
         "effect", names, pair, explained,
@@ -203,26 +167,30 @@ def _pair(
     )  # fmt: skip
 
 
-def _needed(single: Trial, pair: Trial) -> bool:
+def _needed(single: Trial, pair: Trial, rule: DecisionRule) -> bool:
     """Return whether a second effect takes a fair share of what the first one leaves."""
-    return excess(pair) <= PAIR_LEFT * excess(single) and missing(single, pair)
+    left = rule.pair_left * rule.excess(single.z)
+    return rule.excess(pair.z) <= left and missing(single, pair, rule)
 
 
 def _effect_or_class(
-    before: Trial, best: Trial, others: Sequence[Trial], explained: float
+    before: Trial, best: Trial, others: Sequence[Trial], rule: DecisionRule
 ) -> Decision:
     name = _new(best, before)[0]
+    explained = 1.0 - rule.excess(best.z) / rule.excess(before.z)
     rivals = [
         other
         for other in others
-        if missing(before, other) and _rivals(best, other) and not _same(name, other, before)
+        if missing(before, other, rule)
+        and _rivals(best, other, rule)
+        and not _same(name, other, before)
     ]
-    names = (name, *(_new(other, before)[0] for other in rivals))[:MOST]
+    names = (name, *(_new(other, before)[0] for other in rivals))[: rule.largest_class]
     reasons = [
         f"With {name} the error on runs not seen falls from {before.z:.2f} to {best.z:.2f} times "
         f"the noise: {explained:.0%} of what noise does not account for."
     ]
-    if best.z > ADEQUATE:
+    if best.z > rule.adequate:
         reasons.append("A residual remains: the rig's effect has another form than ours.")
     if len(names) > 1:
         reasons.append("These data cannot tell: " + ", ".join(names) + ".")
@@ -230,16 +198,24 @@ def _effect_or_class(
     return Decision("effect", names, best, explained, tuple(reasons))
 
 
-def _rivals(best: Trial, other: Trial) -> bool:
-    if best.z > ADEQUATE:
-        return excess(other) <= RIVAL * excess(best)
-    if other.z / best.z - 1.0 < CLOSE:
+def _rivals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
+    if best.z > rule.adequate:
+        return rule.excess(other.z) <= rule.rival * rule.excess(best.z)
+    if other.z / best.z - 1.0 < rule.close:
         return True
-    return other.z <= ADEQUATE and paired(other.losses, best.losses).low <= 0.0
+    if other.z > rule.adequate:
+        return False
+    return paired(other.losses, best.losses, rule.chance).low <= 0.0
 
 
 def _same(name: str, other: Trial, before: Trial) -> bool:
-    return name in FAMILY and _new(other, before)[0] in FAMILY
+    """Return whether small motion cannot tell an effect from that of another trial."""
+    family = _family(name)
+    return bool(family) and family == _family(_new(other, before)[0])
+
+
+def _family(name: str) -> str:
+    return EFFECTS[name].family if name in EFFECTS else ""
 
 
 def _new(trial: Trial, before: Trial) -> tuple[str, ...]:

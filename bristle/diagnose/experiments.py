@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
 from ..identify.search_context import Search
+from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
 
 LENGTH = 12.0
 """Length of a proposed run [s]."""
-
-TELLS = 4.0
-"""Standard deviations between two rivals below which a run tells them apart by luck at best."""
 
 ZERO = 0.02
 """Share of the largest voltage below which the smallest is zero, but for its noise."""
@@ -41,9 +39,9 @@ class Experiment:
     contrast: float = 0.0
     deviations: float = 0.0
 
-    def words(self) -> str:
+    def words(self, rule: DecisionRule = BENCH) -> str:
         """Return the run as a sentence of an experiment's plan."""
-        if self.deviations < TELLS:
+        if self.deviations < rule.tells:
             return (
                 "No run within the strokes, speeds and voltages of these would tell: at best the "
                 f"rivals' forces differ by {self.deviations:.1f} standard deviations over "

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+
+from ..physics.effect import instrument_of
 
 
 @dataclass(frozen=True)
@@ -30,3 +33,14 @@ class SensorFault:
             "words": self.words,
         }  # fmt: skip
         return {**told, "either": self.either} if self.either else told
+
+
+def instruments_of(sensors: Sequence[SensorFault]) -> tuple[str, ...]:
+    """Return the sensor effects that the faults of channels are."""
+    found = (instrument_of(fault.channel, fault.fault) for fault in sensors)
+    return tuple(dict.fromkeys(name for name in found if name))
+
+
+def words_of(faults: Sequence[SensorFault]) -> list[str]:
+    """Return the sentences of faults."""
+    return [fault.words for fault in faults]

@@ -7,23 +7,17 @@ from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem
 from ..identify.search_context import Expected, Search
-from ..identify.start_grid import starts
+from ..identify.start_grid import initial_guesses
 from .candidates import joinable
-from .decision import GAIN
+from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
 
-TYPICAL = 0.15
-"""Share of the force that an effect is given before the present model is refitted to it."""
 
-SILENT = 1e-3
-"""Share of the force below which an effect of default size is not excited at all."""
-
-
-def detectable(problem: Problem, expected: Expected) -> float:
+def detectable(problem: Problem, expected: Expected, rule: DecisionRule = BENCH) -> float:
     """Return the smallest share of the force RMS that a missing effect must leave to be seen.
 
-    It is what raises z by `GAIN` over the noise expected of a true model.
+    It is what raises z by `rule.gain` over the noise expected of a true model.
     """
     force = np.concatenate([run.force[run.skip :] for run in problem.runs])
     weight = np.concatenate(
@@ -31,13 +25,19 @@ def detectable(problem: Problem, expected: Expected) -> float:
     )
     # Noise as the residual sees it: a residual of share s has the excess s^2 mean(F^2/sigma^2).
     ratio = float(np.sqrt(np.mean(force**2) * np.mean(weight**2)))
-    return float(np.sqrt((1.0 + GAIN) ** 2 - 1.0) / ratio) if ratio > 0.0 else float("inf")
+    return float(np.sqrt((1.0 + rule.gain) ** 2 - 1.0) / ratio) if ratio > 0.0 else float("inf")
 
 
-def untestable(model: Model, problem: Problem, expected: Expected, visible: float) -> list[str]:
+def untestable(
+    model: Model,
+    problem: Problem,
+    expected: Expected,
+    visible: float,
+    rule: DecisionRule = BENCH,
+) -> list[str]:
     """Return the effects that these runs do not excite, or that refitting the model absorbs.
 
-    Each effect is added at default size and scaled to `TYPICAL`; what the sensitivities to the
+    Each effect is added at default size and scaled to `rule.typical`; what the sensitivities to the
     model's own parameters cannot take up must reach `visible`, the detectable share.
     """
     free = model.free()
@@ -55,7 +55,7 @@ def untestable(model: Model, problem: Problem, expected: Expected, visible: floa
         change = _change(name, model, problem, expected, base)
         raw = float(np.linalg.norm(change)) / size
         left = float(np.linalg.norm(change - basis @ (basis.T @ change))) / size
-        if raw < SILENT or TYPICAL * left / raw < visible:
+        if raw < rule.silent or rule.typical * left / raw < visible:
             out.append(name)
     return sorted(out)
 
@@ -63,7 +63,7 @@ def untestable(model: Model, problem: Problem, expected: Expected, visible: floa
 def _change(name: str, model: Model, problem: Problem, expected: Expected, base: Array) -> Array:
     """Return by how much an effect changes the normalised residuals (n,), at most of its starts."""
     found = []
-    for start in starts(name, model, problem):
+    for start in initial_guesses(name, model, problem):
         with_it = Search(problem, start, expected, [])
         found.append(with_it.residuals(with_it.start) - base)
     return max(found, key=lambda change: float(np.linalg.norm(change)))

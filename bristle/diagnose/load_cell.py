@@ -7,18 +7,28 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from ..identify.assigned import corrected
 from ..identify.line import fit_line
-from ..identify.placed import corrected
 from ..identify.response import Response
 from ..identify.structure import StructureProblem, layer_run
 from ..physics.building import Building
+from ..physics.effect import instrument_of
 from ..physics.laws import law_of_part
 from .candidates import judge
-from .sites import CLEAN, GAIN, SHARE, Finding, detectable
+from .finding import Finding
+from .rule import SITE, DecisionRule
+from .sites import detectable
+
+FORCE_GAIN = "force_gain"
+"""What a finding names for a load cell of a wrong scale, which is no effect."""
 
 
 def load_cell(
-    layer: Finding, train: list[Response], holdout: list[Response], building: Building, law: str
+    layer: Finding,
+    train: list[Response],
+    holdout: list[Response],
+    building: Building,
+    rule: DecisionRule = SITE,
 ) -> tuple[Finding, tuple[list[Response], list[Response]]] | None:
     """Return the finding that the load cell is late or wrongly scaled, with the forces set right.
 
@@ -27,16 +37,18 @@ def load_cell(
     """
     best: tuple[float, float, float, Finding] | None = None
     for what in ("delay", "gain"):
-        found = _search_cell(what, train, holdout, building, law)
+        found = _search_cell(what, train, holdout, building)
         if best is None or found[0] < best[0]:
             best = found
     assert best is not None
     z_1, delay, gain, finding = best
     own = min((trial.z for trial in layer.trials), default=np.inf)
-    share = 1.0 - max(z_1**2 - 1.0, 0.01) / max(layer.z_before**2 - 1.0, 0.01)
-    if z_1 >= own or 1.0 - z_1 / layer.z_before < GAIN or (z_1 > CLEAN and share < SHARE):
+    share = 1.0 - rule.excess(z_1) / rule.excess(layer.z_before)
+    if z_1 >= own or 1.0 - z_1 / layer.z_before < rule.gain:
         return None
-    name = "delay" if delay else "force_gain"
+    if z_1 > rule.clean and share < rule.share:
+        return None
+    name = instrument_of("force", "delay") if delay else FORCE_GAIN
     right = tuple([corrected(r, delay, gain) for r in part] for part in (train, holdout))
     told = replace(
         finding, site="force", kind="effect", effects=(name,), z_before=layer.z_before, share=share,
@@ -46,7 +58,7 @@ def load_cell(
 
 
 def _search_cell(
-    what: str, train: list[Response], holdout: list[Response], building: Building, law: str
+    what: str, train: list[Response], holdout: list[Response], building: Building
 ) -> tuple[float, float, float, Finding]:
     """Return z on held-out runs, delay [s], gain and finding of the best delay or gain."""
 

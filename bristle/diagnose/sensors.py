@@ -18,6 +18,7 @@ from ..data.derived import LATE, derived_velocity
 from ..data.measurement import Measurement
 from .clipping import clipped
 from .faults import SensorFault
+from .rule import SENSOR, DecisionRule
 
 __all__ = ["SensorFault", "sensor_faults"]
 
@@ -32,30 +33,18 @@ LOW_PASS = 20.0
 FEWEST = 3
 """Pieces from which on their spread means anything."""
 
-SURE = 6.0
-"""How many standard deviations a fault must be away from none."""
 
-SMALLEST = {"gain": 0.01, "bias": 0.01, "delay": 0.2}
-"""Smallest fault that matters: of the channel, of the channel's RMS, of the sampling step."""
-
-UNRELATED = 0.3
-"""Share of the displacement's power that no fit of the velocity explains: they are two motions."""
-
-RESISTS = 0.2
-"""Power of the force, as a share of its size, that tells the direction."""
-
-
-def sensor_faults(runs: Sequence[Measurement]) -> list[SensorFault]:
+def sensor_faults(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
     """Return the faults that the channels show of each other, over all runs."""
-    found = clipped(runs)
+    found = clipped(runs, rule)
     cut = {fault.channel for fault in found}
     pairs = [run for run in runs if run.has("displacement", "velocity")]
     computed = {run.name: how for run in pairs if (how := derived_velocity(run))}
     found += _computed(pairs, computed)
     pairs = [run for run in pairs if run.name not in computed]
     if pairs and not cut & {"displacement", "velocity"}:
-        found += kinematic(pairs)
-    return found + signs(runs, found)
+        found += kinematic(pairs, rule)
+    return found + signs(runs, found, rule)
 
 
 def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[SensorFault]:
@@ -75,7 +64,7 @@ def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[Senso
     ]  # fmt: skip
 
 
-def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
+def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
     """Return what is wrong between displacement and velocity.
 
     In pieces of `WINDOW`, by least squares on signals low-passed alike,
@@ -88,7 +77,7 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
     """
     if sum(len(_begins(run)) for run in runs) < FEWEST:
         return []  # the spread over pieces is what says how sure a fault is
-    if _unlike(runs) > UNRELATED:
+    if _unrelated_share(runs) > rule.unrelated:
         return [
             SensorFault(
                 "velocity", "unrelated", 0.0, 0.0,
@@ -101,10 +90,10 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
     gain = 1.0 / theta[0]
     found = []
     if gain < 0.0:
-        found.append(_turned(runs))
+        found.append(_turned(runs, rule))
         theta = -theta
         gain = -gain
-    if abs(theta[4]) > max(SURE * std[4], 0.02):
+    if abs(theta[4]) > max(rule.sure * std[4], rule.least_corner):
         found.append(
             SensorFault(
                 "velocity", "high-pass", theta[4] * gain, std[4] * gain,
@@ -116,7 +105,7 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
     theta, std = _pooled(runs, slow=False)
     theta, gain = theta * np.sign(theta[0]), 1.0 / abs(theta[0])
     spread = std[0] * gain * gain
-    if abs(gain - 1.0) > max(SURE * spread, SMALLEST["gain"]):
+    if abs(gain - 1.0) > max(rule.sure * spread, rule.least_gain):
         found.append(
             SensorFault(
                 "velocity", "gain", gain, spread,
@@ -126,10 +115,10 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
                 either="displacement",
             )
         )  # fmt: skip
-    found += _late(theta * gain, std * gain, runs[0].step)
+    found += _late(theta * gain, std * gain, runs[0].step, rule)
     bias, bias_std = -theta[5] * gain, std[5] * gain
     rms = float(np.sqrt(np.mean(np.concatenate([run["velocity"] for run in runs]) ** 2)))
-    if abs(bias) > max(SURE * bias_std, SMALLEST["bias"] * rms):
+    if abs(bias) > max(rule.sure * bias_std, rule.least_bias * rms):
         found.append(
             SensorFault(
                 "velocity", "bias", bias, bias_std,
@@ -140,11 +129,11 @@ def kinematic(runs: Sequence[Measurement]) -> list[SensorFault]:
     return found
 
 
-def _turned(runs: Sequence[Measurement]) -> SensorFault:
+def _turned(runs: Sequence[Measurement], rule: DecisionRule) -> SensorFault:
     """Return which of displacement and velocity is turned: the velocity if the force speeds it."""
     power = _power(runs)
     begin = "Displacement and velocity have opposite signs: "
-    if abs(power) < RESISTS:
+    if abs(power) < rule.resists:
         return SensorFault(
             "velocity", "sign", -1.0, 0.0, begin + "one of the two is turned.", "displacement"
         )
@@ -171,12 +160,12 @@ def _power(runs: Sequence[Measurement]) -> float:
     return float(power.mean() / max(float(np.mean(np.abs(power))), 1e-300))
 
 
-def _late(theta: Array, std: Array, step: float) -> list[SensorFault]:
+def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[SensorFault]:
     """Return a delay of one channel, or a lag of the velocity's instrument."""
     late, late_std = float(theta[1]), float(std[1])
-    if abs(late) <= max(SURE * late_std, SMALLEST["delay"] * step):
+    if abs(late) <= max(rule.sure * late_std, rule.least_delay * step):
         return []
-    order = _order(theta, std) if late > 0.0 else 0
+    order = _order(theta, std, rule) if late > 0.0 else 0
     if order:
         return [
             SensorFault(
@@ -194,7 +183,7 @@ def _late(theta: Array, std: Array, step: float) -> list[SensorFault]:
     ]  # fmt: skip
 
 
-def _order(theta: Array, std: Array) -> int:
+def _order(theta: Array, std: Array, rule: DecisionRule) -> int:
     """Return the order of an instrument that lags, 0 for a plain delay.
 
     A delay D has E = D^2/2 and F = D^3/6; an instrument v + D v' + E v'' of what it shows has F = 0
@@ -207,8 +196,8 @@ def _order(theta: Array, std: Array) -> int:
     if abs(second) / second_std + abs(third) / third_std < shift:
         return 1
     # The series ends at F: of a long delay E is off by some hundredths.
-    bent = abs(second - 0.5) > 0.06 + SURE * second_std and abs(third) < 1.0 / 12.0 + third_std
-    ends = 1.0 / 6.0 - third > 0.5 * SURE * third_std and abs(third) < 0.05
+    bent = abs(second - 0.5) > 0.06 + rule.sure * second_std and abs(third) < 1.0 / 12.0 + third_std
+    ends = 1.0 / 6.0 - third > 0.5 * rule.sure * third_std and abs(third) < 0.05
     return 2 if bent or ends else 0
 
 
@@ -227,7 +216,7 @@ def _pooled(runs: Sequence[Measurement], slow: bool = True) -> tuple[Array, Arra
     return full, full_std
 
 
-def _unlike(runs: Sequence[Measurement]) -> float:
+def _unrelated_share(runs: Sequence[Measurement]) -> float:
     """Return which share of the displacement's power no fit of the velocity explains."""
     pieces = [piece for run in runs for piece in _pieces(run)]
     theta, _ = _pooled(runs)
@@ -267,11 +256,13 @@ def _integral(values: Array, dt: float) -> Array:
     return np.concatenate([[0.0], np.cumsum(0.5 * dt * (values[1:] + values[:-1]))])
 
 
-def signs(runs: Sequence[Measurement], known: Sequence[SensorFault]) -> list[SensorFault]:
+def signs(
+    runs: Sequence[Measurement], known: Sequence[SensorFault], rule: DecisionRule = SENSOR
+) -> list[SensorFault]:
     """Return force or motion that is turned: a damper that yields energy; a voltage below zero."""
     found = []
     turned = any(fault.fault == "sign" for fault in known)
-    if not turned and _power(runs) < -RESISTS:
+    if not turned and _power(runs) < -rule.resists:
         found.append(
             SensorFault(
                 "force", "sign", -1.0, 0.0,
@@ -283,7 +274,7 @@ def signs(runs: Sequence[Measurement], known: Sequence[SensorFault]) -> list[Sen
     if drives:
         V = np.concatenate(drives)
         low, high = np.quantile(V, [0.02, 0.98])
-        if low < 0.0 and -low > 3.0 * max(high, 0.0):
+        if low < 0.0 and -low > rule.turned * max(high, 0.0):
             found.append(
                 SensorFault(
                     "voltage", "sign", -1.0, 0.0,

@@ -6,79 +6,36 @@ effects of the structure are few and distinct, and each is judged by held-out ru
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from itertools import product
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.fit import Fit, fit
+from ..identify.fit import fit
 from ..identify.line import fit_line
 from ..identify.model import Model, Problem, Run
-from ..identify.start_grid import starts
+from ..identify.site_fit import joined
 from ..identify.structure import (
     StructureProblem,
     StructureRun,
-    thinned,
 )
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.laws import law_of_part
 from .candidates import Trial, judge
 from .evidence import paired
+from .finding import Finding
+from .rule import SITE, DecisionRule
 
 Array = NDArray[np.float64]
 
-GAIN = 0.03
-"""Smallest share by which an effect must lower z on held-out runs to be missing at a site."""
-
-CLEAN = 1.15
-"""z above which something is missing at a site, whether an effect explains it or not."""
-
-SHARE = 0.7
-"""Share of a site's excess that an effect must explain where its form leaves more than `CLEAN`."""
-
-NEARLY = 0.005
-"""Rivals whose z lies that close together are not told apart."""
-
-OWN = 0.5
-"""Where its form leaves more than `CLEAN`, what an effect's excess must be below, as a share of
-the next one's: two forms that are both wrong cannot decide otherwise."""
-
-SURE = 40.0
-"""Gain of the log-likelihood that no chance brings: what happens in a few samples only, such as a
-stop that is met once, is seen in no resampling of blocks."""
-
-STOP = 0.4
-"""Share of the largest travel within which a stop would be met so often that it is a spring."""
-
-QUICK = 8
-"""Sweeps of the first, short search from each start, on every fifth sample."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What one site shows: "layer", "storey1", ... or "force" for the load cell.
-
-    `kind` is "none", "effect", "class" or "unknown"; `z_before`, `z_after` on held-out runs;
-    `share` what the best effect explains of the excess, `detectable` the smallest share of the
-    site's force that would have been seen.
-    """
-
-    site: str
-    kind: str
-    effects: tuple[str, ...]
-    z_before: float
-    z_after: float
-    share: float
-    detectable: float
-    coordinate: str = ""
-    model: Model | None = None
-    trials: tuple[Trial, ...] = ()
-    before: Trial | None = None
-
 
 def look_at(
-    site: str, train: StructureProblem, held_out: StructureProblem, present: Model | None = None
+    site: str,
+    train: StructureProblem,
+    held_out: StructureProblem,
+    present: Model | None = None,
+    rule: DecisionRule = SITE,
 ) -> Finding:
     """Return what a layer's or storey's problem shows.
 
@@ -95,27 +52,18 @@ def look_at(
     before = judge(base.model, train, held_out)
     able = [e for e in effects_of("structure") if hook in e.hooks() and e.name not in taken]
     names = [e.name for e in able]
-    if before.z <= 1.0 + 0.5 * GAIN and before.train <= CLEAN:
+    if before.z <= rule.quiet and before.train <= rule.clean:
         names = []  # a line leaves nothing that a further effect could explain
     trials = [try_effect(name, base.model, train, held_out) for name in names]
     trials.sort(key=lambda trial: trial.z)
-    return judge_site(site, base, before, trials, held_out)
+    return judge_site(site, before, trials, held_out, rule)
 
 
 def try_effect(
     effect: str, base: Model, train: StructureProblem, held_out: StructureProblem
 ) -> Trial:
     """Refit a model with one more effect of the structure from several starts; judge the best."""
-    few = thinned(train)
-    light = few.expectation(base)
-    begun = [
-        fit(few, model, expectation=light, max_evaluations=QUICK, with_std=False)
-        for model in structure_starts(effect, base, train)
-    ]
-    best = min(begun, key=lambda one: one.cost).model
-    expected = train.expectation(base)
-    best = fit(train, best, expectation=expected, max_evaluations=25, with_std=False).model
-    return judge(best, train, held_out)
+    return judge(joined(effect, base, train), train, held_out)
 
 
 def shortened(problem: StructureProblem, seconds: float) -> StructureProblem:
@@ -147,98 +95,70 @@ def _begin_of(run: Run, samples: int) -> StructureRun:
     )  # fmt: skip
 
 
-def structure_starts(effect: str, base: Model, train: Problem) -> list[Model]:
-    """Return the models from which the search for an effect of the structure begins.
-
-    Lengths are shares of the largest motion, for a stop beyond it has no force at all.
-    """
-    reach = max(float(np.max(np.abs(run.x))) for run in train.runs)
-    speed = max(float(np.max(np.abs(run.v))) for run in train.runs)
-    force, stiffness = train.size("N"), train.size("N/m")
-    damping = train.size("N.s/m")
-    grid: dict[str, tuple[dict[str, tuple[float, ...]], ...]] = {
-        "base_friction": (
-            {"limit": (0.1 * force,), "x_s": (0.0, 0.05 * reach), "v_r": (0.1 * speed,)},
-        ),
-        "duffing": (
-            {"k_3": (0.3 * stiffness / reach**2, -0.1 * stiffness / reach**2), "shape": (3.0, 5.0)},
-        ),
-        "end_stop": (
-            {
-                "clearance": (0.55 * reach, 0.75 * reach, 0.9 * reach),
-                "k": (1.0 * stiffness,), "c": (1e-3 * damping,),
-            },
-        ),
-        "storey_softening": (
-            {"d_half": (0.7 * reach, 2.5 * reach)},
-            {"d_half": (5.0 * reach,), "yields": (0.3,), "d_y": (0.15 * reach, 0.4 * reach)},
-        ),
-    }  # fmt: skip
-    if effect not in grid:  # a user's own
-        return starts(effect, base, train)
-    own = {name: p.value for name, p in EFFECTS[effect].parameters.items()}
-    out = []
-    for net in grid[effect]:
-        for values in product(*net.values()):
-            chosen = {**own, **dict(zip(net, values, strict=True))}
-            named = {f"{effect}.{name}": value for name, value in chosen.items()}
-            values_now = {**base.values, **named}
-            out.append(replace(base, effects=(*base.effects, effect), values=values_now))
-    if effect == "end_stop":
-        limits = {**base.limits, "end_stop.clearance": (STOP * reach, reach)}
-        out = [replace(model, limits=limits) for model in out]
-    return out
-
-
 def judge_site(
-    site: str, base: Fit, before: Trial, trials: list[Trial], held_out: StructureProblem
+    site: str,
+    before: Trial,
+    trials: list[Trial],
+    held_out: StructureProblem,
+    rule: DecisionRule = SITE,
 ) -> Finding:
     """Return the finding that a site's trials lead to; held-out runs decide."""
-    seen, tried = detectable(held_out), tuple(trials)
-    best = trials[0] if trials else None
-    if best is None or not better(before, best) or 1.0 - best.z / before.z < GAIN:
-        kind = "none" if before.z <= CLEAN else "unknown"
-        where = coordinate_of(before.residual, held_out) if kind == "unknown" else ""
-        return Finding(
-            site, kind, (), before.z, before.z, 0.0, seen, where, before.model, tried, before
-        )
-    share = 1.0 - excess(best) / excess(before)
-    found = Finding(
-        site, "unknown", (), before.z, best.z, share, seen, "", best.model, tried, before
-    )
-    if best.z > CLEAN and share < SHARE:
-        return replace(found, coordinate=coordinate_of(best.residual, held_out))
-    rivals = [best.effects[-1]]
-    for other in trials[1:]:
-        if best.z > CLEAN:
-            rival = excess(best) > OWN * excess(other)
-        else:
-            rival = other.z / best.z - 1.0 < NEARLY or not better(other, best)
-        rivals += [other.effects[-1]] if rival else []
+    kind, effects = decide_site(before, trials, rule)
+    named = trials[0] if trials and lowers(before, trials[0], rule) else before
+    share = 1.0 - rule.excess(named.z) / rule.excess(before.z)
+    where = coordinate_of(named.residual, held_out) if kind == "unknown" else ""
+    return Finding(
+        site, kind, effects, before.z, named.z, share, detectable(held_out, rule), where,
+        named.model, tuple(trials), before, named,
+    )  # fmt: skip
+
+
+def decide_site(
+    before: Trial, trials: Sequence[Trial], rule: DecisionRule = SITE
+) -> tuple[str, tuple[str, ...]]:
+    """Return kind and effects that the trials of a site, best first, lead to."""
+    if not trials or not lowers(before, trials[0], rule):
+        return ("none" if before.z <= rule.clean else "unknown"), ()
+    best = trials[0]
+    share = 1.0 - rule.excess(best.z) / rule.excess(before.z)
+    if best.z > rule.clean and share < rule.share:
+        return "unknown", ()
+    rivals = [best.effects[-1], *(t.effects[-1] for t in trials[1:] if _rivals(best, t, rule))]
     kind = "effect" if len(rivals) == 1 else "class"
-    return replace(found, kind=kind, effects=tuple(rivals[:3]))
+    return kind, tuple(rivals[: rule.largest_class])
 
 
-def excess(trial: Trial) -> float:
-    """Return z^2 - 1, never below a hundredth: noise is not known better."""
-    return max(trial.z**2 - 1.0, 0.01)
+def lowers(before: Trial, after: Trial, rule: DecisionRule = SITE) -> bool:
+    """Return whether an effect lowers the held-out error of a site by enough, and beyond chance."""
+    return better(before, after, rule) and 1.0 - after.z / before.z >= rule.gain
 
 
-def better(first: Trial, second: Trial) -> bool:
+def _rivals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
+    if best.z > rule.clean:
+        return rule.excess(other.z) < rule.rival * rule.excess(best.z)
+    return equals(best, other, rule)
+
+
+def equals(best: Trial, other: Trial, rule: DecisionRule = SITE) -> bool:
+    """Return whether the data cannot tell another trial from the best one."""
+    return other.z / best.z - 1.0 < rule.close or not better(other, best, rule)
+
+
+def better(first: Trial, second: Trial, rule: DecisionRule = SITE) -> bool:
     """Return whether the second trial errs less than the first on held-out runs, beyond chance.
 
     A site's noise is white, so where the second model is adequate its gain in likelihood counts.
     """
-    if paired(first.losses, second.losses).low > 0.0:
+    if paired(first.losses, second.losses, rule.chance).low > 0.0:
         return True
     gain = float(np.sum(first.losses - second.losses))
-    return second.z <= CLEAN and gain > SURE
+    return second.z <= rule.clean and gain > rule.likelihood
 
 
-def detectable(held_out: StructureProblem) -> float:
-    """Return the smallest share of a site's force that lowers z by `GAIN` when it is explained."""
+def detectable(held_out: StructureProblem, rule: DecisionRule = SITE) -> float:
+    """Return the smallest share of a site's force that lowers z by `rule.gain` when explained."""
     noise = float(np.mean([run.noise for run in held_out.runs]))
-    excess = np.sqrt(1.0 / (1.0 - GAIN) ** 2 - 1.0)
+    excess = np.sqrt(1.0 / (1.0 - rule.gain) ** 2 - 1.0)
     return float(excess * noise / max(held_out.size("N"), 1e-300))
 
 

@@ -31,8 +31,9 @@ from .slave import BAKED
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 _BUNDLED = (
-    "errors.py", "units.py", "physics/**/*.py", "control/**/*.py",
-    "fmu/slave.py", "fmu/source.py", "fmu/damper.py", "fmu/controller.py",
+    "errors.py", "units.py", "physics/**/*.py", "control/**/*.py", "component/**/*.py",
+    "fmu/slave.py", "fmu/model_description.py", "fmu/component.py", "fmu/source.py",
+    "fmu/damper.py", "fmu/controller.py",
 )  # fmt: skip
 _NAMESPACE = UUID("7c0b8c8e-3d0f-5d0a-9b55-62726973746c")
 _OPTIONS = {

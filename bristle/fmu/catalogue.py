@@ -15,8 +15,9 @@ from typing import Any
 from .. import units
 from ..errors import BuildError
 from ..resources import components_folder
+from .component import EffectSlave
 from .description import Description, Variable
-from .slave import EffectSlave, Slave
+from .slave import Slave
 
 _PACKAGE = Path(__file__).resolve().parent.parent
 
@@ -223,6 +224,7 @@ def describe(
             description=declared.description or "",
             dependencies=slave._depends.get(key),
             optional=key in slave._optional,
+            over_step=slave._over_step.get(key),
         )
     return Description(
         name=name,

@@ -1,4 +1,4 @@
-"""The base of controllers and instruments: a clock of their own, ports, the baked-in design.
+"""The bases of controllers and sensors: a clock of their own, ports, the baked-in design.
 
 A sample is taken when a step ends on or passes a sample instant, from the inputs as they stand at
 that step: with Gauss-Seidel and the controller after what it measures, these are the values at
@@ -9,16 +9,16 @@ damper, whose force follows the voltage at once.
 
 from __future__ import annotations
 
-from math import ceil, floor, pi
+from math import pi
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
-from ..control import inverse, linear
+from ..component import SAMPLED, clock, controller
+from ..control import inverse
 from ..control.controller import Controller, read_controller
-from ..control.sensing import filtered_velocity, low_passed
 from ..errors import BristleError
-from ..physics import damper
 from ..physics.laws import DEFAULT, LAWS, Law, law_code, laws_of
+from .component import ComponentSlave
 from .slave import Slave
 
 MEASURED = {
@@ -27,28 +27,28 @@ MEASURED = {
     "base_velocity": ("m/s", "velocity across the damper"),
     "damper_force": ("N", "force of the damper, positive against +x"),
 }
-"""Inputs of every controller, in the order in which `sample` gets them, with unit and text."""
+"""Inputs of every controller, in the order in which a sample takes them, with unit and text."""
 
 SAMPLE_PERIOD = 0.002
 """Sample period [s] where no design fixes it."""
 
-_ROUNDING = 1e-6
-"""Share of a sample period by which a step's end may miss an instant."""
-_MOST_SAMPLES = 1_000_000
-"""Samples in one step beyond which the step is taken for a mistake."""
+_LONG = (
+    "stepped by {:g} s, longer than its sample period of {:g} s: samples in between take the "
+    "inputs as linear, and what they answer shows late."
+)
 
 
-class SampledSlave(Slave):
-    """A component that samples `MEASURED` at t = 0, h, 2h ... and holds its outputs in between.
+class SampledSlave(ComponentSlave):
+    """A component that samples `MEASURED` at t = 0, h, 2h ... and holds its outputs in between."""
 
-    A component fills `sample`, which answers with the outputs in the order of their declaration,
-    `rest`, and `get_law`, `set_law` for its state.
-    """
+    def configure(self) -> None:
+        super().configure()
+        self._new_state = self.state  # no step is made twice
 
     def declare_measured(self) -> None:
         """Declare the inputs."""
         for name, (unit, text) in MEASURED.items():
-            self.add_input(name, unit, text)
+            self.add_input(name, unit, text, over_step=SAMPLED)
 
     def declare_period(self, fixed: float | None = None) -> None:
         """Declare the sample period; a design fixes it."""
@@ -56,60 +56,12 @@ class SampledSlave(Slave):
         low, high = (1e-6, 10.0) if fixed is None else (fixed, fixed)
         self.add_parameter("sample_period", fixed or SAMPLE_PERIOD, "s", text, (low, high))
 
-    def rest(self) -> None:
-        """Put the law's state to where it is before the first sample."""
-
-    def sample(self, k: int, measured: list[float]) -> list[float]:
-        """Return the outputs after sample k of what `MEASURED` names, and move the state on."""
-        raise NotImplementedError
-
-    def get_law(self) -> Any:
-        """Return a copy of the law's state."""
-        return None
-
-    def set_law(self, state: Any) -> None:
-        """Take a copy of the law's state."""
-
-    def configure(self) -> None:
-        self.origin = self.time
-        self.samples = 0
-        self.measured = self._measure()
-        self.shown: list[float] = [0.0] * len(self._outputs)
-
-    def _measure(self) -> list[float]:
-        return [self._values[index] for index in self._inputs]
-
-    def advance(self, time: float, step: float) -> None:
-        h = self["sample_period"]
-        if step > h * (1.0 + _ROUNDING):
-            self.warn_once(
-                f"stepped by {step:g} s, longer than its sample period of {h:g} s: samples in "
-                "between take the inputs as linear, and what they answer shows late."
-            )
-        before, now = self.measured, self._measure()
-        last = floor((time + step - self.origin) / h + _ROUNDING)
-        if last - self.samples > _MOST_SAMPLES:
-            raise ValueError(f"{last - self.samples} samples in a step of {step:g} s.")
-        first = ceil((time - self.origin) / h - _ROUNDING)
-        for k in range(max(self.samples, first), last + 1):
-            share = (self.origin + k * h - time) / step
-            if share > 1.0 - _ROUNDING * h / step:
-                at = now
-            else:
-                at = [a + max(share, 0.0) * (b - a) for a, b in zip(before, now)]
-            self.shown = self.sample(k, at)
-            self.samples = k + 1
-        self.measured = now
-
-    def refresh(self) -> None:
-        if not self.stepping:  # the sample at t = 0 follows its inputs until the first step
-            self.origin = self.time
-            self.measured = self._measure()
-            self.rest()
-            self.shown = self.sample(0, self.measured)
-            self.samples = 1
-        for index, value in zip(self._outputs, self.shown):
-            self._values[index] = value
+    def tell(self, code: int, time: float, step: float) -> None:
+        """Warn of a step that is longer than the sample period, and refuse one of a lifetime."""
+        if step > self["sample_period"]:
+            self.warn_once(_LONG.format(step, self["sample_period"]))
+        if code == clock.TOO_MANY_SAMPLES:
+            raise ValueError(f"{step / self['sample_period']:.0f} samples in a step of {step:g} s.")
 
     def _structure(self, structure: Element) -> None:
         """Say that the first sample follows motion; the damper's force it takes as it is given."""
@@ -121,23 +73,16 @@ class SampledSlave(Slave):
                 known = [*motion, *map(int, node.attrib["dependencies"].split())]
                 node.set("dependencies", " ".join(map(str, sorted(known))))
 
-    def get_inner(self) -> Any:
-        clock = [self.origin, self.samples, list(self.measured), list(self.shown)]
-        return [clock, self.get_law()]
-
-    def set_inner(self, state: Any) -> None:
-        (self.origin, self.samples, measured, shown), law = state
-        self.measured, self.shown = list(measured), list(shown)
-        self.rest()
-        self.set_law(law)
-
 
 class ControllerSlave(SampledSlave):
     """A controller: the ports that all share, limits, and the velocity it works with.
 
-    A component fills `act`; its own state goes into the list `self.state`.
+    A component says by its `kind` which law `component.controller` runs, and gives its numbers in
+    `law`.
     """
 
+    functions: ClassVar[Any] = controller
+    law_kind: ClassVar[int]
     command_unit: ClassVar[str] = "N"
 
     def declare(self) -> None:
@@ -157,37 +102,23 @@ class ControllerSlave(SampledSlave):
         """Declare the sample period and the law's own parameters."""
         self.declare_period()
 
-    def act(self, y: float, v: float, f: float) -> tuple[float, float]:
-        """Return voltage [V] and raw command at floor acceleration, velocity, damper force."""
-        raise NotImplementedError
+    def law(self) -> dict[str, Any]:
+        """Return what the law needs of `component.controller.Constants`."""
+        return {"kind": self.law_kind}
 
-    def configure(self) -> None:
-        super().configure()
+    def setup(self) -> tuple[Any, list[float], int]:
         if self["velocity"] not in ("direct", "filtered"):
-            raise ValueError(f"velocity {self.velocity!r} is neither direct nor filtered.")
-        self.rest()
-
-    def rest(self) -> None:
-        self.state: list[float] = []
-        self.low = [0.0, 0.0]  # low-passed displacement, displacement, at the last sample
-
-    def sample(self, k: int, measured: list[float]) -> list[float]:
-        y, x, v, f = measured
-        if self["velocity"] == "filtered":
-            corner = 2.0 * pi * self["velocity_corner"]
-            if k == 0:  # nothing is known of the past: the filter has settled
-                self.low = [x, x]
-            low = low_passed(self.low[0], self.low[1], x, corner, self["sample_period"])
-            self.low = [low, x]
-            v = filtered_velocity(low, x, corner)
-        voltage, command = self.act(y, v, f)
-        return [voltage, command, v]
-
-    def get_law(self) -> Any:
-        return [list(self.state), list(self.low)]
-
-    def set_law(self, state: Any) -> None:
-        self.state, self.low = list(state[0]), list(state[1])
+            raise ValueError(
+                "velocity {!r} is neither direct nor filtered.".format(self["velocity"])
+            )
+        filtered = self["velocity"] == "filtered"
+        return controller.setup(
+            self.time,
+            period=self["sample_period"],
+            v_max=self["v_max"],
+            velocity_corner=2.0 * pi * self["velocity_corner"] if filtered else 0.0,
+            **self.law(),
+        )
 
 
 class LinearSlave(ControllerSlave):
@@ -209,30 +140,17 @@ class LinearSlave(ControllerSlave):
             self.wrong = str(error)
         self.declare_period(self.controller.sample_period if self.controller else SAMPLE_PERIOD)
 
-    def configure(self) -> None:
+    def law(self) -> dict[str, Any]:
         if self.wrong or self.controller is None:
             raise ValueError(self.wrong)
-        super().configure()
-        self.spare = [0.0] * self.controller.n
+        own = ("n", "rows", "v_top", "A", "B", "W", "C")
+        return {**super().law(), **{name: getattr(self.controller, name) for name in own}}
 
-    def rest(self) -> None:
-        super().rest()
-        assert self.controller is not None
-        self.state = [0.0] * self.controller.n
-        self.row = 0
 
-    def command(self, v: float) -> float:
-        """Return the command at velocity v [m/s]."""
-        c = self.controller
-        assert c is not None
-        self.row = linear.table_row(v, c.v_top, c.rows) if c.rows > 1 else 0
-        return linear.command(c.n, c.C, self.row, self.state)
-
-    def move(self, y: float, second: float) -> None:
-        """Move the state on by a sample, given the floor acceleration and the second input."""
-        c = self.controller
-        assert c is not None
-        linear.advance(c.n, c.A, c.B, c.W, self.row, self.state, y, second, self.spare)
+def declare_force_threshold(slave: Slave) -> None:
+    """Declare the command below which a clipped switch stays off."""
+    text = "commands of this size or less are not answered"
+    slave.add_parameter("f_min", 0.5, "N", text, (0.0, 1e9))
 
 
 def declare_anti_windup(slave: Slave, rate: float) -> None:
@@ -247,51 +165,29 @@ def invertible() -> list[type[Law]]:
     return sorted(found, key=lambda law: law.name != DEFAULT)
 
 
-class DamperInverse:
-    """The voltage of a commanded force, by a law's inverse, as parameters of a component.
+def declare_inverse(slave: Slave) -> None:
+    """Declare the law that is inverted and its parameters: `lugre.sigma_a`, `bingham.f_c` ..."""
+    laws = invertible()
+    text = f"the law that is inverted, one of {', '.join(law.name for law in laws)}"
+    slave.add_parameter("inverse", DEFAULT, None, text)
+    for law in laws:
+        for name, p in law.parameters.items():
+            slave.add_parameter(f"{law.name}.{name}", p.value, p.unit, p.text, p.bounds)
+    text = "no voltage below this speed"
+    slave.add_parameter("still", inverse.STILL, "m/s", text, (0.0, 10.0))
+    text = "least force per volt that is divided by"
+    slave.add_parameter("least_slope", inverse.LEAST_SLOPE, "N/V", text, (1e-9, 1e9))
 
-    Parameters are named `lugre.sigma_a`, `bingham.f_c` ...; `z` are the law's states that the
-    controller estimates, as `at_rest` begins them.
-    """
 
-    def __init__(self, slave: Slave) -> None:
-        self.slave = slave
-
-    @staticmethod
-    def declare(slave: Slave) -> None:
-        """Declare the parameters."""
-        laws = invertible()
-        text = f"the law that is inverted, one of {', '.join(law.name for law in laws)}"
-        slave.add_parameter("inverse", DEFAULT, None, text)
-        for law in laws:
-            for name, p in law.parameters.items():
-                slave.add_parameter(f"{law.name}.{name}", p.value, p.unit, p.text, p.bounds)
-        text = "no voltage below this speed"
-        slave.add_parameter("still", inverse.STILL, "m/s", text, (0.0, 10.0))
-        text = "least force per volt that is divided by"
-        slave.add_parameter("least_slope", inverse.LEAST_SLOPE, "N/V", text, (1e-9, 1e9))
-
-    @staticmethod
-    def at_rest() -> list[float]:
-        """Return the states before the first sample, as many as the largest law has."""
-        return [0.0] * damper.SLOTS.law_states
-
-    def configure(self) -> None:
-        """Read the parameters; ValueError where the law is not known."""
-        chosen = self.slave["inverse"]
-        names = [law.name for law in invertible()]
-        if chosen not in names:
-            raise ValueError(f"inverse {chosen!r} is neither {' nor '.join(names)}.")
-        self.law = law_code(chosen)
-        self.p = [self.slave[f"{chosen}.{name}"] for name in LAWS[chosen].parameters]
-        self.limits = tuple(self.slave[name] for name in ("still", "least_slope", "v_max"))
-
-    def __call__(
-        self, command: float, v: float, z: list[float]
-    ) -> tuple[float, float, list[float]]:
-        """Return voltage [V], the force [N] it gives by the law, and the states a sample later."""
-        voltage = inverse.voltage_of_law(self.law, self.p, command, v, z, *self.limits)
-        applied = inverse.force_of_law(self.law, self.p, v, voltage, z)
-        later = list(z)
-        inverse.estimate_states(self.law, self.p, v, voltage, self.slave["sample_period"], later)
-        return voltage, applied, later
+def inverse_law(slave: Slave) -> dict[str, Any]:
+    """Return what an inverse needs of `component.controller.Constants`; ValueError if unknown."""
+    chosen = slave["inverse"]
+    names = [law.name for law in invertible()]
+    if chosen not in names:
+        raise ValueError(f"inverse {chosen!r} is neither {' nor '.join(names)}.")
+    return {
+        "law": law_code(chosen),
+        "p": [slave[f"{chosen}.{name}"] for name in LAWS[chosen].parameters],
+        "still": slave["still"],
+        "least_slope": slave["least_slope"],
+    }

@@ -1,28 +1,32 @@
-"""The base of the dampers: ports, voltage limits, energy and the effects of the site."""
+"""The base of the dampers: ports, parameters and the effects of the site."""
 
 from __future__ import annotations
 
-from math import inf, isfinite
 from typing import Any, ClassVar
 
-from ..physics.damper import DamperModel
+from ..component import HELD, damper
 from ..physics.laws import LAWS
-from .slave import EffectSlave
+from .component import ComponentSlave
 
 
-class DamperSlave(EffectSlave):
+class DamperSlave(ComponentSlave):
     """A damper of one law, from motion and voltage to the force that resists it."""
 
     law: ClassVar[str] = ""
+    functions: ClassVar[Any] = damper
+    texts: ClassVar[dict[int, str]] = {
+        damper.SATURATED: "the voltage left 0 .. {v_max:g} V; the damper saturates."
+    }
+    hidden = 1  # the friction
 
     def declare(self) -> None:
-        self.add_input("displacement", "m", "displacement of the rod")
-        self.add_input("velocity", "m/s", "velocity of the rod")
-        self.add_input("voltage", "V", "voltage of the coil")
+        self.add_input("displacement", "m", "displacement of the rod", over_step=HELD)
+        self.add_input("velocity", "m/s", "velocity of the rod", over_step=HELD)
+        self.add_input("voltage", "V", "voltage of the coil", over_step=HELD)
         text = "force that keeps the structure from accelerating; needs moving_mass"
-        self.add_input("holding_force", "N", text, optional=True)
+        self.add_input("holding_force", "N", text, over_step=HELD, optional=True)
         text = "acceleration of the rod; else from differences of velocity"
-        self.add_input("acceleration", "m/s2", text, optional=True)
+        self.add_input("acceleration", "m/s2", text, over_step=HELD, optional=True)
         follows = ["displacement", "velocity", "voltage", "holding_force", "acceleration"]
         text = "force on the structure, positive against +x"
         self.add_output("force", "N", text, depends=follows, nominal=10.0)
@@ -41,51 +45,21 @@ class DamperSlave(EffectSlave):
             self.add_parameter(f"{name}_0", 0.0, unit, text)
         self.add_effects("damper", self.law)
 
-    def configure(self) -> None:
-        self.model = DamperModel(self.law, self.numbers(), self.effects_on())
-        self.step_before = inf  # no step yet
-        self.difference = 0.0  # of velocity over the last step
-        self.before = [0.0, 0.0]  # velocity and force at the end of the last step
-        self.energy = 0.0
-        self.started = False
+    def setup(self) -> tuple[Any, list[float], int]:
+        self._acceleration = self._index["acceleration"]
+        measured = self._acceleration in self._set
+        return damper.setup(self.law, self.numbers(), self.effects_on(), measured)
 
-    def _motion(self, step: float) -> tuple[float, float, float, float, float, bool]:
-        """Return x, v, a, V within its limits, and the halting force and whether it is known."""
-        x, v, V = self["displacement"], self["velocity"], self["voltage"]
-        if not 0.0 <= V <= self["v_max"]:
-            V = min(max(V, 0.0), self["v_max"])
-            self.warn_once(
-                "the voltage left 0 .. {:g} V; the damper saturates.".format(self["v_max"])
-            )
-        a = self["acceleration"] if self.was_set("acceleration") else self.difference
-        mass = self["moving_mass"]
-        halts = mass > 0.0 and (isfinite(step) or v == 0.0)
-        halt = self["holding_force"] + mass * v / step if halts else 0.0
-        return x, v, a, V, halt, halts
+    def _bind(self) -> None:
+        """Take the acceleration for measured from the moment on at which a host sets it."""
+        self.constants = self.constants._replace(measured=self._acceleration in self._set)
 
     def advance(self, time: float, step: float) -> None:
-        self.difference = (self["velocity"] - self.before[0]) / step
-        x, v, a, V, halt, halts = self._motion(step)
-        force = self.model.step(x, v, a, V, step, self.energy, halt, halts)
-        self.energy += 0.5 * step * (self.before[0] * self.before[1] + v * force)
-        self.before = [v, force]
-        self.step_before = step
-        self.started = True
+        if (self._acceleration in self._set) is not self.constants.measured:
+            self._bind()
+        super().advance(time, step)
 
     def refresh(self) -> None:
-        x, v, a, V, halt, halts = self._motion(self.step_before)
-        values, at = self._values, self._index["force"]
-        force = self.model.force(x, v, a, V, self.step_before, self.energy, halt, halts)
-        if not self.started:
-            self.before = [v, force]
-        values[at] = force
-        values[at + 1] = self.energy
-        values[at + 2] = abs(x) / self["stroke"]
-
-    def get_inner(self) -> Any:
-        scalars = [self.step_before, self.difference, self.energy, self.started]
-        return [list(self.model.z), list(self.before), *scalars]
-
-    def set_inner(self, state: Any) -> None:
-        self.model.z, self.before = list(state[0]), list(state[1])
-        self.step_before, self.difference, self.energy, self.started = state[2:]
+        if (self._acceleration in self._set) is not self.constants.measured:
+            self._bind()
+        super().refresh()

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.parsers import expat
 
+from ..component import OVER_STEP
 from ..errors import FmuError
 from .archive import (
     DESCRIPTION,
@@ -19,6 +20,7 @@ from .archive import (
     open_archive,
     read_member,
 )
+from .model_description import OVER_STEP_TAG, TOOL
 
 __all__ = ["Description", "Value", "Variable", "extract", "read_description"]
 
@@ -34,7 +36,8 @@ class Variable:
 
     `kind` is "Real", "Integer", "Boolean", "String" or "Enumeration"; `unit` is None where the
     FMU gives none ("1" for a dimensionless real that says so). `dependencies` are the names of
-    the inputs that the output follows directly, None where the FMU does not say.
+    the inputs that the output follows directly, None where the FMU does not say. `over_step` is how
+    an input is taken over a step, one of `component.OVER_STEP`, None where the FMU does not say.
     """
 
     name: str
@@ -50,6 +53,7 @@ class Variable:
     description: str = ""
     dependencies: tuple[str, ...] | None = None
     optional: bool = False
+    over_step: str | None = None
 
 
 @dataclass(frozen=True)
@@ -197,7 +201,20 @@ def _variable(
         maximum=_number(name, "max", own.get("max")),
         nominal=_number(name, "nominal", own.get("nominal")),
         description=element.get("description", ""),
+        over_step=_over_step(name, element),
     )
+
+
+def _over_step(name: str, element: ElementTree.Element) -> str | None:
+    for tool in element.iterfind("Annotations/Tool"):
+        text = tool.findtext(OVER_STEP_TAG)
+        if tool.get("name") == TOOL and text is not None:
+            if text not in OVER_STEP:
+                known = ", ".join(OVER_STEP)
+                said = f"the annotation {OVER_STEP_TAG} is {text!r}, none of {known}."
+                raise FmuError(f'variable "{name}": {said}')
+            return text
+    return None
 
 
 def _reference(name: str, text: str | None) -> int:
@@ -261,7 +278,7 @@ def _indexed(listed: list[Variable], text: str | None) -> Variable:
 
 def _mark_optional(root: ElementTree.Element, variables: dict[str, Variable]) -> None:
     for tool in root.iterfind("VendorAnnotations/Tool"):
-        if tool.get("name") != "bristle":
+        if tool.get("name") != TOOL:
             continue
         for name in tool.findtext("optional", "").split():
             if name not in variables or variables[name].causality != "input":

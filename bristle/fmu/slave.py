@@ -15,7 +15,7 @@ from math import isfinite
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
-from xml.etree.ElementTree import Element, SubElement
+from xml.etree.ElementTree import Element
 
 from pythonfmu import (
     Boolean,
@@ -31,7 +31,8 @@ from pythonfmu import (
 from pythonfmu.enums import Fmi2Status
 
 from .. import units
-from ..physics.effect import Parameter, effects_of
+from ..component import OVER_STEP
+from .model_description import add_dependencies, complete
 
 BAKED = "baked.json"
 """Name of the resource with what a build fixes: model name, start values, building."""
@@ -45,7 +46,7 @@ FAULTS = {
     BAD_PARAMETER: "a parameter or record is wrong",
 }
 
-_INSTANTIATED, _INITIALISING, _STEPPING, _TERMINATED = range(4)
+_INSTANTIATED, _INITIALISING, STEPPING, _TERMINATED = range(4)
 
 
 class _Slot:
@@ -86,6 +87,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._bounds: dict[str, tuple[float | None, float | None, float | None]] = {}
         self._depends: dict[str, tuple[str, ...]] = {}
         self._optional: list[str] = []
+        self._over_step: dict[str, str] = {}
         self._inputs: list[int] = []
         self._outputs: list[int] = []
         self._parameters: set[int] = set()
@@ -137,9 +139,22 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     # -- declaring
 
     def add_input(
-        self, name: str, unit: str, text: str, *, start: float = 0.0, optional: bool = False
+        self,
+        name: str,
+        unit: str,
+        text: str,
+        *,
+        over_step: str,
+        start: float = 0.0,
+        optional: bool = False,
     ) -> None:
-        """Declare a Real input; an optional one may stay unconnected."""
+        """Declare a Real input; an optional one may stay unconnected.
+
+        `over_step` says how it is taken over a step, one of `component.OVER_STEP`.
+        """
+        if over_step not in OVER_STEP:
+            raise TypeError(f"{name}: {over_step!r} is none of {', '.join(OVER_STEP)}.")
+        self._over_step[name] = over_step
         if optional:
             self._optional.append(name)
         self._inputs.append(
@@ -223,11 +238,6 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """Return the value of a variable by its full name ("gas_spring.k")."""
         return self._values[self._index[name]]
 
-    @property
-    def stepping(self) -> bool:
-        """Whether initialisation is over."""
-        return self._mode == _STEPPING
-
     def was_set(self, name: str) -> bool:
         """Return whether the host has ever set this variable."""
         return self._index[name] in self._set
@@ -255,7 +265,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             return
         self._unbuilt = self._stale = True
         self._follow(final=True)
-        self._mode = _STEPPING
+        self._mode = STEPPING
 
     def terminate(self) -> None:
         self._mode = _TERMINATED
@@ -263,7 +273,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
     def do_step(self, current_time: float, step_size: float) -> bool:
         if self.fault:
             return False
-        if self._mode != _STEPPING:
+        if self._mode != STEPPING:
             return self._stop(WRONG_MODE, "doStep belongs between initialisation and terminate.")
         if not (step_size > 0.0 and isfinite(step_size) and isfinite(current_time)):
             return self._stop(BAD_STEP, f"time {current_time!r} s, step {step_size!r} s.")
@@ -353,7 +363,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def _put(self, index: int, value: Any) -> None:
         if index in self._parameters:
-            if self._mode in (_STEPPING, _TERMINATED):
+            if self._mode in (STEPPING, _TERMINATED):
                 if value != self._values[index]:
                     kept = f"{self.vars[index].name} keeps {self._values[index]!r}"
                     self.warn_once(f"{kept}: it is fixed after initialisation.")
@@ -400,7 +410,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return [str(self._values[vr]) for vr in self._known(vrs)]
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
-        if self._mode == _STEPPING:
+        if self._mode == STEPPING:
             inputs, store = self._inputs, self._values
             for vr, value in zip(vrs, values):
                 if vr in inputs:
@@ -489,56 +499,21 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """Return pythonfmu's description with what it leaves out."""
         self._follow()
         root: Element = super().to_xml(model_options or {})
-        del root.attrib["generationDateAndTime"]  # two builds of one source are identical
-        root.insert(1, self._unit_definitions())
-        variables = root.find("ModelVariables")
+        complete(root, self)
         structure = root.find("ModelStructure")
-        assert variables is not None
         assert structure is not None
-        for node in variables:
-            self._complete(node)
-        if self._optional:
-            annotations = Element("VendorAnnotations")
-            tool = SubElement(annotations, "Tool", name="bristle")
-            SubElement(tool, "optional").text = " ".join(self._optional)
-            root.insert(list(root).index(variables), annotations)
         self._structure(structure)
         return root
 
-    def _complete(self, node: Element) -> None:
-        name = node.attrib["name"]
-        value = node[0]
-        if name in self._units:
-            value.set("unit", self._units[name])
-        low, high, nominal = self._bounds.get(name, (None, None, None))
-        for key, number in (("min", low), ("max", high), ("nominal", nominal)):
-            if number is not None and isfinite(number):
-                value.set(key, repr(number))
-
-    def _unit_definitions(self) -> Element:
-        definitions = Element("UnitDefinitions")
-        for name in sorted(set(self._units.values())):
-            unit = units.parse(name)
-            exponents = {
-                base: str(power) for base, power in zip(units.DIMENSIONS, unit.dimension) if power
-            }
-            if unit.factor != 1.0:
-                exponents["factor"] = repr(unit.factor)
-            SubElement(SubElement(definitions, "Unit", name=name), "BaseUnit", exponents)
-        return definitions
-
     def _structure(self, structure: Element) -> None:
-        outputs = structure.find("Outputs")
-        if outputs is None:
-            return
-        unknowns = SubElement(structure, "InitialUnknowns")
+        """Say which inputs every output follows, and what its start value follows."""
         parameters = sorted(index + 1 for index in self._parameters)
-        for node in outputs:
-            name = self.vars[int(node.attrib["index"]) - 1].name
-            inputs = [self._index[other] + 1 for other in self._depends[name]]
-            node.set("dependencies", " ".join(str(index) for index in sorted(inputs)))
-            known = " ".join(str(index) for index in sorted(inputs + parameters))
-            SubElement(unknowns, "Unknown", index=node.attrib["index"], dependencies=known)
+        add_dependencies(structure, self._inputs_of, parameters)
+
+    def _inputs_of(self, number: int) -> list[int]:
+        """Return the numbers, from 1, of the inputs that an output follows at once."""
+        name = self.vars[number - 1].name
+        return sorted(self._index[other] + 1 for other in self._depends[name])
 
     def _read_baked(self) -> dict[str, Any]:
         path = Path(self.resources or ".") / BAKED
@@ -548,32 +523,3 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         """Return the path of a file that was bundled with the component, or stands for one."""
         given = self.baked.get("files", {}).get(name)
         return Path(given or Path(self.resources or ".") / name)
-
-
-class EffectSlave(Slave):
-    """A component that offers the effects of its site, each with a switch and its parameters."""
-
-    def add_effects(self, site: str, law: str = "") -> None:
-        """Declare `EFFECT.on`, `EFFECT.PARAMETER`, `EFFECT.STATE_0` for the effects of a site."""
-        own = self.baked.get("own", [])  # a user's, in this process; an FMU's are its library's
-        self._effects = tuple(e for e in effects_of(site, law) if not e.own or e.name in own)
-        for effect in self._effects:
-            self.add_parameter(effect.name + ".on", False, None, effect.first_line())
-            for name, parameter in effect.parameters.items():
-                self.add_physical(effect.name + "." + name, parameter)
-            for name, unit in effect.states.items():
-                text = f"start value of the state {name}"
-                self.add_parameter(f"{effect.name}.{name}_0", 0.0, unit, text)
-
-    def add_physical(self, name: str, parameter: Parameter) -> None:
-        """Declare a parameter of a law or effect."""
-        self.add_parameter(name, parameter.value, parameter.unit, parameter.text, parameter.bounds)
-
-    def effects_on(self) -> list[str]:
-        """Return the names of the effects that are switched on."""
-        return [effect.name for effect in self._effects if self[effect.name + ".on"]]
-
-    def numbers(self) -> dict[str, float]:
-        """Return every Real parameter by its full name."""
-        names = ((self.vars[index].name, self._values[index]) for index in self._parameters)
-        return {name: value for name, value in names if isinstance(value, float)}

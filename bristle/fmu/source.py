@@ -1,14 +1,33 @@
-"""The base of components that play a test signal."""
+"""The bases of components that play a signal."""
 
 from __future__ import annotations
 
+from typing import Any, ClassVar
+
+from ..component import source
 from ..physics.record import read_two_column
 from ..physics.signals import CSV, KINDS, PARAMETERS, STEPS, read_steps
-from .slave import Slave
+from .component import ComponentSlave
 
 
-class SignalSlave(Slave):
+class SourceSlave(ComponentSlave):
+    """A component whose outputs depend on time alone."""
+
+    functions: ClassVar[Any] = source
+
+    def advance(self, time: float, step: float) -> None:
+        """Keep nothing: what a step would show, `refresh` does."""
+
+    def refresh(self) -> None:
+        given = self._given
+        source.output(self.time, given, self.constants, given, given, given)
+        self._values[self._shown_first : self._shown_after] = given
+
+
+class SignalSlave(SourceSlave):
     """Parameters of a test signal, and what follows from them."""
+
+    rated = False
 
     def declare_signal(self, unit: str) -> None:
         """Declare the parameters of a signal in this unit."""
@@ -20,13 +39,14 @@ class SignalSlave(Slave):
         text = "two-column CSV of the kind csv, its header `time [s],NAME [UNIT]`"
         self.add_parameter("file", "", None, text)
 
-    def configure(self) -> None:
+    def setup(self) -> tuple[Any, list[float], int]:
         if self["kind"] not in KINDS:
             raise ValueError("kind {!r} is none of {}.".format(self["kind"], ", ".join(KINDS)))
-        self.code = KINDS[self["kind"]]
-        self.numbers: list[float] = [self[name] for name in PARAMETERS]
-        self.times, self.samples = [0.0], [0.0]
-        if self.code == STEPS:
-            self.times, self.samples = read_steps(self["steps"])
-        elif self.code == CSV:
-            self.times, self.samples = read_two_column(self["file"], header=None)
+        code = KINDS[self["kind"]]
+        times, samples = [0.0], [0.0]
+        if code == STEPS:
+            times, samples = read_steps(self["steps"])
+        elif code == CSV:
+            times, samples = read_two_column(self["file"], header=None)
+        numbers: list[float] = [self[name] for name in PARAMETERS]
+        return source.Constants(code, numbers, times, samples, rated=self.rated), [], 0

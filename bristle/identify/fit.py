@@ -25,16 +25,27 @@ from .model import (
     steady,
     without,
 )  # fmt: skip
+from .residuals import Expected, residuals
 from .search import HUBER_AT_ONE, descend, jacobian, loss
 from .starts import start_model, start_models
 
 __all__ = [
-    "Expected", "Fit", "Model", "Problem", "Run", "Scaled", "fit",
-    "identify", "law_parameters", "parameter", "settled", "sizes", "start_model",
+    "Expected",
+    "Fit",
+    "Model",
+    "Problem",
+    "Run",
+    "Scaled",
+    "fit",
+    "identify",
+    "law_parameters",
+    "multistart_refit",
+    "parameter",
+    "sizes",
+    "start_model",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
-Expected = list[tuple[Array, Array, Array]]
 
 _ALIKE = 1e-3  # relative difference of costs below which two starts have come to the same end
 _WEAK = 1e-6  # a singular value of the scaled Jacobian below this share of the largest is none
@@ -87,12 +98,7 @@ class Scaled:
 
     def residuals(self, theta: Array) -> Array:
         """Return the normalised residuals of all runs, finite."""
-        trial = self.at(theta)
-        parts = []
-        for run, (bias, sigma, _) in zip(self.problem.runs, self.expected, strict=True):
-            r = (run.force - self.problem.predict(trial, run) - bias) / sigma
-            parts.append(np.nan_to_num(r[run.skip :], nan=1e6, posinf=1e6, neginf=-1e6))
-        return np.concatenate(parts)
+        return residuals(self.problem, self.at(theta), self.expected)
 
     def jacobian(self, theta: Array, r: Array) -> Array:
         """Return the derivatives (n, p) of the residuals at theta."""
@@ -137,7 +143,7 @@ def fit(
     return Fit(best, std, found.cost, lost, found.sweeps)
 
 
-def settled(problem: Problem, model: Model, max_evaluations: int = 25) -> Fit:
+def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) -> Fit:
     """Fit a model for the report: many draws for its intervals, and the spread of a rough loss.
 
     Impacts make the loss of a joint rough: a search ends in one of many dents, whose own width says
@@ -268,9 +274,8 @@ def identify(
         for own in _parameters(effect)
     } | dict(values or {})
     model = Model(law, effects, given, held, dict(limits or {}))
-    silent = (
-        tuple(name for name in LAWS[law].driven() if name not in held) if steady(problem) else ()
-    )
+    driven = LAWS[law].driven() if steady(problem) else ()
+    silent = tuple(name for name in driven if name not in held)
     model = without(model, silent)
     trials = start_models(problem, model, starts)
     expected = problem.expectation(trials[0])
@@ -281,7 +286,7 @@ def identify(
     best = min(fits, key=lambda one: one.cost)
     agreed = sum(one.cost <= best.cost * (1.0 + _ALIKE) for one in fits)
     best = fit(problem, best.model, expectation=problem.expectation(best.model), with_std=False)
-    best = settled(problem, best.model)
+    best = multistart_refit(problem, best.model)
     return replace(
         best, unidentified=(*silent, *best.unidentified), starts=len(trials), agreed=agreed
     )

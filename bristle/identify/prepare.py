@@ -138,14 +138,3 @@ def _refuse(measurement: Measurement) -> None:
                 f"{name}: {channel} is {values[0]:g} {measurement.units.get(channel, '')} "
                 "throughout; nothing can be identified from it. Leave the run or the channel out."
             )
-
-
-def saturated(measurement: Measurement) -> float:
-    """Return the share of the force's samples that repeat an extreme in rows of five or more."""
-    y, count = measurement["force"], 0
-    for extreme in (y.max(), y.min()):
-        at = np.concatenate([[0], (y == extreme).astype(np.int8), [0]])
-        edges = np.flatnonzero(np.diff(at))
-        lengths = edges[1::2] - edges[::2]
-        count += int(lengths[lengths >= 5].sum())
-    return count / len(y)

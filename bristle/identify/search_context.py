@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from ..physics.effect import EFFECTS
 from .fit import Model, Problem, parameter
+from .residuals import Expected as Expected
+from .residuals import residuals as residuals
 from .search import Descent, descend, jacobian
 
 Array = NDArray[np.float64]
-Expected = list[tuple[Array, Array, Array]]
 
 MOST_TURNS = 5
 """How often a rough search begins again at most."""
@@ -68,15 +69,6 @@ class Search:
         """Search from the model's own values."""
         found = descend(self.residuals, self.start, self.low, self.high, sweeps, rough=self.rough)
         return self.at(found.theta), found
-
-
-def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
-    """Return the residuals of all runs over the noise expected there (n,)."""
-    parts = []
-    for run, (bias, sigma, _) in zip(problem.runs, expected, strict=True):
-        z = (run.force - problem.predict(model, run) - bias) / sigma
-        parts.append(np.nan_to_num(z[run.skip :], nan=1e6, posinf=1e6, neginf=-1e6))
-    return np.concatenate(parts)
 
 
 def refine(begun: Model, train: Problem, sweeps: int = 12) -> Model:

@@ -1,8 +1,8 @@
-"""Where the search for an effect begins: a net of values, ranked by one linear step."""
+"""Where the search for an effect begins: a grid of values, ranked by one linear step."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from threading import Lock
@@ -10,29 +10,13 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.effect import EFFECTS
-from ..physics.laws import LAWS, laws_of
+from ..physics.effect import EFFECTS, Sizes
+from ..physics.laws import LAWS
 from .fit import Model, Problem
 from .search import HUBER, loss
 from .search_context import Expected, Search, residuals
 
 Array = NDArray[np.float64]
-
-NET: dict[str, dict[str, tuple[float, ...]]] = {
-    "stribeck": {"rise": (1.0, 8.0), "v_s": (0.3, 1.0, 3.0)},
-    "flattening": {"v_f": (0.1, 0.3, 1.0), "bend": (1.0, 2.0)},
-    "saturation": {"V_s": (0.2, 0.4, 1.0)},
-    "coil_lag": {"tau": (0.1, 0.5, 2.0)},
-    "temperature": {"E_0": (1.0, 4.0, 15.0), "tau": (0.07, 0.3)},
-    "presliding": {"x_s": (0.03, 0.1, 0.3, 1.0)},
-    "mount_compliance": {"k": (0.3, 1.0, 3.0, 10.0)},
-    "backlash": {"gap": (0.01, 0.017, 0.03, 0.05, 0.09, 0.15, 0.26, 0.45, 0.8, 1.3, 2.3, 4.0)},
-    "quadratic_damping": {"shape": (0.875, 1.0, 1.25)},
-    "remanence": {"width": (0.3, 1.0)},
-    "delay": {"time": (0.02, 0.1, 0.4, 1.0, 2.5), "filtered": (0.0, 0.2, 1.0)},
-    "velocity_sensor": {"tau": (0.3, 1.0)},
-}
-"""The values looked at, as factors on an effect's defaults scaled to the rig."""
 
 RELAXED = ((0.3, 2.0), (0.05, 10.0))
 """Size and width, as factors, of the part of a law that falls with speed, where a start makes room
@@ -48,59 +32,89 @@ STEPS = (1.0, 0.3)
 """Shares of the linear step that are looked at: a law far from linear overshoots."""
 
 
-def _contact(own: dict[str, float], problem: Problem) -> None:
-    """Tie a contact to its gap: closed, it gives by a small part of it and hardly bounces."""
-    own["backlash.k"] = 20.0 * problem.size("N") / own["backlash.gap"]
-    own["backlash.c"] = max(
-        problem.size("N.s/m"), float(np.sqrt(own["backlash.k"] * own["backlash.mass"]))
-    )
-
-
-def _share_of_yield(own: dict[str, float], _problem: Problem) -> None:
-    """Take an excess near rest out of the yield force, which holds part of it in its mean."""
-    for name in {name for law in laws_of("damper") for name in law.yield_parameters()}:
-        if name in own:
-            own[name] /= 1.0 + 0.5 * own["stribeck.rise"]
-
-
-TIES: dict[str, Callable[[dict[str, float], Problem], None]] = {
-    "backlash": _contact,
-    "stribeck": _share_of_yield,
-}
-"""Start values that follow from others."""
-
-
-def starts(effect: str, base: Model, problem: Problem) -> list[Model]:
+def initial_guesses(effect: str, base: Model, problem: Problem) -> list[Model]:
     """Return the models from which the search for an effect's parameters begins.
 
     An effect of speed alone competes with the law's own fall with speed, which has taken up what it
     could: so some of its starts have that part small and wide.
     """
-    values = {
-        name: problem.scaled(base.law, f"{effect}.{name}") for name in EFFECTS[effect].parameters
-    }
     bases = [dict(base.values)]
     falling, over = base.law_class.falling()
     if EFFECTS[effect].needs == ("v",) and over and not {*falling, over} & set(base.held):
         for size, width in RELAXED:
             relaxed = {name: size * base.value(name) for name in falling}
             bases.append({**base.values, **relaxed, over: width * base.value(over)})
-    factors = NET.get(effect, {})
-    out = []
-    for own in bases:
-        for combination in product(*factors.values()):
-            named = {f"{effect}.{name}": value for name, value in values.items()}
-            for name, factor in zip(factors, combination, strict=True):
-                named[f"{effect}.{name}"] *= factor
-            values_there = {**own, **named}
-            if effect in TIES:
-                TIES[effect](values_there, problem)
-            out.append(replace(base, effects=(*base.effects, effect), values=values_there))
-    return out
+    joined = replace(base, effects=(*base.effects, effect), limits=_limits(effect, base, problem))
+    return [
+        replace(joined, values=_tied(effect, base.law, {**given, **own}, problem))
+        for given in bases
+        for own in _own_values(effect, base, problem)
+    ]
+
+
+def _own_values(effect: str, base: Model, problem: Problem) -> list[dict[str, float]]:
+    """Return the values of an effect's own parameters, by full name, at each node of its grids."""
+    declared = EFFECTS[effect].parameters
+    if EFFECTS[effect].start_shares:
+        plain = {name: parameter.value for name, parameter in declared.items()}
+        scale = _largest(problem)
+        grids = [
+            {n: [share * scale[declared[n].unit] for share in shares] for n, shares in grid.items()}
+            for grid in EFFECTS[effect].start_shares
+        ]
+    else:
+        plain = {name: problem.scaled(base.law, f"{effect}.{name}") for name in declared}
+        factors = EFFECTS[effect].start_grid
+        grids = [{n: [plain[n] * factor for factor in given] for n, given in factors.items()}]
+    nodes = [
+        dict(zip(grid, node, strict=True)) for grid in grids for node in product(*grid.values())
+    ]
+    return [{f"{effect}.{n}": v for n, v in {**plain, **node}.items()} for node in nodes]
+
+
+def _largest(problem: Problem) -> dict[str, float]:
+    """Return the sizes that `Effect.start_shares` are shares of, by unit.
+
+    Lengths and speeds are the largest that were measured: a stop beyond them has no force at all.
+    """
+    x = max(float(np.max(np.abs(run.x))) for run in problem.runs)
+    v = max(float(np.max(np.abs(run.v))) for run in problem.runs)
+    stiffness = problem.size("N/m")
+    bent = {"N/m2": stiffness / x, "N/m3": stiffness / x**2} if x > 0.0 else {}
+    units = {
+        parameter.unit for effect in EFFECTS.values() for parameter in effect.parameters.values()
+    }
+    return {**{unit: problem.size(unit) for unit in units}, **bent, "m": x, "m/s": v}
+
+
+def _limits(effect: str, base: Model, problem: Problem) -> dict[str, tuple[float, float]]:
+    """Return a model's limits with those between which the search for an effect stays."""
+    declared, own = EFFECTS[effect].parameters, EFFECTS[effect].start_limits
+    scale = _largest(problem) if own else {}
+    return base.limits | {
+        f"{effect}.{name}": (low * scale[declared[name].unit], high * scale[declared[name].unit])
+        for name, (low, high) in own.items()
+    }
+
+
+def _tied(effect: str, law: str, values: dict[str, float], problem: Problem) -> dict[str, float]:
+    """Return start values with those that follow from others, the law's yield force included."""
+    joined = EFFECTS[effect]
+    p = joined.values_of({name: values[f"{effect}.{name}"] for name in joined.parameters})
+    if joined.start_ties:
+        sizes = Sizes(*(problem.size(unit) for unit in ("m", "m/s", "V", "N")))
+        tied = joined.tie(p, sizes)  # type: ignore[attr-defined]
+        for name, value in zip(joined.start_ties, tied, strict=True):
+            values[f"{effect}.{name}"] = float(value)
+    if hasattr(joined, "yield_share"):
+        for name in LAWS[law].yield_parameters():
+            if name in values:
+                values[name] /= joined.yield_share(p)
+    return values
 
 
 @dataclass(frozen=True)
-class Light:
+class ScreeningData:
     """Data for a search: runs, what to expect there, and the base model's sensitivities (n, p).
 
     `kept` says from how many starts a search is worth its cost.
@@ -112,25 +126,27 @@ class Light:
     kept: int
 
 
-class Ground:
+class SearchContext:
     """A model that effects are to join, on its training runs: what all their searches share."""
 
     def __init__(self, base: Model, train: Problem) -> None:
         self.base, self.train = base, train
         self.expected = train.expectation(base)
         self.cost = float(np.mean(loss(residuals(train, base, self.expected))))
-        self._light: dict[str, Light] = {}
+        self._screening: dict[str, ScreeningData] = {}
         self._lock = Lock()
 
-    def light(self, effect: str) -> Light:
+    def screening(self, effect: str) -> ScreeningData:
         """Return what the search for an effect is made on."""
         kind = _kind((*self.base.effects, effect), self.base.law)
         with self._lock:
-            if kind not in self._light:
-                problem, expected = _lighter(self.train, self.expected, kind)
+            if kind not in self._screening:
+                problem, expected = _thinned_out(self.train, self.expected, kind)
                 search = Search(problem, self.base, expected, self.base.free())
-                self._light[kind] = Light(problem, expected, search.sensitivities(), KEPT[kind])
-        return self._light[kind]
+                self._screening[kind] = ScreeningData(
+                    problem, expected, search.sensitivities(), KEPT[kind]
+                )
+        return self._screening[kind]
 
 
 def _kind(effects: Sequence[str], law: str) -> str:
@@ -142,7 +158,7 @@ def _kind(effects: Sequence[str], law: str) -> str:
     return "none"
 
 
-def _lighter(problem: Problem, expected: Expected, kind: str) -> tuple[Problem, Expected]:
+def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Problem, Expected]:
     """Return less data for a search: some of the samples without memory, of the runs with a joint.
 
     Without states a law is a function of the motion at each sample. A series element costs many
@@ -169,39 +185,40 @@ def _lighter(problem: Problem, expected: Expected, kind: str) -> tuple[Problem, 
 
 
 @dataclass(frozen=True)
-class Begun:
+class Candidate:
     """A candidate on its way, with its mean loss on the runs looked at."""
 
     model: Model
     cost: float
 
 
-def ranked(effect: str, ground: Ground) -> list[Begun]:
+def ranked_guesses(effect: str, context: SearchContext) -> list[Candidate]:
     """Return an effect's starts after one linear step of all parameters, the best first."""
-    light = ground.light(effect)
-    found = [_stepped(start, effect, light) for start in starts(effect, ground.base, ground.train)]
+    screening = context.screening(effect)
+    guesses = initial_guesses(effect, context.base, context.train)
+    found = [_stepped(guess, effect, screening) for guess in guesses]
     return sorted(found, key=lambda one: one.cost)
 
 
-def _stepped(start: Model, effect: str, light: Light) -> Begun:
+def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
     """Return a start, or what a linear step from it leads to where that is better.
 
     The base model's own sensitivities are taken as they are without the effect.
     """
     base = [name for name in start.free() if not name.startswith(f"{effect}.")]
     added = [name for name in start.free() if name.startswith(f"{effect}.")]
-    own = Search(light.problem, start, light.expected, added)
+    own = Search(screening.problem, start, screening.expected, added)
     here = own.residuals(own.start)
-    J = np.hstack([light.known, own.sensitivities()]) if added else light.known
+    J = np.hstack([screening.known, own.sensitivities()]) if added else screening.known
     weight = np.minimum(1.0, HUBER / np.maximum(np.abs(here), 1e-12))
     normal, gradient = (J * weight[:, None]).T @ J, (J * weight[:, None]).T @ here
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     step = np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=1e-8)[0] / size
-    whole = Search(light.problem, start, light.expected, [*base, *added])
-    best = Begun(start, float(np.mean(loss(here))))
+    whole = Search(screening.problem, start, screening.expected, [*base, *added])
+    best = Candidate(start, float(np.mean(loss(here))))
     for share in STEPS:
         theta = np.clip(whole.start - share * step, whole.low, whole.high)
         cost = float(np.mean(loss(whole.residuals(theta))))
         if cost < best.cost:
-            best = Begun(whole.at(theta), cost)
+            best = Candidate(whole.at(theta), cost)
     return best

@@ -187,19 +187,23 @@ def damper_run(
     """Return the damper's motion and force, measured or from equilibrium.
 
     Of the base's own equilibrium and the sum over all levels the one with less noise is taken; the
-    first needs the storey above to be linear (`linear_storeys`). For a law whose friction jumps
-    with direction samples at which the base may be held are left out.
+    first needs the storey above to be linear (`linear_storeys`). Where a law's friction jumps with
+    direction samples at which the base may be held are left out.
     """
     motion = (response.x[0], response.v[0], response.a[0] - response.ground, response.V)
     if response.force is not None:
         force, noise = response.force, response.noise_force
     else:
         force, noise = reconstructed(response, building, linear_storeys)
-    signed = base_and_variant(law)[0].has("sign")
-    keep = sliding(response) if signed else None
+    keep = sliding(response) if blind_at_rest(law) else None
     return structure_run(
         response.name, response.dt, motion, force, noise, _error(response, 0), keep
     )
+
+
+def blind_at_rest(law: str) -> bool:
+    """Return whether a law tells nothing where the base may be held: it has a sign there."""
+    return base_and_variant(law)[0].has("sign")
 
 
 def reconstructed(

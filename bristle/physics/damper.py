@@ -122,6 +122,16 @@ def without_time(now: Inputs) -> Inputs:
     return Inputs(now.x, now.v, now.a, now.V, 0.0, now.energy, now.stick_force, now.sticks)
 
 
+def force_at(setup: Setup, now: Inputs, z: Row, work: Row) -> tuple[float, float]:
+    """Return force and friction [N] at a state, as `evaluate` does; nothing moves on.
+
+    `work` holds as many floats as `z`, or more.
+    """
+    if not setup.active:
+        return law_force(setup.law, setup.p, now, z)  # type: ignore[no-any-return]
+    return evaluate(setup, now, z, work, work)  # type: ignore[no-any-return]
+
+
 def jump(setup: Setup, now: Inputs, z: Row, work: Row) -> float:
     """Bring the state, in place, to a voltage that has jumped to now.V [V]; return the force [N].
 
@@ -140,9 +150,9 @@ def jump(setup: Setup, now: Inputs, z: Row, work: Row) -> float:
     return evaluate(setup, now, z, rates, after)[0]  # type: ignore[no-any-return]
 
 
-def work_size() -> int:
-    """Return how many floats `step` needs as room to work."""
-    size = SLOTS.z_size
+def work_size(more: int = 0) -> int:
+    """Return how many floats `step` needs as room to work, where states have so many `more`."""
+    size = SLOTS.z_size + more
     return 7 * size + 2 * size * size
 
 

@@ -13,6 +13,7 @@ from typing import Any, Callable, ClassVar, NamedTuple
 
 from ..errors import PhysicsError
 from . import laws as _laws  # noqa: F401  (importing it registers the laws)
+from .effect_check import check_search, check_verdict
 from .law import LAWS, PARTS, Law, laws_of
 from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
 from .parameter import Table as Table
@@ -83,6 +84,15 @@ class Q(NamedTuple):
     value: float  # unit of the channel
 
 
+class Sizes(NamedTuple):
+    """Typical sizes of a measured rig, standard deviations (V: the largest), for `Effect.tie`."""
+
+    x: float  # m
+    v: float  # m/s
+    V: float  # V
+    force: float  # N
+
+
 EFFECTS: dict[str, type[Effect]] = {}
 
 
@@ -127,6 +137,42 @@ class Effect:
         Whether it is a user's own, outside the library; `user.load_effects` sets it.
     passive, zero_at_rest, excludes, source, expect
         See each effect; conformance tests hold the first two.
+
+    Class data of the search
+    ------------------------
+    start_grid
+        Where a search for the effect begins: {parameter: factors} on the defaults, which are scaled
+        to the rig first. All combinations are looked at; without it, the defaults alone.
+    start_shares
+        The same, for an effect whose scale is what was measured and not a rig of 10 N: one grid or
+        more, {parameter: shares} of the largest displacement and speed, the typical force, and
+        what follows from these, by the parameter's unit. Others begin at their defaults.
+    start_limits
+        {parameter: (low, high)}, as such shares: the search stays between them.
+    start_ties
+        Parameters whose start follows from the others: a static method `tie(p, sizes)` gives their
+        values, in this order, as a tuple; `sizes` are the rig's (`Sizes`).
+    A static method `yield_share(p)` says by what the law's own yield force is divided at a start,
+    for an effect that the law has taken up in part.
+
+    Class data of the verdict
+    -------------------------
+    family
+        A name that effects share which small motion cannot tell apart; they are no rivals.
+    lookalikes
+        What else does the same to a building's damper whose force no load cell shows, and in a
+        sentence why: {name of an effect, or what it is in words: sentence}.
+    absorbed_by
+        The part of the damper's law (`LAW_PARTS`) that then takes the effect up whole.
+    mimics
+        Faults of sensors that its absence may look like (`MIMICKED`): they are weighed against it.
+    faults
+        Of a sensor's effect: the kinds of fault of its channel that are this effect ("delay").
+    offset
+        The parameter [N] that is a constant force, all others at zero.
+    mass
+        The parameter [kg] of a mass that moves with the rod; beside a building's model it is part
+        of the moving mass.
     """
 
     name: ClassVar[str] = ""
@@ -151,6 +197,17 @@ class Effect:
     excludes: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str] = ""
     expect: ClassVar[str] = ""
+    start_grid: ClassVar[dict[str, tuple[float, ...]]] = {}
+    start_shares: ClassVar[tuple[dict[str, tuple[float, ...]], ...]] = ()
+    start_limits: ClassVar[dict[str, tuple[float, float]]] = {}
+    start_ties: ClassVar[tuple[str, ...]] = ()
+    family: ClassVar[str] = ""
+    lookalikes: ClassVar[dict[str, str]] = {}
+    absorbed_by: ClassVar[str] = ""
+    mimics: ClassVar[tuple[str, ...]] = ()
+    faults: ClassVar[tuple[str, ...]] = ()
+    offset: ClassVar[str] = ""
+    mass: ClassVar[str] = ""
     State: ClassVar[Any]
     Values: ClassVar[Any]
 
@@ -236,6 +293,8 @@ def _check(effect: type[Effect]) -> None:
     if wrong:
         raise PhysicsError(f"{where}: acts_on {wrong}; laws have parts {PARTS}.")
     check_numbers(where, effect.parameters, effect.tables)
+    check_search(effect, where)
+    check_verdict(effect, where)
 
 
 def _refuse_twin(effect: type[Effect]) -> None:
@@ -260,3 +319,9 @@ def effects_of(site: str, law: str = "") -> tuple[type[Effect], ...]:
 def laws_joined(effect: type[Effect]) -> tuple[str, ...]:
     """Return the names of the laws that an effect of a damper can join; none for other sites."""
     return tuple(law.name for law in laws_of("damper") if effect.joins(law))
+
+
+def instrument_of(channel: str, fault: str) -> str:
+    """Return the sensor effect that is a kind of fault of a channel, "" if none is."""
+    known = [e for e in effects_of("sensor") if e.shows == channel and fault in e.faults]
+    return min(known, key=lambda effect: effect.own).name if known else ""

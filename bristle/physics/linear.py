@@ -22,6 +22,12 @@ def identity(n: int) -> Flat:
     return [1.0 if i == j else 0.0 for i in range(n) for j in range(n)]
 
 
+def copy(source: Row, first: int, target: Row, at: int, count: int) -> None:
+    """Copy so many values from `first` on to the target from `at` on."""
+    for i in range(count):
+        target[at + i] = source[first + i]
+
+
 def multiply(a: Sequence[float], b: Sequence[float], n: int, m: int, columns: int) -> Flat:
     """Return the product of a (n, m) and b (m, columns)."""
     rows = [b[k * columns : (k + 1) * columns] for k in range(m)]

@@ -8,7 +8,7 @@ from itertools import product
 from math import copysign, inf, isfinite
 from typing import Any, Callable
 
-from .effect import Effect, Q
+from .effect import Effect, Q, Sizes
 from .parameter import CHOICES
 
 """Parameters that are choices of a form: they may make a hook jump."""
@@ -55,6 +55,35 @@ def probe(effect: type[Effect]) -> None:
                         _call(effect, "advance", q._replace(dt=dt), z, values, dt < inf)
     _smooth_in_signals(effect, defaults)
     _smooth_in_parameters(effect, defaults)
+    for values in corners:
+        _start(effect, values)
+
+
+def _start(effect: type[Effect], values: dict[str, float]) -> None:
+    """Call what gives start values, at the bounds too; FlawError if that is not right."""
+    p = effect.values_of(values)
+    sizes = Sizes(x=5e-3, v=0.07, V=5.0, force=4.0)
+    for name, given, count in (
+        ("tie", (p, sizes), len(effect.start_ties)),
+        ("yield_share", (p,), 1),
+    ):
+        if not hasattr(effect, name):
+            continue
+        function: Callable[..., Any] = getattr(effect, name)
+        line = function.__code__.co_firstlineno + 1
+        try:
+            found = function(*given)
+        except ZeroDivisionError:  # a start is not taken at such a bound
+            continue
+        except Exception as error:
+            raise FlawError(f"{name} raises {type(error).__name__}: {error}.", line) from None
+        found = found if name == "tie" else (found,)
+        if not isinstance(found, tuple) or len(found) != count:
+            raise FlawError(
+                f"{name} returns {found!r}; a tuple of {count}: start_ties is right.", line
+            )
+        if not all(isinstance(one, (int, float)) and isfinite(one) for one in found):
+            raise FlawError(f"{name} returns {found!r}; finite numbers are right.", line)
 
 
 def _signals() -> list[Q]:

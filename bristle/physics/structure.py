@@ -227,20 +227,28 @@ def balance_contact(
     return tried
 
 
-def rest_forces(
-    n: int, isolated: bool, stiffnesses: Row, C: Row, K: Row, mass: float, x: Row, a_g: float,
-    devices: float, z: Row, p: Row, on: Row, forces: Row,
-) -> float:  # fmt: skip
-    """Fill `forces` (n,) with what the effects exert at a state; return the holding force [N].
-
-    A contact that sticks carries what the devices' force [N] leaves of the holding force, for the
-    devices hold first.
-    """
+def resting_forces(
+    n: int, isolated: bool, stiffnesses: Row, x: Row, z: Row, p: Row, on: Row, forces: Row
+) -> None:
+    """Fill `forces` (n,) with what the effects but contacts exert at a state [N]."""
     effect_forces(n, isolated, stiffnesses, x, inf, 0.0, 0.0, z, p, on, forces)
-    hold = holding_force(n, C, K, mass, x, a_g, forces[0])
-    halt = hold - devices + mass * x[n] / EFFECT_STEP
-    forces[0] += contact_force(n, isolated, stiffnesses, x, inf, 0.0, halt, z, p, on)
-    return hold
+
+
+def resting_contact(
+    n: int, isolated: bool, stiffnesses: Row, x: Row, stick: float, z: Row, p: Row, on: Row
+) -> float:
+    """Return the contacts' force on the first level at a state; `stick` [N] would hold it."""
+    return contact_force(n, isolated, stiffnesses, x, inf, 0.0, stick, z, p, on)  # type: ignore[no-any-return]
+
+
+def pack(values: dict[str, float]) -> list[float]:
+    """Return the flat parameters of all effects; missing ones take their defaults."""
+    p = [0.0] * SLOTS.p_size
+    for effect in SLOTS.effects:
+        for name, parameter in effect.parameters.items():
+            key = effect.name + "." + name
+            p[SLOTS.parameters[key]] = values.get(key, parameter.value)
+    return p
 
 
 def state_size(n: int) -> int:
@@ -263,87 +271,3 @@ def read_building(path: Any) -> Building:
     from .building import read_building as read
 
     return read(path)
-
-
-class StructureModel:
-    """A building and its state, ready to step in plain Python."""
-
-    def __init__(
-        self,
-        building: Building,
-        values: dict[str, float] | None = None,
-        effects: list[str] | None = None,
-    ) -> None:
-        values, effects = values or {}, effects or []
-        self.m = matrices(building)
-        self.x = [0.0] * (2 * self.m.n)
-        self.on = [effect.name in effects for effect in SLOTS.effects]
-        self.active = any(self.on)
-        self.touches = any(e.contact and e.name in effects for e in SLOTS.effects)
-        self.p = [0.0] * SLOTS.p_size
-        for effect in SLOTS.effects:
-            for name, parameter in effect.parameters.items():
-                key = effect.name + "." + name
-                self.p[SLOTS.parameters[key]] = values.get(key, parameter.value)
-        self.z = start_states(self.m.n, values)
-        self._step: dict[float, tuple[int, StepMatrices]] = {}
-        self._unloaded = [0.0] * self.m.n
-        self._gives = self.m.M_inverse[:: self.m.n]  # acceleration per force on the first level
-        self.settle()
-
-    def step(self, dt: float, a0: float, a1: float, force: float) -> None:
-        """Advance over dt [s]: a_g linear from a0 to a1 [m/s2], the devices' force [N] held."""
-        m = self.m
-        count, s = self._matrices(dt)
-        room = [0.0] * work_size(m.n)
-        for k in range(count):
-            begin, end = a0 + (a1 - a0) * k / count, a0 + (a1 - a0) * (k + 1) / count
-            x1, z1 = [0.0] * len(self.x), list(self.z)
-            step(
-                m.n, m.isolated, m.stiffnesses, s.phi, s.held, s.ramp, s.h, self.x, begin, end,
-                force, force, 0.0, self.z, self.p, self.on, self.active, x1, z1, room,
-            )  # fmt: skip
-            self.x, self.z = x1, z1
-        self.settle()
-
-    def _matrices(self, dt: float) -> tuple[int, StepMatrices]:
-        """Return how many substeps dt takes and the matrices of one; kept for the last few dt."""
-        known = self._step.get(dt)
-        if known is None:
-            count = max(1, int(dt / EFFECT_STEP + 0.999999)) if self.active else 1
-            if len(self._step) >= 8:  # a host with ever new steps must not fill the memory
-                self._step.clear()
-            known = self._step[dt] = (count, step_matrices(self.m, dt / count))
-        return known
-
-    def settle(self) -> None:
-        """Compute what follows from the state alone, so that a new device force costs little.
-
-        Call it after the state was set from outside; `step` does so itself.
-        """
-        m = self.m
-        loads = [0.0] * m.n
-        if self.active:
-            effect_forces(
-                m.n, m.isolated, m.stiffnesses, self.x, inf, 0.0, 0.0, self.z, self.p, self.on,
-                loads,
-            )  # fmt: skip
-        accelerations(m.n, m.M_inverse, m.C, m.K, self.x, loads, self._unloaded)
-        self._hold = holding_force(m.n, m.C, m.K, m.mass, self.x, 0.0, loads[0])
-
-    def absolute_accelerations(self, force: float, a_g: float = 0.0) -> list[float]:
-        """Return q'' + a_g (n,) [m/s2] under the devices' force [N] on the first level.
-
-        The ground's acceleration [m/s2] counts where a contact sticks: the level then has it too.
-        """
-        if self.touches:
-            m = self.m
-            halt = self._hold - m.mass * a_g - force + m.mass * self.x[m.n] / EFFECT_STEP
-            force += contact_force(
-                m.n, m.isolated, m.stiffnesses, self.x, inf, 0.0, halt, self.z, self.p, self.on
-            )
-        return [free - give * force for free, give in zip(self._unloaded, self._gives)]
-
-    def holding_force(self, a_g: float, others: float) -> float:
-        """Return the damper force [N] at which the first level stays at its velocity."""
-        return self._hold - self.m.mass * a_g - others

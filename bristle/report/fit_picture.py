@@ -13,7 +13,7 @@ from ..identify.table import low_pass
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..study.identification import Identified
+    from ..study.identified import Identified
 
 _MEASURED, _PREDICTED = "#666666", "#D55E00"  # Okabe & Ito (2008), and a grey
 _RUNS = 3
@@ -29,7 +29,7 @@ def identify_png(found: Identified) -> bytes:
     figure = Figure(figsize=(11.0, 2.7 * len(runs) + 0.9), layout="constrained")
     grid = figure.subplots(len(runs), 3, squeeze=False, width_ratios=(1.0, 1.0, 1.6))
     for row, run in zip(grid, runs, strict=True):
-        _row(list(row), problem, found.drawn or found.fit.model, run, found.cutoff, role)
+        _row(list(row), problem, found.at.model, run, found.cutoff, role)
     figure.suptitle(_title(found), fontsize=10, x=0.01, ha="left")
     file = io.BytesIO()
     figure.savefig(file, format="png", dpi=110)

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..compare.comparison import Comparison
-    from ..compare.held import Held
-    from ..compare.where import Place
+    from ..compare.patterns import ResidualPattern
+    from ..compare.prediction import RunPrediction
 
 Array = NDArray[np.float64]
 
@@ -25,70 +25,79 @@ _DOTS = 3000
 _WINDOW = 600  # samples of a history that are told apart on paper
 
 
-def worst_window(held: Held, samples: int = _WINDOW) -> slice:
+def worst_window(prediction: RunPrediction, samples: int = _WINDOW) -> slice:
     """Return the stretch of a run where its normalised error is largest."""
-    count = len(held.measured)
+    count = len(prediction.measured)
     if count <= samples:
         return slice(0, count)
-    power = np.minimum(((held.measured - held.predicted) / held.sigma) ** 2, 1e4)
-    power[: held.skip] = 0.0
+    power = np.minimum(((prediction.measured - prediction.predicted) / prediction.sigma) ** 2, 1e4)
+    power[: prediction.skip] = 0.0
     total = np.concatenate([[0.0], np.cumsum(power)])
     begin = int(np.argmax(total[samples:] - total[:-samples]))
     return slice(begin, begin + samples)
 
 
-def draw_history(axes: Axes, held: Held, window: slice) -> None:
+def draw_history(axes: Axes, prediction: RunPrediction, window: slice) -> None:
     """Draw measured over predicted output in a stretch of a run."""
-    time = held.time[window]
-    axes.plot(time, held.measured[window], color=MEASURED, lw=1.6, alpha=0.85)
-    axes.plot(time, held.predicted[window], color=PREDICTED, lw=1.3)
+    time = prediction.time[window]
+    axes.plot(time, prediction.measured[window], color=MEASURED, lw=1.6, alpha=0.85)
+    axes.plot(time, prediction.predicted[window], color=PREDICTED, lw=1.3)
     axes.axhline(0.0, color=PALE, lw=0.8, zorder=1)
     axes.margins(x=0.0, y=0.08)
-    axes.set_title(f"{_named(held)} [{held.unit}], {held.name}: its worst stretch")
+    axes.set_title(
+        f"{_named(prediction)} [{prediction.unit}], {prediction.name}: its worst stretch"
+    )
     _legend(axes, ("measured", MEASURED), ("model", PREDICTED))
 
 
-def draw_error(axes: Axes, held: Held, window: slice) -> None:
+def draw_error(axes: Axes, prediction: RunPrediction, window: slice) -> None:
     """Draw the error in a stretch of a run over the band that noise explains."""
-    time, error = held.time[window], (held.measured - held.predicted)[window]
-    band = 2.0 * held.sigma[window]
+    time, error = prediction.time[window], (prediction.measured - prediction.predicted)[window]
+    band = 2.0 * prediction.sigma[window]
     axes.fill_between(time, -band, band, color="#dbe5ec", lw=0.0)
     axes.plot(time, error, color=ERROR, lw=0.9)
     axes.margins(x=0.0)
     top = max(1.15 * float(np.quantile(np.abs(error), 0.995)), 1.5 * float(np.median(band)))
     axes.set_ylim(-top, top)
-    axes.set_title(f"measured less model [{held.unit}]")
+    axes.set_title(f"measured less model [{prediction.unit}]")
     _legend(axes, ("twice the expected noise", "#9fb6c6"))
     axes.set_xlabel("time [s]", loc="right", labelpad=0)
 
 
-def draw_loop(axes: Axes, held: Held, over: str, *, window: slice | None = None) -> None:
+def draw_loop(
+    axes: Axes, prediction: RunPrediction, over: str, *, window: slice | None = None
+) -> None:
     """Draw measured and predicted output over a coordinate."""
     factor, unit = SHOWN.get(over, (1.0, ""))
-    part = window or slice(held.skip, None)
-    x = factor * held.coordinates[over][part]
+    part = window or slice(prediction.skip, None)
+    x = factor * prediction.coordinates[over][part]
     zero_lines(axes)
-    axes.plot(x, held.measured[part], color=MEASURED, lw=1.3, alpha=0.75)
-    axes.plot(x, held.predicted[part], color=PREDICTED, lw=1.0)
-    axes.set_title(f"{_named(held)} [{held.unit}] over {name_of(over, held.site)}")
-    axes.set_xlabel(f"{_axis(over, held.site)} [{unit}]")
+    axes.plot(x, prediction.measured[part], color=MEASURED, lw=1.3, alpha=0.75)
+    axes.plot(x, prediction.predicted[part], color=PREDICTED, lw=1.0)
+    axes.set_title(
+        f"{_named(prediction)} [{prediction.unit}] over {name_of(over, prediction.site)}"
+    )
+    axes.set_xlabel(f"{_axis(over, prediction.site)} [{unit}]")
     axes.margins(0.05)
 
 
-def draw_place(
-    axes: Axes, comparison: Comparison, place: Place, after: Place | None = None
+def draw_pattern(
+    axes: Axes,
+    comparison: Comparison,
+    pattern: ResidualPattern,
+    after: ResidualPattern | None = None,
 ) -> None:
     """Draw the error over a coordinate: samples, and the mean in bins with its interval.
 
-    `after` is a place whose means are taken off first.
+    `after` is a pattern whose means are taken off first.
     """
-    factor, unit = SHOWN.get(place.coordinate, (1.0, ""))
-    x = np.concatenate([one.along()[place.coordinate] for one in comparison.held])
-    y = np.concatenate([one.residual for one in comparison.held])
-    sigma = np.concatenate([one.sigma[one.skip :] for one in comparison.held])
+    factor, unit = SHOWN.get(pattern.coordinate, (1.0, ""))
+    x = np.concatenate([one.along()[pattern.coordinate] for one in comparison.predictions])
+    y = np.concatenate([one.residual for one in comparison.predictions])
+    sigma = np.concatenate([one.sigma[one.skip :] for one in comparison.predictions])
     if after:
         y = y - _means_along(comparison, after)
-    if place.turned:
+    if pattern.turned:
         y = y * _direction(comparison)
     zero_lines(axes)
     band = 2.0 * float(np.median(sigma))
@@ -96,38 +105,38 @@ def draw_place(
     every = max(1, len(x) // _DOTS)
     axes.plot(factor * x[::every], y[::every], ".", ms=1.6, color=PALE, alpha=0.7, zorder=1.5)
     axes.errorbar(
-        factor * place.centre, place.mean, 2.0 * place.std, color=ERROR, lw=1.6, marker="o", ms=3.0,
-        elinewidth=0.9, zorder=3,
+        factor * pattern.centre, pattern.mean, 2.0 * pattern.std, color=ERROR, lw=1.6, marker="o",
+        ms=3.0, elinewidth=0.9, zorder=3,
     )  # fmt: skip
-    top = max(1.25 * float(np.max(np.abs(place.mean))), 1.6 * band)
+    top = max(1.25 * float(np.max(np.abs(pattern.mean))), 1.6 * band)
     axes.set_ylim(-top, top)
-    what = "more resistance than the model" if place.turned else "measured less model"
+    what = "more resistance than the model" if pattern.turned else "measured less model"
     if after:
         what = f"what is left: {what}"
     axes.set_title(f"{what} [{comparison.unit}]")
-    axis = _axis(place.coordinate, comparison.site)
+    axis = _axis(pattern.coordinate, comparison.site)
     axes.set_xlabel(axis + (f" [{unit}]" if unit else ""))
-    if place.coordinate == "direction":
+    if pattern.coordinate == "direction":
         axes.set_xlim(-1.8, 1.8)
         axes.set_xticks([-1.0, 1.0], ["moving back", "moving outwards"])
-    carried = percent(place.share, 0) if place.share >= 0.01 else "below 1 %"
+    carried = percent(pattern.share, 0) if pattern.share >= 0.01 else "below 1 %"
     of = "what is left" if after else "the error's power"
-    share = f"{carried} of {of}" if place.significant else "no more than chance"
+    share = f"{carried} of {of}" if pattern.significant else "no more than chance"
     axes.text(0.98, 0.97, share, transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
               bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
-              color=ERROR if place.significant else GREY)  # fmt: skip
+              color=ERROR if pattern.significant else GREY)  # fmt: skip
 
 
 def _direction(comparison: Comparison) -> Array:
-    return np.concatenate([one.along()["direction"] for one in comparison.held])
+    return np.concatenate([one.along()["direction"] for one in comparison.predictions])
 
 
-def _means_along(comparison: Comparison, place: Place) -> Array:
-    """Return the error's mean (n,) that a place gives each sample."""
-    x = np.concatenate([one.along()[place.coordinate] for one in comparison.held])
-    bins = np.clip(np.searchsorted(place.low, x, side="right") - 1, 0, len(place.mean) - 1)
-    means = place.mean[bins]
-    return np.asarray(means * _direction(comparison) if place.turned else means)
+def _means_along(comparison: Comparison, pattern: ResidualPattern) -> Array:
+    """Return the error's mean (n,) that a pattern gives each sample."""
+    x = np.concatenate([one.along()[pattern.coordinate] for one in comparison.predictions])
+    bins = np.clip(np.searchsorted(pattern.low, x, side="right") - 1, 0, len(pattern.mean) - 1)
+    means = pattern.mean[bins]
+    return np.asarray(means * _direction(comparison) if pattern.turned else means)
 
 
 def draw_spectrum(axes: Axes, comparison: Comparison) -> None:
@@ -175,12 +184,12 @@ def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, 
 
     Edges (b + 1,) in SI; cells of fewer than 8 samples are NaN; None without both coordinates.
     """
-    along = [one.along() for one in comparison.held]
+    along = [one.along() for one in comparison.predictions]
     if not all("displacement" in one and "velocity" in one for one in along):
         return None
     x = np.concatenate([one["displacement"] for one in along])
     v = np.concatenate([one["velocity"] for one in along])
-    r = np.concatenate([one.normalised for one in comparison.held])
+    r = np.concatenate([one.normalised for one in comparison.predictions])
     r = np.clip(r, -30.0, 30.0)
     edges = [_edges(y, bins) for y in (x, v)]
     count = np.histogram2d(x, v, edges)[0]
@@ -228,8 +237,8 @@ def _axis(coordinate: str, site: str) -> str:
     return name_of(coordinate, site).removeprefix("the ")
 
 
-def _named(held: Held) -> str:
-    name = held.quantity.replace("_", " ")
+def _named(prediction: RunPrediction) -> str:
+    name = prediction.quantity.replace("_", " ")
     return name[:1].upper() + name[1:]
 
 
@@ -247,7 +256,7 @@ __all__ = [
     "draw_history",
     "draw_loop",
     "draw_map",
-    "draw_place",
+    "draw_pattern",
     "draw_regimes",
     "draw_spectrum",
     "residual_map",

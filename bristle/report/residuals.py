@@ -10,7 +10,7 @@ from .panels import (
     draw_error,
     draw_history,
     draw_loop,
-    draw_place,
+    draw_pattern,
     draw_regimes,
     draw_spectrum,
     worst_window,
@@ -19,7 +19,7 @@ from .site_pictures import draw_sites, sites_height
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
-    from ..compare.where import Place
+    from ..compare.patterns import ResidualPattern
 
 _HISTORY, _PANELS = 3.1, 3.2
 """Heights of the history with its error, and of a row of two panels [in]."""
@@ -32,10 +32,10 @@ def draw_comparison(comparison: Comparison, title: str = "") -> Page:
     predicted, with the error under it; the loops of that run; the error along the two most telling
     coordinates; its spectrum against that of the noise; z in classes of speed and voltage.
     """
-    held = comparison.worst
-    window = worst_window(held)
-    loops = [name for name in ("displacement", "velocity") if name in held.coordinates]
-    telling = telling_places(comparison)
+    prediction = comparison.worst
+    window = worst_window(prediction)
+    loops = [name for name in ("displacement", "velocity") if name in prediction.coordinates]
+    telling = telling_patterns(comparison)
     first = telling[0] if comparison.second else None
     rows = [bool(loops), bool(telling), True]
     with look():
@@ -51,17 +51,17 @@ def draw_comparison(comparison: Comparison, title: str = "") -> Page:
             height_ratios=[1.6, 1.0],
         )  # fmt: skip
         upper = page.figure.add_subplot(grid[0, 0])
-        draw_history(upper, held, window)
+        draw_history(upper, prediction, window)
         lower = page.figure.add_subplot(grid[1, 0], sharex=upper)
         upper.tick_params(labelbottom=False)
-        draw_error(lower, held, window)
+        draw_error(lower, prediction, window)
         at = begin + _HISTORY
         if loops:
-            _row(page, at, [lambda axes, o=one: draw_loop(axes, held, o) for one in loops])
+            _row(page, at, [lambda axes, o=one: draw_loop(axes, prediction, o) for one in loops])
             at += _PANELS
         if telling:
-            draws = [lambda axes, p=one: draw_place(axes, comparison, p) for one in telling[:1]]
-            draws += [lambda a, p=one: draw_place(a, comparison, p, first) for one in telling[1:]]
+            draws = [lambda axes, p=one: draw_pattern(axes, comparison, p) for one in telling[:1]]
+            draws += [lambda a, p=one: draw_pattern(a, comparison, p, first) for one in telling[1:]]
             _row(page, at, draws)
             at += _PANELS
         last = [lambda axes: draw_spectrum(axes, comparison)]
@@ -80,12 +80,12 @@ def _row(page: Page, top: float, draws: list) -> None:  # type: ignore[type-arg]
         draw(page.figure.add_subplot(grid[0, column]))
 
 
-def telling_places(comparison: Comparison) -> list[Place]:
+def telling_patterns(comparison: Comparison) -> list[ResidualPattern]:
     """Return the two coordinates to draw the error along: the first, and what is left's."""
-    if not comparison.places:
+    if not comparison.patterns:
         return []
-    first = comparison.places[0]
-    rest = [one for one in comparison.places[1:] if one.coordinate not in first.alike]
+    first = comparison.patterns[0]
+    rest = [one for one in comparison.patterns[1:] if one.coordinate not in first.alike]
     chosen = comparison.second or (rest[0] if rest else None)
     return [first, chosen] if chosen else [first]
 

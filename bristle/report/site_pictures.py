@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..compare.errors import CLOSE
-from ..compare.names import name_of, place_name
-from ..compare.words import FAINT
+from ..compare.names import name_of, site_name
+from ..compare.sentences import FAINT
 from ..draw.style import BLUE, FLOOR, GREY, INK, VERMILION, Page, look, short_z
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ def draw_sites(axes: Axes, sites: Sequence[SiteError], before: Sequence[SiteErro
     Small dots are runs, the large one all of them with the 95 % interval; `before` are the sites of
     an earlier model, drawn as rings.
     """
-    shown = sorted((one for one in sites if one.told), key=lambda one: _floor(one.site))
-    earlier = {one.site: one.z for one in before if one.told}
+    shown = sorted((one for one in sites if one.identifiable), key=lambda one: _floor(one.site))
+    earlier = {one.site: one.z for one in before if one.identifiable}
     axes.set_xscale("log")
     axes.axvspan(1.0 / CLOSE, CLOSE, color=FLOOR, lw=0.0)
     for y, one in enumerate(shown):
@@ -41,13 +41,15 @@ def draw_sites(axes: Axes, sites: Sequence[SiteError], before: Sequence[SiteErro
         axes.plot([one.z], [y], "o", ms=5.5, color=colour)
         if one.site in earlier:
             axes.plot([earlier[one.site]], [y], "o", ms=6.5, mfc="none", mec=GREY, mew=1.1)
-        place = one.place if one.fails and one.place and one.place.share >= FAINT else None
+        pattern = one.pattern if one.fails and one.pattern and one.pattern.share >= FAINT else None
         turns = (
-            f", along {name_of(place.coordinate, one.site).removeprefix('the ')}" if place else ""
+            f", along {name_of(pattern.coordinate, one.site).removeprefix('the ')}"
+            if pattern
+            else ""
         )
         axes.text(1.02, y, f"z = {short_z(one.z)}{turns}", transform=axes.get_yaxis_transform(),
                   va="center", fontsize=8.5, color=colour if one.fails else INK)  # fmt: skip
-    names = [place_name(one.site).removeprefix("the ") for one in shown]
+    names = [site_name(one.site).removeprefix("the ") for one in shown]
     axes.set_yticks(range(len(shown)), names, fontsize=9, color=INK)
     axes.tick_params(axis="y", length=0)
     axes.set_ylim(-0.6, len(shown) - 0.4)

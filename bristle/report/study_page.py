@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..compare.names import place_name
+from ..compare.names import site_name
 from ..draw.style import percent, short_z
 from ..errors import BristleError
 from . import html
@@ -19,6 +19,7 @@ from .study_verdict import badge, noise_floor, rivals, separating, untestable, w
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
+    from ..compare.rig import RigComparer
     from ..data.model import StudyModel
     from ..study.history import Step
     from ..study.study import Study
@@ -60,7 +61,8 @@ def study_report(study: Study) -> str:
 def gather(study: Study) -> Content:
     """Return what the report of a study tells; it compares the models before and after."""
     from ..data.model import read_model
-    from ..study.comparison import holder
+    from ..study.comparison import comparer
+    from ..study.identification import as_model
 
     model, steps = study.model(), tuple(study.steps())
     runs = study.runs()
@@ -68,8 +70,8 @@ def gather(study: Study) -> Content:
     trouble, added = "", ""
     found = treads(steps)
     try:
-        hold = holder(study)
-        now = hold.compare(model)
+        against = comparer(study)
+        now = against.compare(as_model(model))
         for step in reversed(steps):
             gone = set(read_model(study.history.model_file(step.number), study.folder).effects)
             if step.number == 0 or not gone <= set(model.effects):
@@ -77,9 +79,9 @@ def gather(study: Study) -> Content:
             earlier = read_model(study.history.model_file(step.number - 1), study.folder)
             new = [name for name in model.effects if name not in earlier.effects]
             if new:
-                before, added = hold.compare(earlier), " and ".join(new)
+                before, added = against.compare(as_model(earlier)), " and ".join(new)
                 break
-        found = [_judged(one, hold, study) for one in found]
+        found = [_judged(one, against, study) for one in found]
     except BristleError as error:
         trouble = str(error)
     return Content(
@@ -87,7 +89,7 @@ def gather(study: Study) -> Content:
     )
 
 
-def _judged(tread: Tread, hold: Any, study: Study) -> Tread:
+def _judged(tread: Tread, against: RigComparer, study: Study) -> Tread:
     """Return a tread with its z where the history does not tell it: an edit by hand."""
     from dataclasses import replace
 
@@ -95,18 +97,20 @@ def _judged(tread: Tread, hold: Any, study: Study) -> Tread:
 
     from ..data.model import read_model
     from ..identify.search import z_scale
+    from ..study.identification import as_model
 
     if tread.z is not None or tread.number == 0:
         return tread  # the model that a study begins with is nobody's guess of this damper
-    held = hold(read_model(study.history.model_file(tread.number), study.folder))
-    return replace(tread, z=z_scale(np.concatenate([one.normalised for one in held])))
+    then = read_model(study.history.model_file(tread.number), study.folder)
+    runs = against.predictions(as_model(then))
+    return replace(tread, z=z_scale(np.concatenate([one.normalised for one in runs])))
 
 
 def render(content: Content) -> str:
     """Return the HTML document."""
     study = content.study
     settings = study.settings
-    rig = "test bench" if settings.rig == "bench" else "structure"
+    rig = "structure" if settings.has_building else "test bench"
     what = " + ".join([content.model.law, *content.model.effects])
     body = [
         f"<h1>{html.escape(settings.title)}</h1>",
@@ -188,9 +192,9 @@ def _where(content: Content) -> str:
         return html.section("Where the model stands", html.paragraphs(content.trouble))
     from ..draw.style import png
     from .study_pictures import error_page
-    from .tables import place_table
+    from .tables import pattern_table
 
-    _, header, rows = place_table(now)
+    _, header, rows = pattern_table(now)
     along = "the two coordinates that organise it most"
     if now.second:
         along = "the coordinate that organises it most, and what is left after that along the next"
@@ -226,7 +230,7 @@ def _sites(content: Content) -> list[str]:
     _, header, rows = site_table(now)
     rings = f" Rings: without {content.added}." if content.before else ""
     worst = now.sites[0]
-    name = place_name(worst.site)
+    name = site_name(worst.site)
     title = f"The model is right within its noise at every site; {name} is worst"
     if worst.fails:
         title = f"Of the building's sites {name} is worst: z = {short_z(worst.z)}"

@@ -26,12 +26,12 @@ from ..draw.style import (
 from .panels import (
     draw_loop,
     draw_map,
-    draw_place,
+    draw_pattern,
     draw_regimes,
     draw_spectrum,
     residual_map,
 )
-from .residuals import telling_places
+from .residuals import telling_patterns
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -129,19 +129,19 @@ def loops_page(before: Comparison | None, now: Comparison, names: tuple[str, str
         page = Page(_WIDTH, 3.0 * len(both) + 0.1, "")
         grid = page.grid(len(both), 2, top=0.4, bottom=0.5, row_gap=0.9, column_gap=0.75)
         for row, (one, name) in enumerate(zip(both, labels, strict=True)):
-            held = next(h for h in one.held if h.name == chosen)
+            prediction = next(h for h in one.predictions if h.name == chosen)
             z = next(run.z for run in one.runs if run.name == chosen)
             for column, over in enumerate(("displacement", "velocity")):
-                if over not in held.coordinates:
+                if over not in prediction.coordinates:
                     continue
                 axes = page.figure.add_subplot(grid[row, column])
-                draw_loop(axes, held, over)
+                draw_loop(axes, prediction, over)
                 if column == 0:
-                    along = name_of(over, held.site)
-                    axes.set_title(f"{name}: force [{held.unit}] over {along}")
+                    along = name_of(over, prediction.site)
+                    axes.set_title(f"{name}: force [{prediction.unit}] over {along}")
                 else:
-                    along = name_of(over, held.site)
-                    axes.set_title(f"over {along}; z = {short_z(z)} on {held.name}")
+                    along = name_of(over, prediction.site)
+                    axes.set_title(f"over {along}; z = {short_z(z)} on {prediction.name}")
         return page
 
 
@@ -174,15 +174,15 @@ def maps_page(before: Comparison | None, now: Comparison, names: tuple[str, str]
 
 def error_page(now: Comparison) -> Page:
     """Return where the error of the present model lives: two coordinates, spectrum, regimes."""
-    telling = telling_places(now)
+    telling = telling_patterns(now)
     first = telling[0] if now.second else None
     with look():
         rows = 1 + bool(telling)
         page = Page(_WIDTH, 3.1 * rows, "")
         grid = page.grid(rows, 2, top=0.4, bottom=0.55, row_gap=0.95, column_gap=1.15)
-        for column, place in enumerate(telling):
+        for column, pattern in enumerate(telling):
             axes = page.figure.add_subplot(grid[0, column])
-            draw_place(axes, now, place, first if column else None)
+            draw_pattern(axes, now, pattern, first if column else None)
         draw_spectrum(page.figure.add_subplot(grid[rows - 1, 0]), now)
         if now.regimes:
             draw_regimes(page.figure.add_subplot(grid[rows - 1, 1]), now)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..compare.names import name_of, place_name
-from ..compare.words import FAINT, begin
+from ..compare.names import name_of, site_name
+from ..compare.sentences import FAINT, begin
 from ..draw.style import percent, short_z
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
     from ..compare.errors import RunError, SiteError
-    from ..compare.where import Place
+    from ..compare.patterns import ResidualPattern
 
 Table = tuple[str, list[str], list[list[str]]]
 
@@ -24,7 +24,7 @@ def comparison_tables(comparison: Comparison) -> list[Table]:
     There are sites of a building only.
     """
     sites = [site_table(comparison)] if comparison.sites else []
-    return [*sites, run_table(comparison), place_table(comparison), band_table(comparison)]
+    return [*sites, run_table(comparison), pattern_table(comparison), band_table(comparison)]
 
 
 def site_table(comparison: Comparison) -> Table:
@@ -36,15 +36,15 @@ def site_table(comparison: Comparison) -> Table:
 
 
 def _site(one: SiteError) -> list[str]:
-    name = place_name(one.site).removeprefix("the ")
-    if not one.told:
+    name = site_name(one.site).removeprefix("the ")
+    if not one.identifiable:
         return [name, "-", "too few samples", "-", "-", "-", "-"]
-    (low, high), total, place = one.z_interval, one.total, one.place
-    told = place is not None and place.share >= FAINT
+    (low, high), total, pattern = one.z_interval, one.total, one.pattern
+    told = pattern is not None and pattern.share >= FAINT
     return [
         name, short_z(one.z), f"{short_z(low)} - {short_z(high)}", f"{total.rms:.3g}",
         percent(total.share), f"{total.noise:.3g}",
-        name_of(place.coordinate, one.site) if place is not None and told else "-",
+        name_of(pattern.coordinate, one.site) if pattern is not None and told else "-",
     ]  # fmt: skip
 
 
@@ -56,7 +56,7 @@ def run_table(comparison: Comparison) -> Table:
     rows = [_run(one) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
     title = "Error over the noise that a true model would show (z), and what half the step changes"
     if comparison.sites:
-        title = f"{begin(place_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
+        title = f"{begin(site_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
     return title, header, rows
 
 
@@ -68,19 +68,19 @@ def _run(run: RunError) -> list[str]:
     ]  # fmt: skip
 
 
-def place_table(comparison: Comparison) -> Table:
+def pattern_table(comparison: Comparison) -> Table:
     """Return the coordinates by how much of the error's power each carries."""
     header = ["coordinate", "of the error", "of what exceeds noise", "chance"]
-    rows = [_place(one, comparison.site) for one in comparison.places[:_SHOWN]]
+    rows = [_pattern(one, comparison.site) for one in comparison.patterns[:_SHOWN]]
     return "Where the error lives: the part of its power that a coordinate carries", header, rows
 
 
-def _place(place: Place, site: str) -> list[str]:
-    name = name_of(place.coordinate, site)
-    name += ", with the direction of motion" if place.turned else ""
-    excess = percent(place.of_excess, 0) if place.of_excess == place.of_excess else "-"
-    chance = f"{place.p:.1g}" if place.p >= 0.001 else "< 0.001"
-    return [name, percent(place.share), excess, chance]
+def _pattern(pattern: ResidualPattern, site: str) -> list[str]:
+    name = name_of(pattern.coordinate, site)
+    name += ", with the direction of motion" if pattern.turned else ""
+    excess = percent(pattern.of_excess, 0) if pattern.of_excess == pattern.of_excess else "-"
+    chance = f"{pattern.p:.1g}" if pattern.p >= 0.001 else "< 0.001"
+    return [name, percent(pattern.share), excess, chance]
 
 
 def band_table(comparison: Comparison) -> Table:

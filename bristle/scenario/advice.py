@@ -11,6 +11,7 @@ from math import sqrt
 
 from ..errors import BristleError, PhysicsError
 from ..findings import Findings
+from ..physics.effect import EFFECTS
 from ..physics.laws import laws_of
 from .connections import Wire
 from .library import Library
@@ -296,11 +297,10 @@ def _mass_terms(damper: Part, mass: float, findings: Findings) -> None:
             f"{damper.name}.moving_mass = {held:.6g} kg; the mass that it moves is {mass:.6g} kg "
             "(attached_mass included).",
         )
-    if damper.value("fluid_inertia.on") is not True:
-        return
+    carried = [n for n, e in EFFECTS.items() if e.mass and damper.value(f"{n}.on") is True]
     for name, variable in damper.variables.items():
         value = damper.real(name)
-        if not name.startswith("fluid_inertia.") or variable.unit != "kg" or value is None:
+        if name.partition(".")[0] not in carried or variable.unit != "kg" or value is None:
             continue
         if value >= 0.5 * mass:
             findings.warning(

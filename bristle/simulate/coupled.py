@@ -14,7 +14,7 @@ from ..errors import RunError
 from ..jit import compiled
 from ..physics import damper, structure
 from ..scenario.scenario import Scenario
-from . import march
+from . import time_loop
 from .clocks import are_whole
 from .system import System
 
@@ -23,12 +23,12 @@ LONGEST_SUBSTEP = 2e-4
 
 Array = NDArray[Any]
 
-_serve = march.serve
+_sample = time_loop.sample
 _has_clocks = False
 
 
 class StoppedError(RunError):
-    """A march that had to stop; `columns` holds the rows before."""
+    """A run that had to stop; `columns` holds the rows before."""
 
     def __init__(self, text: str, columns: dict[str, Array]) -> None:
         super().__init__(text)
@@ -61,8 +61,8 @@ def simulate(scenario: Scenario) -> dict[str, Array]:
     h = scenario.step / substeps
     table = np.zeros((rows + 1, len(system.outputs)))
     slots = np.array(list(system.outputs.values()), dtype=np.int64)
-    filled, unsettled, _ = compiled_march(bool(system.names["sampled"]))(
-        rows, substeps, h, *system.arrays(h), *system.sampled(h, rows * substeps),
+    filled, unsettled, _ = compiled_loop(bool(system.names["sampled"]))(
+        rows, substeps, h, *system.arrays(h), *system.sampled(h),
         system.start_values(), slots, table,
     )  # fmt: skip
     what = ""
@@ -98,11 +98,11 @@ def _substeps(step: float, periods: list[float]) -> int:
     return next((n for n in range(least, 4 * least) if are_whole(periods, step / n)), least)
 
 
-def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int]]:
-    """Return the compiled time march, with sampled components or without.
+def compiled_loop(clocked: bool = False) -> Callable[..., tuple[int, int, int]]:
+    """Return the compiled time loop, with sampled components or without.
 
     The first call on a machine takes seconds, more of them with sampled components. A process that
-    has the march with them uses it for everything: it gives the same numbers.
+    has the loop with them uses it for everything: it gives the same numbers.
     """
     global _has_clocks
     _has_clocks = _has_clocks or clocked
@@ -113,8 +113,7 @@ def compiled_march(clocked: bool = False) -> Callable[..., tuple[int, int, int]]
 def _compiled(
     evaluate: Any, effect_forces: Any, clocked: bool
 ) -> Callable[..., tuple[int, int, int]]:
-    """Compile the march with these generated functions: there are new ones after a new effect."""
-    march.damper_evaluate = evaluate
-    march.serve = _serve if clocked else march.idle
-    function: Callable[..., tuple[int, int, int]] = compiled(march.march, march.INLINE)
+    """Compile the loop as these generated functions are: there are new ones after a new effect."""
+    time_loop.sample = _sample if clocked else time_loop.idle
+    function: Callable[..., tuple[int, int, int]] = compiled(time_loop.integrate, time_loop.INLINE)
     return function

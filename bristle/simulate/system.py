@@ -1,4 +1,4 @@
-"""Lays a scenario of built-in components out in records of numbers for the time march."""
+"""Lays a scenario of built-in components out in records of numbers for the time loop."""
 
 from __future__ import annotations
 
@@ -8,29 +8,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..component import controller, damper, sensors, source, structure
 from ..data import ground_motion_file
 from ..errors import ScenarioError
 from ..fmu import catalogue
 from ..fmu.slave import Slave
-from ..physics.signals import CONSTANT, CSV, PARAMETERS
-from ..physics.structure import step_matrices
+from ..physics.signals import CONSTANT
 from ..scenario.scenario import Component, Scenario
-from . import layout, sampled
+from . import records
 from .clocks import Clocks
 
 Array = NDArray[Any]
 Port = tuple[str, str]
 
-KINDS = {
-    "Structure": "structure",
-    "LuGreDamper": "damper",
-    "BinghamDamper": "damper",
-    "ConstantVoltage": "source",
-    "GroundMotion": "source",
-    "PrescribedMotion": "source",
-    "SignalSource": "source",
-    **dict.fromkeys(sampled.KINDS, "sampled"),
+KINDS: dict[Any, str] = {
+    structure: "structure",
+    damper: "damper",
+    source: "source",
+    controller: "sampled",
+    sensors: "sampled",
 }
+"""What the functions of a component make it in the time loop."""
 
 
 class System:
@@ -59,20 +57,21 @@ class System:
         self.outputs: dict[str, int] = {}
         self.kinds: dict[str, str] = {}
         for component in scenario.components:
-            for variable in component.description.variables.values():
-                if variable.causality in ("input", "output"):
-                    self.slots[component.name, variable.name] = len(self.slots)
-                if variable.causality == "output":
-                    name = f"{component.name}.{variable.name}"
-                    self.outputs[name] = self.slots[component.name, variable.name]
-                    self.kinds[name] = variable.kind
-        self.size = len(self.slots)
+            self._add_slots(component)
         self.slots.update({end: self.slots[begin] for end, begin in self.source_of.items()})
-        # The friction in each damper's force has a slot of its own, and no friction has one.
-        self.friction = {
-            (name, "force"): self.size + i for i, name in enumerate(self.names["damper"])
-        }
-        self.no_friction = self.size + len(self.friction)
+
+    def _add_slots(self, component: Component) -> None:
+        """Give every input and output a slot; hidden outputs stand behind the others."""
+        for variable in component.description.variables.values():
+            name = f"{component.name}.{variable.name}"
+            if variable.name == "fault":
+                for k in range(self.slaves[component.name].hidden):
+                    self.slots[component.name, f"hidden {k}"] = len(self.slots)
+            if variable.causality in ("input", "output"):
+                self.slots[component.name, variable.name] = len(self.slots)
+            if variable.causality == "output":
+                self.outputs[name] = self.slots[component.name, variable.name]
+                self.kinds[name] = variable.kind
 
     def _followed_first(self, scenario: Scenario) -> list[str]:
         """Return the structures so that one whose ground is another's floor comes after it."""
@@ -94,77 +93,81 @@ class System:
 
     def start_values(self) -> Array:
         """Return the signals before the run: what the scenario holds constant, friction 0."""
-        signals = np.zeros(self.no_friction + 1)
+        signals = np.zeros(len(self.slots) + 1)  # the last one is no friction
         for name, slave in self.slaves.items():
             for index in slave._inputs:
                 key = (name, slave.vars[index].name)
                 if key not in self.source_of:
                     signals[self.slots[key]] = slave._values[index]
         for name in self.names["source"]:
-            signal = source_signal(self.slaves[name])
-            if signal["kind"] == CONSTANT:
-                signals[self.slots[name, signal["value"]]] = signal["p"][0]
+            constants = self.slaves[name].constants
+            if constants.kind == CONSTANT:
+                signals[self._first(name)] = constants.scale * constants.p[0]
         return signals
+
+    def _first(self, name: str) -> int:
+        """Return the slot of a component's first output; the others follow."""
+        slave = self.slaves[name]
+        return self.slots[name, slave.vars[slave._outputs[0]].name]
+
+    def _inputs(self, name: str) -> list[int]:
+        """Return the slots of a component's inputs."""
+        slave = self.slaves[name]
+        return [self.slots[name, slave.vars[index].name] for index in slave._inputs]
 
     def arrays(self, h: float) -> tuple[Array, Array, Array, Array, Array]:
         """Return sources, their times and samples, dampers and structures for substeps of h [s]."""
-        return (*self._sources(), self._dampers(), self._structures(h))
+        structures = self._structures(h)
+        return (*self._sources(), self._dampers(structures, h), structures)
 
     def periods(self) -> list[float]:
         """Return the sample periods [s] of the components that have a clock."""
         return [self.slaves[name]["sample_period"] for name in self.names["sampled"]]
 
-    def sampled(self, h: float, substeps: int) -> tuple[Array, Array, Array]:
-        """Return sampled components, their constants and memory for so many substeps of h [s]."""
+    def sampled(self, h: float) -> tuple[Array, Array, Array]:
+        """Return sampled components, their constants and memory for substeps of h [s]."""
         slaves = {name: self.slaves[name] for name in self.names["sampled"]}
-        clocks = Clocks(slaves, lambda *port: self.slots[port], h, substeps)
+        clocks = Clocks(slaves, lambda *port: self.slots[port], h)
         return clocks.records, clocks.constants, clocks.memory
 
     def _sources(self) -> tuple[Array, Array, Array]:
         """Return the sources that change, as records, and the samples of all of them."""
-        signals = {name: source_signal(self.slaves[name]) for name in self.names["source"]}
-        changing = {name: one for name, one in signals.items() if one["kind"] != CONSTANT}
-        records = np.zeros(len(changing), layout.source_record())
+        constants = {name: self.slaves[name].constants for name in self.names["source"]}
+        changing = {name: c for name, c in constants.items() if c.kind != CONSTANT}
+        found = np.zeros(len(changing), records.source_record())
         times: list[float] = []
         samples: list[float] = []
-        for record, (name, signal) in zip(records, changing.items(), strict=True):
-            record["begin"] = len(times)
-            times.extend(signal["times"])
-            samples.extend(signal["samples"])
+        for record, (name, c) in zip(found, changing.items(), strict=True):
+            record["first"], record["begin"] = self._first(name), len(times)
+            times.extend(c.times)
+            samples.extend(c.samples)
             record["end"] = len(times)
-            for field in ("kind", "delay", "scale", "p"):
-                record[field] = signal[field]
-            record["out"] = self.slots[name, signal["value"]]
-            record["rate_out"] = self.slots[name, signal["rate"]] if signal["rate"] else -1
-        return records, np.array(times), np.array(samples)
+            for field in ("kind", "scale", "delay", "rated"):
+                record[field] = getattr(c, field)
+            _fill(record, p=c.p)
+        return found, np.array(times), np.array(samples)
 
-    def _dampers(self) -> Array:
+    def _dampers(self, structures: Array, h: float) -> Array:
+        """Return the dampers; one that sticks does so with the structure that it pushes."""
         names = self.names["damper"]
-        records = np.zeros(len(names), layout.damper_record())
-        ports = {
-            "x": "displacement", "v": "velocity", "V": "voltage", "force": "force",
-            "energy": "dissipated_energy", "stroke_ratio": "stroke_ratio",
-        }  # fmt: skip
-        for record, name in zip(records, names, strict=True):
-            slave = self.slaves[name]
-            model = slave.model
-            for field, port in ports.items():
-                record[field] = self.slots[name, port]
-            record["friction"] = self.friction[name, "force"]
-            given = (name, "acceleration") in self.source_of or slave.was_set("acceleration")
-            record["a"] = self.slots[name, "acceleration"] if given else -1
-            for field in ("law", "n_moving", "advances", "n_own", "signed", "active"):
-                record[field] = getattr(model.setup, field)
-            record["n_states"] = len(model.z) if model.active else model.setup.n_own
-            record["v_max"], record["stroke"] = slave["v_max"], slave["stroke"]
-            record["on_structure"] = self._pushed_by(name)
-            _fill(record, z=model.z, z1=model.z, p=model.p, on=model.on, moving=model.moving)
-        records["halts"] = records["on_structure"] >= 0
-        sticking = records["on_structure"][records["signed"]]
-        for record in records:
-            together = int(np.count_nonzero(sticking == record["on_structure"]))
-            record["sharing"] = max(1, together)
-        return records
+        found = np.zeros(len(names), records.damper_record())
+        pushed = [self._pushed_by(name) for name in names]
+        signs = [self.slaves[name].constants.law.signed for name in names]
+        sticking = [i for i, signed in zip(pushed, signs, strict=True) if signed]
+        for record, name, on in zip(found, names, pushed, strict=True):
+            c, state = self.slaves[name].constants, self.slaves[name].state
+            _copy(record, c.law, ("law", "n_moving", "n_own", "active", "advances", "signed"))
+            _copy(record, c, ("v_max", "stroke"))
+            own = c.law
+            _fill(record, state=state, new_state=state, p=own.p, on=own.on, moving=own.moving)
+            record["inputs"], record["first"] = self._inputs(name), self._first(name)
+            given = (name, "acceleration") in self.source_of
+            record["measured"] = c.measured or given
+            record["on_structure"], record["sharing"] = on, max(1, sticking.count(on))
+            if on >= 0:  # velocity of the level per force that stands over a substep
+                gain = structures[on]["held"][structures[on]["n"] * (structures[on]["n"] + 1)]
+                record["moving_mass"] = -h / (gain * record["sharing"])
+        return found
 
     def _pushed_by(self, damper: str) -> int:
         """Return the structure whose first level a damper both feels and pushes, or -1."""
@@ -178,30 +181,24 @@ class System:
 
     def _structures(self, h: float) -> Array:
         names = self.names["structure"]
-        records = np.zeros(len(names), layout.structure_record())
-        for record, name in zip(records, names, strict=True):
-            model = self.slaves[name].model
-            m = model.m
-            step = step_matrices(m, h)
-            for field, port in (
-                ("ground", "ground_acceleration"), ("force", "damper_force"),
-                ("extra", "extra_force"), ("holding", "holding_force"),
-                ("first_output", f"{self._levels(name)[0]}_displacement"),
-            ):  # fmt: skip
-                record[field] = self.slots[name, port]
-            for field, port in (("friction", "damper_force"), ("extra_friction", "extra_force")):
-                source = self.source_of.get((name, port), ("", ""))
-                record[field] = self.friction.get(source, self.no_friction)
-            ground = self.source_of.get((name, "ground_acceleration"), ("", ""))[0]
-            record["follows"], record["followed"] = ground in names, self._followed(name)
-            record["n"], record["isolated"], record["mass"] = m.n, m.isolated, m.mass
-            record["active"] = model.active
-            record["gain"] = step.held[m.n * (m.n + 1)]
+        found = np.zeros(len(names), records.structure_record())
+        for record, name in zip(found, names, strict=True):
+            c, state = self.slaves[name].constants, self.slaves[name].state
+            c = structure.discretise(h, c)
+            _copy(record, c, ("n", "mass", "h", "active", "touches", "isolated"))
             _fill(
-                record, phi=step.phi, held=step.held, ramp=step.ramp, m_inverse=m.M_inverse, c=m.C,
-                k=m.K, stiffness=m.stiffnesses, x=model.x, z=model.z, p=model.p, on=model.on,
+                record, stiffnesses=c.stiffnesses, m_inverse=c.m_inverse, damping=c.damping,
+                stiffness=c.stiffness, phi=c.phi, held=c.held, ramp=c.ramp, p=c.p, on=c.on,
+                state=state, new_state=state,
             )  # fmt: skip
-        return records
+            record["inputs"], record["first"] = self._inputs(name), self._first(name)
+            record["n_states"], record["followed"] = len(state), self._followed(name)
+            record["holding"] = self.slots[name, "holding_force"]
+            for field, port in (("friction", "damper_force"), ("extra_friction", "extra_force")):
+                begin = self.source_of.get((name, port), ("", ""))
+                pushes = begin[0] in self.names["damper"] and begin[1] == "force"
+                record[field] = self.slots[begin[0], "hidden 0"] if pushes else len(self.slots)
+        return found
 
     def _followed(self, structure: str) -> bool:
         """Return whether a component reads more of a structure than displacement and velocity."""
@@ -219,18 +216,20 @@ class System:
 
 
 def kind_of(component: Component, scenario: Scenario) -> str:
-    """Return "source", "damper" or "structure".
+    """Return "source", "damper", "structure" or "sampled".
 
     Raises
     ------
     ScenarioError
         Naming a component that cannot be compiled.
     """
-    if component.path is None and component.fmu in KINDS:
-        return KINDS[component.fmu]
+    known = catalogue.component_names()
+    if component.path is None and component.fmu in known:
+        kind: Any = catalogue.component_class(catalogue.source(component.fmu))
+        return KINDS[kind.functions]
     raise ScenarioError(
         f"{scenario.file} [components.{component.name}]: {component.fmu} cannot be compiled. "
-        f"Compiled are {', '.join(sorted(KINDS))}; run it with the engine fmu."
+        f"Compiled are {', '.join(known)}; run it with the engine fmu."
     )
 
 
@@ -259,24 +258,10 @@ def configured(component: Component, scenario: Scenario) -> Slave:
     return slave
 
 
-def source_signal(slave: Any) -> dict[str, Any]:
-    """Return the signal of a source: kind, numbers, samples, and the ports of value and rate."""
-    signal: dict[str, Any] = {
-        "kind": CSV, "p": [0.0] * len(PARAMETERS), "times": [0.0], "samples": [0.0],
-        "delay": 0.0, "scale": 1.0, "value": "value", "rate": "",
-    }  # fmt: skip
-    name = type(slave).__name__
-    if name == "ConstantVoltage":
-        signal.update(kind=CONSTANT, p=[slave["level"], *signal["p"][1:]], value="voltage")
-    elif name == "GroundMotion":
-        motion = slave.motion
-        signal.update(times=motion.times, samples=motion.values, value="ground_acceleration")
-        signal.update(delay=slave["start"], scale=slave.scale)
-    else:
-        signal.update(kind=slave.code, p=slave.numbers, times=slave.times, samples=slave.samples)
-        if name == "PrescribedMotion":
-            signal.update(value="displacement", rate="velocity")
-    return signal
+def _copy(record: Any, constants: Any, fields: tuple[str, ...]) -> None:
+    """Copy numbers of a component's constants."""
+    for field in fields:
+        record[field] = getattr(constants, field)
 
 
 def _fill(record: Any, **values: Any) -> None:

@@ -14,7 +14,7 @@ from ..identify.building import StructureFit, equilibrium, identify_structure
 from ..identify.building_file import building_text
 from ..physics.building import Building, frequencies
 from .history import Step
-from .structure import building_of
+from .rig import building_of
 from .study import Study
 
 
@@ -83,13 +83,14 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
     RecordError
         If a file cannot be read, a channel is missing, or a stiffness comes out negative.
     """
-    if study.settings.rig != "structure":
+    model = study.model()
+    given = building_of(study, model)
+    if given is None:
         raise StudyError(
             f'{study.folder}: rig = "{study.settings.rig}": there is no building in it. '
             "--structure needs a study made with  --rig structure --building FILE"
         )
-    model, runs = study.model(), study.runs()
-    given = building_of(study, model)
+    runs = study.runs()
     fit = identify_structure(runs.train, given)
     before: dict[str, float] = {}
     after: dict[str, float] = {}

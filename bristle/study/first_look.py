@@ -107,7 +107,7 @@ def first_look(study: Study, show: Callable[[int], None] | None = None) -> First
     """
     runs = study.runs()
     level = ""
-    if study.settings.rig == "structure":
+    if study.settings.has_building:
         level = damper_level(runs.all)
     findings = [Finding("split", "warning", note) for note in runs.notes]
     for done, run in enumerate(runs.all, 1):
@@ -116,7 +116,7 @@ def first_look(study: Study, show: Callable[[int], None] | None = None) -> First
             show(done)
     together, excitations = look_at_runs(runs.train, runs.holdout, level)
     findings += together
-    if study.settings.rig == "structure":
+    if study.settings.has_building:
         findings += _unmeasured(runs.all)
     findings = [_milder(finding, runs.all) for finding in findings]
     ordered = [finding for level in _HEADINGS for finding in findings if finding.level == level]

@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..data.channels import DRIVE
+from ..data.checks.clipping import saturated_share
 from ..data.measurement import Measurement
 from ..data.model import StudyModel, new_model
 from ..errors import StudyError
-from ..identify.fit import Fit, Model, Problem, identify
-from ..identify.fit import fit as fit_model
-from ..identify.prepare import prepare, saturated
-from ..identify.table import LawError, error_rms, error_table, force_rms
-from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
+from ..identify.fit import Fit, Model
+from ..identify.residuals import robust_z
+from ..identify.rig import DAMPER, Rig, bench_rig
+from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
+from ..identify.table import LawError, error_table
+from ..physics.laws import DEFAULT, base_and_variant, law_names
 from ..units import convert
-from .history import Step
-from .judged import robust_z
+from .identified import Identified
+from .rig import rig_of
 from .study import Runs, Study
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from ..identify.structure import StructureProblem
 
 Show = Callable[[int], None]
 
@@ -38,81 +37,11 @@ _TABLE_STARTS = 3
 _LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
 
 
-@dataclass(frozen=True)
-class Identified:
-    """What an identification found.
-
-    `fit` in SI; `model` the study's model with the values; `table` the errors of the laws after
-    the low-pass at `cutoff` [Hz]; `before`, `after` errors of the two models; `notes` what to
-    know; `step` the history's new step, None where nothing was written; `train`, `holdout` the
-    runs as they were fitted and judged, `drawn` the part of the model that predicts them where
-    that is not the whole of it.
-    """
-
-    fit: Fit
-    model: StudyModel
-    table: list[LawError]
-    cutoff: float
-    before: dict[str, float]
-    after: dict[str, float]
-    notes: tuple[str, ...]
-    step: Step | None
-    train: Problem
-    holdout: Problem | None
-    drawn: Model | None = None
-
-    @property
-    def unidentified(self) -> tuple[str, ...]:
-        """Names of the parameters that the data cannot tell."""
-        return self.fit.unidentified
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return what json can hold."""
-        rows = {row["name"]: row for row in self.parameters()}
-        return {
-            "schema": 1,
-            "law": self.model.law,
-            "effects": list(self.model.effects),
-            "parameters": {
-                name: {key: row[key] for key in row if key != "name"} for name, row in rows.items()
-            },
-            "unidentified": list(self.unidentified),
-            "starts": self.fit.starts,
-            "agreed": self.fit.agreed,
-            "cut_off": self.cutoff,
-            "before": self.before,
-            "after": self.after,
-            "table": [row.as_dict() for row in self.table],
-            "notes": list(self.notes),
-            "step": self.step.number if self.step else None,
-        }
-
-    def parameters(self) -> list[dict[str, Any]]:
-        """Return one row per parameter: name, value, unit, half of its 95 % interval, how."""
-        rows = []
-        for name, value in self.model.flat().items():
-            if name in self.fit.unidentified:
-                how = "cannot be told"
-            elif name in self.fit.std:
-                how = "identified"
-            else:
-                how = "held"
-            half = 1.96 * value.std if value.std is not None and how == "identified" else None
-            rows.append(
-                {
-                    "name": name, "value": value.value, "unit": value.unit, "interval95": half,
-                    "how": how,
-                }
-            )  # fmt: skip
-        return rows
-
-
 def identify_study(
     study: Study,
     *,
     law: str | None = None,
     model: StudyModel | None = None,
-    begin: Mapping[str, float] | None = None,
     cutoff: float | None = None,
     starts: int = 4,
     table: bool = True,
@@ -125,7 +54,6 @@ def identify_study(
     ----------
     law : another law to take than the model's; its effects stay where they can join it
     model : a model to take in place of the present one
-    begin : values in SI by name from which one more fit begins; the better one counts
     cutoff : Hz, of the low-pass for the table of errors; None takes the study's
     starts : how many starting points are tried
     table : whether to compare the laws as the paper does
@@ -142,89 +70,101 @@ def identify_study(
     """
     if starts < 1:
         raise StudyError(f"starts = {starts}; 1 or more is right.")
-    identifier = IDENTIFIERS.get(study.settings.rig)
-    if identifier is None:
-        raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not identified yet.')
-    left_out = tuple(f"Left out: {why}" for why in study.usable_effects())
     model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    found = identifier(study, model, cutoff, starts, table, show or (lambda done: None), begin)
-    found = replace(found, notes=(*found.notes, *left_out))
+    found = identify_model(study, model, FitTask(cutoff, starts, table, show=show or _show_nothing))
     if not write:
         return found
     step = study.add_step(
         f"identify {found.model.law}" + "".join(f" + {e}" for e in found.model.effects),
-        _why(study, found), found.model, found.before, found.after,
+        _why(found), found.model, found.before, found.after,
     )  # fmt: skip
     return replace(found, step=step)
 
 
-def identify_bench(
-    study: Study, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show,
-    begin: Mapping[str, float] | None = None,
-) -> Identified:  # fmt: skip
-    """Identify a damper on a test bench: motion prescribed, force measured."""
+def _show_nothing(done: int) -> None:
+    """Tell nobody how many stages are done."""
+
+
+@dataclass(frozen=True)
+class FitTask:
+    """How a model is to be identified.
+
+    `cutoff` [Hz] of the low-pass for the table of errors; `starts` how many starting points are
+    tried; `table` whether to compare the laws; `present` the model whose errors are those before,
+    None for the one that is identified; `begin` values in SI by name from which one more fit
+    begins, the better one counts; `show` is told how many of `STAGES` are done.
+    """
+
+    cutoff: float
+    starts: int = 4
+    table: bool = True
+    present: StudyModel | None = None
+    begin: Mapping[str, float] = field(default_factory=dict)
+    show: Show = _show_nothing
+
+
+def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified:
+    """Identify a model on a study's training runs; the study stays as it is.
+
+    Raises
+    ------
+    StudyError, RecordError
+        As `identify_study`.
+    """
+    left_out = tuple(f"Left out: {why}" for why in study.usable_effects())
+    model = _with_choices(model, task.begin)
     runs = study.runs()
-    return _identify(runs, model, cutoff, starts, table, show, begin)
+    found = _identify(rig_of(study, model, runs), runs, model, task)
+    return replace(found, notes=(*found.notes, *left_out))
 
 
-def identify_building(
-    study: Study, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show,
-    begin: Mapping[str, float] | None = None,
-) -> Identified:  # fmt: skip
-    """Identify a damper in a building, and what the building's sites carry beside it."""
-    from .structure import Sites, building_of, errors_of_sites
-
-    runs = study.runs()
-    notes = [*runs.notes, *_doubts([run for run in runs.all if run.has("force")])]
-    model = _with_choices(model, begin or {})
-    sites = Sites(runs, building_of(study, model))
-    show(1)
+def _identify(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+    """Identify a model on a rig: fit it at all sites, then judge it there."""
     start = as_model(model)
-    found = sites.fitted(start, starts, begin)
-    show(2)
-    fit = found.one(start)
-    after_model = _with_fit(model, fit)
-    held = sites.lines(as_model(after_model))
-    # An effect that was never fitted is being added: before, there was none.
-    fitted = {
-        name: values for name, values in model.effects.items()
-        if any(value.origin == "identified" for value in values.values())
-    }  # fmt: skip
-    before = sites.errors(as_model(replace(model, effects=fitted)), cutoff)
-    after = errors_of_sites(held, cutoff)
-    show(3)
-    rows: list[LawError] = []
-    site = "damper" if "damper" in held else next(iter(held))
-    drawn, (train, holdout) = held[site]
-    if table and site == "damper" and not LAWS[model.base_law].has("sign"):
-        rows = error_table(train, holdout, cutoff, starts=min(starts, _TABLE_STARTS))
-    show(4)
-    notes += [*found.notes(), _by_site(held), *_weighing(rows, model, after)]
-    if train.reconstructed:
-        notes.append("The damper's force was not measured: it is what equilibrium asks for.")
-    return Identified(
-        fit, after_model, rows, cutoff, before, after, tuple(notes), None, train, holdout, drawn
+    rig.prepare(start)
+    notes = [*runs.notes, *_doubts([run for run in runs.all if run.has("force")])]
+    task.show(1)
+    fits = fit_rig(rig, start, task.starts, task.begin)
+    task.show(2)
+    fit = fits.whole(start)
+    fitted = _with_fit(model, fit)
+    models = site_models(rig, as_model(fitted))
+    before = errors_of(site_models(rig, as_model(task.present or model)), task.cutoff)
+    after = errors_of(models, task.cutoff)
+    task.show(3)
+    at = models.get(DAMPER) or next(iter(models.values()))
+    rows = _table(at, task) if task.table else []
+    task.show(4)
+    notes += [*fits.notes(), *_by_site(models), *_weighing(rows, model, after), *rig.notes]
+    return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
+
+
+def _table(at: SiteModel, task: FitTask) -> list[LawError]:
+    """Return the errors of the laws; none where not every law can be held against the samples."""
+    site = at.site
+    samples = sum(len(run.force) for run in site.train.runs)
+    if site.is_line or not site.any_law or samples > _LONGEST_TABLE:
+        return []
+    return error_table(
+        site.train, site.holdout, task.cutoff, starts=min(task.starts, _TABLE_STARTS)
     )
 
 
-def _by_site(held: Mapping[str, tuple[Model, tuple[StructureProblem, StructureProblem]]]) -> str:
-    z = {site: robust_z(pair[1], own) for site, (own, pair) in held.items()}
+def _by_site(models: SiteModels) -> list[str]:
+    """Return the sentence that tells z by site, none where the one site goes without saying."""
+    held = {at.site.shown: at.site.holdout for at in models.values()}
+    if "" in held:
+        return []
+    z = {n: robust_z(p, models[n].model) for n, p in held.items() if p is not None}
     told = ", ".join(f"{site} {z[site]:.3g}" for site in sorted(z, key=lambda site: -z[site]))
-    return f"z on held-out runs by site: {told}; the errors' z is the worst site's."
+    return [f"z on held-out runs by site: {told}; the errors' z is the worst site's."]
 
 
 def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
     """Return the model with the choices of a form, such as a storey's number, that were found."""
     chosen = {n: v for n, v in begin.items() if n.endswith(".which") and n in model.flat()}
     return model.with_values(chosen, origin="assumed") if chosen else model
-
-
-IDENTIFIERS: dict[
-    str,
-    Callable[[Study, StudyModel, float, int, bool, Show, Mapping[str, float] | None], Identified],
-] = {"bench": identify_bench, "structure": identify_building}
-"""What identifies a study, by its rig."""
 
 
 def identify_frames(
@@ -258,7 +198,7 @@ def identify_frames(
     model = _of_law(new_model(law, effects) if law in law_names() else new_model(), law)
     notes = () if held else ("No run is held out: errors are those of the fit itself.",)
     runs = Runs(train, held, notes)
-    return _identify(runs, model, cutoff, starts, table, lambda done: None)
+    return _identify(bench_rig(train, held), runs, model, FitTask(cutoff, starts, table))
 
 
 def measurements_of_frames(
@@ -306,38 +246,6 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
     return replace(other, effects=dict(model.effects))
 
 
-def _identify(
-    runs: Runs, model: StudyModel, cutoff: float, starts: int, table: bool, show: Show,
-    begin: Mapping[str, float] | None = None,
-) -> Identified:  # fmt: skip
-    train = Problem([prepare(one, seed=31 * k) for k, one in enumerate(runs.train)])
-    held = [prepare(one, seed=31 * k + 7) for k, one in enumerate(runs.holdout)]
-    holdout = Problem(held) if held else None
-    notes = [*runs.notes, *_doubts(runs.all)]
-    show(1)
-    start = as_model(model)
-    fit = identify(
-        train, start.law, start.effects, starts, values=start.values, held=start.held,
-        limits=start.limits,
-    )  # fmt: skip
-    if begin is not None:
-        other = fit_model(train, replace(fit.model, values={**fit.model.values, **begin}))
-        fit = other if other.cost < fit.cost else fit
-    show(2)
-    found = _with_fit(model, fit)
-    before = errors_of(train, holdout, start, cutoff)
-    after = errors_of(train, holdout, fit.model, cutoff)
-    show(3)
-    rows: list[LawError] = []
-    if table and sum(len(run.force) for run in train.runs) <= _LONGEST_TABLE:
-        rows = error_table(train, holdout, cutoff, starts=min(starts, _TABLE_STARTS))
-    show(4)
-    notes += _weighing(rows, model, after)
-    if not any(one.has(c) for one in runs.all for c in DRIVE):
-        notes.append("Neither voltage nor current was measured: the parameters hold at its level.")
-    return Identified(fit, found, rows, cutoff, before, after, tuple(notes), None, train, holdout)
-
-
 def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float]) -> list[str]:
     """Say what a model that errs by more than noise does to intervals and to the fit."""
     if after["z_train"] <= _MISFIT:
@@ -367,19 +275,6 @@ def as_model(model: StudyModel) -> Model:
     return Model(model.base_law, tuple(model.effects), model.values(), tuple(held), limits)
 
 
-def errors_of(
-    train: Problem, holdout: Problem | None, model: Model, cutoff: float
-) -> dict[str, float]:
-    """Return z and RMS error [N, after the low-pass] on training and held-out runs."""
-    out = {"z_train": robust_z(train, model), "rms_train": error_rms(train, model, cutoff)}
-    out["share_train"] = out["rms_train"] / force_rms(train.runs, cutoff)
-    if holdout is not None:
-        out["z_holdout"] = robust_z(holdout, model)
-        out["rms_holdout"] = error_rms(holdout, model, cutoff)
-        out["share_holdout"] = out["rms_holdout"] / force_rms(holdout.runs, cutoff)
-    return out
-
-
 def _with_fit(model: StudyModel, fit: Fit) -> StudyModel:
     """Return the study's model with the values found; what the data cannot tell has no interval."""
     flat = model.flat()
@@ -405,7 +300,7 @@ def _doubts(runs: list[Measurement]) -> list[str]:
     """Refuse a saturated force; say what weakens an identification."""
     notes = []
     for run in runs:
-        share = saturated(run)
+        share = saturated_share(run["force"])
         if share > _SATURATED:
             raise StudyError(
                 f"{run.name}: {share:.0%} of the force's samples stand at its extremes: the load "
@@ -428,7 +323,7 @@ def _doubts(runs: list[Measurement]) -> list[str]:
     return notes
 
 
-def _why(study: Study, found: Identified) -> str:
+def _why(found: Identified) -> str:
     runs, held = len(found.train.runs), len(found.holdout.runs) if found.holdout else 0
     lost = ", ".join(found.unidentified)
     return (

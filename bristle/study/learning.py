@@ -7,22 +7,21 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..data.model import StudyModel
-from ..diagnose import Diagnosis, diagnose
+from ..diagnose import Diagnosis, diagnose, diagnose_rig
 from ..diagnose.faults import SensorFault
-from ..diagnose.structure import diagnose_structure
-from ..diagnose.structure_verdict import StructureDiagnosis
 from ..errors import StudyError
 from ..physics.effect import EFFECTS, laws_joined
 from ..physics.laws import DEFAULT, LAWS
 from .history import Step
-from .identification import Identified, as_model, errors_of, identify_study
+from .identification import FitTask, as_model, identify_model, identify_study
+from .identified import Identified
+from .rig import building_of
 from .study import Study, split_in_time
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Say = Callable[[str], None]
-Verdict = Diagnosis | StructureDiagnosis
 
 MOST_EFFECTS = 4
 """Effects that `learn` adds at the most: a model that asks for more is the wrong model."""
@@ -32,7 +31,7 @@ def _silent(text: str) -> None:
     """Say nothing."""
 
 
-def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> Verdict:
+def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> Diagnosis:
     """Return what the present model of a study is missing; write verdict.json.
 
     Parameters
@@ -48,11 +47,11 @@ def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> V
     """
     for why in study.usable_effects():
         say(f"left out: {why}")
-    model = study.model()
-    diagnoser = DIAGNOSERS.get(study.settings.rig)
-    if diagnoser is None:
-        raise StudyError(f'{study.folder}: rig = "{study.settings.rig}" is not diagnosed yet.')
-    found = diagnoser(study, model, say)
+    model, runs = study.model(), study.runs()
+    found = diagnose_rig(
+        runs.train, runs.holdout, as_model(model), building_of(study, model),
+        identified=any(value.origin == "identified" for value in model.flat().values()), say=say,
+    )  # fmt: skip
     found = replace(found, sensors=(*found.sensors, *_turned(study)))
     if write:
         study.write_verdict(verdict_of(study, found))
@@ -71,33 +70,7 @@ def _turned(study: Study) -> list[SensorFault]:
     ]  # fmt: skip
 
 
-def _diagnose_bench(study: Study, model: StudyModel, say: Say) -> Diagnosis:
-    runs = study.runs()
-    start = as_model(model)
-    identified = any(value.origin == "identified" for value in model.flat().values())
-    return diagnose(
-        runs.train, runs.holdout, law=start.law, effects=start.effects,
-        values=start.values if identified else None, held=start.held, limits=start.limits,
-        progress=say,
-    )  # fmt: skip
-
-
-def _diagnose_building(study: Study, model: StudyModel, say: Say) -> StructureDiagnosis:
-    from .structure import building_of
-
-    runs, present = study.runs(), as_model(model)
-    building = building_of(study, model)
-    return diagnose_structure(runs.train, runs.holdout, building, present=present, say=say)
-
-
-DIAGNOSERS: dict[str, Callable[[Study, StudyModel, Say], Verdict]] = {
-    "bench": _diagnose_bench,
-    "structure": _diagnose_building,
-}
-"""What diagnoses a study, by its rig."""
-
-
-def verdict_of(study: Study, found: Verdict) -> dict[str, Any]:
+def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
     """Return the content of verdict.json, with what weakens the split of the runs."""
     verdict = found.as_dict()
     notes = study.runs().notes
@@ -118,7 +91,7 @@ class Added:
 
 
 def add_effects(
-    study: Study, names: Sequence[str], *, why: str = "", found: Verdict | None = None
+    study: Study, names: Sequence[str], *, why: str = "", found: Diagnosis | None = None
 ) -> Added:
     """Add effects to a study's model, refit it, and write the step.
 
@@ -136,25 +109,19 @@ def add_effects(
     for name in names:
         _refuse(model, name)
         model = model.with_effect(name)
-    start: Mapping[str, float] | None = None
-    if found is not None and found.values:
-        known = set(model.flat())
-        start = {k: v for k, v in found.values.items() if k in known}
-    identified = identify_study(study, model=model, begin=start, table=False, write=False)
-    before = identified.before
-    if study.settings.rig == "bench":
-        # It has the new effects at their defaults, which is nobody's model.
-        before = errors_of(
-            identified.train, identified.holdout, as_model(present), identified.cutoff
-        )
+    known = set(model.flat())
+    start = {k: v for k, v in found.values.items() if k in known} if found is not None else {}
+    # With the new effects at their defaults it would be nobody's model: before is the one without.
+    task = FitTask(study.settings.cut_off, table=False, present=present, begin=start)
+    identified = identify_model(study, model, task)
     verdict = study.verdict()
     if not why:
         agreed = verdict is not None and set(names) <= set(verdict.get("effects", []))
         why = f"verdict: {verdict['kind']}" if agreed and verdict else "by hand"
     step = study.add_step(
-        "add " + ", ".join(names), why, identified.model, before, identified.after
+        "add " + ", ".join(names), why, identified.model, identified.before, identified.after
     )
-    return Added(tuple(names), replace(identified, before=before, step=step), step)
+    return Added(tuple(names), replace(identified, step=step), step)
 
 
 def _refuse(model: StudyModel, name: str) -> None:
@@ -178,7 +145,7 @@ def _refuse(model: StudyModel, name: str) -> None:
 class Learned:
     """What `learn` came to: the last diagnosis, and the steps that it made."""
 
-    verdict: Verdict
+    verdict: Diagnosis
     steps: tuple[Step, ...]
 
     def as_dict(self) -> dict[str, Any]:

@@ -44,6 +44,11 @@ class Settings:
     cut_off: float = CUT_OFF
     comments: dict[str, str] = field(default_factory=dict)
 
+    @property
+    def has_building(self) -> bool:
+        """Whether a building was measured with its damper; else a damper on a test bench."""
+        return self.rig == "structure"
+
 
 def read_settings(path: Path) -> Settings:
     """Return the settings in a study.toml.

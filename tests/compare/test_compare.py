@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from held_made import DT, held_runs_with, motion
+from predictions_made import DT, motion, predictions_with
 
-from bristle.compare import compare, compare_held
-from bristle.compare.held import halved, held_runs
+from bristle.compare import compare, compare_predictions
+from bristle.compare.prediction import halved, run_predictions
 from bristle.errors import RecordError
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run
@@ -43,7 +43,7 @@ def bench(law="lugre", values=None, n=4000, count=3, noise=0.01, skip=25):
 @pytest.mark.parametrize("size", [1.0, 2.5])
 @pytest.mark.parametrize("phi", [0.0, 0.9])
 def test_z_is_the_size_of_the_error_over_the_noise(size, phi):
-    found = compare_held(held_runs_with(size=size, phi=phi, n=6000))
+    found = compare_predictions(predictions_with(size=size, phi=phi, n=6000))
     low, high = found.z_interval
     # Huber's scale reads a Gaussian error as its RMS only up to about k = 2.
     expected = 1.0 if size == 1.0 else pytest.approx(2.1, abs=0.25)
@@ -66,8 +66,8 @@ def test_the_truth_is_right_within_its_noise_and_a_wrong_model_is_not():
 def test_the_numerical_error_falls_with_the_step():
     run = bench(count=1, noise=1e-6).runs[0]
     finer = halved(run)
-    coarse = held_runs(Problem([run]), Model("lugre"))[0]
-    fine = held_runs(
+    coarse = run_predictions(Problem([run]), Model("lugre"))[0]
+    fine = run_predictions(
         Problem([replace(finer, draws=np.zeros((1, len(finer.x), 4)))]), Model("lugre")
     )[0]
     moving = slice(100, None)
@@ -100,7 +100,7 @@ def test_samples_that_were_filled_in_do_not_count():
 
 
 def test_white_noise_is_at_its_floor_in_every_band():
-    found = compare_held(held_runs_with(n=6000))
+    found = compare_predictions(predictions_with(n=6000))
     assert all(band.z == pytest.approx(1.0, abs=0.35) for band in found.spectrum.bands)
     assert sum(band.p < 0.01 for band in found.spectrum.bands) <= 1
     assert found.spectrum.noise[5:] == pytest.approx(2.0 * 0.05**2 * DT, rel=1e-9)
@@ -112,7 +112,7 @@ def test_a_tone_is_in_its_band():
     def tone(along):
         return 0.1 * np.sin(2.0 * np.pi * 3.0 * along["time"])
 
-    found = compare_held(held_runs_with(tone, n=6000))
+    found = compare_predictions(predictions_with(tone, n=6000))
     loudest = max(found.spectrum.bands, key=lambda band: band.share)
     assert loudest.low <= 3.0 < loudest.high
     assert loudest.share > 0.9
@@ -125,8 +125,8 @@ def numbers(text):
 
 
 def test_sentences_say_the_numbers_of_a_spring_that_is_missing():
-    held = held_runs_with(lambda c: 40.0 * c["displacement"])
-    found = compare_held(held)
+    held = predictions_with(lambda c: 40.0 * c["displacement"])
+    found = compare_predictions(held)
     how, where, right = found.sentences
     assert how.startswith("On runs it has not seen the model misses the force by")
     rms, share, z = numbers(how)[:3]
@@ -148,25 +148,27 @@ def test_sentences_say_the_numbers_of_a_spring_that_is_missing():
 
 
 def test_a_softer_spring_pushes_back_less():
-    where = compare_held(held_runs_with(lambda c: -40.0 * c["displacement"])).sentences[1]
+    where = compare_predictions(predictions_with(lambda c: -40.0 * c["displacement"])).sentences[1]
     assert re.search(r"pushes back up to [\d.]+ N less than the model", where)
 
 
 def test_an_error_that_grows_with_voltage_is_said_to():
-    held = held_runs_with(lambda c: 15.0 * c["displacement"] * c["voltage"])
-    where = compare_held(held).sentences[1]
+    held = predictions_with(lambda c: 15.0 * c["displacement"] * c["voltage"])
+    where = compare_predictions(held).sentences[1]
     assert "more at high voltage" in where
 
 
 def test_more_resistance_at_high_speed():
-    held = held_runs_with(lambda c: 300.0 * c["velocity"] * np.abs(c["velocity"]))
-    where = compare_held(held).sentences[1]
+    held = predictions_with(lambda c: 300.0 * c["velocity"] * np.abs(c["velocity"]))
+    where = compare_predictions(held).sentences[1]
     assert re.search(r"above [\d.]+ mm/s the damper resists up to [\d.]+ N more", where)
 
 
 def test_where_it_is_right_is_said():
-    held = held_runs_with(lambda c: np.where(c["speed"] > 0.05, 0.3 * c["direction"], 0.0), n=6000)
-    found = compare_held(held)
+    held = predictions_with(
+        lambda c: np.where(c["speed"] > 0.05, 0.3 * c["direction"], 0.0), n=6000
+    )
+    found = compare_predictions(held)
     right = [one for one in found.regimes if one.right]
     assert right
     assert found.sentences[2].startswith("At low speed")
@@ -175,21 +177,25 @@ def test_where_it_is_right_is_said():
 
 
 def test_nothing_is_said_of_noise():
-    found = compare_held(held_runs_with(n=6000))
+    found = compare_predictions(predictions_with(n=6000))
     assert "which its noise explains" in found.sentences[0]
     assert found.sentences[1] == "What is left looks like noise along every coordinate."
     assert found.sentences[2].startswith("It is right within its noise at every speed and voltage")
 
 
 def test_the_runs_of_the_fit_are_called_so():
-    held = held_runs_with()
-    assert compare_held(held, seen=True).sentences[0].startswith("On the runs that it was fitted")
-    assert compare_held(held, seen=None).sentences[0].startswith("In this measurement")
+    held = predictions_with()
+    assert (
+        compare_predictions(held, seen=True)
+        .sentences[0]
+        .startswith("On the runs that it was fitted")
+    )
+    assert compare_predictions(held, seen=None).sentences[0].startswith("In this measurement")
 
 
 def test_the_comparison_is_json_and_the_same_again():
-    held = held_runs_with(lambda c: 40.0 * c["displacement"])
-    first, again = (json.dumps(compare_held(held).as_dict()) for _ in range(2))
+    held = predictions_with(lambda c: 40.0 * c["displacement"])
+    first, again = (json.dumps(compare_predictions(held).as_dict()) for _ in range(2))
     assert first == again
     answer = json.loads(first)
     assert answer["places"][0]["coordinate"] == "displacement"
@@ -199,23 +205,23 @@ def test_the_comparison_is_json_and_the_same_again():
 
 def test_without_any_run_there_is_nothing_to_compare():
     with pytest.raises(RecordError, match="no run"):
-        compare_held([])
+        compare_predictions([])
 
 
 def test_a_prediction_that_is_not_finite_is_refused_with_its_time():
-    one = held_runs_with(count=1)[0]
+    one = predictions_with(count=1)[0]
     predicted = one.predicted.copy()
     predicted[500] = np.nan
     with pytest.raises(RecordError, match=r"run_0: the predicted force is nan at 1 s"):
-        compare_held([replace(one, predicted=predicted)])
+        compare_predictions([replace(one, predicted=predicted)])
 
 
 def test_a_channel_without_noise_is_refused():
-    one = held_runs_with(count=1)[0]
+    one = predictions_with(count=1)[0]
     with pytest.raises(RecordError, match=r"noise of the force is zero"):
-        compare_held([replace(one, sigma=np.zeros_like(one.sigma))])
+        compare_predictions([replace(one, sigma=np.zeros_like(one.sigma))])
 
 
 def test_a_short_run_is_refused():
     with pytest.raises(RecordError, match="100 samples"):
-        compare_held(held_runs_with(count=1, n=100))
+        compare_predictions(predictions_with(count=1, n=100))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bristle import run
-from bristle.compare.held import held_runs
+from bristle.compare.prediction import run_predictions
 from bristle.identify.model import Model
 from bristle.identify.structure import StructureProblem, structure_run
 from bristle.study import create_study
@@ -63,10 +63,10 @@ def test_samples_that_are_left_out_leave_time_and_history_alone():
     model = Model("bingham", ("presliding",))
     draws = np.zeros((2, n, 4))
     every = structure_run("r", dt, (x, v, a, np.zeros(n)), np.zeros(n), 0.01, draws)
-    whole = held_runs(StructureProblem([every]), model)[0]
+    whole = run_predictions(StructureProblem([every]), model)[0]
     keep = np.abs(v) > 0.03
     some = structure_run("r", dt, (x, v, a, np.zeros(n)), np.zeros(n), 0.01, draws, keep)
-    part = held_runs(StructureProblem([some]), model)[0]
+    part = run_predictions(StructureProblem([some]), model)[0]
     index = some.keep
     assert 0.3 < len(index) / n < 0.9
     assert part.time == pytest.approx(t[index])

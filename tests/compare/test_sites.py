@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from held_made import held_runs_with
+from predictions_made import predictions_with
 
 from bristle.compare import compare_sites
-from bristle.compare.names import place_names
+from bristle.compare.names import site_names
 from bristle.compare.sites import site_errors
 
 
@@ -22,7 +22,7 @@ def building(plants, **choices):
     return {
         site: [
             replace(one, site=site, quantity="force")
-            for one in held_runs_with(plant, seed=50 + k, **choices)
+            for one in predictions_with(plant, seed=50 + k, **choices)
         ]
         for k, (site, plant) in enumerate(plants.items())
     }
@@ -32,7 +32,7 @@ def test_the_site_that_misses_a_spring_is_the_worst_and_the_others_are_right():
     found = compare_sites(building({"damper": None, "layer": spring, "storey1": None}))
     assert [one.fails for one in found.sites] == [True, False, False]
     assert found.site == found.sites[0].site == "layer"
-    assert found.sites[0].place.coordinate == "displacement"
+    assert found.sites[0].pattern.coordinate == "displacement"
     assert found.sites[0].total == found.total
     assert not found.right
     assert found.sentences[0].count("the damper and storey 1 are right within their noise") == 1
@@ -79,7 +79,10 @@ def test_a_site_with_too_few_samples_is_said_to_tell_nothing():
         for one in held["layer"]
     ]  # fmt: skip
     found = compare_sites(held)
-    assert [(one.site, one.told) for one in found.sites] == [("damper", True), ("layer", False)]
+    assert [(one.site, one.identifiable) for one in found.sites] == [
+        ("damper", True),
+        ("layer", False),
+    ]
     assert "the isolation layer: too few samples to tell" in found.sentences[0]
     assert found.as_dict()["sites"][1]["fails"] is False
 
@@ -94,4 +97,4 @@ def test_a_site_with_too_few_samples_is_said_to_tell_nothing():
     ],
 )
 def test_sites_are_named_together(sites, words):
-    assert place_names(sites) == words
+    assert site_names(sites) == words

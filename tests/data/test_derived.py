@@ -9,7 +9,7 @@ import pytest
 from bristle.data.channels import ChannelSpec
 from bristle.data.derived import derived_velocity
 from bristle.data.measurement import measurements_of_frame
-from bristle.diagnose.mended import mended
+from bristle.diagnose.corrected import corrected
 from bristle.diagnose.sensors import sensor_faults
 from bristle.identify.prepare import prepare
 
@@ -74,6 +74,6 @@ def test_it_is_told_as_what_it_is():
     assert [(one.channel, one.fault) for one in faults] == [("velocity", "derived")]
     assert faults[0].value == pytest.approx(0.5 * DT)
     assert "backward difference of displacement" in faults[0].words
-    assert not mended([run], faults)[0].has("velocity")
+    assert not corrected([run], faults)[0].has("velocity")
     # A central difference is not late: nothing is wrong with it.
     assert sensor_faults([bench(differences(x)["central"], x)]) == []

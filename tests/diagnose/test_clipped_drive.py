@@ -7,23 +7,24 @@ from dataclasses import replace
 import numpy as np
 from test_starts import LAW, recorded_rig
 
-from bristle.diagnose.diagnosis import _left, diagnose
+from bristle.diagnose.corrected import corrected
+from bristle.diagnose.diagnosis import diagnose
 from bristle.diagnose.faults import SensorFault
-from bristle.diagnose.mended import mended
+from bristle.diagnose.opening import _left
 
 
 def test_a_run_of_which_clipping_leaves_nothing_is_left_out():
     runs = recorded_rig((), {})
     cut = SensorFault("voltage", "clipping", 3.0, 0.0, "The voltage stands at 3 V.")
     high = replace(runs[0], channels={**runs[0].channels, "voltage": np.full(3000, 3.0)})
-    kept = _left(mended([high, *runs[1:]], [cut]))
+    kept = _left(corrected([high, *runs[1:]], [cut]))
     assert [run.name for run in kept] == [run.name for run in runs[1:]]
 
 
 def test_no_run_left_is_a_verdict_of_insufficiency(monkeypatch):
     runs = recorded_rig((), {})
     cut = SensorFault("voltage", "clipping", 1.0, 0.0, "The voltage stands at its end.")
-    monkeypatch.setattr("bristle.diagnose.diagnosis.sensor_faults", lambda _runs: [cut])
+    monkeypatch.setattr("bristle.diagnose.opening.sensor_faults", lambda _runs: [cut])
     every = [replace(run, channels={**run.channels, "voltage": np.ones(3000)}) for run in runs]
     found = diagnose(every[:2], every[2:], law="bingham", values=LAW)
     assert found.kind == "insufficient"

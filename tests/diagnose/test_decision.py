@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bristle.diagnose.candidates import Trial
-from bristle.diagnose.decision import CLEAN, COMPLETE, GAIN, PAIR_PART, decide, missing
+from bristle.diagnose.decision import decide, missing
+from bristle.diagnose.rule import BENCH
 from bristle.identify.fit import Model
 
 SAMPLES = 6000
@@ -41,7 +42,10 @@ def test_none_where_nothing_helps_and_the_error_is_noise():
 
 def test_a_gain_below_the_smallest_is_none_and_above_it_an_effect():
     before = trial(1.1)
-    less, more = trial(1.1 * (1.0 - 0.8 * GAIN), "drift"), trial(1.1 * (1.0 - 2.0 * GAIN), "drift")
+    less, more = (
+        trial(1.1 * (1.0 - 0.8 * BENCH.gain), "drift"),
+        trial(1.1 * (1.0 - 2.0 * BENCH.gain), "drift"),
+    )
     assert not missing(before, less)
     assert decide(before, [less], no_more).kind == "none"
     assert missing(before, more)
@@ -50,7 +54,7 @@ def test_a_gain_below_the_smallest_is_none_and_above_it_an_effect():
 
 def test_a_gain_within_chance_is_none_missing():
     before, after = trial(1.1), trial(1.05, "drift", spread=1.0)
-    assert 1.0 - after.z / before.z > GAIN
+    assert 1.0 - after.z / before.z > BENCH.gain
     assert not missing(before, after)
 
 
@@ -108,7 +112,7 @@ def test_unknown_where_the_best_effect_leaves_most_of_it():
     assert "stribeck" in found.reasons[0]
 
 
-@pytest.mark.parametrize(("z", "organised"), [(CLEAN + 0.05, False), (1.05, True)])
+@pytest.mark.parametrize(("z", "organised"), [(BENCH.clean + 0.05, False), (1.05, True)])
 def test_unknown_where_no_effect_helps_but_something_is_there(z, organised):
     found = decide(trial(z), [trial(z, "stribeck")], refuse, organised=organised)
     assert (found.kind, found.effects) == ("unknown", ())
@@ -135,16 +139,16 @@ def test_a_second_effect_that_takes_little_is_not_named():
 @pytest.mark.parametrize(
     ("large", "alone", "left", "names"),
     [
-        (8.0, 1.4, COMPLETE, 2),
-        (8.0, 1.4, 1.1 * COMPLETE, 1),
+        (8.0, 1.4, BENCH.complete, 2),
+        (8.0, 1.4, 1.1 * BENCH.complete, 1),
         (8.0, 1.12, 1.02, 1),
-        (36.0, 6.7, 1.02 * COMPLETE, 2),
+        (36.0, 6.7, 1.02 * BENCH.complete, 2),
         (36.0, 6.7, 2.0, 1),
     ],
 )
 def test_a_small_second_effect_counts_where_it_leaves_nothing(large, alone, left, names):
     best = trial(alone, "gas_spring")
-    assert (best.z**2 - 1.0) / (large**2 - 1.0) < PAIR_PART
+    assert (best.z**2 - 1.0) / (large**2 - 1.0) < BENCH.pair_part
     found = decide(
         trial(large),
         [best, trial(7.7, "delay")],

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from test_starts import LAW, recorded_rig
 
+from bristle.diagnose.corrected import corrected
 from bristle.diagnose.experiments import _contrast, _run, separating
-from bristle.diagnose.mended import mended
 from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
 
@@ -46,7 +46,7 @@ def test_a_difference_across_all_parameters_counts_whole():
 
 def test_a_plan_stays_within_what_the_rig_has_done():
     runs = recorded_rig((), {})
-    problem = Problem([prepare(one) for one in mended(runs, [])])
+    problem = Problem([prepare(one) for one in corrected(runs, [])])
     rivals = [
         Model("bingham", ("gas_spring",), {**LAW, "gas_spring.k": 100.0}),
         Model("bingham", ("asymmetry",), {**LAW, "asymmetry.ratio": 0.1}),

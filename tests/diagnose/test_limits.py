@@ -8,8 +8,8 @@ import pytest
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of_frame
-from bristle.diagnose.decision import GAIN
 from bristle.diagnose.limits import detectable, untestable
+from bristle.diagnose.rule import BENCH
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
@@ -73,7 +73,7 @@ def test_the_share_is_what_raises_z_by_the_smallest_gain():
     share = detectable(problem, white(problem, sigma))
     force = np.concatenate([run.force[run.skip :] for run in problem.runs])
     missing = share * np.sqrt(np.mean(force**2))  # N, RMS
-    assert np.sqrt(1.0 + (missing / sigma) ** 2) == pytest.approx(1.0 + GAIN, rel=1e-9)
+    assert np.sqrt(1.0 + (missing / sigma) ** 2) == pytest.approx(1.0 + BENCH.gain, rel=1e-9)
 
 
 def test_less_noise_on_all_channels_shows_less():

@@ -11,7 +11,7 @@ from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
 from bristle.data.channels import ChannelSpec
 from bristle.data.measurement import measurements_of_frame
-from bristle.diagnose.mended import mended
+from bristle.diagnose.corrected import corrected
 from bristle.diagnose.sensors import sensor_faults
 
 STEP, SECONDS, NOISE = 0.002, 10.0, 0.01
@@ -136,7 +136,7 @@ def test_mended_channels_show_no_fault():
     spoilt = runs(late=0.006, spoil=lambda c: c.update(velocity=1.1 * c["velocity"]))
     found = sensor_faults(spoilt)
     assert {one.fault for one in found} == {"gain", "delay"}
-    assert sensor_faults(mended(spoilt, found)) == []
+    assert sensor_faults(corrected(spoilt, found)) == []
 
 
 def test_a_channel_that_stands_at_its_ends_nearly_always_is_clipped_too():
@@ -155,7 +155,7 @@ def test_a_channel_cut_on_one_side():
     spoilt = runs(after=clip)
     fault = only(sensor_faults(spoilt))
     assert (fault.channel, fault.fault) == ("force", "clipping")
-    for before, after in zip(spoilt, mended(spoilt, [fault]), strict=True):
+    for before, after in zip(spoilt, corrected(spoilt, [fault]), strict=True):
         cut = before["force"] == before["force"].max()
         told, level = after.told("force"), before["force"].max()
         assert not told[cut].any()
@@ -175,7 +175,7 @@ def test_noise_that_comes_after_the_cut_is_lost_with_it():
 
     spoilt = runs(after=clip)
     fault = only([one for one in sensor_faults(spoilt) if one.fault == "clipping"])
-    for after, end in zip(mended(spoilt, [fault]), level, strict=True):
+    for after, end in zip(corrected(spoilt, [fault]), level, strict=True):
         beyond = np.abs(after["force"]) > 0.985 * end
         assert beyond.sum() > 100
         assert np.mean(after.told("force")[beyond]) < 0.1
@@ -205,11 +205,11 @@ def test_a_turned_displacement_is_told_by_the_force():
     assert (fault.channel, fault.fault) == ("velocity", "sign")
 
 
-def test_a_turned_velocity_with_an_offset_is_mended():
+def test_a_turned_velocity_with_an_offset_is_corrected():
     whole = runs(spoil=lambda c: c.update(velocity=0.005 - c["velocity"]))
     found = sensor_faults(whole)
     assert {one.fault for one in found} == {"sign", "bias"}
-    assert sensor_faults(mended(whole, found)) == []
+    assert sensor_faults(corrected(whole, found)) == []
 
 
 def test_a_gain_names_the_other_channel_too():

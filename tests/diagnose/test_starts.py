@@ -1,4 +1,4 @@
-"""Where searches begin: one linear step ranks the starts, and a light look at the data suffices."""
+"""Where searches begin: one linear step ranks the starts, and little of the data suffices."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ import pandas as pd
 import pytest
 
 from bristle.data.measurement import measurements_of_frame
-from bristle.diagnose.candidates import begin, joinable
+from bristle.diagnose.candidates import joinable, short_search
 from bristle.identify.fit import Model, Problem, identify
 from bristle.identify.prepare import prepare
 from bristle.identify.search_context import refine
-from bristle.identify.start_grid import NET, Ground, ranked, starts
+from bristle.identify.start_grid import SearchContext, initial_guesses, ranked_guesses
+from bristle.physics.effect import EFFECTS
 
 DT, RATE = 0.002, 500.0
 LAW = {"f_c": 1.3, "f_v": 0.83, "c_0": 40.0, "c_v": 15.0, "v_n": 0.05, "exponent": 1.0}
@@ -51,28 +52,30 @@ def rig(effects, values):
 @pytest.fixture(scope="module")
 def springy():
     problem = rig(("gas_spring",), {"gas_spring.k": 200.0, "gas_spring.preload": 0.4})
-    return Ground(identify(problem, "bingham", starts=2).model, problem)
+    return SearchContext(identify(problem, "bingham", starts=2).model, problem)
 
 
 def test_a_linear_effect_is_found_by_the_first_step(springy):
-    (best,) = ranked("gas_spring", springy)
-    others = [ranked(name, springy)[0].cost for name in ("stribeck", "saturation", "asymmetry")]
+    (best,) = ranked_guesses("gas_spring", springy)
+    others = [
+        ranked_guesses(name, springy)[0].cost for name in ("stribeck", "saturation", "asymmetry")
+    ]
     assert best.cost < 0.3 * min(others)
     assert best.model.value("gas_spring.k") == pytest.approx(200.0, rel=0.05)
 
 
 def test_a_short_search_ends_where_a_long_one_does(springy):
-    begun = begin("gas_spring", springy, ranked("gas_spring", springy))
-    fitted = refine(begun.model, springy.train, 20)
-    assert begun.cost < 0.3 * springy.cost
+    guesses = short_search("gas_spring", springy, ranked_guesses("gas_spring", springy))
+    fitted = refine(guesses.model, springy.train, 20)
+    assert guesses.cost < 0.3 * springy.cost
     assert fitted.value("gas_spring.k") == pytest.approx(200.0, rel=0.05)
     assert fitted.value("gas_spring.preload") == pytest.approx(0.4, rel=0.1)
 
 
 @pytest.mark.parametrize("effect", joinable(Model("bingham")))
-def test_starts_cover_the_net_and_differ(springy, effect):
-    found = starts(effect, springy.base, springy.train)
-    nets = int(np.prod([len(values) for values in NET.get(effect, {}).values()]))
-    assert len(found) % nets == 0
+def test_starts_cover_the_grid_and_differ(springy, effect):
+    found = initial_guesses(effect, springy.base, springy.train)
+    nodes = int(np.prod([len(values) for values in EFFECTS[effect].start_grid.values()]))
+    assert len(found) % nodes == 0
     values = {tuple(sorted(model.values.items())) for model in found}
     assert len(values) == len(found)

@@ -6,19 +6,21 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
-from bristle.diagnose import structure, structure_damper
+from bristle.diagnose import damper as of_damper
+from bristle.diagnose import diagnose_rig, equilibrium, opening
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.decision import Decision
 from bristle.diagnose.faults import SensorFault
+from bristle.diagnose.finding import Finding, of_decision
 from bristle.diagnose.load_cell import load_cell
-from bristle.diagnose.sites import Finding, look_at, shortened
-from bristle.diagnose.structure import diagnose_structure
-from bristle.diagnose.structure_damper import QUIET, DamperVerdict
-from bristle.diagnose.structure_verdict import combine, lookalikes
+from bristle.diagnose.opening import Opening
+from bristle.diagnose.rule import BENCH
+from bristle.diagnose.sites import look_at, shortened
+from bristle.diagnose.verdict import lookalikes, of_sites
 from bristle.errors import RecordError
 from bristle.identify.fit import Model
 from bristle.identify.response import responses
-from bristle.identify.structure import problems_of
+from bristle.identify.structure import StructureProblem, problems_of
 
 
 def duffing(x, v):
@@ -41,6 +43,7 @@ def soften(x, v):
     return [loss[0] - loss[1], loss[1] - loss[2], loss[2]]
 
 
+NOTHING = Finding("layer", "none", (), 1.0, 1.0, 0.0, 0.0)
 HIDDEN = {"duffing": duffing, "base_friction": rub, "end_stop": stop, "storey_softening": soften}
 
 
@@ -102,7 +105,7 @@ def test_a_load_cell_that_is_late_or_wrong_is_told_from_physics(what, value):
     found = responses(runs, b)
     problems = problems_of(found[:2], found[2:], b)
     layer = look_at("layer", *problems["layer"])
-    told = load_cell(layer, found[:2], found[2:], b, "lugre")
+    told = load_cell(layer, found[:2], found[2:], b)
     assert told is not None
     finding, (train, _) = told
     assert finding.effects == (what,)
@@ -114,13 +117,13 @@ def test_a_load_cell_that_is_late_or_wrong_is_told_from_physics(what, value):
 
 def test_a_real_effect_is_not_blamed_on_the_load_cell():
     found, all_runs, b = findings(duffing)
-    assert load_cell(found["layer"], all_runs[:2], all_runs[2:], b, "lugre") is None
+    assert load_cell(found["layer"], all_runs[:2], all_runs[2:], b) is None
 
 
 def test_bare_building_diagnosed_from_start_to_end():
     b, runs = runs_of(duffing, damper=None)
     said = []
-    found = diagnose_structure(runs[:2], runs[2:], b, say=said.append)
+    found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b, say=said.append)
     assert (found.kind, found.effects) == ("effect", ("duffing",))
     assert found.sites == {"duffing": "layer"}
     assert not found.reconstructed
@@ -134,11 +137,13 @@ def test_bare_building_diagnosed_from_start_to_end():
 
 
 def test_what_a_reconstructed_force_cannot_tell_is_named():
-    assert lookalikes(("gas_spring",)) == ["duffing"]
-    assert lookalikes(("duffing", "gas_spring")) == []
-    assert lookalikes(("fluid_inertia",)) == ["base_mass"]
-    assert lookalikes(("base_friction",)) == ["f_c"]
-    assert lookalikes(("stribeck",)) == []
+    assert list(lookalikes(("gas_spring",))) == ["duffing"]
+    assert lookalikes(("duffing", "gas_spring")) == {}
+    assert list(lookalikes(("fluid_inertia",))) == [
+        "a mass of the base that the file does not know"
+    ]
+    assert list(lookalikes(("base_friction",))) == ["f_c of the damper"]
+    assert lookalikes(("stribeck",)) == {}
 
 
 def test_findings_of_sites_become_one_verdict():
@@ -146,12 +151,12 @@ def test_findings_of_sites_become_one_verdict():
         return Finding(site, kind, effects, 3.0, 1.0, 1.0, 0.01, coordinate="velocity")
 
     both = {"layer": at("layer", "effect", "duffing"), "storey1": at("storey1", "none")}
-    assert combine(both, None, None, {}).effects == ("duffing",)
+    assert of_sites(both).effects == ("duffing",)
     both["storey1"] = at("storey1", "effect", "storey_softening")
-    found = combine(both, None, None, {})
+    found = of_sites(both)
     assert (found.kind, found.effects) == ("effect", ("duffing", "storey_softening"))
     both["storey1"] = at("storey1", "unknown")
-    found = combine(both, None, None, {})
+    found = of_sites(both)
     assert (found.kind, found.coordinate) == ("unknown", "velocity")
     assert "Besides, duffing is missing (layer)." in found.words
 
@@ -161,7 +166,7 @@ def test_missing_channels_are_named():
     clean = shake(b, 20, friction, samples=1000)
     bad = measured(clean, 0, without=("ground_acceleration", "base_displacement", "base_velocity"))
     with pytest.raises(RecordError, match="ground_acceleration, base_displacement missing"):
-        diagnose_structure([bad], runs, b)
+        diagnose_rig([bad], runs, Model("lugre"), b)
 
 
 def test_late_velocity_of_the_base_is_a_sensor_fault_and_not_physics():
@@ -172,7 +177,7 @@ def test_late_velocity_of_the_base_is_a_sensor_fault_and_not_physics():
         late = 4
         clean["base_velocity"] = np.concatenate([np.zeros(late), clean["base_velocity"][:-late]])
         runs.append(measured(clean, i))
-    found = diagnose_structure(runs[:2], runs[2:], b)
+    found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b)
     (fault,) = found.sensors
     assert (fault.channel, fault.fault) == ("velocity", "delay")
     assert fault.value == pytest.approx(4 * 0.002, rel=0.05)
@@ -182,7 +187,7 @@ def test_late_velocity_of_the_base_is_a_sensor_fault_and_not_physics():
 
 def test_lag_of_a_velocity_is_its_instrument():
     lag = SensorFault("velocity", "lag", 0.004, 1e-4, "Velocity lags.")
-    found = combine({"layer": structure._NOTHING}, None, None, {}, (lag,))
+    found = of_sites({"layer": NOTHING}, sensors=(lag,))
     assert (found.kind, found.effects) == ("effect", ("velocity_sensor",))
     assert found.sites == {"velocity_sensor": "sensor"}
     assert "velocity_sensor (sensor)" in found.words
@@ -193,13 +198,6 @@ def trial(effects=(), z=1.0, train=1.0, losses=None):
     return Trial(Model("lugre", effects), train, z, 1.0, lost, np.sqrt(2.0 * lost))
 
 
-class Seen:
-    """What `_decided` asks of a problem."""
-
-    reconstructed = False
-    runs = ()
-
-
 @pytest.mark.parametrize(
     ("z", "train", "searched"), [(1.0, 1.0, 0), (1.04, 1.0, 1), (1.0, 1.04, 1)]
 )
@@ -208,15 +206,19 @@ def test_effects_of_the_damper_are_searched_only_where_one_could_matter(
 ):
     asked = []
 
-    def search(*given):
+    def search(*given, **_more):
         asked.append(given)
         return [trial(("gas_spring",), z)]
 
-    monkeypatch.setattr(structure_damper, "try_all", search)
-    found = structure_damper._decided(trial((), z, train), Seen(), Seen())
+    monkeypatch.setattr(opening, "try_all", search)
+    none = StructureProblem([])
+    inside = Opening(trial((), z, train), none, none, (), {}, (), none)
+    found = of_damper.look_at_damper(inside)
     assert len(asked) == searched
-    assert found.decision.kind == "none"
-    assert QUIET < 1.02, "above that an effect could lower z by its smallest share to that of noise"
+    assert found.kind == "none"
+    assert BENCH.quiet < 1.02, (
+        "above that an effect could lower z by its smallest share to that of noise"
+    )
 
 
 def test_a_stop_that_is_met_once_is_told_by_its_likelihood():
@@ -226,23 +228,23 @@ def test_a_stop_that_is_met_once_is_told_by_its_likelihood():
     before = trial((), 1.3, losses=hit)
     stop = trial(("end_stop",), 0.99, losses=quiet)
     spring = trial(("duffing",), 1.29, losses=hit * 0.999)
-    decision = structure_damper._seldom(before, [stop, spring])
+    decision = of_damper._rare(before, [stop, spring])
     assert decision is not None
     assert (decision.kind, decision.effects) == ("effect", ("end_stop",))
     assert decision.explained > 0.95
     close = trial(("duffing",), 0.991, losses=quiet * 1.0001)
-    assert structure_damper._seldom(before, [stop, close]).effects == ("end_stop", "duffing")
-    assert structure_damper._seldom(before, [trial(("gas_spring",), 0.99, losses=quiet)]) is None
+    assert of_damper._rare(before, [stop, close]).effects == ("end_stop", "duffing")
+    assert of_damper._rare(before, [trial(("gas_spring",), 0.99, losses=quiet)]) is None
     poor = trial(("end_stop",), 1.25, losses=hit * 0.99)
-    assert structure_damper._seldom(before, [poor]) is None
+    assert of_damper._rare(before, [poor]) is None
 
 
-def test_only_what_an_instrument_accounts_for_is_forgiven():
+def test_only_what_an_instrument_accounts_for_is_excused_by_sensor():
     def judged(z, gain):
         before = trial((), z)
         unknown = Decision("unknown", (), before, 0.0, ("z.",))
-        verdict = DamperVerdict(unknown, before, (trial(("stribeck",), z * (1.0 - gain)),))
-        return structure_damper.forgiven(verdict, 1.25, "Blurred.").decision.kind
+        found = of_decision(unknown, before, (trial(("stribeck",), z * (1.0 - gain)),))
+        return of_damper.excused_by_sensor(found, 1.25, "Blurred.").kind
 
     assert judged(1.19, 0.001) == "none"
     assert judged(1.19, 0.1) == "unknown", "an effect explains it in part"
@@ -253,10 +255,10 @@ def test_a_load_cell_that_rounds_is_put_on_the_model_and_not_taken_back():
     def told(effect, z):
         return Finding("force", "effect", (effect,), 4.0, z, 0.9, 0.01, coordinate="0.0125 s")
 
-    assert structure._rounded(told("delay", 1.9))
-    assert not structure._rounded(told("delay", 1.02)), "moved ahead it fits: a plain delay"
-    assert not structure._rounded(told("force_gain", 1.9))
-    model = structure._late(Model("lugre", ("gas_spring",)), told("delay", 1.9))
+    assert equilibrium._rounded(told("delay", 1.9))
+    assert not equilibrium._rounded(told("delay", 1.02)), "moved ahead it fits: a plain delay"
+    assert not equilibrium._rounded(told("force_gain", 1.9))
+    model = equilibrium._late(Model("lugre", ("gas_spring",)), told("delay", 1.9))
     assert model.effects == ("gas_spring", "delay")
     assert model.value("delay.time") == 0.0125
 

@@ -14,9 +14,10 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 
 from bristle.cli import main
+from bristle.component.clock import COMING
+from bristle.component.sensors import Channel, reading, setup
 from bristle.control import inverse, linear, switching
 from bristle.control.controller import Controller, building_digest, read_controller
-from bristle.control.instrument import Instrument
 from bristle.errors import BuildError, DesignError
 from bristle.fmu import build, catalogue
 from bristle.fmu.controller import MEASURED
@@ -138,7 +139,7 @@ def test_a_longer_step_warns_once_and_takes_the_samples_in_between(
     long = stepped(slave, 0.005, 0.2)
     assert len(said) == 1
     assert "longer than its sample period of 0.002 s" in said[0]
-    assert slave.samples == round(0.2 / H) + 1  # that of t = 0 included
+    assert slave.state[COMING] == round(0.2 / H) + 1  # that of t = 0 included
     # What is measured is taken as linear: no exact match, but the same course.
     own = np.array(stepped(started(name), H, 0.2))[4::5, 0]
     shown = np.array(long)[1::2, 0]
@@ -332,33 +333,35 @@ def test_gain_bias_quantisation_and_delay_of_one_channel() -> None:
         assert rows[k][:3] == motion((k + 1) * H)[:3]
 
 
+def readings(signal: list[float], channel: Channel, place: int = 0, seed: int = 1) -> list[float]:
+    """Return what a channel in a place among four shows of a signal, sample by sample."""
+    c, state, _ = setup(0.0, H, seed, [channel] * 4)
+    return [reading(place, k, value, c, state) for k, value in enumerate(signal)]
+
+
 def test_a_delay_between_two_samples_is_exact_for_a_ramp() -> None:
-    instrument = Instrument(0, 1, H, delay=2.5 * H)
-    readings = [instrument(k, 10.0 * k) for k in range(20)]
-    assert readings[0] == 0.0
-    assert readings[4:] == pytest.approx([10.0 * (k - 2.5) for k in range(4, 20)])
+    found = readings([10.0 * k for k in range(20)], Channel(delay=2.5 * H))
+    assert found[0] == 0.0
+    assert found[4:] == pytest.approx([10.0 * (k - 2.5) for k in range(4, 20)])
 
 
 def test_cut_off_halves_the_power_at_its_corner() -> None:
-    instrument = Instrument(0, 1, H, cut_off=5.0)
-    readings = [instrument(k, sin(2 * pi * 5.0 * k * H)) for k in range(2000)]
-    assert max(readings[1000:]) == pytest.approx(sqrt(0.5), rel=2e-3)
+    found = readings([sin(2 * pi * 5.0 * k * H) for k in range(2000)], Channel(cut_off=5.0))
+    assert max(found[1000:]) == pytest.approx(sqrt(0.5), rel=2e-3)
 
 
 def test_noise_has_its_density_its_seed_and_no_memory() -> None:
     density, n = 0.01, 20000
-    instrument = Instrument(2, 7, H, noise_density=density)
-    readings = np.array([instrument(k, 0.0) for k in range(n)])
+    channel = Channel(noise_density=density)
+    found = np.array(readings([0.0] * n, channel, 2, 7))
     deviation = density * sqrt(0.5 / H)
-    assert readings.std() == pytest.approx(deviation, rel=4.0 / sqrt(2 * n))
-    assert abs(readings.mean()) < 4.0 * deviation / sqrt(n)
-    assert abs(np.mean(readings[1:] * readings[:-1])) < 4.0 * deviation**2 / sqrt(n)
-    again, other, seed = (Instrument(c, s, H, noise_density=density) for c, s in _CHOICES)
-    assert again(n - 1, 0.0) == readings[-1]
-    assert other(5, 0.0) != readings[5] != seed(5, 0.0)
-
-
-_CHOICES = ((2, 7), (3, 7), (2, 8))
+    assert found.std() == pytest.approx(deviation, rel=4.0 / sqrt(2 * n))
+    assert abs(found.mean()) < 4.0 * deviation / sqrt(n)
+    assert abs(np.mean(found[1:] * found[:-1])) < 4.0 * deviation**2 / sqrt(n)
+    c, state, _ = setup(0.0, H, 7, [channel] * 4)
+    assert reading(2, n - 1, 0.0, c, state) == found[-1]
+    other, seed = (readings([0.0] * 6, channel, *choice) for choice in ((3, 7), (2, 8)))
+    assert other[5] != found[5] != seed[5]
 
 
 # -- the closed loop
@@ -419,7 +422,7 @@ def test_peaks_on_el_centro_with_the_frozen_matrices(
 
 
 # Acceleration [m/s2], drift [mm], force [N] at other intensities; where the reference has none,
-# the coupled march with the same matrices stands in.
+# the coupled engine with the same matrices stands in.
 OTHER_INTENSITIES = [
     (0.2, "clipped", "ClippedOptimal", "hinf", (2.992, 3.9, 8.35)),
     (0.2, "hinf", "HinfInverse", "hinf", (2.591, 4.8, 2.85)),

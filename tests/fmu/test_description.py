@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from bristle.component import OVER_STEP
 from bristle.errors import FmuError
 from bristle.fmu import archive, build, catalogue
 from bristle.fmu.archive import extract, library_member
@@ -33,7 +34,9 @@ XML = """<?xml version="1.0" encoding="UTF-8"?>
   </VendorAnnotations>
   <ModelVariables>
     <ScalarVariable name="x" valueReference="0" causality="input" description="where it is">
-      <Real unit="m" start="0.5" min="-1" max="1" nominal="0.1"/></ScalarVariable>
+      <Real unit="m" start="0.5" min="-1" max="1" nominal="0.1"/>
+      <Annotations><Tool name="other"><overStep>late</overStep></Tool>
+      <Tool name="bristle"><overStep>linear</overStep></Tool></Annotations></ScalarVariable>
     <ScalarVariable name="flag" valueReference="0" causality="input" variability="discrete">
       <Boolean start="true"/></ScalarVariable>
     <ScalarVariable name="force" valueReference="1" causality="output">
@@ -120,6 +123,11 @@ def test_dependencies_name_inputs_only_and_silence_is_none(write: Write) -> None
     assert found == [("x",), (), None, None]
 
 
+def test_how_an_input_is_taken_comes_from_our_annotation_only(write: Write) -> None:
+    variables = read_description(write()).variables
+    assert {name: v.over_step for name, v in variables.items() if v.over_step} == {"x": "linear"}
+
+
 def test_optional_inputs_come_from_our_annotation_only(write: Write) -> None:
     variables = read_description(write()).variables
     assert [name for name, v in variables.items() if v.optional] == ["x", "flag"]
@@ -150,6 +158,7 @@ CHANGES = [
     ('max="8"', 'max="nan"', "max is not a number"),
     ('max="8"', 'max="high"', "max is 'high', not a number"),
     ("<String start", "<Text start", '"text" has no type'),
+    (">linear<", ">late<", "overStep is 'late', none of held, linear, sampled"),
     ('index="3"', 'index="9"', "names variable '9'; the variables are 1 to 8"),
     ('index="3"', 'index="0"', "names variable '0'"),
     ('dependencies="1 8"', 'dependencies="1 x"', "names variable 'x'"),
@@ -356,3 +365,23 @@ def test_built_fmu_says_what_the_catalogue_says(name: str) -> None:
         assert variable.unit == other.unit
         assert variable.dependencies == other.dependencies
         assert variable.optional == other.optional
+        assert variable.over_step == other.over_step
+
+
+@pytest.mark.parametrize("name", catalogue.component_names())
+def test_every_input_says_how_it_is_taken_over_a_step(name: str) -> None:
+    found = {v.name: v.over_step for v in catalogue.describe(name).of("input")}
+    assert set(found.values()) <= set(OVER_STEP)
+    if "sample_period" in catalogue.describe(name).variables:
+        assert set(found.values()) == {"sampled"}
+    elif found:
+        assert found.pop("ground_acceleration", "linear") == "linear"
+        assert set(found.values()) == {"held"}
+
+
+def test_a_component_cannot_leave_it_open() -> None:
+    slave = catalogue.instantiate("ConstantVoltage")
+    with pytest.raises(TypeError, match="over_step"):
+        slave.add_input("more", "V", "one more")  # type: ignore[call-arg]
+    with pytest.raises(TypeError, match="'late' is none of held, linear, sampled"):
+        slave.add_input("more", "V", "one more", over_step="late")

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from truths import hidden_case, true_case
 
-from bristle.identify.fit import fit, identify, settled
-from bristle.study.judged import robust_z
+from bristle.identify.fit import fit, identify, multistart_refit
+from bristle.identify.residuals import robust_z
 
 RIGS = ("bench_10N", "bench_2kN")
 NOISES = (0.01, 0.03)
@@ -44,7 +44,7 @@ def test_a_rough_loss_widens_its_intervals_by_the_spread_of_its_ends():
     train, truth = hidden_case(21, "backlash", "rigid", 0.15, "bench_10N", "lugre")
     begun = replace(truth, effects=("backlash",), values={**truth.values, **CLOSED})
     once = fit(train, begun)
-    found = settled(train, once.model)
+    found = multistart_refit(train, once.model)
     assert found.cost <= once.cost
     wider = [found.std[name] / once.std[name] for name in truth.values if name in found.std]
     assert min(wider) > 0.9
@@ -56,7 +56,7 @@ def test_a_rough_loss_widens_its_intervals_by_the_spread_of_its_ends():
     ]
     assert np.max(np.abs(errors)) < 6.0
     smooth = fit(train, truth, max_evaluations=6)
-    assert settled(train, smooth.model).std == pytest.approx(smooth.std, rel=0.3)
+    assert multistart_refit(train, smooth.model).std == pytest.approx(smooth.std, rel=0.3)
 
 
 @pytest.mark.slow

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bristle.component.structure import StructureModel
 from bristle.jit import compiled
 from bristle.physics import damper, structure
 from bristle.physics.building import paper_building
@@ -104,7 +105,7 @@ VALUES = {
 
 
 def structure_run(step: Any, effects: list[str], to: Any) -> np.ndarray:
-    model = structure.StructureModel(paper_building(), VALUES, effects)
+    model = StructureModel(paper_building(), VALUES, effects)
     m = model.m
     s = structure.step_matrices(m, 5e-4)
     stiffnesses, matrices = to(m.stiffnesses), [to(row) for row in (s.phi, s.held, s.ramp)]

@@ -11,12 +11,12 @@ from rigs import LAWS, NO_LAW, Bench, force_at, sine
 from scipy.integrate import solve_ivp
 
 from bristle.check.channel import shown
+from bristle.component.structure import StructureModel
 from bristle.errors import PhysicsError
 from bristle.physics import damper
 from bristle.physics.building import paper_building
 from bristle.physics.damper import DamperModel, advances, moving_states
 from bristle.physics.effect import EFFECTS, Effect, Parameter, Q, effects_of
-from bristle.physics.structure import StructureModel
 
 both_laws = pytest.mark.parametrize("law", LAWS)
 

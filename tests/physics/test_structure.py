@@ -14,9 +14,10 @@ from published import MODEL
 from scipy.integrate import solve_ivp
 from scipy.linalg import eigh, expm
 
+from bristle.component.structure import StructureModel
 from bristle.physics import structure
 from bristle.physics.building import Building, from_data, modes, paper_building
-from bristle.physics.structure import StructureModel, matrices, step_matrices
+from bristle.physics.structure import matrices, step_matrices
 
 STEPS = [1e-5, 5e-4, 2e-3, 1e-2, 0.1]
 

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bristle.check.user_effects import refused, usable
 from bristle.cli import main
 from bristle.cli._effect_template import template
+from bristle.diagnose.candidates import joinable
+from bristle.diagnose.verdict import lookalikes
 from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
+from bristle.identify.model import REFERENCE, Model, Problem, Run
+from bristle.identify.start_grid import initial_guesses
 from bristle.physics import damper, user
 from bristle.physics.damper import DamperModel
 from bristle.physics.effect import EFFECTS
@@ -187,3 +192,78 @@ def test_one_file_is_loaded_by_name_or_refused(tmp_path: Path) -> None:
     assert user.load_effect(written(tmp_path)).name == "seal"
     with pytest.raises(PhysicsError, match="there is no such file"):
         user.load_effect(tmp_path / "gone.py")
+
+
+SEARCHED = """    start_grid = {"v_s": (0.3, 1.0, 3.0)}
+    start_ties = ("f_s",)
+    family = "rubbing"
+    lookalikes = {"gas_spring": "at one amplitude both hold the rod back"}
+    mimics = ("force_bias",)
+
+    @staticmethod
+    def tie(p, sizes):
+        return (0.05 * sizes.force,)
+
+    @staticmethod
+    def yield_share(p):
+        return 1.1
+
+    @staticmethod
+    def force("""
+
+
+def test_the_search_and_the_verdict_take_what_an_effect_says_of_itself(tmp_path: Path) -> None:
+    written(tmp_path, **{"    @staticmethod\n    def force(": SEARCHED})
+    (loaded,) = user.load_effects(tmp_path)
+    assert loaded.error == ""
+    t = 0.002 * np.arange(2000)
+    x, v = 0.01 * np.sin(6.0 * t), 0.06 * np.cos(6.0 * t)
+    force, zero = 40.0 * v + np.sign(v), np.zeros_like(t)
+    run = Run("run", 0.002, x, v, -0.36 * x, zero, force, 0.01, np.zeros((2, len(t), 4)))
+    problem, base = Problem([run]), Model("bingham", (), {"f_c": 1.1})
+    assert "seal" in joinable(base)
+    found = initial_guesses("seal", base, problem)
+    declared = EFFECTS["seal"].parameters["v_s"].value * problem.size("m/s") / REFERENCE["m/s"]
+    begun = {round(model.value("seal.v_s") / declared, 6) for model in found}
+    assert begun == {0.3, 1.0, 3.0}
+    assert {model.value("seal.f_s") for model in found} == {0.05 * problem.size("N")}
+    assert [model.value("f_c") for model in found] == pytest.approx([1.0] * len(found))
+    assert list(lookalikes(("seal",))) == ["gas_spring"]
+
+
+@pytest.mark.parametrize(
+    ("line", "word"),
+    [
+        ('start_grid = {"v": (1.0,)}', "start_grid names"),
+        ('start_grid = {"v_s": 1.0}', "a tuple of numbers"),
+        ('start_limits = {"v_s": (1.0, 0.5)}', "start_limits"),
+        ('start_ties = ("f_s",)', "tie(p, sizes)"),
+        ('mimics = ("late",)', "mimics names"),
+        ('absorbed_by = "spring"', "absorbed_by names"),
+        ('offset = "v_s"', "a parameter in N is right"),
+        ('offset = "f_s"', "all other parameters may be zero"),
+        ('mass = "f_s"', "a parameter in kg is right"),
+        ('faults = ("delay",)', "sensor's effect"),
+        ('lookalikes = {"gas_spring": ""}', "a sentence for each"),
+    ],
+)
+def test_what_an_effect_says_wrongly_of_itself_is_refused(
+    tmp_path: Path, line: str, word: str
+) -> None:
+    written(tmp_path, **{"    passive = True\n": f"    passive = True\n    {line}\n"})
+    (loaded,) = user.load_effects(tmp_path)
+    assert loaded.effect is None
+    assert word in loaded.error
+
+
+@pytest.mark.parametrize(
+    ("body", "word"),
+    [("return 0.05 * sizes.force", "a tuple of 1"), ("return (p.gone,)", "raises AttributeError")],
+)
+def test_a_tie_that_gives_no_start_is_refused(tmp_path: Path, body: str, word: str) -> None:
+    tie = '    start_ties = ("f_s",)\n\n    @staticmethod\n    def tie(p, sizes):\n'
+    tie += f"        {body}\n\n"
+    begin = "    @staticmethod\n    def force("
+    written(tmp_path, **{begin: tie + begin})
+    (loaded,) = user.load_effects(tmp_path)
+    assert word in loaded.error

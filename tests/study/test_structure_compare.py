@@ -11,8 +11,8 @@ from house_made import STIFF, study_of
 
 from bristle.cli import main
 from bristle.report.study_page import study_report
-from bristle.study.comparison import compare_study, holder
-from bristle.study.identification import identify_study
+from bristle.study.comparison import compare_study, comparer
+from bristle.study.identification import as_model, identify_study
 from bristle.study.study import Study
 
 
@@ -47,7 +47,7 @@ def test_the_layer_whose_spring_stiffens_is_the_worst_site_along_displacement(st
     worst, *others = found.sites
     assert (found.site, worst.site, worst.fails) == ("layer", "layer", True)
     assert worst.z == found.z > 1.5
-    assert worst.place.coordinate == found.first.coordinate == "displacement"
+    assert worst.pattern.coordinate == found.first.coordinate == "displacement"
     assert not any(one.fails for one in others)
     how, where, _ = found.sentences
     assert "misses the force of the isolation layer" in how
@@ -83,21 +83,21 @@ def test_a_storey_that_softens_is_named_along_its_drift(tmp_path):
 
 
 def test_a_wrong_damper_is_the_worst_site_of_a_clean_building(clean):
-    found = holder(clean).compare(clean.model().with_values({"c_0": 12.0}))
+    found = comparer(clean).compare(as_model(clean.model().with_values({"c_0": 12.0})))
     assert (found.site, found.sites[0].site) == ("damper", "damper")
     assert found.z > 1.5
     assert {one.site for one in found.sites if one.fails} == {"damper"}
 
 
 def test_the_site_stays_the_same_for_all_models_of_a_history(stiff):
-    hold = holder(stiff)
+    against = comparer(stiff)
     better = stiff.model().with_effect("duffing")
     better = better.with_values({"duffing.k_3": STIFF, "duffing.shape": 3.0})
-    found = hold.compare(better)
-    assert (hold.site, found.site) == ("layer", "layer")
+    found = against.compare(as_model(better))
+    assert (against.site, found.site) == ("layer", "layer")
     assert not any(one.fails for one in found.sites)
     assert found.z == pytest.approx(1.0, abs=0.1)
-    assert hold.compare(replace(better, effects={})).z > 1.5
+    assert against.compare(as_model(replace(better, effects={}))).z > 1.5
 
 
 def test_the_command_tells_of_every_site(stiff, capsys):

@@ -10,12 +10,11 @@ from house_made import study_of
 from shaken import building, friction
 
 from bristle.cli import diagnose as diagnose_command
-from bristle.diagnose.sites import Finding
-from bristle.diagnose.structure_damper import DamperVerdict
-from bristle.diagnose.structure_verdict import combine
+from bristle.diagnose.finding import Finding
+from bristle.diagnose.verdict import of_sites
 from bristle.errors import StudyError
+from bristle.identify.assigned import at_site, unassigned
 from bristle.identify.model import Model
-from bristle.identify.placed import at_site, homeless
 from bristle.physics.effect import EFFECTS
 from bristle.study.comparison import compare_study
 from bristle.study.identification import identify_study
@@ -74,32 +73,20 @@ def test_each_effect_acts_at_its_own_site():
     second = replace(model, values={"storey_softening.which": 2.0})
     assert at_site(second, "storey1", sites).effects == ()
     assert at_site(model, "damper", ("damper",)).effects == ("stribeck", "duffing")
-    assert homeless(model, ["damper", "layer"]) == ["storey_softening"]
+    assert unassigned(model, ["damper", "layer"]) == ["storey_softening"]
 
 
 def test_wrong_load_cell_is_a_sensor_fault_and_no_effect():
     cell = Finding("force", "effect", ("force_gain",), 3.0, 1.0, 1.0, 0.01, coordinate="1.15")
-    found = combine({"layer": cell}, None, None, {})
+    found = of_sites({"layer": cell})
     assert (found.kind, found.effects) == ("none", ())
     assert [(f.channel, f.fault, f.value) for f in found.sensors] == [("force", "gain", 1.15)]
     assert "1.15 times" in found.as_dict()["sensors"][0]["words"]
 
 
 def test_mass_of_the_base_is_a_rival_in_words_alone():
-    class Decision:
-        kind, effects = "effect", ("fluid_inertia",)
-
-        class best:  # noqa: N801
-            z = 1.0
-
-    class Trial:
-        z, effects = 2.0, ()
-
-    class Problem:
-        reconstructed = True
-
-    verdict = DamperVerdict(Decision, Trial, ())
-    found = combine({}, None, verdict, {"damper": (Problem, Problem)})
+    damper = Finding("damper", "effect", ("fluid_inertia",), 2.0, 1.0, 1.0, float("nan"))
+    found = of_sites({"damper": damper}, "reconstructed")
     assert (found.kind, found.effects) == ("class", ("fluid_inertia",))
     assert all(name in EFFECTS for name in found.effects)
     assert "a mass of the base that the file does not know" in found.words

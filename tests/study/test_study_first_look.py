@@ -12,7 +12,7 @@ import pytest
 from made import Columns, bench_run, write
 
 from bristle.cli import main
-from bristle.data.checks.channels import clipped_share
+from bristle.data.checks.clipping import clipped_share
 from bristle.data.checks.finding import Finding
 from bristle.data.checks.runs import cycles, drive_levels
 from bristle.study import Study, create_study

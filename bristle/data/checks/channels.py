@@ -10,6 +10,7 @@ from ..channels import DRIVE
 from ..measurement import Measurement
 from ..noise import Noise, is_switched
 from ..table import Array
+from .clipping import clipped_share
 from .finding import Finding, Level
 
 _MOTIONLESS = "Check the cable and the column: is it the right one?"
@@ -44,34 +45,6 @@ def look_at_channels(run: Measurement, velocity: Array | None) -> Iterator[Findi
         yield from _drift(run, run["displacement"], velocity)
     if "force" in run.channels and velocity is not None and np.ptp(velocity) > 0.0:
         yield from _force_offset(run, run["force"], velocity)
-
-
-def clipped_share(values: Array, quantum: float) -> tuple[float, float, int]:
-    """Return (share of samples, level, stretches) at an extreme where a channel is cut off.
-
-    A stretch is three or more equal samples at the largest or smallest value, away from the ends of
-    the record. A turning point of a signal written in steps dwells there too, but then almost as
-    long on the next step.
-    """
-    span = float(np.ptp(values))
-    tolerance = max(0.5 * quantum, 1e-9 * span)
-    best = (0.0, 0.0, 0)
-    for extreme in (float(values.max()), float(values.min())):
-        distance = np.abs(values - extreme)
-        flat = (distance <= tolerance).astype(np.int8)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], flat, [0]]))).reshape(-1, 2)
-        inner = [(a, b) for a, b in edges if b - a >= 3 and a > 0 and b < len(values)]
-        count = sum(b - a for a, b in inner)
-        near = max(quantum, 5e-3 * span) + tolerance
-        beside = int(((distance > tolerance) & (distance <= near)).sum())
-        levels = max(1.0, 5e-3 * span / quantum) if quantum else 1.0
-        # How much longer a round peak dwells on the last step than on each of the next.
-        round_peak = 0.707 * levels / ((levels + 0.5) ** 0.5 - 0.707)
-        often = count >= 5 and (len(inner) > 1 or count >= 10)
-        if often and count > 4.0 * round_peak * beside / levels:
-            share = count / len(values)
-            best = max(best, (share, extreme, len(inner)))
-    return best
 
 
 def _still(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:

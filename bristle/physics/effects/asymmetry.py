@@ -28,6 +28,7 @@ class Asymmetry(Effect):
         "v_s": Parameter(1e-3, "m/s", (1e-6, 1.0), "speed over which the difference sets in"),
         "side": Parameter(0.0, "1", (-1.0, 1.0), "0 both directions, 1 along +x alone, -1 back"),
     }
+    mimics = ("force_bias",)
 
     @staticmethod
     def factor(q, z, p):

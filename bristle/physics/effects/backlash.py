@@ -32,6 +32,9 @@ class Backlash(Effect):
         "c": Parameter(80.0, "N.s/m", (0.0, 1e6), "damping of the closed joint"),
         "mass": Parameter(0.004, "kg", (1e-5, 10.0), "mass of the joint"),
     }
+    start_grid = {"gap": (0.01, 0.017, 0.03, 0.05, 0.09, 0.15, 0.26, 0.45, 0.8, 1.3, 2.3, 4.0)}
+    start_ties = ("k", "c")
+    family = "series"  # elastic before it slides
 
     @staticmethod
     def motion(q, z, p):
@@ -56,3 +59,9 @@ class Backlash(Effect):
         elif beyond < 0.0:
             force = min(p.k * beyond + p.c * slip, 0.0)
         return slip, (force - q.force) / p.mass
+
+    @staticmethod
+    def tie(p, sizes):
+        # A closed contact gives by a small part of its gap, and hardly bounces.
+        k = 20.0 * sizes.force / p.gap
+        return k, max(sizes.force / sizes.v, (k * p.mass) ** 0.5)

@@ -33,6 +33,12 @@ class BaseFriction(Effect):
         "v_r": Parameter(0.02, "m/s", (1e-4, 1.0), "speed over which it changes"),
         "x_s": Parameter(0.0, "m", (0.0, 0.1), "elastic travel before it slides; below 1 um none"),
     }
+    start_shares = ({"limit": (0.1,), "x_s": (0.0, 0.05), "v_r": (0.1,)},)
+    absorbed_by = "yield"
+    lookalikes = {
+        "f_c of the damper": "friction under the base and the damper's own yield force add up to "
+        "one force"
+    }
 
     @staticmethod
     def force(q, z, p):

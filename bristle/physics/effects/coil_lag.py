@@ -33,6 +33,8 @@ class CoilLag(Effect):
         "fall": Parameter(1.0, "1", (0.1, 10.0), "how much longer it takes to fall than to rise"),
         "eddy": Parameter(0.0, "1", (0.0, 0.95), "second time constant by the first"),
     }
+    start_grid = {"tau": (0.1, 0.5, 2.0)}
+    mimics = ("late_drive",)
 
     @staticmethod
     def voltage(q, z, p):

@@ -35,6 +35,9 @@ class Delay(Effect):
         "time": Parameter(0.005, "s", (0.0, 0.2), "how late the force is shown"),
         "filtered": Parameter(0.5, "1", (0.0, 1.0), "share of the time that a filter takes"),
     }
+    start_grid = {"time": (0.02, 0.1, 0.4, 1.0, 2.5), "filtered": (0.0, 0.2, 1.0)}
+    faults = ("delay",)
+    mimics = ("late_drive",)
 
     @staticmethod
     def channel(q, z, p):

@@ -29,6 +29,10 @@ class Duffing(Effect):
         "k_3": Parameter(1e6, "N/m3", (-1e10, 1e10), "coefficient, at X_r for every shape"),
         "shape": Parameter(3.0, "1", (2.0, 7.0), "exponent: 3 cubic, 5 late in the stroke"),
     }
+    start_shares = ({"k_3": (0.3, -0.1), "shape": (3.0, 5.0)},)
+    lookalikes = {
+        "gas_spring": "a spring of the damper and one of the isolation layer add up to one force"
+    }
 
     @staticmethod
     def force(q, z, p):

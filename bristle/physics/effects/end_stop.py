@@ -32,6 +32,9 @@ class EndStop(Effect):
         "shape": Parameter(1.0, "1", (1.0, 3.0), "1 linear, 1.5 Hertz"),
         "loss": Parameter(0.0, "s/m", (0.0, 100.0), "loss by the closing speed"),
     }
+    start_shares = ({"clearance": (0.55, 0.75, 0.9), "k": (1.0,), "c": (1e-3,)},)
+    # A stop that is met nearer than that is met so often that it is a spring.
+    start_limits = {"clearance": (0.4, 1.0)}
 
     @staticmethod
     def force(q, z, p):

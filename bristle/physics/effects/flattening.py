@@ -32,6 +32,7 @@ class Flattening(Effect):
             1.0, "1", (0.5, 2.5), "1: it falls from rest on, 2: beyond v_f (Carreau)"
         ),
     }
+    start_grid = {"v_f": (0.1, 0.3, 1.0), "bend": (1.0, 2.0)}
 
     @staticmethod
     def factor(q, z, p):

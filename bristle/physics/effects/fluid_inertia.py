@@ -40,6 +40,11 @@ class FluidInertia(Effect):
         "m_f": Parameter(0.3, "kg", (0.0, 1e4), "mass that moves with the piston"),
         "m_h": Parameter(0.0, "kg", (0.0, 1e4), "what the memory weighs at 20 rad/s"),
     }
+    mass = "m_f"
+    lookalikes = {
+        "a mass of the base that the file does not know": "a mass that moves with the piston and "
+        "one of the base add up to one force"
+    }
 
     @staticmethod
     def force(q, z, p):

@@ -29,6 +29,11 @@ class GasSpring(Effect):
         "k_2": Parameter(0.0, "N/m2", (-1e9, 1e9), "growth of the stiffness towards one end"),
         "k_3": Parameter(0.0, "N/m3", (-1e12, 1e12), "growth of the stiffness towards both ends"),
     }
+    offset = "preload"
+    mimics = ("force_bias",)
+    lookalikes = {
+        "duffing": "a spring of the damper and one of the isolation layer add up to one force"
+    }
 
     @staticmethod
     def force(q, z, p):

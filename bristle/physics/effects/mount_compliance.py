@@ -34,6 +34,8 @@ class MountCompliance(Effect):
         "c": Parameter(60.0, "N.s/m", (0.0, 1e6), "damping of the mount"),
         "mass": Parameter(4e-4, "kg", (1e-5, 10.0), "mass of the joint"),
     }
+    start_grid = {"k": (0.3, 1.0, 3.0, 10.0)}
+    family = "series"  # elastic before it slides
 
     @staticmethod
     def motion(q, z, p):

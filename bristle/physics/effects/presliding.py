@@ -26,6 +26,8 @@ class Presliding(Effect):
         "x_s": Parameter(5e-4, "m", (1e-7, 0.1), "travel over which the yield force builds up"),
         "shape": Parameter(1.0, "1", (0.0, 3.0), "0 elastic-plastic, 1 Dahl, above: a long tail"),
     }
+    start_grid = {"x_s": (0.03, 0.1, 0.3, 1.0)}
+    family = "series"  # elastic before it slides
 
     @staticmethod
     def yield_force(q, z, p):

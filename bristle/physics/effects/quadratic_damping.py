@@ -28,6 +28,7 @@ class QuadraticDamping(Effect):
         "c_2": Parameter(100.0, "N.s2/m2", (0.0, 1e7), "coefficient, at V_r for every shape"),
         "shape": Parameter(2.0, "1", (1.3, 3.5), "exponent: 2 turbulent, 1.75 smooth gap"),
     }
+    start_grid = {"shape": (0.875, 1.0, 1.25)}
 
     @staticmethod
     def force(q, z, p):

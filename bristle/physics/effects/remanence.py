@@ -35,6 +35,8 @@ class Remanence(Effect):
             0.0, "1", (0.0, 1.3), "spread of the widths: 0 one, 1 from zero to twice"
         ),
     }
+    start_grid = {"width": (0.3, 1.0)}
+    mimics = ("late_drive",)
 
     @staticmethod
     def voltage(q, z, p):

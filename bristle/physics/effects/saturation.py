@@ -22,6 +22,8 @@ class Saturation(Effect):
         "V_s": Parameter(8.0, "V", (0.05, 1e4), "voltage at which the field saturates"),
         "shape": Parameter(2.0, "1", (1.0, 6.0), "sharpness of the bend"),
     }
+    start_grid = {"V_s": (0.2, 0.4, 1.0)}
+    mimics = ("late_drive",)
 
     @staticmethod
     def voltage(q, z, p):

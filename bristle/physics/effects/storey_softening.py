@@ -37,6 +37,10 @@ class StoreySoftening(Effect):
         "d_y": Parameter(0.005, "m", (1e-5, 10.0), "drift at which that share has yielded"),
         "sharpness": Parameter(2.0, "1", (1.0, 10.0), "how sharply it does"),
     }
+    start_shares = (
+        {"d_half": (0.7, 2.5)},
+        {"d_half": (5.0,), "yields": (0.3,), "d_y": (0.15, 0.4)},
+    )
 
     @staticmethod
     def spring(q, z, p):

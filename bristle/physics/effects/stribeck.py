@@ -33,6 +33,7 @@ class Stribeck(Effect):
         "shape": Parameter(2.0, "1", (0.4, 3.0), "exponent: 2 Gaussian, 1 exponential"),
         "way": Parameter(0.0, "1", (0.0, 1.0), "0: of the force, 1: of the bristles' deflection"),
     }
+    start_grid = {"rise": (1.0, 8.0), "v_s": (0.3, 1.0, 3.0)}
 
     bristles = ("way",)
 
@@ -44,3 +45,8 @@ class Stribeck(Effect):
     @staticmethod
     def reach(q, z, p):
         return 1.0 + p.way * p.rise * exp(-((abs(q.v) / p.v_s) ** p.shape))
+
+    @staticmethod
+    def yield_share(p):
+        # The law's yield force holds part of the excess in its mean.
+        return 1.0 + 0.5 * p.rise

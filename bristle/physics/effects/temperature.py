@@ -45,6 +45,8 @@ class Temperature(Effect):
         ),
         "housing": Parameter(0.0, "1", (0.0, 0.7), "share of the heat that the steel takes"),
     }
+    start_grid = {"E_0": (1.0, 4.0, 15.0), "tau": (0.07, 0.3)}
+    mimics = ("late_drive",)
 
     @staticmethod
     def yield_factor(q, z, p):

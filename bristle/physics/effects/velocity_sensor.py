@@ -33,6 +33,8 @@ class VelocitySensor(Effect):
         "shape": Parameter(0.25, "1", (0.0, 2.0), "0 first order, 0.25 and more second order"),
         "corner": Parameter(1.0, "1/s", (0.0, 100.0), "corner of the high-pass; 0: none"),
     }
+    start_grid = {"tau": (0.3, 1.0)}
+    faults = ("lag", "high-pass")
 
     @staticmethod
     def channel(q, z, p):

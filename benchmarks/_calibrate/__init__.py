@@ -1,0 +1,1 @@
+"""What the values of the decision rule trade, from trials stored once and decided often."""

@@ -1,0 +1,113 @@
+"""The table of the docs: what each value trades, and what the rule says of all its fields."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import groupby
+from pathlib import Path
+
+from bristle.diagnose.rule import BENCH, SITE, DecisionRule
+
+from .replay import Traded
+from .trials import Stored
+from .varied import names, told, values_of
+
+BEGIN, END = "<!-- calibrate -->", "<!-- /calibrate -->"
+COLUMNS: dict[str, Callable[[Traded], tuple[int, int]]] = {
+    "false alarms": lambda row: row.alarms,
+    "missed": lambda row: row.missed,
+    "another named": lambda row: row.wrong,
+    "outside named": lambda row: row.outside,
+    "pairs: both": lambda row: row.pairs,
+}
+RULES: dict[str, DecisionRule] = {"bench": BENCH, "site": SITE}
+TITLES = {"bench": "On the bench", "site": "At a building's layer and storeys"}
+
+
+def text(rows: dict[str, list[Traded]], cases: list[Stored], seed: int) -> str:
+    """Return the block of the docs in Markdown."""
+    out = [conditions(cases, seed)]
+    for name, found in rows.items():
+        out += [f"### {TITLES[name]}", sensitivity(found), table(found, RULES[name])]
+    return "\n\n".join([*out, "### All fields", every_field()])
+
+
+def conditions(cases: list[Stored], seed: int) -> str:
+    """Return on what the tables rest."""
+    bench = sum(not case.site for case in cases)
+    buildings = len({case.task.key for case in cases if case.site})
+    codes = len({case.code for case in cases})
+    more = f" They were made by {codes} versions of the code." if codes > 1 else ""
+    return (
+        f"Seed {seed}: cases on the bench {bench}, buildings {buildings}, whose sites count one by "
+        f"one.{more} Today's value stands in bold."
+    )
+
+
+def sensitivity(rows: list[Traded]) -> str:
+    """Return which fields these cases can say anything about: those that move a count at all."""
+    fields = list(dict.fromkeys(row.field for row in rows))
+    moved = [name for name in fields if _moves([row for row in rows if row.field == name])]
+    if not moved:
+        return (
+            "**No value of any field changes a count here. These cases lie too far from every "
+            "border to tell one value from another: they neither support today's values nor show "
+            "that values do not matter.**"
+        )
+    still = len(fields) - len(moved)
+    return (
+        f"Counts change with {', '.join(f'`{name}`' for name in moved)}. Of the other {still} "
+        "fields these cases say nothing: none lies near their borders."
+    )
+
+
+def _moves(rows: list[Traded]) -> bool:
+    return len({tuple(of(row) for of in COLUMNS.values()) for row in rows}) > 1
+
+
+def table(rows: list[Traded], base: DecisionRule) -> str:
+    """Return one line per field: its values, and under each the counts."""
+    used = {what: of for what, of in COLUMNS.items() if any(of(row)[1] for row in rows)}
+    most = {what: max(of(row)[1] for row in rows) for what, of in used.items()}
+    titles = [f"{what} of {most[what]}" for what in used]
+    lines = [["field", "values", *titles], ["---"] * (2 + len(used))]
+    for name, group in groupby(rows, key=lambda row: row.field):
+        own = list(group)
+        today = [row.value == getattr(base, name) for row in own]
+        cells = [f"{row.value:g}" for row in own]
+        left = sum(row.left for row in own)
+        lines.append(
+            [f"`{name}`" + (f" ({left} left out)" if left else ""), _marked(cells, today)]
+            + [_marked([str(of(row)[0]) for row in own], today) for of in used.values()]
+        )
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def _marked(cells: list[str], today: list[bool]) -> str:
+    return " / ".join(f"**{c}**" if now else c for c, now in zip(cells, today, strict=True))
+
+
+def every_field() -> str:
+    """Return what the rule says of each field, replayed or not."""
+    known = told()
+    lines = [["field", "value", "decides", "trades", "found"], ["---"] * 5]
+    lines += [
+        [f"`{n}`", values_of(n), known[n].decides, known[n].trades, known[n].found] for n in names()
+    ]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def write(page: Path, block: str) -> None:
+    """Write the block between the marks of a page.
+
+    Raises
+    ------
+    ValueError
+        If the page has no marks.
+    """
+    whole = page.read_text(encoding="utf-8")
+    if BEGIN not in whole or END not in whole:
+        raise ValueError(f"{page}: no {BEGIN} and {END} are there to write between.")
+    head, _, rest = whole.partition(BEGIN)
+    tail = rest.partition(END)[2]
+    page.write_text(f"{head}{BEGIN}\n\n{block}\n\n{END}{tail}", encoding="utf-8")

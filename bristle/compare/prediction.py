@@ -1,0 +1,140 @@
+"""A run held against a prediction, with the noise that a true model would show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..identify.fit import Model, Problem, Run
+from ..identify.model import LOST
+from ..identify.residuals import over_noise
+from ..identify.structure import StructureRun
+from .coordinates import coordinates_of
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class RunPrediction:
+    """One output of one run, measured and predicted, in SI.
+
+    `measured`, `predicted`, `sigma` (n,): `sigma` is the noise expected of a true model, the
+    channel's own (`noise`) and that of the measured inputs carried through the model, of which
+    `spread` (d, n) are draws. `coordinates` name to (n,). `numerical` (n,) is how far the
+    prediction moves at half the step, None where that was not tried. The first `skip` samples do
+    not count, for the model's states begin somewhere, nor do those where `known` (n,) is False:
+    they were not measured but filled in. `site` of a building is "damper", "layer", "storey1" ...,
+    "" on a bench. `index` (n,) numbers the samples where some were left out, None where none were.
+    """
+
+    name: str
+    dt: float
+    measured: Array
+    predicted: Array
+    sigma: Array
+    noise: float
+    spread: Array
+    coordinates: dict[str, Array] = field(default_factory=dict)
+    numerical: Array | None = None
+    quantity: str = "force"
+    unit: str = "N"
+    skip: int = 25
+    known: NDArray[np.bool_] | None = None
+    site: str = ""
+    index: NDArray[np.int64] | None = None
+
+    @property
+    def time(self) -> Array:
+        """Time (n,) [s] from the run's begin."""
+        index = np.arange(len(self.measured)) if self.index is None else self.index
+        return np.asarray(index * self.dt, dtype=float)
+
+    @property
+    def residual(self) -> Array:
+        """Measured less predicted, without the skipped samples, in the unit; 0 where not known."""
+        error = self.measured - self.predicted
+        return (error if self.known is None else np.where(self.known, error, 0.0))[self.skip :]
+
+    @property
+    def normalised(self) -> Array:
+        """The residual over the noise expected of a true model."""
+        return over_noise(self.residual, self.sigma[self.skip :])
+
+    @property
+    def carried(self) -> Array:
+        """The draws of the carried noise (d, n) without the skipped samples."""
+        return self.spread[:, self.skip :]
+
+    def along(self) -> dict[str, Array]:
+        """Return the coordinates without the skipped samples."""
+        return {name: values[self.skip :] for name, values in self.coordinates.items()}
+
+
+def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[RunPrediction]:
+    """Return the runs of a problem held against a model's force.
+
+    Parameters
+    ----------
+    problem : Problem
+        Runs that the model was not fitted to, if it is to be judged.
+    draws : int
+        How many draws of the measured inputs' error to carry through the model.
+    """
+    out = []
+    for run, (bias, sigma, spread) in zip(
+        problem.runs, problem.expectation(model, draws), strict=True
+    ):
+        predicted = problem.predict(model, run)
+        finer = problem.predict(model, halved(run))[::2]
+        if run.measured is not None:
+            sigma = np.where(run.measured, sigma, sigma / LOST)  # `known` says it instead
+        out.append(
+            RunPrediction(
+                run.name, run.dt, run.force, predicted + bias, sigma, run.noise, spread,
+                coordinates_of_run(run), finer - predicted, skip=run.skip, known=run.measured,
+                index=run.keep if isinstance(run, StructureRun) else None,
+            )
+        )  # fmt: skip
+    return out
+
+
+def coordinates_of_run(run: Run) -> dict[str, Array]:
+    """Return the coordinates (n,) of a run; time and history go on where samples are left out."""
+    if isinstance(run, StructureRun) and run.whole is not None:
+        return {name: y[run.keep] for name, y in coordinates_of_run(run.whole).items()}
+    return coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force)
+
+
+def halved(run: Run) -> Run:
+    """Return a run with a sample between any two: motion by Hermite's cubic, voltage by a line."""
+    x, v, a = run.x, run.v, run.a
+    whole: dict[str, Any] = {}
+    if isinstance(run, StructureRun) and run.whole is not None:
+        keep = np.empty(2 * len(x) - 1, dtype=np.int64)
+        keep[::2], keep[1::2] = 2 * run.keep, 2 * run.keep[:-1] + 1
+        whole = {"whole": halved(run.whole), "keep": keep}
+    return replace(
+        run,
+        **whole,
+        dt=0.5 * run.dt,
+        x=between(x, v, run.dt),
+        v=between(v, a, run.dt),
+        a=between(a, None, run.dt),
+        V=between(run.V, None, run.dt),
+        force=between(run.force, None, run.dt),
+        draws=np.zeros((0, 2 * len(x) - 1, 4)),
+        measured=None,
+    )
+
+
+def between(y: Array, rate: Array | None, dt: float) -> Array:
+    """Return samples (2 n - 1,) of which every second one is of y (n,)."""
+    out = np.empty(2 * len(y) - 1)
+    out[::2] = y
+    out[1::2] = 0.5 * (y[:-1] + y[1:])
+    if rate is not None:
+        out[1::2] += 0.125 * dt * (rate[:-1] - rate[1:])
+    return out

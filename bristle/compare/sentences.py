@@ -1,0 +1,321 @@
+"""What an engineer would say of a comparison, from its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .coordinates import SHOWN
+from .names import joined, name_of, site_name, site_names
+from .patterns import Finder, ResidualPattern
+from .regimes import Regime
+
+if TYPE_CHECKING:
+    from .comparison import Comparison
+    from .prediction import RunPrediction
+
+Array = NDArray[np.float64]
+
+FAINT = 0.02
+"""Share of an error's power below which its pattern is not worth a sentence."""
+_STEP = 0.3  # numerical error, in units of the noise, that is worth a word
+_SPIKY = 1.4  # plain over robust RMS from which spikes carry the error
+_WHICH = {
+    None: "In this measurement",
+    False: "On runs it has not seen",
+    True: "On the runs that it was fitted to",
+}
+_NAMED = 3  # sites that fail beside the worst one, by name
+_RIPPLES = 4  # changes of sign along a coordinate from which it goes up and down
+_ALIKE = 0.25  # parts of a pattern's size by which it may differ between voltages
+
+
+def sentences(comparison: Comparison, finder: Finder) -> tuple[str, ...]:
+    """Return three sentences: how wrong, where it turns, where it is right."""
+    return (_how_wrong(comparison), _where(comparison, finder), _where_right(comparison))
+
+
+def _how_wrong(comparison: Comparison) -> str:
+    total = comparison.total
+    what, unit = comparison.quantity.replace("_", " "), comparison.unit
+    where = f"{_WHICH[comparison.seen]} the model misses"
+    size = f"{total.rms:.2g} {unit} RMS"
+    if total.share == total.share:
+        size += f" ({_percent(total.share)} of the {what})"
+    step = ""
+    if total.numerical_z > _STEP:
+        step = f"; the step of the calculation alone makes {total.numerical_z:.2g} times the noise"
+    if total.rms > _SPIKY * total.z * total.noise:
+        size += ", much of it in short spikes"
+    if not comparison.right:
+        times = f"{total.z:.3g}" if total.z < 100.0 else f"{total.z:.0f}"
+        text = f"{where} the {what} by {size}, {times} times what its noise would explain{step}"
+    else:
+        text = f"{where} the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}"
+    return f"{text}{_elsewhere(comparison)}."
+
+
+def _elsewhere(comparison: Comparison) -> str:
+    """Return how wrong the model is at the other sites of a building; "" on a bench."""
+    others = [one for one in comparison.sites if one.site != comparison.site]
+    fail = [one for one in others if one.fails]
+    right = [one for one in others if one.identifiable and not one.fails]
+    text = ""
+    if fail:
+        listed = [f"{site_name(one.site)} (z = {one.z:.3g})" for one in fail[:_NAMED]]
+        if len(fail) > _NAMED:
+            listed.append(f"{len(fail) - _NAMED} more sites")
+        text += f"; it fails {'' if comparison.right else 'too '}at {joined(listed)}"
+    if right:
+        span = f"z {min(one.z for one in right):.2f} to {max(one.z for one in right):.2f}"
+        span = f"z = {right[0].z:.2f}" if len(right) == 1 else span
+        are = "is right within its noise" if len(right) == 1 else "are right within their noise"
+        text += f"; {site_names([one.site for one in right])} {are} ({span})"
+    hidden = [one.site for one in others if not one.identifiable]
+    return text + (f"; {site_names(hidden)}: too few samples to tell" if hidden else "")
+
+
+def _where(comparison: Comparison, finder: Finder) -> str:
+    first = comparison.first
+    if first is None or first.share < FAINT:
+        if comparison.right:
+            return "What is left looks like noise along every coordinate."
+        loud = _loudest(comparison)
+        most = (
+            "the error beyond chance"
+            if first is None
+            else f"more than {_percent(first.share)} of it"
+        )
+        return f"No coordinate organises {most}{f'; {loud}' if loud else ''}."
+    if comparison.right:
+        text = _pattern_text(first, comparison.predictions[0])
+        return (
+            f"A pattern is left with {name_of(first.coordinate, comparison.site)}, "
+            f"{_percent(first.share)} of the error's power: {text}."
+        )
+    also = ""
+    if first.alike:
+        names = " and ".join(name_of(name, comparison.site) for name in first.alike[:2])
+        also = f" (in these runs {names} tell{'s' * (len(first.alike) == 1)} the same)"
+    text = f"The error turns with {name_of(first.coordinate, comparison.site)}{also}: "
+    text += _pattern_text(first, comparison.predictions[0]) + _at_voltages(
+        first, comparison, finder
+    )
+    second = comparison.second
+    if second is not None and second.share > 0.03:
+        text += f"; what is left then turns with {name_of(second.coordinate, comparison.site)}"
+    return text + "."
+
+
+def _where_right(comparison: Comparison) -> str:
+    every = comparison.regimes
+    whole = (
+        f"between {min(r.z for r in every):.2f} and {max(r.z for r in every):.2f}" if every else ""
+    )
+    right = [one for one in every if one.right]
+    if every and len(right) == len(every):
+        kinds = [kind for kind in ("speed", "voltage") if any(getattr(r, kind) for r in every)]
+        return f"It is right within its noise at every {' and '.join(kinds)} (z {whole})."
+    if right:
+        best = max(right, key=lambda one: (not (one.speed and one.voltage), one.samples))
+        others = [one for one in right if _beside(one, best)]
+        text = f"{begin(best.text)} it is right within its noise (z = {best.z:.2f})"
+        if others:
+            text += f", and so it is {max(others, key=lambda one: one.samples).text}"
+        return text + "."
+    loud = _loudest(comparison)
+    if not every:
+        return f"{begin(loud)}." if loud else "There is no speed to tell regimes by."
+    best = min(every, key=lambda one: one.z)
+    if comparison.right:
+        return f"It does best {best.text} (z = {best.z:.2f})."
+    text = f"Nowhere is it right within its noise: it does best {best.text} (z = {best.z:.3g})"
+    return text + (f"; {loud}." if loud else ".")
+
+
+def _beside(one: Regime, best: Regime) -> bool:
+    """Return whether a regime is neither the other nor a part of it."""
+    if one.speed and one.voltage and (one.speed == best.speed or one.voltage == best.voltage):
+        return bool(best.speed and best.voltage)
+    return one != best
+
+
+def _loudest(comparison: Comparison) -> str:
+    """Return which frequencies hold most of what exceeds the noise, "" where none stands out."""
+    bands = [band for band in comparison.spectrum.bands if band.p < 0.001]
+    chosen: list[int] = []
+    for band in sorted(bands, key=lambda band: -band.share):
+        if sum(comparison.spectrum.bands[i].share for i in chosen) > 0.7 or len(chosen) == 3:
+            break
+        chosen.append(comparison.spectrum.bands.index(band))
+    if not chosen or max(chosen) - min(chosen) >= len(chosen):
+        return ""  # scattered over the spectrum
+    share = sum(comparison.spectrum.bands[i].share for i in chosen)
+    low = comparison.spectrum.bands[min(chosen)].low
+    high = comparison.spectrum.bands[max(chosen)].high
+    span = f"below {high:.3g} Hz" if low == 0.0 else f"between {low:.3g} and {high:.3g} Hz"
+    return f"{_percent(share)} of what exceeds the noise lies {span}"
+
+
+def _pattern_text(pattern: ResidualPattern, prediction: RunPrediction) -> str:
+    """Return how a residual goes along a coordinate: "beyond 8 mm it pushes back 0.4 N more"."""
+    hot, unit = _hot(pattern), prediction.unit
+    peak = float(np.max(np.abs(pattern.mean)))
+    if not hot:
+        return f"by up to {peak:.2g} {unit}"
+    clear = pattern.mean[np.abs(pattern.mean) > 2.0 * pattern.std]
+    changes = int(np.count_nonzero(np.diff(np.sign(clear))))
+    if changes >= _RIPPLES and pattern.coordinate in ("displacement", "velocity", "acceleration"):
+        return f"it goes up and down {changes + 1} times along it, by up to {peak:.2g} {unit}"
+    mirrored = _mirrored(pattern, hot, prediction)
+    if mirrored:
+        return mirrored
+    return "; ".join(_one(pattern, begin, end, prediction) for begin, end in hot[:2])
+
+
+def _hot(pattern: ResidualPattern) -> list[tuple[int, int]]:
+    """Return stretches of bins (first, last) where the mean is large and clear, largest first."""
+    mean = pattern.mean
+    top = float(np.max(np.abs(mean)))
+    large = np.abs(mean) >= 0.5 * top
+    clear = np.abs(mean) > 2.0 * pattern.std
+    out: list[tuple[int, int]] = []
+    for i in np.flatnonzero(large):
+        if out and out[-1][1] == i - 1 and mean[i] * mean[i - 1] > 0.0:
+            out[-1] = (out[-1][0], int(i))
+        else:
+            out.append((int(i), int(i)))
+    out = [(i, j) for i, j in out if clear[i : j + 1].any()]
+    return sorted(out, key=lambda pair: -float(np.sum(np.abs(mean[pair[0] : pair[1] + 1]))))
+
+
+def _mirrored(
+    pattern: ResidualPattern, hot: list[tuple[int, int]], prediction: RunPrediction
+) -> str:
+    """Return the words for a pattern that is alike, or opposite, on both sides of zero."""
+    if len(hot) < 2 or pattern.coordinate not in ("displacement", "velocity", "acceleration"):
+        return ""
+    (a, b), (c, d) = sorted(hot[:2])
+    ends = max(1, len(pattern.mean) // 16)  # the outermost bins may hold too few blocks
+    if a > ends or d < len(pattern.mean) - 1 - ends:
+        return ""
+    if pattern.high[b] >= 0.0 or pattern.low[c] <= 0.0:
+        return ""
+    factor, shown = SHOWN[pattern.coordinate]
+    edge = factor * 0.5 * float(pattern.low[c] - pattern.high[b])
+    left, right = _largest(pattern.mean, a, b), _largest(pattern.mean, c, d)
+    size = 0.5 * (abs(left) + abs(right))
+    where = f"beyond {edge:.2g} {shown} to either side"
+    if left * right > 0.0:
+        return f"{where} {_acts(pattern, right, 0.0, size, prediction)}"
+    return f"{where} {_acts(pattern, right, 1.0, size, prediction)}"
+
+
+def _largest(mean: Array, begin: int, end: int) -> float:
+    part = mean[begin : end + 1]
+    return float(part[int(np.argmax(np.abs(part)))])
+
+
+def _one(pattern: ResidualPattern, begin: int, end: int, prediction: RunPrediction) -> str:
+    size = _largest(pattern.mean, begin, end)
+    centre = float(pattern.centre[begin : end + 1].mean())
+    acts = _acts(pattern, size, centre, abs(size), prediction)
+    return f"{_location(pattern, begin, end)} {acts}"
+
+
+def _acts(
+    pattern: ResidualPattern, size: float, side: float, amount: float, prediction: RunPrediction
+) -> str:
+    """Return what the measured force does that the model's does not.
+
+    `side` is where along the coordinate; 0 for a pattern alike on both sides.
+    """
+    unit = prediction.unit
+    up_to = f"up to {amount:.2g} {unit}"
+    more = "more" if size > 0.0 else "less"
+    if unit != "N":
+        return f"it is {up_to} {'higher' if size > 0.0 else 'lower'} than the model's"
+    if pattern.turned:
+        return f"{site_name(prediction.site or 'damper')} resists {up_to} {more} than the model"
+    if side and pattern.coordinate in ("displacement", "velocity", "acceleration"):
+        more = "more" if size * side > 0.0 else "less"
+        verb = {"displacement": "pushes back", "velocity": "resists"}.get(
+            pattern.coordinate, "resists the acceleration"
+        )
+        return f"it {verb} {up_to} {more} than the model"
+    return f"the force is {up_to} {'higher' if size > 0.0 else 'lower'} than the model's"
+
+
+def _location(pattern: ResidualPattern, begin: int, end: int) -> str:
+    """Return where along a coordinate a stretch of bins lies."""
+    name = pattern.coordinate
+    factor, unit = SHOWN.get(name, (1.0, ""))
+    low, high = factor * float(pattern.low[begin]), factor * float(pattern.high[end])
+    last = len(pattern.mean) - 1
+    if name == "direction":
+        return "moving outwards (+x)" if pattern.centre[begin] > 0.0 else "moving back (-x)"
+    if name == "voltage_rate":
+        return "just after the voltage has " + ("risen" if pattern.centre[end] > 0.0 else "fallen")
+    if begin == 0 and end == last:
+        return "throughout"
+    if name == "time_since_reversal":
+        if begin == 0:
+            return f"in the first {high:.2g} ms after the motion turns"
+        return f"later than {low:.2g} ms after the motion turns"
+    if name == "dissipated_energy":
+        if begin == 0:
+            return f"before {high:.2g} J are dissipated"
+        return f"once {low:.2g} J are dissipated"
+    if name == "voltage" and high - low < 0.02 * factor * float(np.ptp(pattern.centre)):
+        return f"at {0.5 * (low + high):.2g} {unit}"
+    if begin == 0:
+        return f"below {high:.2g} {unit}"
+    if end == last:
+        return f"{'after' if name == 'time' else 'above'} {low:.2g} {unit}"
+    return f"between {low:.2g} and {high:.2g} {unit}"
+
+
+def _at_voltages(pattern: ResidualPattern, comparison: Comparison, finder: Finder) -> str:
+    """Return whether a pattern is alike at low and high voltage; "" where that cannot be asked."""
+    if "voltage" in pattern.coordinate or "voltage" not in finder.bins:
+        return ""
+    if comparison.site not in ("", "damper"):
+        return ""  # it tells how far the damper let a spring move, and nothing of the spring
+    V = np.concatenate([one.along()["voltage"] for one in comparison.predictions])
+    middle = 0.5 * float(np.quantile(V, 0.98))
+    sizes = [size_of(pattern, finder, chosen) for chosen in (middle > V, middle <= V)]
+    if not all(np.isfinite([*low, *high]).all() for low, high in [sizes]):
+        return ""
+    (low, low_std), (high, high_std) = sizes
+    doubt = 2.0 * float(np.hypot(low_std, high_std))
+    if abs(high - low) <= max(_ALIKE * max(abs(low), abs(high)), doubt):
+        return ", at every voltage alike" if doubt < 0.7 else ""
+    peak = float(np.max(np.abs(pattern.mean)))
+    unit = comparison.unit
+    parts = f"{low * peak:.2g} {unit} below {middle:.2g} V, {high * peak:.2g} {unit} above"
+    return f", {'more' if high > low else 'less'} at high voltage ({parts})"
+
+
+def size_of(
+    pattern: ResidualPattern, finder: Finder, chosen: Sequence[bool] | NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Return the size of a pattern among some samples, 1 for that of all, and its uncertainty."""
+    mean, std = finder.mean_along(pattern, finder.raw, np.asarray(chosen, dtype=float))
+    good = np.isfinite(mean)
+    shape = pattern.mean[good]
+    power = float(shape @ shape)
+    if power <= 0.0 or good.sum() < 2:
+        return float("nan"), float("nan")
+    return float(shape @ mean[good]) / power, float(np.sqrt(shape**2 @ std[good] ** 2)) / power
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
+
+
+def begin(text: str) -> str:
+    """Return a text with a capital at its begin."""
+    return text[:1].upper() + text[1:]

@@ -1,0 +1,174 @@
+"""Controllers on a clock of their own: from what is measured to a voltage within limits.
+
+A command comes from a designed state-space law or from skyhook; a switch, a law's inverse or the
+signed voltage turns it into a voltage, which stands until the next sample.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from ..control.inverse import estimate_states, force_of_law, voltage_of_law
+from ..control.linear import advance, command, table_row
+from ..control.sensing import (
+    filtered_velocity,
+    leaky_integral,
+    low_passed,
+    skyhook_command,
+    skyhook_switch,
+)
+from ..control.switching import applied_signed, clipped_voltage, signed_voltage
+from ..physics import damper
+from ..physics.linear import Row
+from .clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
+
+FLOOR_ACCELERATION, BASE_DISPLACEMENT, BASE_VELOCITY, DAMPER_FORCE = range(4)
+VOLTAGE, COMMAND_RAW, SCHEDULING = range(3)
+
+CLIPPED, INVERSE, SIGNED, CLIPPED_LQG, SKYHOOK_SWITCH, SKYHOOK_INVERSE = range(6)
+"""Kinds of controllers."""
+
+REMEMBERED = 6
+LOW, X_BEFORE, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, -2)
+"""What the state holds behind that of the state-space law and the states of the damper's law that
+is inverted, as the controller estimates them; before `ORIGIN` and `COMING`."""
+
+
+class Constants(NamedTuple):
+    """What a controller computes with; what its kind does not need is 0.
+
+    `n`, `rows`, `v_top`, `A`, `B`, `W`, `C` are those of `control.controller.Controller`;
+    `velocity_corner` [rad/s] is that of the low-passed displacement whose rate is the velocity, 0:
+    the velocity is measured; `law` and `p` say which damper's law is inverted, `still` and
+    `least_slope` how; `gain` and `integral_corner` [rad/s] belong to skyhook.
+    """
+
+    kind: int
+    period: float
+    v_max: float
+    velocity_corner: float
+    n: int
+    rows: int
+    v_top: float
+    A: Row
+    B: Row
+    W: Row
+    C: Row
+    f_min: float
+    anti_windup: float
+    law: int
+    p: Row
+    still: float
+    least_slope: float
+    gain: float
+    integral_corner: float
+
+
+NOTHING: dict[str, Any] = {
+    "velocity_corner": 0.0, "n": 0, "rows": 1, "v_top": 0.0, "A": [], "B": [], "W": [], "C": [],
+    "f_min": 0.0, "anti_windup": 0.0, "law": 0, "p": [], "still": 0.0, "least_slope": 1.0,
+    "gain": 0.0, "integral_corner": 0.0,
+}  # fmt: skip
+"""What a kind does not need."""
+
+
+def setup(time: float, **values: Any) -> tuple[Constants, list[float], int]:
+    """Return constants, state and size of work, given what differs from `NOTHING`."""
+    c = Constants(**{**NOTHING, **values})
+    state = [0.0] * (c.n + damper.SLOTS.law_states + REMEMBERED)
+    state[ORIGIN] = time
+    return c, state, c.n + 4
+
+
+def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
+    """Take the first sample from a law at rest."""
+    for i in range(len(state)):
+        state[i] = 0.0
+    state[ORIGIN], state[COMING] = time, 1.0
+    sample(0, inputs, c, state, outputs, work)
+    return 0
+
+
+def step(
+    clock: tuple[float, float, int], before: Row, now: Row, c: Constants, state: Row,
+    new_state: Row, outputs: Row, work: Row,
+) -> int:  # fmt: skip
+    """Take the samples that the step ends on or passes; `new_state` is `state` itself."""
+    time, dt, _ = clock
+    origin, coming = state[ORIGIN], state[COMING]
+    last = last_sample(time + dt, c.period, origin)
+    code = step_code(dt, c.period, last - coming)
+    if code < 0:
+        return code
+    measured = work[c.n : c.n + 4]
+    for k in range(first_sample(time, c.period, origin, coming), last + 1):
+        measure(origin + k * c.period - time, dt, c.period, before, now, measured)
+        sample(k, measured, c, new_state, outputs, work)
+        new_state[COMING] = k + 1.0
+    return code
+
+
+def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
+    """Hold the outputs: none follows an input."""
+    return 0
+
+
+def sample(k: int, measured: Row, c: Constants, state: Row, outputs: Row, spare: Row) -> None:
+    """Take sample k: fill the outputs and move the state on, in place."""
+    y, v = measured[FLOOR_ACCELERATION], measured[BASE_VELOCITY]
+    if c.velocity_corner > 0.0:
+        x = measured[BASE_DISPLACEMENT]
+        if k == 0:  # nothing is known of the past: the filter has settled
+            state[LOW] = state[X_BEFORE] = x
+        low = low_passed(state[LOW], state[X_BEFORE], x, c.velocity_corner, c.period)
+        state[LOW], state[X_BEFORE] = low, x
+        v = filtered_velocity(low, x, c.velocity_corner)
+    if c.kind >= SKYHOOK_SWITCH:
+        voltage, u = skyhook(y, v, c, state)
+    else:
+        voltage, u = designed(y, v, measured[DAMPER_FORCE], c, state, spare)
+    outputs[VOLTAGE], outputs[COMMAND_RAW], outputs[SCHEDULING] = voltage, u, v
+
+
+def designed(
+    y: float, v: float, f: float, c: Constants, state: Row, spare: Row
+) -> tuple[float, float]:
+    """Return voltage [V] and raw command of a state-space law, and move its state on."""
+    row = table_row(v, c.v_top, c.rows) if c.rows > 1 else 0
+    u = command(c.n, c.C, row, state)
+    if c.kind == INVERSE:
+        voltage, applied = inverted(u, v, c, state)
+        second = c.anti_windup * (applied - u)
+    elif c.kind == SIGNED:
+        voltage = signed_voltage(u, v, c.v_max)
+        second = c.anti_windup * (applied_signed(voltage, v) - u)
+    else:
+        voltage = clipped_voltage(u, f, c.f_min, c.v_max)
+        second = f if c.kind == CLIPPED_LQG else 0.0
+    advance(c.n, c.A, c.B, c.W, row, state, y, second, spare)
+    return voltage, u
+
+
+def inverted(u: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
+    """Return the voltage [V] of the commanded force and the force [N] that it gives by the law.
+
+    Moves the estimated states of the law on.
+    """
+    z = state[c.n : len(state) - REMEMBERED]
+    voltage = voltage_of_law(c.law, c.p, u, v, z, c.still, c.least_slope, c.v_max)
+    applied = force_of_law(c.law, c.p, v, voltage, z)
+    estimate_states(c.law, c.p, v, voltage, c.period, z)
+    for i in range(len(z)):
+        state[c.n + i] = z[i]
+    return voltage, applied
+
+
+def skyhook(y: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
+    """Return voltage [V] and command [N] of the skyhook law, and move its integral on."""
+    total, before = state[ABSOLUTE], state[Y_BEFORE]
+    absolute = leaky_integral(total, before, y, c.integral_corner, c.period)
+    state[ABSOLUTE], state[Y_BEFORE] = absolute, y
+    u = skyhook_command(absolute, c.gain)
+    if c.kind == SKYHOOK_SWITCH:
+        return skyhook_switch(absolute, v, c.v_max), u
+    return inverted(u, v, c, state)[0], u

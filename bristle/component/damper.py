@@ -1,0 +1,156 @@
+"""A damper: its law and effects within limits of the voltage, sticking, and the energy it takes."""
+
+from __future__ import annotations
+
+from math import inf, isfinite
+from typing import Any, NamedTuple
+
+from ..control.switching import limited
+from ..physics.codegen import hold
+from ..physics.damper import force_at, setup_of, start_states, work_size
+from ..physics.damper import step as law_step
+from ..physics.inputs import Inputs, Setup
+from ..physics.linear import Row
+from ..physics.tuples import record
+
+DISPLACEMENT, VELOCITY, VOLTAGE, HOLDING_FORCE, ACCELERATION = range(5)
+FORCE, DISSIPATED_ENERGY, STROKE_RATIO, FRICTION = range(4)
+"""Outputs; friction, the part of the force that is, is hidden."""
+
+REMEMBERED = 5
+ENERGY, FORCE_AT_END, ACCELERATION_AT_END, VOLTAGE_AT_END, LAST_STEP = range(-REMEMBERED, 0)
+"""What the state holds behind the states of law and effects: counted from its end."""
+
+SATURATED = 1
+"""The voltage left its limits."""
+
+
+hold_law: Any = None
+hold(globals(), "hold_law")
+
+
+class Constants(NamedTuple):
+    """What a damper computes with.
+
+    `law` is its law and effects as `physics.damper.step` takes them.
+    `moving_mass` [kg] is what the holding force holds, 0: the law slides. The acceleration is
+    `measured`, or the difference of velocity over the step. Motion and voltage are `linear` over a
+    step, or held at their newest.
+    """
+
+    law: Setup
+    v_max: float
+    stroke: float
+    moving_mass: float
+    measured: bool
+    linear: bool
+
+
+def setup(
+    law: str, values: dict[str, float], effects: list[str], measured: bool
+) -> tuple[Constants, list[float], int]:
+    """Return constants, state and size of work of a damper in plain Python, its inputs held.
+
+    Parameters
+    ----------
+    law : str
+        A damper's law, such as "bingham".
+    values : dict
+        Every Real parameter of the component, by name, in SI.
+    effects : list of str
+        The effects that are on.
+    measured : bool
+        Whether the acceleration is an input that is given.
+    """
+    constants = Constants(
+        setup_of(law, values, effects), values["v_max"], values["stroke"], values["moving_mass"],
+        measured, False,
+    )  # fmt: skip
+    return constants, start_states(law, values) + [0.0] * REMEMBERED, work_size(REMEMBERED)
+
+
+def stick_force(holding: float, v: float, mass: float, dt: float) -> float:
+    """Return the force [N] that brings a mass [kg] at v [m/s] to rest within dt [s].
+
+    `holding` is the force [N] at which its velocity stays.
+    """
+    return holding + mass * v / dt
+
+
+def present_force(
+    inputs: Row, V: float, a: float, c: Constants, state: Row, work: Row
+) -> tuple[float, float]:
+    """Return force and friction [N] at these inputs, V [V] and a [m/s2], without moving on."""
+    x, v, dt = inputs[DISPLACEMENT], inputs[VELOCITY], state[LAST_STEP]
+    sticks = c.moving_mass > 0.0 and (isfinite(dt) or v == 0.0)
+    stick = stick_force(inputs[HOLDING_FORCE], v, c.moving_mass, dt) if sticks else 0.0
+    now = record(Inputs, (x, v, a, V, dt, state[ENERGY], stick, sticks))
+    return force_at(c.law, now, state, work)
+
+
+def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
+    """Begin without energy and without a step behind; states of the law are those given."""
+    state[ENERGY], state[LAST_STEP] = 0.0, inf
+    state[ACCELERATION_AT_END] = inputs[ACCELERATION] if c.measured else 0.0
+    code = output(time, inputs, c, state, outputs, work)
+    remember(inputs, c, state, outputs)
+    return code
+
+
+def remember(inputs: Row, c: Constants, state: Row, outputs: Row) -> None:
+    """Take the present voltage and force for those from which the next step begins."""
+    state[FORCE_AT_END] = outputs[FORCE]
+    state[VOLTAGE_AT_END] = limited(inputs[VOLTAGE], 0.0, c.v_max)
+    if c.measured:
+        state[ACCELERATION_AT_END] = inputs[ACCELERATION]
+
+
+def step(
+    clock: tuple[float, float, int], before: Row, now: Row, c: Constants, state: Row,
+    new_state: Row, outputs: Row, work: Row,
+) -> int:  # fmt: skip
+    """Advance law, effects and energy over one step.
+
+    A voltage that has jumped since the last step acts from the begin of this one on: the energy's
+    trapezoid begins at the force that the damper then has.
+    """
+    dt = clock[1]
+    x0, v0 = before[DISPLACEMENT], before[VELOCITY]
+    x1, v1 = now[DISPLACEMENT], now[VELOCITY]
+    V1 = limited(now[VOLTAGE], 0.0, c.v_max)
+    V0 = limited(before[VOLTAGE], 0.0, c.v_max) if c.linear else V1
+    a0 = state[ACCELERATION_AT_END]
+    a1 = now[ACCELERATION] if c.measured else (v1 - v0) / dt
+    force0, energy = state[FORCE_AT_END], state[ENERGY]
+    if state[VOLTAGE_AT_END] != V0:
+        force0 = present_force(before, V0, a0, c, state, work)[0]
+    power0 = force0 * v0
+    sticks = c.moving_mass > 0.0
+    stick = stick_force(now[HOLDING_FORCE], v1, c.moving_mass, dt) if sticks else 0.0
+    end = record(Inputs, (x1, v1, a1, V1, dt, energy, stick, sticks))
+    if c.linear:
+        begin = record(Inputs, (x0, v0, a0, V0, dt, energy, stick, sticks))
+        force, friction = law_step(c.law, begin, end, state, new_state, work)
+    elif c.law.active:
+        force, friction = law_step(c.law, end, end, state, new_state, work)
+    else:
+        force, friction = hold_law(c.law.law, c.law.p, end, state, new_state)
+    energy += 0.5 * dt * (power0 + force * v1)
+    new_state[ENERGY], new_state[FORCE_AT_END] = energy, force
+    new_state[ACCELERATION_AT_END], new_state[VOLTAGE_AT_END] = a1, V1
+    new_state[LAST_STEP] = dt
+    outputs[FORCE], outputs[FRICTION] = force, friction
+    outputs[DISSIPATED_ENERGY], outputs[STROKE_RATIO] = energy, abs(x1) / c.stroke
+    if c.law.active and not c.linear:  # an effect may know the energy, which is a step older above
+        return output(clock[0] + dt, now, c, new_state, outputs, work)
+    return SATURATED if now[VOLTAGE] != V1 else 0
+
+
+def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
+    """Let the force follow motion and voltage, the states held."""
+    V = limited(inputs[VOLTAGE], 0.0, c.v_max)
+    a = inputs[ACCELERATION] if c.measured else state[ACCELERATION_AT_END]
+    outputs[FORCE], outputs[FRICTION] = present_force(inputs, V, a, c, state, work)
+    outputs[DISSIPATED_ENERGY] = state[ENERGY]
+    outputs[STROKE_RATIO] = abs(inputs[DISPLACEMENT]) / c.stroke
+    return SATURATED if inputs[VOLTAGE] != V else 0

@@ -1,0 +1,258 @@
+"""A building under ground motion and the forces of devices on its first level."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from ..physics.building import Building
+from ..physics.effect import effects_of
+from ..physics.linear import Row, copy
+from ..physics.structure import (
+    EFFECT_STEP,
+    Matrices,
+    accelerations,
+    add_force,
+    free_step,
+    holding_force,
+    matrices,
+    pack,
+    resting_contact,
+    resting_forces,
+    start_states,
+    state_size,
+    step_matrices,
+    work_size,
+)
+from ..physics.structure import step as effects_step
+from .damper import stick_force
+
+GROUND_ACCELERATION, DAMPER_FORCE, EXTRA_FORCE = range(3)
+
+PER_LEVEL = 3
+"""Outputs of each level: displacement, velocity, absolute acceleration.
+
+The drifts follow, then the holding force.
+"""
+
+
+class Constants(NamedTuple):
+    """What a structure computes with.
+
+    `n`, `isolated`, `mass`, `m_inverse`, `damping`, `stiffness`, `stiffnesses` are those of
+    `physics.structure.Matrices`; `p`, `on` the parameters and switches of effects, any of which is
+    `active`, one of which is a contact that `touches`. `substeps` of `h` [s] make a step, whose
+    matrices are `phi`, `held`, `ramp` (see `discretise`). Forces are `linear` over a step, or held.
+    """
+
+    n: int
+    isolated: bool
+    mass: float
+    m_inverse: Row
+    damping: Row
+    stiffness: Row
+    stiffnesses: Row
+    p: Row
+    on: Row
+    active: bool
+    touches: bool
+    linear: bool
+    substeps: int = 1
+    h: float = 0.0
+    phi: Row = ()
+    held: Row = ()
+    ramp: Row = ()
+
+
+def setup(
+    building: Building, values: dict[str, float], effects: list[str]
+) -> tuple[Constants, list[float], int]:
+    """Return constants without a step, state and size of work, forces held.
+
+    The state holds displacements and velocities (2n,), the states of effects, and what `settle`
+    makes of them: absolute accelerations without devices (n,) and the holding force on still
+    ground.
+    """
+    m = matrices(building)
+    constants = Constants(
+        m.n, m.isolated, m.mass, m.M_inverse, m.C, m.K, m.stiffnesses, pack(values),
+        [effect.name in effects for effect in effects_of("structure")], bool(effects),
+        any(effect.contact and effect.name in effects for effect in effects_of("structure")),
+        linear=False,
+    )  # fmt: skip
+    state = [0.0] * (2 * m.n) + start_states(m.n, values) + [0.0] * (m.n + 1)
+    work = [0.0] * room(m.n)
+    settle(constants, state, work)
+    return constants, state, len(work)
+
+
+def room(n: int) -> int:
+    """Return the size of work of a structure of n levels."""
+    return work_size(n) + 2 * n + 2 * state_size(n)
+
+
+def discretise(dt: float, c: Constants) -> Constants:
+    """Return the constants with the matrices of a step of dt [s]."""
+    substeps = max(1, int(dt / EFFECT_STEP + 0.999999)) if c.active else 1
+    m = Matrices(c.n, c.m_inverse, c.damping, c.stiffness, c.stiffnesses, c.mass, c.isolated)
+    step = step_matrices(m, dt / substeps)
+    return c._replace(substeps=substeps, h=step.h, phi=step.phi, held=step.held, ramp=step.ramp)
+
+
+def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
+    """Begin at rest, in balance with nothing yet: the state follows no input."""
+    show_motion(c, state, outputs)
+    return output(time, inputs, c, state, outputs, work)
+
+
+def step(
+    clock: tuple[float, float, int], before: Row, now: Row, c: Constants, state: Row,
+    new_state: Row, outputs: Row, work: Row,
+) -> int:  # fmt: skip
+    """Advance over one step: the ground linear, the devices' force held unless `c.linear`.
+
+    A caller that sweeps, `c.linear`, gets the motion, drifts included; on what it keeps it calls
+    `settle` before it asks for the other outputs.
+    """
+    n, size = c.n, 2 * c.n
+    a0, a1 = before[GROUND_ACCELERATION], now[GROUND_ACCELERATION]
+    f1 = now[DAMPER_FORCE] + now[EXTRA_FORCE]
+    f0 = before[DAMPER_FORCE] + before[EXTRA_FORCE] if c.linear else f1
+    if c.active:
+        effect_steps(a0, a1, f0, f1, c, state, new_state, work)
+    else:
+        # Without the devices' force no sweep differs from the one before.
+        if clock[2] == 0 or work[size] != a1:
+            free_step(n, c.phi, c.held, c.ramp, state, a0, a1, work)
+            work[size] = a1
+        for i in range(size):
+            new_state[i] = work[i]
+        add_force(n, c.held, c.ramp, 0, f0, f1, new_state)
+    show_motion(c, new_state, outputs)
+    if c.linear:
+        return 0
+    settle(c, new_state, work)
+    return output(clock[0] + clock[1], now, c, new_state, outputs, work)
+
+
+def effect_steps(
+    a0: float, a1: float, f0: float, f1: float, c: Constants, state: Row, new_state: Row, work: Row
+) -> None:
+    """Advance motion and states of effects over the substeps of a step.
+
+    Ground acceleration [m/s2] and force [N] go linearly from a0, f0 to a1, f1.
+    """
+    n, size, states = c.n, 2 * c.n, len(state) - 3 * c.n - 1
+    room = work[0 : 6 * n]
+    x0 = work[6 * n : 8 * n]
+    z0 = work[8 * n : 8 * n + states]
+    z1 = work[8 * n + states : 8 * n + 2 * states]
+    copy(state, 0, new_state, 0, size)
+    copy(state, size, z1, 0, states)
+    for k in range(c.substeps):
+        s, e = k / c.substeps, (k + 1.0) / c.substeps
+        copy(new_state, 0, x0, 0, size)
+        copy(z1, 0, z0, 0, states)
+        effects_step(
+            n, c.isolated, c.stiffnesses, c.phi, c.held, c.ramp, c.h, x0, a0 + s * (a1 - a0),
+            a0 + e * (a1 - a0), f0 + s * (f1 - f0), f0 + e * (f1 - f0), 0.0, z0, c.p, c.on, True,
+            new_state, z1, room,
+        )  # fmt: skip
+    copy(z1, 0, new_state, size, states)
+
+
+def settle(c: Constants, state: Row, work: Row) -> None:
+    """Put what follows from the state alone behind it, so that a new force costs little."""
+    n, end = c.n, len(state) - c.n - 1
+    loads, unloaded = work[3 * n : 4 * n], work[4 * n : 5 * n]  # behind what sweeps share
+    if c.active:
+        resting_forces(n, c.isolated, c.stiffnesses, state, state[2 * n : end], c.p, c.on, loads)
+    else:
+        for i in range(n):
+            loads[i] = 0.0
+    accelerations(n, c.m_inverse, c.damping, c.stiffness, state, loads, unloaded)
+    copy(unloaded, 0, state, end, n)
+    state[end + n] = holding_force(n, c.damping, c.stiffness, c.mass, state, 0.0, loads[0])
+
+
+def show_motion(c: Constants, state: Row, outputs: Row) -> None:
+    """Give displacements, velocities and drifts of a state."""
+    n, at = c.n, 0
+    for i in range(n):
+        outputs[at], outputs[at + 1] = state[i], state[n + i]
+        at += PER_LEVEL
+    for i in range(1 if c.isolated else 0, n):
+        outputs[at] = state[i] - (state[i - 1] if i > 0 else 0.0)
+        at += 1
+
+
+def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
+    """Let absolute accelerations and the holding force follow the inputs, the motion held.
+
+    A contact that sticks carries what the devices' force leaves of the holding force, for the
+    devices hold first; the level then has the ground's acceleration.
+    """
+    n, end = c.n, len(state) - c.n - 1
+    force = inputs[DAMPER_FORCE] + inputs[EXTRA_FORCE]
+    hold = state[end + n] - c.mass * inputs[GROUND_ACCELERATION]
+    if c.touches:
+        stick = stick_force(hold - force, state[n], c.mass, EFFECT_STEP)
+        force += resting_contact(
+            n, c.isolated, c.stiffnesses, state, stick, state[2 * n : end], c.p, c.on
+        )
+    for i in range(n):
+        outputs[PER_LEVEL * i + 2] = state[end + i] - c.m_inverse[i * n] * force
+    drifts = n - 1 if c.isolated else n
+    outputs[PER_LEVEL * n + drifts] = hold - inputs[EXTRA_FORCE]
+    return 0
+
+
+class StructureModel:
+    """A building and its state, ready to step in plain Python outside an FMU.
+
+    `x` (2n,) [m, m/s] and `z`, the states of effects, may be set; `settle` then.
+    """
+
+    def __init__(
+        self,
+        building: Building,
+        values: dict[str, float] | None = None,
+        effects: list[str] | None = None,
+    ) -> None:
+        self.m = matrices(building)
+        self.constants, state, work = setup(building, values or {}, effects or [])
+        size = 2 * self.m.n
+        self.x, self.z = state[0:size], state[size : size + state_size(self.m.n)]
+        self.p, self.on = self.constants.p, self.constants.on
+        self._work = [0.0] * work
+        self._outputs = [0.0] * (PER_LEVEL * self.m.n + self.m.n + 1)
+        self._h = 0.0
+        self.settle()
+
+    def settle(self) -> None:
+        """Compute what follows from the state, which was set from outside."""
+        self._state = [*self.x, *self.z, *[0.0] * (self.m.n + 1)]
+        settle(self.constants, self._state, self._work)
+
+    def step(self, dt: float, a0: float, a1: float, force: float) -> None:
+        """Advance over dt [s]: a_g linear from a0 to a1 [m/s2], the devices' force [N] held."""
+        if dt != self._h:
+            self.constants, self._h = discretise(dt, self.constants), dt
+        new, inputs = list(self._state), ((a0, 0.0, 0.0), (a1, force, 0.0))
+        clock = (0.0, dt, 0)
+        step(clock, *inputs, self.constants, self._state, new, self._outputs, self._work)
+        self._state, size = new, 2 * self.m.n
+        self.x, self.z = new[0:size], new[size : size + len(self.z)]
+
+    def absolute_accelerations(self, force: float, a_g: float = 0.0) -> list[float]:
+        """Return q'' + a_g (n,) [m/s2] under the devices' force [N] on the first level."""
+        self._show(a_g, force, 0.0)
+        return self._outputs[2 : PER_LEVEL * self.m.n : PER_LEVEL]
+
+    def holding_force(self, a_g: float, others: float) -> float:
+        """Return the damper force [N] at which the first level stays at its velocity."""
+        self._show(a_g, 0.0, others)
+        return self._outputs[PER_LEVEL * self.m.n + self.m.n - self.m.isolated]
+
+    def _show(self, a_g: float, force: float, extra: float) -> None:
+        inputs = (a_g, force, extra)
+        output(0.0, inputs, self.constants, self._state, self._outputs, self._work)

@@ -1,0 +1,220 @@
+"""A building's runs as a diagnosis takes them: what equilibrium tells at each site, and of what.
+
+Equilibrium parts the question. Each storey's shear is known from the accelerations above it,
+whatever happens below; what the isolation layer carries is known where the damper's force was
+measured; and the damper's force is then held against the damper's law. Without a measured force the
+layer and the damper are one unknown, and effects that act alike are named together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from ..data.measurement import Measurement
+from ..identify.assigned import at_site, corrected_for_delay, linear_storeys
+from ..identify.model import Model
+from ..identify.response import responses
+from ..identify.rig import DAMPER
+from ..identify.search_context import refine
+from ..identify.site_fit import fit_damper
+from ..identify.structure import StructureProblem, problems_of
+from ..physics.building import Building
+from .building_prior import moved_numbers, within_prior
+from .candidates import SHOWN, judge
+from .corrected import corrected
+from .damper import excused_by_sensor, left_by_filter
+from .finding import Finding
+from .load_cell import load_cell
+from .opening import Opening, Progress
+from .rule import BENCH, SITE, DecisionRule
+from .sensors import SensorFault, sensor_faults
+from .sites import coordinate_of, shortened
+from .verdict import Diagnosis, late_values, of_sites
+
+Pair = tuple[StructureProblem, StructureProblem]
+
+BLURRED = ("lag", "high-pass", "delay", "derived")
+"""Faults for which a building's velocity is left out: displacement and accelerometer say the same
+without them, and what is left of a delay would be held against the law at each reversal."""
+
+SEARCHED = 12.0
+"""Seconds of each run, from its begin, on which the damper's effects are searched: the strongest
+shaking is over. The best are then fitted to all that was recorded; held-out runs stay whole."""
+
+
+class BuildingRuns:
+    """The runs of a building; what is asked of them in turn, `diagnosis.diagnose_rig` has.
+
+    Parameters
+    ----------
+    train, holdout : measurements to fit to, and those that decide
+    present : the model as it is, with the effects of all sites
+    building : its masses are taken as known
+    """
+
+    def __init__(
+        self,
+        train: Sequence[Measurement],
+        holdout: Sequence[Measurement],
+        present: Model,
+        building: Building,
+        say: Progress,
+    ) -> None:
+        self._building, self._say = building, say
+        say("looking for sensor faults")
+        self._sensors = tuple(sensor_faults([_as_bench(m, building) for m in (*train, *holdout)]))
+        right = [_corrected(list(runs), self._sensors, building) for runs in (train, holdout)]
+        say("smoothing the motion of each level")
+        found = responses([*right[0], *right[1]], building)
+        found, self._present = corrected_for_delay(found, present)
+        self._train, self._holdout = found[: len(right[0])], found[len(right[0]) :]
+        self._straight = linear_storeys(self._present.effects)
+        self._problems = self._made(building)
+        self._notes: list[str] = []
+
+    def _made(self, building: Building) -> dict[str, Pair]:
+        law = self._present.law
+        return problems_of(self._train, self._holdout, building, law, self._straight)
+
+    def lines(self) -> dict[str, Pair]:
+        """Return the sites beside the damper, each with its runs for training and held out."""
+        return {site: pair for site, pair in self._problems.items() if site != DAMPER}
+
+    def part(self, site: str) -> Model:
+        """Return the part of the model at a site."""
+        return at_site(self._present, site, self._problems)
+
+    def correct(self, findings: dict[str, Finding]) -> None:
+        """Set right what the lines tell of the load cell, and of the building's numbers."""
+        if DAMPER not in self._problems:
+            return
+        layer = findings.get("layer")
+        if layer is not None and layer.kind != "none":
+            self._correct_load_cell(layer, findings)
+        if self._problems[DAMPER][0].reconstructed:
+            self._correct_building(findings)
+
+    def _correct_load_cell(self, layer: Finding, findings: dict[str, Finding]) -> None:
+        self._say("layer: the load cell")
+        late = load_cell(layer, self._train, self._holdout, self._building)
+        if late is None:
+            return
+        findings["layer"], (self._train, self._holdout) = late
+        shown = self._problems[DAMPER]
+        self._problems = self._made(self._building)
+        if _rounded(findings["layer"]):
+            self._problems[DAMPER] = shown
+            self._present = _late(self._present, findings["layer"])
+
+    def _correct_building(self, findings: Mapping[str, Finding]) -> None:
+        self._say("damper: what the building's file leaves open")
+        storeys = [found for site, found in findings.items() if site.startswith("storey")]
+        self._straight = self._straight and all(found.kind == "none" for found in storeys)
+        self._problems = self._made(self._building)
+        known = self._within_prior()
+        suited = self._made(known)
+        if _suits(suited[DAMPER], self._problems[DAMPER], self._present):
+            self._problems, self._notes = suited, moved_numbers(self._building, known)
+
+    def _within_prior(self) -> Building:
+        """Return the building that makes the damper's force, its numbers as far as known."""
+        present, straight = self._present, self._straight
+        problem = problems_of(self._train, [], self._building, present.law, straight)
+        damper = fit_damper(problem[DAMPER][0], at_site(present, DAMPER, problem))
+        return within_prior(damper.model, self._train, self._building, present.law, straight)
+
+    def open_damper(self) -> Opening | None:
+        """Return the damper's law fitted and judged, None where no damper was measured."""
+        if DAMPER not in self._problems:
+            return None
+        self._say("damper: its law, then effects")
+        train, held_out = self._problems[DAMPER]
+        model = refine(fit_damper(train, self.part(DAMPER)).model, train)
+        # A force that no load cell shows cannot be late.
+        shown = () if train.reconstructed else SHOWN
+        return Opening(
+            judge(model, train, held_out), train, held_out, self._sensors, {}, shown,
+            shortened(train, SEARCHED),
+        )  # fmt: skip
+
+    def excused(self, finding: Finding, findings: Mapping[str, Finding]) -> Finding:
+        """Return the damper's finding, not unknown where an instrument explains what is left."""
+        if _blurred(self._sensors):
+            why = "Without its velocity the base's reversals blur."
+            finding = excused_by_sensor(finding, BENCH.blurred, why)
+        layer = findings.get("layer")
+        if layer is not None and _rounded(layer):
+            most = left_by_filter(self._present.law, *self._problems[DAMPER])
+            why = "The load cell's filter has another form than ours."
+            finding = excused_by_sensor(finding, most, why)
+        if finding.kind == "unknown" and finding.before is not None:
+            along = coordinate_of(finding.before.residual, self._problems[DAMPER][1])
+            finding = replace(finding, coordinate=along)
+        return finding
+
+    def verdict(self, findings: Mapping[str, Finding]) -> Diagnosis:
+        """Return the verdict that the findings of all sites amount to."""
+        reconstructed = DAMPER in self._problems and self._problems[DAMPER][0].reconstructed
+        found = of_sites(findings, "reconstructed" if reconstructed else "measured", self._sensors)
+        return replace(found, words=" ".join([found.words, *self._notes]))
+
+
+def _suits(suited: Pair, given: Pair, present: Model, rule: DecisionRule = BENCH) -> bool:
+    """Return whether moved numbers of a building explain what the file's leave, held-out runs too.
+
+    What an effect does they may follow in part; then they are the file's still.
+    """
+
+    def left(pair: Pair) -> float:
+        base = fit_damper(pair[0], at_site(present, "damper", ("damper",)))
+        return rule.excess(judge(base.model, *pair).z)
+
+    return left(suited) <= rule.moved * left(given)
+
+
+def _rounded(layer: Finding, rule: DecisionRule = SITE) -> bool:
+    """Return whether a load cell is late in a way that moving its record ahead does not undo.
+
+    A filter rounds the force besides. That cannot be taken back, but it can be put on the model.
+    """
+    return bool(late_values(layer)) and layer.z_after > rule.clean
+
+
+def _late(present: Model, layer: Finding) -> Model:
+    """Return the model whose damper's force is shown as late as equilibrium says."""
+    effects = (*present.effects, *layer.effects)
+    return replace(present, effects=effects, values={**present.values, **late_values(layer)})
+
+
+def _blurred(faults: tuple[SensorFault, ...]) -> bool:
+    return any(f.channel == "velocity" and f.fault in BLURRED for f in faults)
+
+
+def _corrected(
+    runs: list[Measurement], faults: tuple[SensorFault, ...], building: Building
+) -> list[Measurement]:
+    """Return measurements without the faults of the damper's channels.
+
+    Of velocities that are late or rounded the displacement says the same.
+    """
+    first = building.levels()[0]
+    names = {"displacement": f"{first}_displacement", "velocity": f"{first}_velocity"}
+    theirs = [replace(f, channel=names.get(f.channel, f.channel)) for f in faults]
+    late = names["velocity"]
+    out = corrected(runs, [f for f in theirs if not (f.channel == late and f.fault in BLURRED)])
+    if not _blurred(faults):
+        return out
+    return [
+        replace(one, channels={n: v for n, v in one.channels.items() if n != late}) for one in out
+    ]
+
+
+def _as_bench(measurement: Measurement, building: Building) -> Measurement:
+    """Return a measurement whose base channels are named as those of a bench."""
+    first = building.levels()[0]
+    names = {f"{first}_displacement": "displacement", f"{first}_velocity": "velocity"}
+    keep = {k: v for k, v in measurement.channels.items() if k in names or k == "force"}
+    channels = {names.get(k, k): v for k, v in keep.items()}
+    noise = {names.get(k, k): v for k, v in measurement.noise.items() if k in keep}
+    return replace(measurement, channels=channels, noise=noise)

@@ -1,0 +1,213 @@
+"""From measurements to trials at the damper: sensors' faults, the present model, every effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..compare.patterns import ResidualPattern
+from ..data.derived import derived_velocity
+from ..data.measurement import Measurement
+from ..identify.fit import Model, Problem, identify
+from ..identify.prepare import SHORTEST
+from ..identify.rig import DAMPER, Seeds, bench_rig
+from ..identify.search_context import refine
+from ..identify.structure import StructureProblem
+from ..physics.effect import effects_of
+from .candidates import SECONDS, Trial, judge, try_all, try_members
+from .corrected import corrected
+from .faults import SensorFault, words_of
+from .model_based_faults import model_based_fault
+from .remaining_residual import patterns_of
+from .rule import BENCH, DecisionRule
+from .sensors import sensor_faults
+from .sites import try_effect
+
+DRAWS = Seeds(train=0, holdout=1000, apart=1)
+"""Draws of the motion's error of a diagnosis's own: what a fit was drawn from does not judge it."""
+
+CONTENDERS, NEAR = 3, 1.03
+"""How many trials at most are fitted to all that was recorded, and up to which z as a multiple of
+the best one's: rivals are told apart on equal terms."""
+
+Progress = Callable[[str], None]
+
+
+def silent(_text: str) -> None:
+    """Say nothing."""
+
+
+@dataclass(frozen=True)
+class Insufficient:
+    """Why data carry no verdict, in sentences, with the faults of the sensors and the noise."""
+
+    reasons: tuple[str, ...]
+    faults: tuple[SensorFault, ...]
+    noise: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What a diagnosis of a damper begins with: runs freed of sensors' faults, and its model.
+
+    `before` is the present model, fitted to `problem` and judged on `held_out`; `shown` the
+    channels whose instruments may still have an effect. Inside a building `brief` is the part of
+    the training runs that effects are searched on, None on a bench.
+    """
+
+    before: Trial
+    problem: Problem
+    held_out: Problem
+    faults: tuple[SensorFault, ...]
+    noise: Mapping[str, float]
+    shown: tuple[str, ...]
+    brief: StructureProblem | None = None
+
+
+def opening(
+    train: Sequence[Measurement],
+    holdout: Sequence[Measurement],
+    present: Model,
+    *,
+    identified: bool = False,
+    say: Progress = silent,
+) -> Opening | Insufficient:
+    """Return what a diagnosis begins with, or why the data carry no verdict.
+
+    Parameters
+    ----------
+    present : the model as it is
+    identified : whether its values were fitted before: they are then refined, not sought anew
+    """
+    say("looking for sensor faults")
+    faults = sensor_faults([*train, *holdout])
+    lacking = _lacking([*train, *holdout], faults)
+    noise = _noise([*train, *holdout])
+    if lacking:
+        return Insufficient(tuple(lacking), tuple(faults), noise)
+    say("smoothing the motion")
+    left = [_left(corrected(runs, faults)) for runs in (train, holdout)]
+    if not all(left):
+        told = ("No run has enough samples that are not clipped.", *words_of(faults))
+        return Insufficient(told, tuple(faults), noise)
+    problem, held_out = bench_rig(left[0], left[1], DRAWS).sites(present)[DAMPER].pair
+    say("fitting the present model")
+    base = refine(present, problem) if identified else _identified(present, problem)
+    before = judge(base, problem, held_out)
+    drive = "current" if train[0].has("current") and not train[0].has("voltage") else "voltage"
+    shown = model_based_fault(before, problem, held_out, drive)
+    if shown is not None:
+        faults.append(shown.fault)
+        problem, held_out, before = shown.train, shown.held_out, shown.trial
+    redundant = any(
+        run.has("displacement", "velocity") and not derived_velocity(run) for run in train
+    )
+    channels = ("force",) if redundant else ("force", "velocity")
+    return Opening(before, problem, held_out, tuple(faults), noise, channels)
+
+
+def _identified(present: Model, problem: Problem) -> Model:
+    found = identify(
+        problem, present.law, present.effects, held=present.held, limits=present.limits
+    )
+    return found.model
+
+
+class Trials:
+    """The trials of single effects, and those of pairs as far as they are asked for."""
+
+    def __init__(self, opened: Opening, say: Progress = silent) -> None:
+        self.opened, self.say = opened, say
+        self.before = opened.before
+        say("trying every effect inside the model")
+        self.single = self._all(self.before, None)
+
+    @cached_property
+    def patterns(self) -> list[ResidualPattern]:
+        """Along which coordinates the present model's residual is organised."""
+        return patterns_of(self.before, self.opened.held_out)
+
+    def grow(self, first: Trial) -> list[Trial]:
+        """Return the trials of all effects added to a trial's model."""
+        self.say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
+        return self._all(first, SECONDS)
+
+    def reduce(self, pair: Trial) -> list[Trial]:
+        """Return the trials of a pair's members alone."""
+        return try_members(pair, self.before.model, self.opened.problem, self.opened.held_out)
+
+    def _all(self, first: Trial, most: int | None) -> list[Trial]:
+        opened = self.opened
+        on, held_out = opened.brief or opened.problem, opened.held_out
+        trials = try_all(first.model, on, held_out, shown=opened.shown, most=most)
+        if opened.brief is None:
+            return trials
+        trials = sorted([*trials, *self._of_layer(first)], key=lambda trial: trial.z)
+        if opened.brief is not opened.problem:
+            best = trials[0].z
+            for k, one in enumerate(trials[:CONTENDERS]):
+                if one.refined and one.z <= NEAR * best:
+                    trials[k] = judge(refine(one.model, opened.problem), opened.problem, held_out)
+        return sorted(trials, key=lambda trial: trial.z)
+
+    def _of_layer(self, first: Trial) -> list[Trial]:
+        """Return the trials of the layer's effects, of which a reconstructed force has a share."""
+        problem, held_out = self.opened.problem, self.opened.held_out
+        assert isinstance(problem, StructureProblem)
+        assert isinstance(held_out, StructureProblem)
+        if not problem.reconstructed:
+            return []
+        return [
+            try_effect(effect.name, first.model, problem, held_out)
+            for effect in effects_of("structure")
+            if "force" in effect.hooks() and effect.name not in first.model.effects
+        ]
+
+
+def _left(runs: Sequence[Measurement]) -> list[Measurement]:
+    """Return the runs without those of which a fault has left too few samples."""
+    return [
+        run
+        for run in runs
+        if len(run.time) < SHORTEST or np.count_nonzero(run.told(*run.channels)) >= SHORTEST
+    ]
+
+
+def _noise(runs: Sequence[Measurement]) -> dict[str, float]:
+    """Return the median noise of each channel over the runs, in SI."""
+    names = dict.fromkeys(name for run in runs for name in run.noise)
+    return {
+        name: float(np.median([run.noise[name] for run in runs if name in run.noise]))
+        for name in names
+    }
+
+
+def _lacking(
+    runs: Sequence[Measurement], faults: Sequence[SensorFault], rule: DecisionRule = BENCH
+) -> list[str]:
+    """Return what keeps these data from carrying a verdict, in sentences."""
+    out = []
+    force = np.concatenate([run["force"] for run in runs if run.has("force")] or [np.zeros(1)])
+    spread = float(np.std(force))
+    noise = float(np.median([run.noise.get("force", 0.0) for run in runs]))
+    if spread <= 0.0:
+        out.append("The force is constant: there is nothing to explain.")
+    elif spread < rule.quietest * noise:
+        out.append(
+            f"The force's noise, {noise:.3g} N, is nearly the force itself, {spread:.3g} N RMS: "
+            f"at least {rule.quietest:g} times are needed."
+        )
+    for channel in ("displacement", "velocity"):
+        able = [run[channel] for run in runs if run.has(channel)]
+        if able and float(np.ptp(np.concatenate(able))) == 0.0:
+            out.append(f"The {channel} does not change: without motion no damper shows anything.")
+    out += [fault.words for fault in faults if fault.fault == "unrelated"]
+    cut = [fault for fault in faults if fault.channel == "force" and fault.fault == "clipping"]
+    if cut:
+        share = float(np.mean(np.abs(force) >= cut[0].value * (1.0 - 1e-9)))
+        if share > rule.cut:
+            out.append(f"The force stands at the end of its range in {share:.0%} of the samples.")
+    return out

@@ -1,0 +1,113 @@
+"""Along what the rest is organised that no effect explains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.signal import welch
+
+from ..compare.coordinates import coordinates_of, late_speed
+from ..compare.names import name_of
+from ..compare.patterns import ResidualPattern, residual_patterns
+from ..identify.fit import Problem
+from .candidates import Trial
+from .decision import missing
+from .rule import BENCH, DecisionRule
+
+FLIPS = 499
+"""Random patterns of signs that say what chance would organise."""
+
+
+def patterns_of(trial: Trial, held_out: Problem) -> list[ResidualPattern]:
+    """Return along which coordinates a trial's residual is organised, the most telling first."""
+    normalised, raw, coordinates, begin = [], [], [], 0
+    for run in held_out.runs:
+        size = len(run.force) - run.skip
+        normalised.append(trial.residual[begin : begin + size])
+        raw.append(normalised[-1] * run.noise)
+        along = coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force)
+        along["rest"] = late_speed(run.v, run.dt)
+        coordinates.append({name: values[run.skip :] for name, values in along.items()})
+        begin += size
+    return residual_patterns(normalised, raw, coordinates, flips=FLIPS)
+
+
+def remaining_residual(
+    before: Trial,
+    trials: Sequence[Trial],
+    rest: list[ResidualPattern],
+    held_out: Problem,
+    rule: DecisionRule = BENCH,
+) -> tuple[str, list[ResidualPattern]]:
+    """Return the coordinate that organises what no effect explains, and all patterns of it.
+
+    What an effect can mimic may hide what no effect can: where `rest`, the patterns of the residual
+    of `before`, is not clear, what the nearest effect leaves is looked at.
+    """
+    nearest = min(trials, key=lambda trial: trial.z, default=before)
+    if _clear(rest, rule) or not missing(before, nearest, rule):
+        return most_telling(rest, before, held_out, rule), rest
+    rest = patterns_of(nearest, held_out)
+    return most_telling(rest, nearest, held_out, rule), rest
+
+
+def sentences(
+    coordinate: str, rest: Sequence[ResidualPattern], rule: DecisionRule = BENCH
+) -> list[str]:
+    """Return the sentence about the coordinate of what is unexplained, in a list; none without."""
+    if not coordinate:
+        return []
+    sure = coordinate == "frequency" or any(
+        pattern.p <= rule.chance for pattern in rest if pattern.coordinate == coordinate
+    )
+    how = "is organised by" if sure else "follows no coordinate beyond chance; nearest is"
+    return [f"What is unexplained {how} {name_of(coordinate)}."]
+
+
+def _clear(patterns: Sequence[ResidualPattern], rule: DecisionRule) -> bool:
+    return bool(patterns) and patterns[0].p <= rule.chance and patterns[0].share > rule.clear
+
+
+def most_telling(
+    rest: Sequence[ResidualPattern], trial: Trial, held_out: Problem, rule: DecisionRule = BENCH
+) -> str:
+    """Return the coordinate of a residual: "frequency" where it rings and nothing else tells.
+
+    A residual that rings with the time since a reversal belongs to a resonance that reversals
+    strike. Significance chooses among patterns that tell about as much: one along which the data
+    fall into few blocks may carry most of the residual all the same.
+    """
+    telling = [pattern for pattern in rest if pattern.p <= rule.chance] or list(rest)
+    if not telling:
+        return ""
+    first = telling[0] if telling[0].share > rule.half * rest[0].share else rest[0]
+    struck = first.coordinate == "time_since_reversal"
+    if (struck or not _clear(telling, rule)) and ringing(trial, held_out) > rule.rings:
+        return "frequency"
+    return first.coordinate
+
+
+def ringing(trial: Trial, held_out: Problem) -> float:
+    """Return the largest share of a residual's power within a third of an octave, above the motion.
+
+    The motion ends where nine tenths of the velocity's power lie below.
+    """
+    largest, begin = 0.0, 0
+    powers, motions = [], []
+    size = min(1024, *(len(run.force) - run.skip for run in held_out.runs))
+    rate = 1.0 / held_out.runs[0].dt
+    for run in held_out.runs:
+        count = len(run.force) - run.skip
+        residual = np.clip(trial.residual[begin : begin + count], -50.0, 50.0)
+        begin += count
+        f, power = welch(residual, rate, nperseg=size)
+        powers.append(power)
+        motions.append(welch(run.v[run.skip :], rate, nperseg=size)[1])
+    power, motion = np.mean(powers, axis=0), np.cumsum(np.mean(motions, axis=0))
+    ends = f[int(np.searchsorted(motion, 0.9 * motion[-1]))]
+    total = float(power.sum())
+    for centre in f[f > 1.5 * ends]:
+        inside = (f >= centre / 2 ** (1 / 6)) & (f <= centre * 2 ** (1 / 6))
+        largest = max(largest, float(power[inside].sum()) / total)
+    return largest

@@ -1,0 +1,55 @@
+"""A verdict in words: what a damper lacks, or what is missing at the sites of a building."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from ..physics.effect import EFFECTS
+from .faults import SensorFault, words_of
+from .finding import Finding
+from .remaining_residual import sentences
+
+
+def of_damper(found: Finding, faults: Sequence[SensorFault]) -> str:
+    """Return the verdict on a bench: the damper's reasons, and what the channels show."""
+    told = [*found.reasons, *words_of(faults)]
+    if found.kind == "none":
+        told.append(
+            f"An effect that leaves {found.detectable:.2%} of the force would have been seen."
+        )
+    if found.kind == "unknown":
+        told += sentences(found.coordinate, found.patterns)
+    return " ".join(told)
+
+
+def of_sites(
+    kind: str,
+    effects: tuple[str, ...],
+    sites: Mapping[str, str],
+    alike: Mapping[str, str],
+    coordinate: str,
+) -> str:
+    """Return the verdict on a building.
+
+    Parameters
+    ----------
+    sites : the site of each effect
+    alike : what acts like an effect where no load cell tells, and why
+    coordinate : along which an unknown residual is organised
+    """
+    told = []
+    if kind == "none":
+        told.append("No effect is missing at any site that these runs test.")
+    elif kind == "effect":
+        told.append(f"Missing: {', '.join(f'{e} ({sites[e]})' for e in effects)}.")
+    elif kind == "class":
+        others = [twin for twin in alike if twin not in EFFECTS]
+        told.append(
+            f"Missing is one of {', '.join([*effects, *others])}; these runs cannot say which."
+        )
+    else:
+        told.append(f"Something is missing that no effect explains, along {coordinate}.")
+        told += [f"Besides, {e} is missing ({sites[e]})." for e in effects if e in sites]
+    for reason in alike.values():
+        told.append(f"Without a measured force {reason}: a load cell at the damper would tell.")
+    return " ".join(told)

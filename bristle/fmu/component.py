@@ -1,0 +1,114 @@
+"""The base of components whose computing is pure functions: it calls them as a host steps.
+
+See `bristle.component` for the functions. The texts of their codes live in the component's class.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from ..physics.effect import Parameter, effects_of
+from .slave import STEPPING, Slave
+
+
+class EffectSlave(Slave):
+    """A component that offers the effects of its site, each with a switch and its parameters."""
+
+    def add_effects(self, site: str, law: str = "") -> None:
+        """Declare `EFFECT.on`, `EFFECT.PARAMETER`, `EFFECT.STATE_0` for the effects of a site."""
+        own = self.baked.get("own", [])  # a user's, in this process; an FMU's are its library's
+        self._effects = tuple(e for e in effects_of(site, law) if not e.own or e.name in own)
+        for effect in self._effects:
+            self.add_parameter(effect.name + ".on", False, None, effect.first_line())
+            for name, parameter in effect.parameters.items():
+                self.add_physical(effect.name + "." + name, parameter)
+            for name, unit in effect.states.items():
+                text = f"start value of the state {name}"
+                self.add_parameter(f"{effect.name}.{name}_0", 0.0, unit, text)
+
+    def add_physical(self, name: str, parameter: Parameter) -> None:
+        """Declare a parameter of a law or effect."""
+        self.add_parameter(name, parameter.value, parameter.unit, parameter.text, parameter.bounds)
+
+    def effects_on(self) -> list[str]:
+        """Return the names of the effects that are switched on."""
+        return [effect.name for effect in self._effects if self[effect.name + ".on"]]
+
+    def numbers(self) -> dict[str, float]:
+        """Return every Real parameter by its full name."""
+        names = ((self.vars[index].name, self._values[index]) for index in self._parameters)
+        return {name: value for name, value in names if isinstance(value, float)}
+
+
+class ComponentSlave(EffectSlave):
+    """A component made of ports, functions and texts.
+
+    A component fills `setup`; `functions` has `start`, `step` and `output`; `texts` tells what a
+    code means, with parameters in braces. `hidden` outputs have no port.
+    """
+
+    functions: ClassVar[Any]
+    texts: ClassVar[dict[int, str]] = {}
+    hidden: ClassVar[int] = 0
+
+    def setup(self) -> tuple[Any, list[float], int]:
+        """Return constants, state and size of work; raise what is wrong with the parameters."""
+        raise NotImplementedError
+
+    def configure(self) -> None:
+        self.constants, self.state, work = self.setup()
+        self._new_state = list(self.state)
+        self._work = [0.0] * work
+        self._first, self._after = _span(self._inputs)
+        self._shown_first, self._shown_after = _span(self._outputs)
+        count = self._shown_after - self._shown_first
+        self._given = [0.0] * (count + self.hidden)
+        self._count = count
+        self.before = self._values[self._first : self._after]
+        self._fresh = False
+
+    def advance(self, time: float, step: float) -> None:
+        now = self._values[self._first : self._after]
+        code = self.functions.step(
+            (time, step, 0), self.before, now, self.constants, self.state, self._new_state,
+            self._given, self._work,
+        )  # fmt: skip
+        if code:
+            self.tell(code, time, step)
+        self.state, self._new_state = self._new_state, self.state
+        self.before = now
+        self._values[self._shown_first : self._shown_after] = self._given[: self._count]
+        self._fresh = True
+
+    def refresh(self) -> None:
+        if self._fresh:  # as the step has left them
+            self._fresh = False
+            return
+        now = self._values[self._first : self._after]
+        if self._mode == STEPPING:
+            show = self.functions.output
+        else:  # until the first step the state follows the inputs
+            show = self.functions.start
+            self.before = now
+        code = show(self.time, now, self.constants, self.state, self._given, self._work)
+        if code:
+            self.tell(code, self.time, 0.0)
+        self._values[self._shown_first : self._shown_after] = self._given[: self._count]
+
+    def tell(self, code: int, time: float, step: float) -> None:
+        """Warn of what a code says, or raise it."""
+        text = self.texts[code].format_map(self)
+        if code < 0:
+            raise ValueError(text)
+        self.warn_once(text)
+
+    def get_inner(self) -> Any:
+        return [list(self.state), list(self.before), list(self._given)]
+
+    def set_inner(self, state: Any) -> None:
+        self.state[:], self.before, self._given[:] = state[0], list(state[1]), state[2]
+
+
+def _span(indices: list[int]) -> tuple[int, int]:
+    """Return begin and end of variables that are neighbours."""
+    return (indices[0], indices[-1] + 1) if indices else (0, 0)

@@ -1,0 +1,224 @@
+"""A rig: its sites, at each of which a model's force is held against a measured one.
+
+A test bench has one site, its damper. A building has several, and equilibrium says which: the
+damper where its force is known, what the isolation layer carries beside it, each storey.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import NamedTuple
+
+from ..data.channels import DRIVE
+from ..data.measurement import Measurement
+from ..errors import StudyError
+from ..physics.building import Building
+from ..physics.effect import EFFECTS
+from .assigned import corrected_for_delay, lateness, linear_storeys, unassigned
+from .model import Model, Problem
+from .prepare import prepare
+from .response import Response, responses
+from .structure import StructureProblem, blind_at_rest, problems_of
+
+ROLES = ("train", "holdout")
+DAMPER = "damper"
+
+
+class Seeds(NamedTuple):
+    """Seeds of the draws of the motion's error: that of run k is `apart` k more than the first."""
+
+    train: int = 0
+    holdout: int = 7
+    apart: int = 31
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A place on a rig where a model's force is held against a measured one.
+
+    Parameters
+    ----------
+    name : str
+        "damper", "layer", "storey1" ...
+    make : callable
+        Returns the runs of a role, "train" or "holdout"; None where no run is held out.
+    quantity, unit : str
+        What is compared, in words.
+    shown : str
+        The name that answers give the site: "" for the one of a bench, which goes without saying.
+    is_line : bool
+        Whether the model there is a line, k x + c v, that is fitted along with the effects and is
+        no part of a study's model; else it is the damper's law.
+    any_law : bool
+        Whether every law can be held against these samples; else some were left out that one law
+        cannot tell.
+    """
+
+    name: str
+    make: Callable[[str], Problem | None] = field(repr=False)
+    quantity: str = "force"
+    unit: str = "N"
+    shown: str = ""
+    is_line: bool = False
+    any_law: bool = True
+
+    @cached_property
+    def train(self) -> Problem:
+        """The runs that models are fitted to."""
+        found = self.make(ROLES[0])
+        assert found is not None
+        return found
+
+    @cached_property
+    def holdout(self) -> Problem | None:
+        """The runs that models are judged on, None where none is held out."""
+        return self.make(ROLES[1])
+
+    @property
+    def pair(self) -> tuple[Problem, Problem]:
+        """The runs of both roles, where some are held out."""
+        held_out = self.holdout
+        assert held_out is not None
+        return self.train, held_out
+
+    def problem_of(self, role: str) -> Problem | None:
+        """Return the runs of a role, None where no run is held out."""
+        return self.train if role == ROLES[0] else self.holdout
+
+
+@dataclass(frozen=True, eq=False)
+class Rig:
+    """The sites of a rig, by name.
+
+    Parameters
+    ----------
+    sites_for : callable
+        A model to the sites that it is held against. A building's depend on it: on its law, on
+        whether its storeys stay straight, and on a delay of the force that equilibrium asks for.
+    building : Building or None
+        What equilibrium is asked of; None on a bench.
+    notes : tuple of str
+        What weakens an identification on this rig, in sentences.
+    """
+
+    sites_for: Callable[[Model], dict[str, Site]] = field(repr=False)
+    building: Building | None = None
+    notes: tuple[str, ...] = ()
+
+    def sites(self, model: Model) -> dict[str, Site]:
+        """Return the sites that a model is held against.
+
+        Raises
+        ------
+        StudyError
+            If an effect of the model acts at no site that these runs show.
+        """
+        foreign = [name for name in model.effects if EFFECTS[name].site == "structure"]
+        if foreign and self.building is None:
+            raise StudyError(f"{', '.join(foreign)}: of a structure, and on a bench there is none.")
+        found = self.sites_for(model)
+        lost = unassigned(model, list(found))
+        if lost:
+            raise StudyError(
+                f"{', '.join(lost)}: acts at no site that these runs show; they show "
+                f"{', '.join(found)}."
+            )
+        return found
+
+    def prepare(self, model: Model) -> None:
+        """Prepare all runs now, in place of where they are first asked for; raises as `sites`."""
+        for site in self.sites(model).values():
+            for role in ROLES:
+                site.problem_of(role)
+
+
+def bench_rig(
+    train: Sequence[Measurement], holdout: Sequence[Measurement], seeds: Seeds | None = None
+) -> Rig:
+    """Return the rig of a damper on a test bench: motion prescribed, force measured.
+
+    The motion is smoothed where a role's runs are first asked for.
+
+    Parameters
+    ----------
+    train, holdout : runs to fit to, and those held out, if any
+    seeds : of the draws of the motion's error
+    """
+    seeds = seeds or Seeds()
+    runs = {ROLES[0]: (train, seeds.train), ROLES[1]: (holdout, seeds.holdout)}
+
+    def problem(role: str) -> Problem | None:
+        measured, first = runs[role]
+        prepared = [prepare(one, seed=seeds.apart * k + first) for k, one in enumerate(measured)]
+        return Problem(prepared) if prepared else None
+
+    site = Site(DAMPER, problem)
+    notes: tuple[str, ...] = ()
+    if not any(run.has(channel) for run in (*train, *holdout) for channel in DRIVE):
+        notes = ("Neither voltage nor current was measured: the parameters hold at its level.",)
+    return Rig(lambda _model: {DAMPER: site}, notes=notes)
+
+
+def building_rig(
+    train: Sequence[Measurement], holdout: Sequence[Measurement], building: Building
+) -> Rig:
+    """Return the rig of a building with its damper: ground motion in, response out.
+
+    Parameters
+    ----------
+    train, holdout : runs to fit to, and those held out
+    building : its masses count everywhere; its stiffnesses and damping where a force that was not
+        measured is reconstructed
+
+    Raises
+    ------
+    RecordError
+        If a channel is missing, or the building has other levels than were measured.
+    """
+    found = responses([*train, *holdout], building)
+    notes: tuple[str, ...] = ()
+    if any(one.driven for one in found) and any(one.force is None for one in found):
+        notes = ("The damper's force was not measured: it is what equilibrium asks for.",)
+    return Rig(_BuildingSites(found, len(train), building), building, notes)
+
+
+class _BuildingSites:
+    """The sites of a building's responses by model, each kind made once."""
+
+    def __init__(self, found: list[Response], count: int, building: Building) -> None:
+        self._found, self._building = found, building
+        self._count = count  # the first ones are for training
+        self._made: dict[tuple[object, ...], dict[str, Site]] = {}
+
+    def __call__(self, model: Model) -> dict[str, Site]:
+        straight, late = linear_storeys(model.effects), lateness(model)
+        key = (model.law, straight, late)
+        if key not in self._made:
+            plain = self._sites(self._found, model.law, straight)
+            if late and "layer" in plain:  # equilibrium needs the force of the same instant
+                corrected = corrected_for_delay(self._found, model)[0]
+                right = self._sites(corrected, model.law, straight)
+                plain = {name: plain[name] if name == DAMPER else right[name] for name in plain}
+            self._made[key] = plain
+        return self._made[key]
+
+    def _sites(self, found: list[Response], law: str, straight: bool) -> dict[str, Site]:
+        problems = problems_of(
+            found[: self._count], found[self._count :], self._building, law, linear_storeys=straight
+        )
+        return {name: building_site(name, pair, law) for name, pair in problems.items()}
+
+
+def building_site(name: str, pair: tuple[StructureProblem, StructureProblem], law: str) -> Site:
+    """Return a site of a building from its runs of both roles."""
+    quantity = f"shear of storey {name.removeprefix('storey')}"
+    if name == DAMPER:
+        quantity = "reconstructed force" if pair[0].reconstructed else "force"
+    elif name == "layer":
+        quantity = "force of the isolation layer"
+    return Site(
+        name, lambda role: pair[ROLES.index(role)], quantity, shown=name, is_line=name != DAMPER,
+        any_law=not blind_at_rest(law),
+    )  # fmt: skip

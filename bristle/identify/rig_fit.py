@@ -1,0 +1,144 @@
+"""A model fitted to a rig at all its sites, and judged there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .assigned import at_site
+from .fit import Fit
+from .model import Model
+from .residuals import robust_z
+from .rig import DAMPER, ROLES, Rig, Site
+from .site_fit import fit_site, with_line
+from .table import error_rms, force_rms
+
+
+class SiteModel(NamedTuple):
+    """A site, and the part of a model that predicts its runs."""
+
+    site: Site
+    model: Model
+
+
+SiteModels = dict[str, SiteModel]
+"""What predicts a rig's runs, by site."""
+
+
+@dataclass(frozen=True)
+class RigFit:
+    """The fits by site."""
+
+    fits: dict[str, Fit]
+    sites: dict[str, Site]
+
+    def whole(self, model: Model) -> Fit:
+        """Return all sites' fits as one of the whole model; a storey's effect is the mean of all.
+
+        The mean counts each storey by its certainty. A line's own parameters are no part of it.
+        """
+        values, std, lost = dict(model.values), {}, list[str]()
+        damper = self.fits.get(DAMPER)
+        for name in dict.fromkeys(name for found in self.fits.values() for name in found.std):
+            told = [found for found in self.fits.values() if name in found.std]
+            if "." not in name and damper not in told:
+                continue
+            values[name], std[name] = _mean([(f.model.value(name), f.std[name]) for f in told])
+            lost += [name] if all(name in f.unidentified for f in told) else []
+        if damper is None:
+            lost = [*Model(model.law).free(), *lost]
+        else:
+            values.update({n: v for n, v in damper.model.values.items() if n not in std})
+            lost = list(dict.fromkeys([*damper.unidentified, *lost]))
+        return Fit(
+            replace(model, values=values), std, max(f.cost for f in self.fits.values()),
+            tuple(lost), starts=damper.starts if damper else 1,
+            agreed=damper.agreed if damper else 1,
+        )  # fmt: skip
+
+    def notes(self) -> list[str]:
+        """Return what was found of the lines, one sentence each."""
+        out = []
+        for name, found in self.fits.items():
+            if self.sites[name].is_line:
+                told = [
+                    f"{own} = {found.model.value(own):.5g} +- {1.96 * found.std[own]:.2g} {unit}"
+                    for own, unit in (("k", "N/m"), ("c", "N s/m")) if own in found.std
+                ]  # fmt: skip
+                out.append(f"{name}: " + ", ".join(told) + " (fitted along, not in model.toml).")
+        return out
+
+
+def _mean(told: list[tuple[float, float]]) -> tuple[float, float]:
+    """Return the mean of values with their standard deviations, and its own."""
+    if len(told) == 1:
+        return told[0]
+    weight = np.array([1.0 / max(std, 1e-300) ** 2 for _, std in told])
+    mean = float(np.dot(weight, [value for value, _ in told]) / weight.sum())
+    return mean, float(weight.sum() ** -0.5)
+
+
+def fit_rig(
+    rig: Rig, model: Model, starts: int = 4, also: Mapping[str, float] | None = None
+) -> RigFit:
+    """Fit a model to the training runs of a rig, the damper's law first.
+
+    Parameters
+    ----------
+    model : the damper's law with the effects of all sites
+    starts : how many starting points are tried for the damper's law
+    also : values in SI by name from which one more fit begins at each site; the better one counts
+
+    Raises
+    ------
+    StudyError, RecordError
+        If an effect acts at no site of the rig, or a run cannot be held against a model.
+    """
+    also = also or {}
+    sites = rig.sites(model)
+    fits: dict[str, Fit] = {}
+    if DAMPER in sites:
+        fits[DAMPER] = fit_site(model, sites[DAMPER], sites, starts, also)
+        # A delay of the force that was found moves what equilibrium leaves to the other sites.
+        model = replace(model, values={**model.values, **fits[DAMPER].model.values})
+        sites = rig.sites(model)
+    for name, site in sites.items():
+        if name != DAMPER:
+            fits[name] = fit_site(model, site, sites, starts, also)
+    return RigFit(fits, sites)
+
+
+def site_models(rig: Rig, model: Model) -> SiteModels:
+    """Return by site what predicts its runs: the model as it stands, with lines fitted.
+
+    Lines are fitted to the training runs; the values of effects stay.
+    """
+    sites = rig.sites(model)
+    found = {}
+    for name, site in sites.items():
+        own = at_site(model, name, sites)
+        found[name] = SiteModel(site, with_line(own, site) if site.is_line else own)
+    return found
+
+
+def errors_of(models: SiteModels, cutoff: float) -> dict[str, float]:
+    """Return z of the worst site, and the RMS error [N] of the forces of all sites together.
+
+    Both on training runs, and on held-out ones if there are any; the RMS after the low-pass at
+    `cutoff` [Hz]. `share` is that RMS over the RMS of all these forces.
+    """
+    out: dict[str, float] = {}
+    for role in ROLES:
+        each = [(model, site.problem_of(role)) for site, model in models.values()]
+        held = [(model, problem) for model, problem in each if problem is not None]
+        if not held:
+            continue
+        out[f"z_{role}"] = max(robust_z(problem, model) for model, problem in held)
+        squares = [error_rms(problem, model, cutoff) ** 2 for model, problem in held]
+        forces = [force_rms(problem.runs, cutoff) ** 2 for _, problem in held]
+        out[f"rms_{role}"] = float(np.sqrt(sum(squares)))
+        out[f"share_{role}"] = out[f"rms_{role}"] / float(np.sqrt(sum(forces)))
+    return out

@@ -1,0 +1,128 @@
+"""Fits at one site: the damper's law with its effects, or the line of a layer or storey with its.
+
+Effects of a structure join one by one, each searched from several starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ..physics.effect import EFFECTS
+from .assigned import at_site
+from .fit import Fit, fit, identify
+from .line import fit_line
+from .model import Model, Problem
+from .rig import Site
+from .search_context import refine
+from .start_grid import initial_guesses
+from .structure import StructureProblem, thinned
+
+QUICK = 8
+"""Sweeps of the first, short search from each start, on every fifth sample."""
+
+Values = Mapping[str, float]
+
+
+def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, also: Values) -> Fit:
+    """Return a model's part at one site fitted to its training runs.
+
+    Parameters
+    ----------
+    model : the damper's law with the effects of all sites
+    sites : all sites that the runs show
+    count : how many starting points are tried for the damper's law
+    also : values in SI by name from which one more fit begins; the better one counts
+    """
+    own = at_site(model, site.name, sites)
+    return _fit_line(own, site, also) if site.is_line else _fit_law(own, site, count, also)
+
+
+def _fit_law(own: Model, site: Site, count: int, also: Values) -> Fit:
+    """Return the damper's law fitted from several starts, and from the values in `also`."""
+    layer = [name for name in own.effects if EFFECTS[name].site == "structure"]
+    if not layer:
+        found = identify(
+            site.train, own.law, own.effects, count, values=own.values, held=own.held,
+            limits=own.limits,
+        )  # fmt: skip
+    else:  # of a reconstructed force the layer's effects are a part
+        first = replace(own, effects=tuple(name for name in own.effects if name not in layer))
+        found = _fit_grown(at_site(first, site.name, (site.name,)), own, layer, site)
+    if also:
+        known = {name: value for name, value in also.items() if _belongs(name, own)}
+        values = {**found.model.values, **known}
+        other = fit(site.train, replace(found.model, values=values))
+        if other.cost < found.cost:
+            found = replace(other, starts=found.starts, agreed=found.agreed)
+    return found
+
+
+def _fit_grown(bare: Model, own: Model, layer: list[str], site: Site) -> Fit:
+    """Return a law fitted without the layer's effects, which then join one by one."""
+    begun = fit_damper(site.train, bare)
+    grown = begun.model
+    for name in layer:
+        grown = joined(name, grown, _structure(site))
+    whole = refine(replace(grown, effects=own.effects, held=own.held), site.train)
+    return replace(fit(site.train, whole), starts=begun.starts, agreed=begun.agreed)
+
+
+def fit_damper(problem: Problem, present: Model) -> Fit:
+    """Return the damper's law fitted anew, with the effects that the model has already."""
+    effects = present.effects
+    known = {n: v for n, v in present.values.items() if n.partition(".")[0] in effects}
+    kept = {n: v for n, v in present.values.items() if n in present.held}
+    return identify(
+        problem, present.law, effects, values={**known, **kept}, held=present.held,
+        limits=present.limits,
+    )  # fmt: skip
+
+
+def _belongs(name: str, model: Model) -> bool:
+    effect, dot, _ = name.partition(".")
+    return effect in model.effects if dot else name in model.values
+
+
+def _fit_line(own: Model, site: Site, also: Values) -> Fit:
+    """Return a layer's or storey's line fitted with its effects."""
+    train = _structure(site)
+    found = fit_line(train, own.law)
+    if not own.effects:
+        return found
+    grown = replace(found.model, held=own.held, limits=own.limits)
+    for name in own.effects:
+        grown = joined(name, grown, train)
+    tried = [replace(grown, held=own.held, limits=own.limits)]
+    for values in (own.values, {n: v for n, v in also.items() if _belongs(n, own) and "." in n}):
+        if values:
+            tried.append(replace(tried[0], values={**grown.values, **values}))
+    return min((fit(train, model) for model in tried), key=lambda one: one.cost)
+
+
+def with_line(own: Model, site: Site) -> Model:
+    """Return a model's part at a line's site with its line fitted, its effects as they stand."""
+    train = _structure(site)
+    line = fit_line(train, own.law).model.values
+    held = tuple(name for name in own.values if "." in name)
+    own = replace(own, values={**line, **own.values}, held=held)
+    return fit(train, own, with_std=False).model if own.effects else own
+
+
+def _structure(site: Site) -> StructureProblem:
+    problem = site.train
+    assert isinstance(problem, StructureProblem)
+    return problem
+
+
+def joined(effect: str, base: Model, train: StructureProblem) -> Model:
+    """Return a model fitted with one more effect of the structure, the best of several starts."""
+    few = thinned(train)
+    light = few.expectation(base)
+    begun = [
+        fit(few, model, expectation=light, max_evaluations=QUICK, with_std=False)
+        for model in initial_guesses(effect, base, train)
+    ]
+    best = min(begun, key=lambda one: one.cost).model
+    expected = train.expectation(base)
+    return fit(train, best, expectation=expected, max_evaluations=25, with_std=False).model

@@ -1,0 +1,63 @@
+"""What the class data of an effect must be for a search to begin from and a verdict to rest on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from ..errors import PhysicsError
+
+if TYPE_CHECKING:
+    from .effect import Effect
+
+LAW_PARTS = ("yield", "viscous")
+"""Parts of a damper's law that may take up what an effect of the structure does."""
+
+MIMICKED = ("force_bias", "late_drive")
+"""Faults of a sensor that an effect may look like: the force's zero, a drive on record late."""
+
+
+def check_search(effect: type[Effect], where: str) -> None:
+    """Refuse starts that a search could not begin from."""
+    grids: list[tuple[str, Mapping[str, tuple[float, ...]]]] = [
+        ("start_grid", effect.start_grid),
+        ("start_limits", effect.start_limits),
+    ]
+    grids += [("start_shares", grid) for grid in effect.start_shares]
+    grids += [("start_ties", dict.fromkeys(effect.start_ties, (0.0,)))]
+    for field, grid in grids:
+        unknown = [name for name in grid if name not in effect.parameters]
+        if unknown:
+            raise PhysicsError(
+                f"{where}: {field} names {unknown}; its parameters are {list(effect.parameters)}."
+            )
+        if not all(isinstance(values, tuple) and values for values in grid.values()):
+            raise PhysicsError(f"{where}: {field} holds a tuple of numbers for each parameter.")
+    if effect.start_grid and effect.start_shares:
+        raise PhysicsError(f"{where}: start_grid or start_shares is right, not both.")
+    for name, limits in effect.start_limits.items():
+        if len(limits) != 2 or not limits[0] < limits[1]:
+            raise PhysicsError(f"{where}: start_limits of {name} = {limits}; low, high is right.")
+    if bool(effect.start_ties) != hasattr(effect, "tie"):
+        raise PhysicsError(f"{where}: start_ties and a static method tie(p, sizes) go together.")
+
+
+def check_verdict(effect: type[Effect], where: str) -> None:
+    """Refuse class data that a verdict could not be made from."""
+    for field, given, known in (
+        ("mimics", effect.mimics, MIMICKED),
+        ("absorbed_by", [effect.absorbed_by] if effect.absorbed_by else [], LAW_PARTS),
+    ):
+        wrong = [one for one in given if one not in known]
+        if wrong:
+            raise PhysicsError(f"{where}: {field} names {wrong}; there are {list(known)}.")
+    for field, name, unit in (("offset", effect.offset, "N"), ("mass", effect.mass, "kg")):
+        if name and (name not in effect.parameters or effect.parameters[name].unit != unit):
+            raise PhysicsError(f"{where}: {field} = {name!r}; a parameter in {unit} is right.")
+    others = [parameter for name, parameter in effect.parameters.items() if name != effect.offset]
+    if effect.offset and not all(p.bounds[0] <= 0.0 <= p.bounds[1] for p in others):
+        raise PhysicsError(f"{where}: offset asks that all other parameters may be zero.")
+    if effect.faults and effect.site != "sensor":
+        raise PhysicsError(f"{where}: faults are those of a sensor's effect.")
+    if not all(isinstance(why, str) and why for why in effect.lookalikes.values()):
+        raise PhysicsError(f"{where}: lookalikes holds a sentence for each.")

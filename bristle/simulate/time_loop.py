@@ -1,0 +1,339 @@
+"""The time loop of the coupled system: written in plain Python, compiled by `jit`.
+
+In each substep the structures take their exact linear step and the dampers theirs, with the smooth
+forces linear in time and friction held at its new value. The forces at the end are extrapolated
+from the last substeps, and corrected until motion and forces agree. Friction that sticks takes
+whatever value brings the motion to rest, up to its limit (Moreau's time stepping: Moreau 1988, in
+Nonsmooth Mechanics and Applications, CISM 302).
+
+What components do is what their FMUs do (`bristle.component`); here is what couples them. All
+signals of the scenario stand in one vector `s`; each component is a record (see `records`) that
+holds its numbers, the slots of its inputs in `s`, and the first of its outputs.
+"""
+
+from __future__ import annotations
+
+from math import floor, inf, isfinite
+
+from ..component import clock, controller, damper, sensors, source, structure
+from ..component.damper import (
+    FORCE,
+    FRICTION,
+    HOLDING_FORCE,
+    LAST_STEP,
+    VOLTAGE,
+    VOLTAGE_AT_END,
+)
+from ..component.structure import DAMPER_FORCE, EXTRA_FORCE
+from ..control.switching import limited
+from ..physics.inputs import Setup
+from ..physics.laws import laws_of
+
+ROUNDING = clock.ROUNDING
+DamperConstants, StructureConstants = damper.Constants, structure.Constants
+ControllerConstants, SensorConstants = controller.Constants, sensors.Constants
+SourceConstants = source.Constants
+damper_start, damper_step, damper_output = damper.start, damper.step, damper.output
+damper_remember = damper.remember
+structure_step, structure_output = structure.step, structure.output
+settle, show_motion = structure.settle, structure.show_motion
+controller_start, controller_step = controller.start, controller.step
+sensors_start, sensors_step = sensors.start, sensors.step
+source_output = source.output
+
+TOLERANCE = 1e-6
+"""Disagreement of a force, as a share of the largest force so far, at which sweeps end."""
+
+MAX_SWEEPS = 40
+
+INLINE = (
+    *("time_loop.play", "time_loop.start", "time_loop.begin", "time_loop.move"),
+    *("time_loop.correct", "time_loop.accept", "time_loop.gather"),
+    *("time_loop.damper_constants", "time_loop.structure_constants"),
+    *("damper.step", "damper.stick_force", "damper.step_law", "switching.limited"),
+    *("structure.step", "structure.settle", "structure.output", "structure.show_motion"),
+    *("structure.free_step", "structure.add_force", "structure.copy"),
+    *("controller.step", "controller.sample", "sensors.step"),
+    *("codegen.step_law", "falling.falling"),
+    *(
+        f"{hook.__module__.rpartition('.')[2]}.{hook.__qualname__}"
+        for law in laws_of("damper")
+        for hook in law.hooks().values()
+    ),
+)
+"""What becomes part of its caller: it is short or has one caller. Saves time, twice."""
+
+
+def integrate(
+    rows, substeps, h, sources, times, samples, dampers, structures, sampled, constants, memory,
+    s, outputs, table
+):  # fmt: skip
+    """Fill `table` (rows + 1, m) with the signals `outputs` (m,), one row per `substeps` of h [s].
+
+    `sources`, `dampers`, `structures`, `sampled` are arrays of records (see `records`), `times` and
+    `samples` the samples of all sources one after another, `constants` and `memory` what sampled
+    components compute with, `s` the signals with their start values.
+
+    Returns
+    -------
+    tuple of int
+        How many rows are filled, the last of them perhaps with values that are not finite; the
+        damper whose force and motion did not agree, which ends the loop before the next row (-1:
+        none); the number of sweeps.
+    """
+    scale, sweeps = 1e-9, 0
+    play(sources, times, samples, 0.0, s)
+    start(dampers, structures, h, s)
+    sample(sampled, dampers, structures, 0, h, constants, memory, s)
+    for j in range(len(outputs)):
+        table[0, j] = s[outputs[j]]
+    for row in range(rows):
+        for k in range(substeps):
+            at = row * substeps + k + 1
+            begin(dampers, structures, s)
+            play(sources, times, samples, at * h, s)
+            sweep, change = 0, inf
+            while change > TOLERANCE * scale and sweep < MAX_SWEEPS:
+                for i in range(len(structures)):
+                    move(structures[i], (at * h - h, h, sweep), s)
+                change = 0.0
+                for i in range(len(dampers)):
+                    change = max(change, correct(dampers[i], (at * h - h, h, sweep), s))
+                    scale = max(scale, abs(dampers[i].found))
+                sweep += 1
+            sweeps += sweep
+            if change > TOLERANCE * scale:
+                worst = 0
+                for i in range(len(dampers)):
+                    worst = i if abs(dampers[i].excess) == change else worst
+                return row + 1, worst, sweeps
+            accept(dampers, structures, s)
+            sample(sampled, dampers, structures, at, h, constants, memory, s)
+        for i in range(len(structures)):
+            show(structures[i], structures[i].state, s)
+        total = 0.0
+        for j in range(len(outputs)):
+            table[row + 1, j] = s[outputs[j]]
+            total += s[outputs[j]]
+        if not isfinite(total):
+            return row + 2, -1, sweeps
+    return rows + 1, -1, sweeps
+
+
+def play(sources, times, samples, t, s):
+    """Write what the sources give at time t [s] into the signals."""
+    for i in range(len(sources)):
+        g = sources[i]
+        c = SourceConstants(
+            g.kind, g.p[:], times[g.begin : g.end], samples[g.begin : g.end], g.scale, g.delay,
+            g.rated,
+        )  # fmt: skip
+        shown = s[g.first :]
+        source_output(t, shown, c, shown, shown, shown)
+
+
+def start(dampers, structures, h, s):
+    """Settle the signals at the begin: accelerations and forces may follow each other."""
+    for _ in range(3):
+        for i in range(len(structures)):
+            b = structures[i]
+            show_motion(structure_constants(b), b.state[:], s[b.first :])
+            show(b, b.state, s)
+        for i in range(len(dampers)):
+            d = dampers[i]
+            gather(d.inputs, s, d.now)
+            if d.on_structure >= 0:
+                d.now[HOLDING_FORCE] = s[structures[d.on_structure].holding] / d.sharing
+            c, state = damper_constants(d), d.state[:]
+            damper_start(0.0, d.now[:], c, state, s[d.first :], d.work[:])
+            state[LAST_STEP] = h
+            d.smooth = d.smooth_1 = d.smooth_2 = s[d.first + FORCE]
+            s[d.first + FRICTION] = 0.0
+
+
+def begin(dampers, structures, s):
+    """Keep what a substep begins from, and extrapolate the forces to its end."""
+    for i in range(len(structures)):
+        b = structures[i]
+        gather(b.inputs, s, b.before)
+        b.smooth0 = (
+            b.before[DAMPER_FORCE] + b.before[EXTRA_FORCE] - s[b.friction] - s[b.extra_friction]
+        )
+    for i in range(len(dampers)):
+        d = dampers[i]
+        gather(d.inputs, s, d.before)
+        s[d.first + FORCE] = 3.0 * (d.smooth - d.smooth_1) + d.smooth_2 + s[d.first + FRICTION]
+        d.smooth_2, d.smooth_1 = d.smooth_1, d.smooth
+
+
+def move(b, clock, s):
+    """Take a structure to the end of the substep under the forces of the present sweep."""
+    gather(b.inputs, s, b.now)
+    b.before[DAMPER_FORCE] = b.smooth0 + s[b.friction] + s[b.extra_friction]
+    b.before[EXTRA_FORCE] = 0.0
+    structure_step(
+        clock, b.before[:], b.now[:], structure_constants(b), b.state[0 : b.n_states],
+        b.new_state[0 : b.n_states], s[b.first :], b.work[:],
+    )  # fmt: skip
+    if b.followed:
+        show(b, b.new_state, s)
+
+
+def correct(d, clock, s):
+    """Take a damper to the end of the substep and correct its force; return its disagreement [N].
+
+    The correction is the secant's, from the second sweep on and while friction stays: a plain
+    exchange of forces converges slowly, or not at all, where a damper is stiff or has inertia.
+    """
+    shown = s[d.first :]
+    tried, friction = shown[FORCE], shown[FRICTION]
+    gather(d.inputs, s, d.now)
+    d.now[HOLDING_FORCE] = tried  # under it the level has the velocity that the damper feels
+    damper_step(
+        clock, d.before[:], d.now[:], damper_constants(d), d.state[:],
+        d.new_state[:], shown, d.work[:],
+    )  # fmt: skip
+    d.found = shown[FORCE]
+    excess, slope = d.found - tried, -1.0
+    if clock[2] > 0 and tried != d.tried and shown[FRICTION] == friction:
+        slope = min((excess - d.excess) / (tried - d.tried), -0.5)
+    d.tried, d.excess = tried, excess
+    shown[FORCE] = tried - excess / slope
+    return abs(excess)
+
+
+def accept(dampers, structures, s):
+    """Accept a substep."""
+    for i in range(len(structures)):
+        b = structures[i]
+        for j in range(b.n_states):
+            b.state[j] = b.new_state[j]
+    for i in range(len(dampers)):
+        d = dampers[i]
+        for j in range(len(d.state)):
+            d.state[j] = d.new_state[j]
+        s[d.first + FORCE] = d.found
+        d.smooth = d.found - s[d.first + FRICTION]
+
+
+def idle(sampled, dampers, structures, at, h, constants, memory, s):
+    """Do nothing, in place of `sample` where nothing has a clock: the loop compiles sooner."""
+
+
+def sample(sampled, dampers, structures, at, h, constants, memory, s):
+    """Let the components act whose instant substep `at` reaches; the forces follow.
+
+    Components measure the motion and the dampers' forces with the voltages before, in the order of
+    the scenario.
+    """
+    some = False
+    for i in range(len(sampled)):
+        c = sampled[i]
+        some = some or not c.aligned or floor(at * h / c.period + ROUNDING) >= c.coming
+    if not some:
+        return
+    for i in range(len(structures)):
+        show(structures[i], structures[i].state, s)
+    for i in range(len(sampled)):
+        c = sampled[i]
+        gather(c.inputs, s, c.now)
+        if c.senses:
+            take_readings(c, at, h, constants, memory, s)
+        else:
+            take_command(c, at, h, constants, memory, s)
+        c.coming = floor(at * h / c.period + ROUNDING) + 1
+        for j in range(len(c.inputs)):
+            c.before[j] = c.now[j]
+    respond(dampers, structures, s)
+
+
+def take_command(c, at, h, constants, memory, s):
+    """Let a controller act at the end of substep `at` (0: the begin)."""
+    n, size = c.n, c.rows * c.n
+    law = ControllerConstants(
+        c.kind, c.period, c.v_max, c.velocity_corner, n, c.rows, c.v_top,
+        constants[c.A : c.A + size * n], constants[c.B : c.B + size],
+        constants[c.W : c.W + size], constants[c.C : c.C + size], c.f_min, c.anti_windup, c.law,
+        c.p[:], c.still, c.least_slope, c.gain, c.integral_corner,
+    )  # fmt: skip
+    state, work = memory[c.state : c.work], memory[c.work : c.end]
+    if at == 0:
+        controller_start(0.0, c.now[:], law, state, s[c.first :], work)
+    else:
+        span = (at * h - h, h, 0)
+        controller_step(span, c.before[:], c.now[:], law, state, state, s[c.first :], work)
+
+
+def take_readings(c, at, h, constants, memory, s):
+    """Let sensors act at the end of substep `at` (0: the begin)."""
+    law = SensorConstants(
+        c.period, c.seed, c.size, c.gains[:], c.biases[:], c.deviation[:], c.quantisation[:],
+        c.corner[:], c.share[:], c.length[:], c.ring[:],
+    )  # fmt: skip
+    state, work = memory[c.state : c.work], memory[c.work : c.end]
+    if at == 0:
+        sensors_start(0.0, c.now[:], law, state, s[c.first :], work)
+    else:
+        span = (at * h - h, h, 0)
+        sensors_step(span, c.before[:], c.now[:], law, state, state, s[c.first :], work)
+
+
+def respond(dampers, structures, s):
+    """Let the forces of dampers follow voltages that have jumped, the motion held.
+
+    Where a damper is given the acceleration, force and acceleration follow each other as in
+    `start`. The forces are extrapolated from here with the slope that they had.
+    """
+    for k in range(3):
+        again = False
+        for i in range(len(dampers)):
+            d = dampers[i]
+            gather(d.inputs, s, d.now)
+            if k == 0:
+                d.jumps = limited(d.now[VOLTAGE], 0.0, d.v_max) != d.state[VOLTAGE_AT_END]
+            if not d.jumps:
+                continue
+            again = again or d.measured
+            shown, state = s[d.first :], d.state[:]
+            d.now[HOLDING_FORCE] = shown[FORCE]
+            c = damper_constants(d)
+            damper_output(0.0, d.now[:], c, state, shown, d.work[:])
+            damper_remember(d.now[:], c, state, shown)
+            jump = shown[FORCE] - shown[FRICTION] - d.smooth
+            d.smooth += jump
+            d.smooth_1 += jump
+            d.smooth_2 += jump
+        if not again:
+            break
+        for i in range(len(structures)):
+            show(structures[i], structures[i].state, s)
+
+
+def show(b, state, s):
+    """Write accelerations and holding force of a structure in a state into the signals."""
+    gather(b.inputs, s, b.now)
+    c, now = structure_constants(b), state[0 : b.n_states]
+    settle(c, now, b.work[:])
+    structure_output(0.0, b.now[:], c, now, s[b.first :], b.work[:])
+
+
+def gather(slots, s, values):
+    """Read a component's inputs from the signals."""
+    for j in range(len(slots)):
+        values[j] = s[slots[j]]
+
+
+def damper_constants(d):
+    """Return what a damper's functions compute with."""
+    law = Setup(
+        d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.n_own, d.signed, d.active
+    )
+    return DamperConstants(law, d.v_max, d.stroke, d.moving_mass, d.measured, True)
+
+
+def structure_constants(b):
+    """Return what a structure's functions compute with."""
+    return StructureConstants(
+        b.n, b.isolated, b.mass, b.m_inverse[:], b.damping[:], b.stiffness[:], b.stiffnesses[:],
+        b.p[:], b.on[:], b.active, b.touches, True, 1, b.h, b.phi[:], b.held[:], b.ramp[:],
+    )  # fmt: skip

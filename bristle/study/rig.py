@@ -1,0 +1,35 @@
+"""The rig of a study: what its settings say was measured, as sites.
+
+Here alone a study's `rig` decides; identification, comparison and diagnosis ask the rig.
+"""
+
+from __future__ import annotations
+
+from ..data.model import StudyModel
+from ..identify.rig import Rig, bench_rig, building_rig
+from ..physics.building import Building, paper_building, read_building
+from .study import Runs, Study
+
+
+def rig_of(study: Study, model: StudyModel, runs: Runs) -> Rig:
+    """Return the rig of a study with its runs.
+
+    Raises
+    ------
+    RecordError
+        If a building lacks a channel, or has other levels than were measured.
+    """
+    building = building_of(study, model)
+    if building is None:
+        return bench_rig(runs.train, runs.holdout)
+    return building_rig(runs.train, runs.holdout, building)
+
+
+def building_of(study: Study, model: StudyModel) -> Building | None:
+    """Return the building of a study: its file, or the paper's where it names none.
+
+    None where the damper was measured on a test bench.
+    """
+    if not study.settings.has_building:
+        return None
+    return read_building(study.folder / model.building) if model.building else paper_building()

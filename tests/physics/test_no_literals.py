@@ -1,0 +1,74 @@
+"""No text in the package selects an effect or a law by name: class data of its own file does."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from bristle.physics.damper import LAWS
+from bristle.physics.effect import EFFECTS
+
+PACKAGE = Path(__file__).resolve().parents[2] / "bristle"
+EXEMPT = ("physics", "paper")
+"""Where laws and effects are at home, and where a published model is rebuilt by name."""
+
+KINDS = {"effects": EFFECTS, "laws": LAWS}
+ELSEWHERE = {
+    ("data/checks/motion.py", "delay"): "a kind of finding: a channel that comes late",
+    ("diagnose/corrected.py", "delay"): "a kind of sensor fault",
+    ("diagnose/load_cell.py", "delay"): "a kind of sensor fault",
+    ("diagnose/model_based_faults.py", "delay"): "a kind of sensor fault",
+    ("diagnose/sensors.py", "delay"): "a kind of sensor fault",
+    ("diagnose/equilibrium.py", "delay"): "a kind of sensor fault",
+    ("simulate/layout.py", "delay"): "a field of the engine's record: a sensor's parameter",
+    ("simulate/system.py", "delay"): "a field of the engine's record: a sensor's parameter",
+}
+"""Files in which such a word means something else, and what."""
+
+
+def literals(text: str) -> Iterator[tuple[int, str]]:
+    """Yield line and name of each string that is one, or the begin of a parameter's full name."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            name, dot, rest = node.value.partition(".")
+            if name.isidentifier() and (not dot or not rest or rest.isidentifier()):
+                yield node.lineno, name
+
+
+def selections(names: set[str]) -> list[tuple[str, int, str]]:
+    """Return file, line and name of all strings in the package that are one of these names."""
+    return [
+        (path.relative_to(PACKAGE).as_posix(), line, name)
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if path.relative_to(PACKAGE).parts[0] not in EXEMPT
+        for line, name in literals(path.read_text(encoding="utf-8"))
+        if name in names
+    ]
+
+
+@pytest.mark.parametrize("kind", ["effects"])
+def test_no_literal_selects_by_name(kind: str) -> None:
+    found = selections(set(KINDS[kind]))
+    assert not [place for place in found if (place[0], place[2]) not in ELSEWHERE]
+
+
+def test_every_exemption_is_needed() -> None:
+    found = {(file, name) for file, _, name in selections(set(EFFECTS))}
+    assert set(ELSEWHERE) <= found
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ('x = "delay"', ["delay"]),
+        ('x = {"delay.time": 1.0}', ["delay"]),
+        ('x = name.startswith("delay.")', ["delay"]),
+        ('x = f"delay.{name}"', ["delay"]),
+        ('"""A delay. It is late."""', []),
+    ],
+)
+def test_a_name_is_seen_in_each_way_of_writing_it(text: str, names: list[str]) -> None:
+    assert [name for _, name in literals(text)] == names
