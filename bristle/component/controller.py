@@ -18,6 +18,7 @@ from ..control.sensing import (
     skyhook_switch,
 )
 from ..control.switching import applied_signed, clipped_voltage, signed_voltage
+from ..physics import damper
 from ..physics.linear import Row
 from .clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
 
@@ -29,8 +30,8 @@ CLIPPED, INVERSE, SIGNED, CLIPPED_LQG, SKYHOOK_SWITCH, SKYHOOK_INVERSE = range(6
 
 REMEMBERED = 6
 LOW, X_BEFORE, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, -2)
-"""What the state holds behind that of the state-space law and the estimated states of the inverted
-law, before `ORIGIN` and `COMING`."""
+"""What the state holds behind that of the state-space law and the states of the damper's law that
+is inverted, as the controller estimates them; before `ORIGIN` and `COMING`."""
 
 
 class Constants(NamedTuple):
@@ -38,9 +39,8 @@ class Constants(NamedTuple):
 
     `n`, `rows`, `v_top`, `A`, `B`, `W`, `C` are those of `control.controller.Controller`;
     `velocity_corner` [rad/s] is that of the low-passed displacement whose rate is the velocity, 0:
-    the velocity is measured; `law` and `p` say which damper's law is inverted, `estimated` how many
-    states of it are, `still` and `least_slope` how; `gain` and `integral_corner` [rad/s] belong to
-    skyhook.
+    the velocity is measured; `law` and `p` say which damper's law is inverted, `still` and
+    `least_slope` how; `gain` and `integral_corner` [rad/s] belong to skyhook.
     """
 
     kind: int
@@ -57,7 +57,6 @@ class Constants(NamedTuple):
     f_min: float
     anti_windup: float
     law: int
-    estimated: int
     p: Row
     still: float
     least_slope: float
@@ -67,8 +66,8 @@ class Constants(NamedTuple):
 
 NOTHING: dict[str, Any] = {
     "velocity_corner": 0.0, "n": 0, "rows": 1, "v_top": 0.0, "A": [], "B": [], "W": [], "C": [],
-    "f_min": 0.0, "anti_windup": 0.0, "law": 0, "estimated": 0, "p": [], "still": 0.0,
-    "least_slope": 1.0, "gain": 0.0, "integral_corner": 0.0,
+    "f_min": 0.0, "anti_windup": 0.0, "law": 0, "p": [], "still": 0.0, "least_slope": 1.0,
+    "gain": 0.0, "integral_corner": 0.0,
 }  # fmt: skip
 """What a kind does not need."""
 
@@ -76,7 +75,7 @@ NOTHING: dict[str, Any] = {
 def setup(time: float, **values: Any) -> tuple[Constants, list[float], int]:
     """Return constants, state and size of work, given what differs from `NOTHING`."""
     c = Constants(**{**NOTHING, **values})
-    state = [0.0] * (c.n + c.estimated + REMEMBERED)
+    state = [0.0] * (c.n + damper.SLOTS.law_states + REMEMBERED)
     state[ORIGIN] = time
     return c, state, c.n + c.estimated + 4
 
@@ -156,15 +155,12 @@ def inverted(u: float, v: float, c: Constants, state: Row, spare: Row) -> tuple[
 
     Moves the estimated states of the law on.
     """
-    n, m = c.n, c.estimated
-    z = spare[n : n + m]
-    for i in range(m):
-        z[i] = state[n + i]
+    z = state[c.n : len(state) - REMEMBERED]
     voltage = voltage_of_law(c.law, c.p, u, v, z, c.still, c.least_slope, c.v_max)
     applied = force_of_law(c.law, c.p, v, voltage, z)
     estimate_states(c.law, c.p, v, voltage, c.period, z)
-    for i in range(m):
-        state[n + i] = z[i]
+    for i in range(len(z)):
+        state[c.n + i] = z[i]
     return voltage, applied
 
 

@@ -187,7 +187,6 @@ def inverse_law(slave: Slave) -> dict[str, Any]:
         raise ValueError(f"inverse {chosen!r} is neither {' nor '.join(names)}.")
     return {
         "law": law_code(chosen),
-        "estimated": len(LAWS[chosen].states),
         "p": [slave[f"{chosen}.{name}"] for name in LAWS[chosen].parameters],
         "still": slave["still"],
         "least_slope": slave["least_slope"],

@@ -274,9 +274,8 @@ def identify(
         for own in _parameters(effect)
     } | dict(values or {})
     model = Model(law, effects, given, held, dict(limits or {}))
-    silent = (
-        tuple(name for name in LAWS[law].driven() if name not in held) if steady(problem) else ()
-    )
+    driven = LAWS[law].driven() if steady(problem) else ()
+    silent = tuple(name for name in driven if name not in held)
     model = without(model, silent)
     trials = start_models(problem, model, starts)
     expected = problem.expectation(trials[0])

@@ -18,7 +18,6 @@ from .search_context import Expected, Search, residuals
 
 Array = NDArray[np.float64]
 
-
 RELAXED = ((0.3, 2.0), (0.05, 10.0))
 """Size and width, as factors, of the part of a law that falls with speed, where a start makes room
 for an effect of speed: a fit without it inflates that part."""

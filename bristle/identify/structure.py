@@ -187,8 +187,8 @@ def damper_run(
     """Return the damper's motion and force, measured or from equilibrium.
 
     Of the base's own equilibrium and the sum over all levels the one with less noise is taken; the
-    first needs the storey above to be linear (`linear_storeys`). For a law whose friction jumps
-    with direction samples at which the base may be held are left out.
+    first needs the storey above to be linear (`linear_storeys`). Where a law's friction jumps with
+    direction samples at which the base may be held are left out.
     """
     motion = (response.x[0], response.v[0], response.a[0] - response.ground, response.V)
     if response.force is not None:

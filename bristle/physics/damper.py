@@ -25,6 +25,8 @@ from .tuples import record
 SLOTS: Slots
 advance_law: Any = None
 evaluate: Any = None
+felt_voltage: Any = None
+hold_law: Any = None
 inner_motion: Any = None
 law_force: Any = None
 series_element: Any = None
@@ -34,6 +36,8 @@ step_law: Any = None
 _GENERATED = {
     "advance_law": source.advance_law_source,
     "evaluate": source.evaluate_source,
+    "felt_voltage": source.voltage_source,
+    "hold_law": source.hold_law_source,
     "inner_motion": source.motion_source,
     "law_force": source.law_force_source,
     "net_force": source.net_force_source,
@@ -51,8 +55,8 @@ def regenerate() -> None:
 
 
 hold(
-    globals(), "advance_law", "evaluate", "inner_motion", "law_force", "series_element",
-    "slip_length_factor", "step_law",
+    globals(), "advance_law", "evaluate", "felt_voltage", "hold_law", "inner_motion", "law_force",
+    "series_element", "slip_length_factor", "step_law",
 )  # fmt: skip
 regenerate()
 
@@ -83,8 +87,9 @@ def step(
     n_own = setup.n_own if setup.n_moving == 0 and speed < 0 else 0
     moved = work[2 * size : 3 * size]
     if n_own > 0:
-        xs, vs, _ = inner_motion(setup, begin, z0)
-        xe, ve, V = inner_motion(setup, end, z0)
+        xs, vs = inner_motion(setup, begin, z0)
+        xe, ve = inner_motion(setup, end, z0)
+        V = felt_voltage(setup, end, z0)
         inner = Inputs(
             0.5 * (xs + xe), 0.5 * (vs + ve), end.a, V, end.dt, end.energy, end.stick_force,
             end.sticks,
@@ -115,6 +120,16 @@ def step(
 def without_time(now: Inputs) -> Inputs:
     """Return the same inputs for a step in which no time goes by."""
     return Inputs(now.x, now.v, now.a, now.V, 0.0, now.energy, now.stick_force, now.sticks)
+
+
+def force_at(setup: Setup, now: Inputs, z: Row, work: Row) -> tuple[float, float]:
+    """Return force and friction [N] at a state, as `evaluate` does; nothing moves on.
+
+    `work` holds as many floats as `z`, or more.
+    """
+    if not setup.active:
+        return law_force(setup.law, setup.p, now, z)  # type: ignore[no-any-return]
+    return evaluate(setup, now, z, work, work)  # type: ignore[no-any-return]
 
 
 def jump(setup: Setup, now: Inputs, z: Row, work: Row) -> float:
@@ -259,7 +274,7 @@ class DamperModel:
         if self.active:
             force = step(self.setup, now, now, self.z, self._end, self._work)[0]
         else:
-            force = step_law(self.law, self.p, now, now, self.z, self._end)[0]
+            force = hold_law(self.law, self.p, now, self.z, self._end)[0]
         self.z, self._end = self._end, self.z
         return force
 

@@ -17,16 +17,29 @@ _ROD = ["    rod_x = x", "    rod_v = v"]
 
 
 def motion_source(slots: Slots) -> str:
-    """Return `inner_motion`: motion across the fluid and felt voltage, behind what changes them."""
+    """Return `inner_motion`: the motion across the fluid, behind what gives way."""
     q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
     lines = [
         "def inner_motion(setup, now, z):",
         "    p, on = setup.p, setup.on",
         _NOW,
         *_ROD,
-        *switched(slots, "voltage", "V = {call}", **q),
         *switched(slots, "motion", "x, v = {call}", **q),
-        "    return x, v, V",
+        "    return x, v",
+    ]
+    return "\n".join(lines)
+
+
+def voltage_source(slots: Slots) -> str:
+    """Return `felt_voltage`: the voltage that the fluid feels."""
+    q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
+    lines = [
+        "def felt_voltage(setup, now, z):",
+        "    p, on = setup.p, setup.on",
+        _NOW,
+        *_ROD,
+        *switched(slots, "voltage", "V = {call}", **q),
+        "    return V",
     ]
     return "\n".join(lines)
 
@@ -124,23 +137,29 @@ def law_force_source(slots: Slots) -> str:
 
 def step_law_source(slots: Slots) -> str:
     """Return `step_law`: a step of the law alone; force and friction at its end."""
+    middle = (
+        "m = record(Inputs, (0.5 * (begin.x + q.x), 0.5 * (begin.v + q.v), q.a, V, q.dt, q.energy, "
+        "halt, halts))"
+    )
+    return _law_steps(slots, "def step_law(law, p, begin, q, z, z1):", [middle])
 
+
+def hold_law_source(slots: Slots) -> str:
+    """Return `hold_law`: `step_law` with the inputs held over the step."""
+    return _law_steps(slots, "def hold_law(law, p, q, z, z1):", ["m = q"])
+
+
+def _law_steps(slots: Slots, head: str, middle: list[str]) -> str:
     def own(law: type[Law]) -> list[str]:
         lines = [f"k = {law_values(law)}"]
         if law.hook("advance") is not None:
-            lines += [
-                "if begin == q:",
-                "    m = q",
-                "else:",
-                "    m = record(Inputs, (0.5 * (begin.x + q.x), 0.5 * (begin.v + q.v), q.a, V, "
-                "q.dt, q.energy, halt, halts))",
-                f"{_targets(law, 'z1')} = {law.name}_advance(m, {law_state(law)}, k)",
-            ]
+            advanced = f"{law.name}_advance(m, {law_state(law)}, k)"
+            lines += [*middle, f"{_targets(law, 'z1')} = {advanced}"]
         lines += [f"s = {law_state(law).replace('z[', 'z1[')}", f"rest = {_forces(law, False)}"]
         return [*lines, *(_friction(f"{law.name}_limit(q, s, k)") if law.has("sign") else [])]
 
     lines = [
-        "def step_law(law, p, begin, q, z, z1):",
+        head,
         "    v, V, halt, halts = q.v, q.V, q.stick_force, q.sticks",
         "    friction = 0.0",
         "    rest = 0.0",

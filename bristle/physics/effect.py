@@ -316,12 +316,12 @@ def effects_of(site: str, law: str = "") -> tuple[type[Effect], ...]:
     )
 
 
+def laws_joined(effect: type[Effect]) -> tuple[str, ...]:
+    """Return the names of the laws that an effect of a damper can join; none for other sites."""
+    return tuple(law.name for law in laws_of("damper") if effect.joins(law))
+
+
 def instrument_of(channel: str, fault: str) -> str:
     """Return the sensor effect that is a kind of fault of a channel, "" if none is."""
     known = [e for e in effects_of("sensor") if e.shows == channel and fault in e.faults]
     return min(known, key=lambda effect: effect.own).name if known else ""
-
-
-def laws_joined(effect: type[Effect]) -> tuple[str, ...]:
-    """Return the names of the laws that an effect of a damper can join; none for other sites."""
-    return tuple(law.name for law in laws_of("damper") if effect.joins(law))

@@ -34,9 +34,9 @@ SETTLE = 5e-3
 
 net_force: Any = None
 advance_law: Any = None
-inner_motion: Any = None
+felt_voltage: Any = None
 slip_length_factor: Any = None
-hold(globals(), "net_force", "advance_law", "inner_motion", "slip_length_factor")
+hold(globals(), "net_force", "advance_law", "felt_voltage", "slip_length_factor")
 
 
 class Balance(NamedTuple):
@@ -78,7 +78,7 @@ def advance_series(
         z[deflection] += 0.5 * h * (v0 - was + now.v - found)
         z[speed] = found
         if setup.n_own > 0:
-            _, _, V = inner_motion(setup, now, z)
+            V = felt_voltage(setup, now, z)
             middle = Inputs(
                 now.x - z[deflection], 0.5 * (was + found), now.a, V, h, now.energy, 0.0, False
             )

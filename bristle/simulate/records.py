@@ -79,7 +79,7 @@ def structure_record() -> np.dtype[np.void]:
     without friction at the begin. It is `followed` by a component that reads more than its motion.
     """
     n = LEVELS
-    slots_of_effects = structure.SLOTS
+    lay = structure.SLOTS
     states = 3 * n + 1 + structure.state_size(n)
     slots = ("first", "friction", "extra_friction", "holding")
     return np.dtype(
@@ -115,8 +115,11 @@ def sampled_record() -> np.dtype[np.void]:
     own = ("gains", "biases", "deviation", "quantisation", "corner", "share")
     return np.dtype(
         [
-            *((name, _INT) for name in ("kind", "n", "rows", "seed", "size", "coming", "first")),
-            *((name, _INT) for name in ("law", "estimated", *places)),
+            *(
+                (name, _INT)
+                for name in ("kind", "law", "n", "rows", "seed", "size", "coming", "first")
+            ),
+            *((name, _INT) for name in places),
             *((name, _FLOAT) for name in ("period", *numbers, "gain", "integral_corner")),
             *((name, _FLAG) for name in ("aligned", "senses")),
             *_inputs(m),

@@ -54,7 +54,7 @@ INLINE = (
     *("structure.step", "structure.settle", "structure.output", "structure.show_motion"),
     *("structure.free_step", "structure.add_force", "structure.copy"),
     *("controller.step", "controller.sample", "sensors.step"),
-    *("codegen.step_law", "codegen.law_force", "falling.falling"),
+    *("codegen.step_law", "falling.falling"),
     *(
         f"{hook.__module__.rpartition('.')[2]}.{hook.__qualname__}"
         for law in laws_of("damper")
@@ -254,7 +254,7 @@ def take_command(c, at, h, constants, memory, s):
         c.kind, c.period, c.v_max, c.velocity_corner, n, c.rows, c.v_top,
         constants[c.A : c.A + size * n], constants[c.B : c.B + size],
         constants[c.W : c.W + size], constants[c.C : c.C + size], c.f_min, c.anti_windup, c.law,
-        c.estimated, c.p[:], c.still, c.least_slope, c.gain, c.integral_corner,
+        c.p[:], c.still, c.least_slope, c.gain, c.integral_corner,
     )  # fmt: skip
     state, work = memory[c.state : c.work], memory[c.work : c.end]
     if at == 0:
@@ -325,10 +325,10 @@ def gather(slots, s, values):
 
 def damper_constants(d):
     """Return what a damper's functions compute with."""
-    setup = Setup(
+    law = Setup(
         d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.n_own, d.signed, d.active
     )
-    return DamperConstants(setup, d.v_max, d.stroke, d.moving_mass, d.measured, True)
+    return DamperConstants(law, d.v_max, d.stroke, d.moving_mass, d.measured, True)
 
 
 def structure_constants(b):

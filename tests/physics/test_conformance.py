@@ -163,7 +163,7 @@ def test_its_hooks_are_pure_functions_in_order(effect: type[Effect]) -> None:
 def test_hooks_return_as_many_values_as_they_must(effect: type[Effect]) -> None:
     q = Q(*(0.01 * (i + 1) for i in range(len(Q._fields))))
     z = effect.State(*(0.001 for _ in effect.states))
-    p = effect.Values(*(parameter.value for parameter in effect.parameters.values()))
+    p = effect.values_of({})
     counts = {"rate": len(effect.states), "advance": len(effect.states), "motion": 2}
     for hook, function in effect.hooks().items():
         returned = function(q, z, p)
