@@ -77,7 +77,7 @@ def setup(time: float, **values: Any) -> tuple[Constants, list[float], int]:
     c = Constants(**{**NOTHING, **values})
     state = [0.0] * (c.n + damper.SLOTS.law_states + REMEMBERED)
     state[ORIGIN] = time
-    return c, state, c.n + c.estimated + 4
+    return c, state, c.n + 4
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
@@ -100,8 +100,7 @@ def step(
     code = step_code(dt, c.period, last - coming)
     if code < 0:
         return code
-    room = c.n + c.estimated
-    measured = work[room : room + 4]
+    measured = work[c.n : c.n + 4]
     for k in range(first_sample(time, c.period, origin, coming), last + 1):
         measure(origin + k * c.period - time, dt, c.period, before, now, measured)
         sample(k, measured, c, new_state, outputs, work)
@@ -125,7 +124,7 @@ def sample(k: int, measured: Row, c: Constants, state: Row, outputs: Row, spare:
         state[LOW], state[X_BEFORE] = low, x
         v = filtered_velocity(low, x, c.velocity_corner)
     if c.kind >= SKYHOOK_SWITCH:
-        voltage, u = skyhook(y, v, c, state, spare)
+        voltage, u = skyhook(y, v, c, state)
     else:
         voltage, u = designed(y, v, measured[DAMPER_FORCE], c, state, spare)
     outputs[VOLTAGE], outputs[COMMAND_RAW], outputs[SCHEDULING] = voltage, u, v
@@ -138,7 +137,7 @@ def designed(
     row = table_row(v, c.v_top, c.rows) if c.rows > 1 else 0
     u = command(c.n, c.C, row, state)
     if c.kind == INVERSE:
-        voltage, applied = inverted(u, v, c, state, spare)
+        voltage, applied = inverted(u, v, c, state)
         second = c.anti_windup * (applied - u)
     elif c.kind == SIGNED:
         voltage = signed_voltage(u, v, c.v_max)
@@ -150,7 +149,7 @@ def designed(
     return voltage, u
 
 
-def inverted(u: float, v: float, c: Constants, state: Row, spare: Row) -> tuple[float, float]:
+def inverted(u: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
     """Return the voltage [V] of the commanded force and the force [N] that it gives by the law.
 
     Moves the estimated states of the law on.
@@ -164,7 +163,7 @@ def inverted(u: float, v: float, c: Constants, state: Row, spare: Row) -> tuple[
     return voltage, applied
 
 
-def skyhook(y: float, v: float, c: Constants, state: Row, spare: Row) -> tuple[float, float]:
+def skyhook(y: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
     """Return voltage [V] and command [N] of the skyhook law, and move its integral on."""
     total, before = state[ABSOLUTE], state[Y_BEFORE]
     absolute = leaky_integral(total, before, y, c.integral_corner, c.period)
@@ -172,4 +171,4 @@ def skyhook(y: float, v: float, c: Constants, state: Row, spare: Row) -> tuple[f
     u = skyhook_command(absolute, c.gain)
     if c.kind == SKYHOOK_SWITCH:
         return skyhook_switch(absolute, v, c.v_max), u
-    return inverted(u, v, c, state, spare)[0], u
+    return inverted(u, v, c, state)[0], u

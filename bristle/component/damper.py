@@ -13,6 +13,9 @@ from ..physics.inputs import Inputs, Setup
 from ..physics.linear import Row
 from ..physics.tuples import record
 
+hold_law: Any = None
+hold(globals(), "hold_law")
+
 DISPLACEMENT, VELOCITY, VOLTAGE, HOLDING_FORCE, ACCELERATION = range(5)
 FORCE, DISSIPATED_ENERGY, STROKE_RATIO, FRICTION = range(4)
 """Outputs; friction, the part of the force that is, is hidden."""
@@ -25,20 +28,15 @@ SATURATED = 1
 """The voltage left its limits."""
 
 
-hold_law: Any = None
-hold(globals(), "hold_law")
-
-
 class Constants(NamedTuple):
     """What a damper computes with.
 
-    `law` is its law and effects as `physics.damper.step` takes them.
-    `moving_mass` [kg] is what the holding force holds, 0: the law slides. The acceleration is
-    `measured`, or the difference of velocity over the step. Motion and voltage are `linear` over a
-    step, or held at their newest.
+    `setup` is that of law and effects. `moving_mass` [kg] is what the holding force holds, 0: the
+    law slides. The acceleration is `measured`, or the difference of velocity over the step. Motion
+    and voltage are `linear` over a step, or held at their newest.
     """
 
-    law: Setup
+    setup: Setup
     v_max: float
     stroke: float
     moving_mass: float
@@ -85,7 +83,7 @@ def present_force(
     sticks = c.moving_mass > 0.0 and (isfinite(dt) or v == 0.0)
     stick = stick_force(inputs[HOLDING_FORCE], v, c.moving_mass, dt) if sticks else 0.0
     now = record(Inputs, (x, v, a, V, dt, state[ENERGY], stick, sticks))
-    return force_at(c.law, now, state, work)
+    return force_at(c.setup, now, state, work)
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
@@ -124,24 +122,23 @@ def step(
     force0, energy = state[FORCE_AT_END], state[ENERGY]
     if state[VOLTAGE_AT_END] != V0:
         force0 = present_force(before, V0, a0, c, state, work)[0]
-    power0 = force0 * v0
     sticks = c.moving_mass > 0.0
     stick = stick_force(now[HOLDING_FORCE], v1, c.moving_mass, dt) if sticks else 0.0
     end = record(Inputs, (x1, v1, a1, V1, dt, energy, stick, sticks))
     if c.linear:
         begin = record(Inputs, (x0, v0, a0, V0, dt, energy, stick, sticks))
-        force, friction = law_step(c.law, begin, end, state, new_state, work)
-    elif c.law.active:
-        force, friction = law_step(c.law, end, end, state, new_state, work)
+        force, friction = law_step(c.setup, begin, end, state, new_state, work)
+    elif c.setup.active:
+        force, friction = law_step(c.setup, end, end, state, new_state, work)
     else:
-        force, friction = hold_law(c.law.law, c.law.p, end, state, new_state)
-    energy += 0.5 * dt * (power0 + force * v1)
+        force, friction = hold_law(c.setup.law, c.setup.p, end, state, new_state)
+    energy += 0.5 * dt * (force0 * v0 + force * v1)
     new_state[ENERGY], new_state[FORCE_AT_END] = energy, force
     new_state[ACCELERATION_AT_END], new_state[VOLTAGE_AT_END] = a1, V1
     new_state[LAST_STEP] = dt
     outputs[FORCE], outputs[FRICTION] = force, friction
     outputs[DISSIPATED_ENERGY], outputs[STROKE_RATIO] = energy, abs(x1) / c.stroke
-    if c.law.active and not c.linear:  # an effect may know the energy, which is a step older above
+    if c.setup.active and not c.linear:  # an effect may know the energy: above, that of before
         return output(clock[0] + dt, now, c, new_state, outputs, work)
     return SATURATED if now[VOLTAGE] != V1 else 0
 

@@ -116,7 +116,7 @@ def _compiled_law(step_law: Any) -> Callable[..., None]:
     from ..jit import compiled
 
     law_step = step_law
-    function: Callable[..., None] = compiled(law_history, ("step_law", "falling"))
+    function: Callable[..., None] = compiled(law_history, ("codegen.step_law", "falling.falling"))
     return function
 
 

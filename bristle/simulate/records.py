@@ -79,7 +79,7 @@ def structure_record() -> np.dtype[np.void]:
     without friction at the begin. It is `followed` by a component that reads more than its motion.
     """
     n = LEVELS
-    lay = structure.SLOTS
+    slots_of_effects = structure.SLOTS
     states = 3 * n + 1 + structure.state_size(n)
     slots = ("first", "friction", "extra_friction", "holding")
     return np.dtype(

@@ -152,13 +152,13 @@ class System:
         names = self.names["damper"]
         found = np.zeros(len(names), records.damper_record())
         pushed = [self._pushed_by(name) for name in names]
-        signs = [self.slaves[name].constants.law.signed for name in names]
+        signs = [self.slaves[name].constants.setup.signed for name in names]
         sticking = [i for i, signed in zip(pushed, signs, strict=True) if signed]
         for record, name, on in zip(found, names, pushed, strict=True):
             c, state = self.slaves[name].constants, self.slaves[name].state
-            _copy(record, c.law, ("law", "n_moving", "n_own", "active", "advances", "signed"))
+            _copy(record, c.setup, ("law", "n_moving", "n_own", "active", "advances", "signed"))
             _copy(record, c, ("v_max", "stroke"))
-            own = c.law
+            own = c.setup
             _fill(record, state=state, new_state=state, p=own.p, on=own.on, moving=own.moving)
             record["inputs"], record["first"] = self._inputs(name), self._first(name)
             given = (name, "acceleration") in self.source_of

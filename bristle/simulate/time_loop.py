@@ -325,10 +325,10 @@ def gather(slots, s, values):
 
 def damper_constants(d):
     """Return what a damper's functions compute with."""
-    law = Setup(
+    setup = Setup(
         d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.n_own, d.signed, d.active
     )
-    return DamperConstants(law, d.v_max, d.stroke, d.moving_mass, d.measured, True)
+    return DamperConstants(setup, d.v_max, d.stroke, d.moving_mass, d.measured, True)
 
 
 def structure_constants(b):

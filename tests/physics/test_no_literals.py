@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from bristle.physics.effect import EFFECTS
-from bristle.physics.laws import law_names
+from bristle.physics.laws import LAWS, law_names
 
 PACKAGE = Path(__file__).resolve().parents[2] / "bristle"
 EXEMPT = ("physics", "paper")
@@ -41,6 +41,13 @@ def literals(text: str) -> Iterator[tuple[int, str]]:
                 yield node.lineno, name
 
 
+def classes(text: str, names: set[str]) -> Iterator[tuple[int, str]]:
+    """Yield line and name of each use of a class by one of these names."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Name) and node.id in names:
+            yield node.lineno, node.id
+
+
 def selections(names: set[str]) -> list[tuple[str, int, str]]:
     """Return file, line and name of all strings in the package that are one of these names."""
     return [
@@ -56,6 +63,17 @@ def selections(names: set[str]) -> list[tuple[str, int, str]]:
 def test_no_literal_selects_by_name(kind: str) -> None:
     found = selections(KINDS[kind])
     assert not [place for place in found if (place[0], place[2]) not in ELSEWHERE]
+
+
+def test_no_class_of_a_law_or_effect_is_named() -> None:
+    own = {one.__name__ for one in (*EFFECTS.values(), *LAWS.values())}
+    found = [
+        (path.relative_to(PACKAGE).as_posix(), line, name)
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if path.relative_to(PACKAGE).parts[0] not in EXEMPT
+        for line, name in classes(path.read_text(encoding="utf-8"), own)
+    ]
+    assert not found
 
 
 def test_every_exemption_is_needed() -> None:
