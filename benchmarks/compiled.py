@@ -133,10 +133,12 @@ class _Ours:
     def run(self, h: float) -> float:
         """Run once from the start; return the seconds of the loop alone."""
         system = self.system
-        clocked = system.sampled(h)
-        arguments = (*system.arrays(h), *clocked, system.start_values(), self._slots, self._table)
+        arguments = (
+            system.sources(), system.coupled(h), system.sampled(h), system.start_values(),
+            self._slots, self._table,
+        )  # fmt: skip
         before = time.perf_counter()
-        filled, _, self.sweeps = self._loop(self.rows, self.substeps, h, *arguments)
+        filled, _, self.sweeps = self._loop((self.rows, self.substeps, h), *arguments)
         seconds = time.perf_counter() - before
         if filled <= self.rows:
             raise RuntimeError(f"the loop stopped at row {filled}")
@@ -183,7 +185,8 @@ class Peer:
 
     def run(self, h: float) -> float:
         """Run once from the start; return the seconds of the loop alone."""
-        sources, times, samples, dampers, structures = self.system.arrays(h)
+        sources, times, samples = self.system.sources()
+        dampers, structures = self.system.coupled(h)
         kept: list[np.ndarray] = []
 
         def address(values: Any) -> Any:

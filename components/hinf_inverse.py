@@ -16,5 +16,5 @@ class HinfInverse(LinearSlave):
         declare_anti_windup(self, 0.0)
         declare_inverse(self)
 
-    def law(self):
-        return {**super().law(), **inverse_law(self), "anti_windup": self.anti_windup}
+    def law_constants(self):
+        return {**super().law_constants(), **inverse_law(self), "anti_windup": self.anti_windup}

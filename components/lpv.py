@@ -16,5 +16,5 @@ class Lpv(LinearSlave):
         super().declare_law()
         declare_anti_windup(self, 200.0)
 
-    def law(self):
-        return {**super().law(), "anti_windup": self.anti_windup}
+    def law_constants(self):
+        return {**super().law_constants(), "anti_windup": self.anti_windup}

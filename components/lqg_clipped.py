@@ -15,5 +15,5 @@ class LqgClipped(LinearSlave):
         super().declare_law()
         declare_force_threshold(self)
 
-    def law(self):
-        return {**super().law(), "f_min": self.f_min}
+    def law_constants(self):
+        return {**super().law_constants(), "f_min": self.f_min}

@@ -18,7 +18,7 @@ class Skyhook(ControllerSlave):
         self.add_parameter("integral_corner", 0.2, "Hz", text, (1e-4, 1e4))
         declare_inverse(self)
 
-    def law(self):
+    def law_constants(self):
         kinds = {"switch": SKYHOOK_SWITCH, "inverse": SKYHOOK_INVERSE}
         if self.kind not in kinds:
             raise ValueError(f"kind {self.kind!r} is neither switch nor inverse.")

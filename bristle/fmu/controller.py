@@ -78,7 +78,7 @@ class ControllerSlave(SampledSlave):
     """A controller: the ports that all share, limits, and the velocity it works with.
 
     A component says by its `kind` which law `component.controller` runs, and gives its numbers in
-    `law`.
+    `law_constants`.
     """
 
     functions: ClassVar[Any] = controller
@@ -102,7 +102,7 @@ class ControllerSlave(SampledSlave):
         """Declare the sample period and the law's own parameters."""
         self.declare_period()
 
-    def law(self) -> dict[str, Any]:
+    def law_constants(self) -> dict[str, Any]:
         """Return what the law needs of `component.controller.Constants`."""
         return {"kind": self.law_kind}
 
@@ -117,7 +117,7 @@ class ControllerSlave(SampledSlave):
             period=self["sample_period"],
             v_max=self["v_max"],
             velocity_corner=2.0 * pi * self["velocity_corner"] if filtered else 0.0,
-            **self.law(),
+            **self.law_constants(),
         )
 
 
@@ -140,11 +140,11 @@ class LinearSlave(ControllerSlave):
             self.wrong = str(error)
         self.declare_period(self.controller.sample_period if self.controller else SAMPLE_PERIOD)
 
-    def law(self) -> dict[str, Any]:
+    def law_constants(self) -> dict[str, Any]:
         if self.wrong or self.controller is None:
             raise ValueError(self.wrong)
         own = ("n", "rows", "v_top", "A", "B", "W", "C")
-        return {**super().law(), **{name: getattr(self.controller, name) for name in own}}
+        return {**super().law_constants(), **{name: getattr(self.controller, name) for name in own}}
 
 
 def declare_force_threshold(slave: Slave) -> None:

@@ -7,6 +7,8 @@ serialise; outputs that follow their inputs as soon as these are set.
 This module is bundled in every FMU: standard library and pythonfmu only.
 """
 
+# Longer than most files: FMI's calls are one class, for all of them act on the same flat values.
+
 from __future__ import annotations
 
 import json

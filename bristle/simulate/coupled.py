@@ -62,7 +62,7 @@ def simulate(scenario: Scenario) -> dict[str, Array]:
     table = np.zeros((rows + 1, len(system.outputs)))
     slots = np.array(list(system.outputs.values()), dtype=np.int64)
     filled, unsettled, _ = compiled_loop(bool(system.names["sampled"]))(
-        rows, substeps, h, *system.arrays(h), *system.sampled(h),
+        (rows, substeps, h), system.sources(), system.coupled(h), system.sampled(h),
         system.start_values(), slots, table,
     )  # fmt: skip
     what = ""

@@ -115,10 +115,10 @@ class System:
         slave = self.slaves[name]
         return [self.slots[name, slave.vars[index].name] for index in slave._inputs]
 
-    def arrays(self, h: float) -> tuple[Array, Array, Array, Array, Array]:
-        """Return sources, their times and samples, dampers and structures for substeps of h [s]."""
+    def coupled(self, h: float) -> tuple[Array, Array]:
+        """Return dampers and structures for substeps of h [s]."""
         structures = self._structures(h)
-        return (*self._sources(), self._dampers(structures, h), structures)
+        return self._dampers(structures, h), structures
 
     def periods(self) -> list[float]:
         """Return the sample periods [s] of the components that have a clock."""
@@ -130,7 +130,7 @@ class System:
         clocks = Clocks(slaves, lambda *port: self.slots[port], h)
         return clocks.records, clocks.constants, clocks.memory
 
-    def _sources(self) -> tuple[Array, Array, Array]:
+    def sources(self) -> tuple[Array, Array, Array]:
         """Return the sources that change, as records, and the samples of all of them."""
         constants = {name: self.slaves[name].constants for name in self.names["source"]}
         changing = {name: c for name, c in constants.items() if c.kind != CONSTANT}

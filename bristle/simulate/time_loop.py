@@ -64,15 +64,21 @@ INLINE = (
 """What becomes part of its caller: it is short or has one caller. Saves time, twice."""
 
 
-def integrate(
-    rows, substeps, h, sources, times, samples, dampers, structures, sampled, constants, memory,
-    s, outputs, table
-):  # fmt: skip
-    """Fill `table` (rows + 1, m) with the signals `outputs` (m,), one row per `substeps` of h [s].
+def integrate(span, sources, coupled, sampled, s, outputs, table):
+    """Fill `table` (rows + 1, m) with the signals `outputs` (m,), a row for some substeps each.
 
-    `sources`, `dampers`, `structures`, `sampled` are arrays of records (see `records`), `times` and
-    `samples` the samples of all sources one after another, `constants` and `memory` what sampled
-    components compute with, `s` the signals with their start values.
+    Parameters
+    ----------
+    span : tuple
+        Number of rows, substeps of each, and a substep [s].
+    sources : tuple of arrays
+        Records (see `records`), and the times [s] and samples of all of them one after another.
+    coupled : tuple of arrays
+        Records of dampers and of structures.
+    sampled : tuple of arrays
+        Records of components with clocks, and the constants and the memory that they compute with.
+    s : (n,) array
+        The signals, with their start values.
 
     Returns
     -------
@@ -81,17 +87,18 @@ def integrate(
         damper whose force and motion did not agree, which ends the loop before the next row (-1:
         none); the number of sweeps.
     """
+    (rows, substeps, h), (dampers, structures) = span, coupled
     scale, sweeps = 1e-9, 0
-    play(sources, times, samples, 0.0, s)
+    play(sources, 0.0, s)
     start(dampers, structures, h, s)
-    sample(sampled, dampers, structures, 0, h, constants, memory, s)
+    sample(sampled, coupled, 0, h, s)
     for j in range(len(outputs)):
         table[0, j] = s[outputs[j]]
     for row in range(rows):
         for k in range(substeps):
             at = row * substeps + k + 1
             begin(dampers, structures, s)
-            play(sources, times, samples, at * h, s)
+            play(sources, at * h, s)
             sweep, change = 0, inf
             while change > TOLERANCE * scale and sweep < MAX_SWEEPS:
                 for i in range(len(structures)):
@@ -108,7 +115,7 @@ def integrate(
                     worst = i if abs(dampers[i].excess) == change else worst
                 return row + 1, worst, sweeps
             accept(dampers, structures, s)
-            sample(sampled, dampers, structures, at, h, constants, memory, s)
+            sample(sampled, coupled, at, h, s)
         for i in range(len(structures)):
             show(structures[i], structures[i].state, s)
         total = 0.0
@@ -120,10 +127,11 @@ def integrate(
     return rows + 1, -1, sweeps
 
 
-def play(sources, times, samples, t, s):
+def play(sources, t, s):
     """Write what the sources give at time t [s] into the signals."""
-    for i in range(len(sources)):
-        g = sources[i]
+    records, times, samples = sources
+    for i in range(len(records)):
+        g = records[i]
         c = SourceConstants(
             g.kind, g.p[:], times[g.begin : g.end], samples[g.begin : g.end], g.scale, g.delay,
             g.rated,
@@ -216,29 +224,30 @@ def accept(dampers, structures, s):
         d.smooth = d.found - s[d.first + FRICTION]
 
 
-def idle(sampled, dampers, structures, at, h, constants, memory, s):
+def idle(sampled, coupled, at, h, s):
     """Do nothing, in place of `sample` where nothing has a clock: the loop compiles sooner."""
 
 
-def sample(sampled, dampers, structures, at, h, constants, memory, s):
+def sample(sampled, coupled, at, h, s):
     """Let the components act whose instant substep `at` reaches; the forces follow.
 
     Components measure the motion and the dampers' forces with the voltages before, in the order of
     the scenario.
     """
+    (records, constants, memory), (dampers, structures) = sampled, coupled
     some = False
-    for i in range(len(sampled)):
-        c = sampled[i]
+    for i in range(len(records)):
+        c = records[i]
         some = some or not c.aligned or floor(at * h / c.period + ROUNDING) >= c.coming
     if not some:
         return
     for i in range(len(structures)):
         show(structures[i], structures[i].state, s)
-    for i in range(len(sampled)):
-        c = sampled[i]
+    for i in range(len(records)):
+        c = records[i]
         gather(c.inputs, s, c.now)
         if c.senses:
-            take_readings(c, at, h, constants, memory, s)
+            take_readings(c, at, h, memory, s)
         else:
             take_command(c, at, h, constants, memory, s)
         c.coming = floor(at * h / c.period + ROUNDING) + 1
@@ -264,7 +273,7 @@ def take_command(c, at, h, constants, memory, s):
         controller_step(span, c.before[:], c.now[:], law, state, state, s[c.first :], work)
 
 
-def take_readings(c, at, h, constants, memory, s):
+def take_readings(c, at, h, memory, s):
     """Let sensors act at the end of substep `at` (0: the begin)."""
     law = SensorConstants(
         c.period, c.seed, c.size, c.gains[:], c.biases[:], c.deviation[:], c.quantisation[:],
