@@ -20,7 +20,8 @@ from bristle.control import inverse, linear, switching
 from bristle.control.controller import read_controller
 from bristle.jit import compiled
 from bristle.physics.building import paper_building
-from bristle.physics.lugre import LuGre
+from bristle.physics.laws import law_code
+from bristle.physics.laws.lugre import LuGre
 
 Array = NDArray[np.float64]
 
@@ -32,8 +33,9 @@ PASSIVE, CLIPPED, FEEDBACK, ESTIMATED = range(4)
 STILL = 0.3
 """Force per volt [N/V] below which the voltage does next to nothing: it is then held."""
 
-lugre_force = inverse.lugre_force
-estimated_deflection = inverse.estimated_deflection
+LUGRE = law_code("lugre")
+force_of_law = inverse.force_of_law
+estimate_states = inverse.estimate_states
 clipped_voltage = switching.clipped_voltage
 limited = switching.limited
 command, advance = linear.command, linear.advance
@@ -41,7 +43,7 @@ command, advance = linear.command, linear.advance
 
 def rates(x, ground, V, K, C, mass, p, out):  # type: ignore[no-untyped-def]
     """Fill out (7,) with the rates of x (7,): displacements, velocities, bristle deflection."""
-    force = lugre_force(x[6], x[3], V, p)
+    force = force_of_law(LUGRE, p, x[3], V, x[6:7])
     for i in range(3):
         out[i] = x[3 + i]
         load = force if i == 0 else 0.0
@@ -76,8 +78,8 @@ def voltage(gains, x, swing, z, p):  # type: ignore[no-untyped-def]
     u, share = 0.0, swing / (swing + 0.008) - 0.5
     for i in range(6):
         u += (gains[i] + share * gains[6 + i]) * x[i]
-    f_0 = lugre_force(z, x[3], 0.0, p)
-    slope = lugre_force(z, x[3], 1.0, p) - f_0
+    f_0 = force_of_law(LUGRE, p, x[3], 0.0, z)
+    slope = force_of_law(LUGRE, p, x[3], 1.0, z) - f_0
     if abs(slope) < STILL:
         return limited(gains[13], 0.0, 8.0)
     return limited((u - f_0) / slope, 0.0, 8.0)
@@ -98,8 +100,8 @@ def simulate(  # type: ignore[no-untyped-def]
     state, out,
 ):  # fmt: skip
     """Fill out (samples + 1, 2) with the second floor's absolute acceleration and the voltage."""
-    x, e, spare = work[5], work[6], work[7]
-    z, swing, V = 0.0, 0.0, gains[13] if law == 0 else 0.0
+    x, e, spare, z = work[5], work[6], work[7], work[8, :1]
+    swing, V = 0.0, gains[13] if law == 0 else 0.0
     kept = exp(-0.002 / (0.3 + abs(gains[12])))
     stride = 8 // (2 * steps)
     for k in range(len(out)):
@@ -107,15 +109,15 @@ def simulate(  # type: ignore[no-untyped-def]
         swing = max(abs(x[0]), swing * kept)
         if law == 1:
             u = command(n, hidden, 0, state[0])
-            V = clipped_voltage(u, lugre_force(x[6], x[3], V, p), 0.5, 8.0)
+            V = clipped_voltage(u, force_of_law(LUGRE, p, x[3], V, x[6:7]), 0.5, 8.0)
             advance(n, A, B, W, 0, state[0], y, 0.0, state[1])
         elif law == 2:
-            V = voltage(gains, x, swing, x[6], p)
+            V = voltage(gains, x, swing, x[6:7], p)
         elif law == 3:
             observe(e, y, x[0], x[3], seen, correct, spare)
             V = voltage(gains, spare, swing, z, p)
-            force = lugre_force(z, x[3], V, p)
-            z = estimated_deflection(z, x[3], 0.002, p[6])
+            force = force_of_law(LUGRE, p, x[3], V, z)
+            estimate_states(LUGRE, p, x[3], V, 0.002, z)
             for i in range(6):
                 e[i] = push[i] * force
                 for j in range(6):
@@ -210,7 +212,7 @@ def run(law: int, ground: Array, gains: Array, quick: bool = False) -> Array:
     _compiled()(
         law, ground, 2 if quick else 4, K, C, mass, p, np.asarray(gains, dtype=np.float64), c.n,
         np.array(c.A), np.array(c.B), np.array(c.W), np.array(c.C), free, push, seen, correct,
-        np.zeros((8, 7)), np.zeros((2, c.n)), out,
+        np.zeros((9, 7)), np.zeros((2, c.n)), out,
     )  # fmt: skip
     return out
 

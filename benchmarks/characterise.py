@@ -148,13 +148,15 @@ def studied(case: Any, law: str) -> dict[str, Any]:
         files = sorted(str(path) for path in data.glob("*.csv"))
         is_building = (data / "building.toml").is_file()
         asked("study", "new", study, "--law", law, *(more if is_building else []), "--data", *files)
-        return {
-            "identify": json.loads(asked("identify", study, "--no-table", "--json")),
-            "compare": json.loads(
-                asked("compare", study, "--json", "--out", f"{folder}/picture.png")
-            ),
-            "diagnose": json.loads(asked("diagnose", study, "--json")),
+        answers = {
+            "identify": asked("identify", study, "--no-table", "--json"),
+            "compare": asked("compare", study, "--json", "--out", f"{folder}/picture.png"),
+            "diagnose": asked("diagnose", study, "--json"),
         }
+    found = {name: json.loads(answer) for name, answer in answers.items()}
+    for answer in found.values():
+        answer.pop("picture", None)  # a path of this run
+    return found
 
 
 def differences(name: str, before: dict[str, Any], after: dict[str, Any]) -> Iterator[str]:

@@ -19,6 +19,8 @@ from typing import Any
 
 import numba
 import numpy as np
+from numba.core import types
+from numba.extending import intrinsic
 
 from .resources import cache_folder
 
@@ -28,7 +30,22 @@ _OPTIONS = {"error_model": "numpy", "_nrt": False}
 # Callees are never called from Python.
 _CALLEE = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-_NUMBERS = (bool, int, float, str)
+_NUMBERS = (bool, int, float, str, tuple)
+
+
+_MAKES_TUPLE = tuple.__new__
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _record(typing: Any, kind: Any, values: Any) -> Any:
+    """Make a named tuple from a tuple, as tuple.__new__ does in Python: both lie alike."""
+    made = types.containers.BaseTuple.from_types(values.types, kind.instance_class)
+
+    def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return arguments[1]
+
+    return made(kind, values), code
+
 
 # numba asks for the folder of its cache in a global of its own, more than once per function.
 _FOLDER = Lock()
@@ -128,6 +145,8 @@ def _closed(function: Any, done: dict[int, Any], inline: tuple[str, ...]) -> Fun
                 how = "always" if short in inline else "never"
                 done[id(value)] = numba.njit(inline=how, **_CALLEE)(_closed(value, done, inline))
             namespace[name] = done[id(value)]
+        elif value is _MAKES_TUPLE:
+            namespace[name] = _record
     copy = FunctionType(
         function.__code__, namespace, function.__name__, function.__defaults__, function.__closure__
     )

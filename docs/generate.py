@@ -20,8 +20,8 @@ from pictures import picture
 from bristle.cli.effects import tell
 from bristle.fmu import catalogue
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
-from bristle.physics.damper import LAWS
 from bristle.physics.effect import EFFECTS
+from bristle.physics.laws import LAWS
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig

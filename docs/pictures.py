@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from bristle.draw.style import BLUE, PALE, Page, label, look, zero_lines
 from bristle.physics import damper
-from bristle.physics.effect import EFFECTS, Effect, Q
+from bristle.physics.effect import EFFECTS, Effect, Q, laws_joined
+from bristle.physics.laws import DEFAULT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,7 +28,8 @@ def picture(name: str) -> tuple[bytes, str, float] | None:
 
 
 def _of_damper(effect: type[Effect]) -> tuple[bytes, str, float]:
-    law = "bingham" if "lugre" not in effect.laws else "lugre"
+    joined = laws_joined(effect)
+    law = DEFAULT if DEFAULT in joined else joined[0]
     voltage = "voltage" in effect.hooks()
     motion = _sweep if voltage else _sine
     without, with_it = motion(law, []), motion(law, [effect.name])
@@ -80,7 +82,7 @@ def _march(law, effects, length, kept, motion) -> Points:  # type: ignore[no-unt
 
 
 def _of_storey(effect: type[Effect]) -> tuple[bytes, str, float]:
-    values = effect.Values(*(p.value for p in effect.parameters.values()))
+    values = effect.values_of({})
     z = effect.State(*(0.0 for _ in effect.states))
     stiffness = 1366.5  # N/m, of the default building
     rest = Q(*(0.0 for _ in Q._fields))._replace(dt=STEP, stiffness=stiffness, storey=1.0)

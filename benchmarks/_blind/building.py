@@ -15,10 +15,11 @@ from bristle.diagnose.sites import try_effect
 from bristle.identify.fit import Model, identify
 from bristle.identify.line import fit_line
 from bristle.identify.search_context import refine
-from bristle.identify.structure import LinearLayer, LinearStorey, StructureProblem
+from bristle.identify.structure import StructureProblem
 from bristle.identify.structure import structure_problems as problems
 from bristle.physics.building import Building, from_data
 from bristle.physics.effect import EFFECTS
+from bristle.physics.laws import law_of_part
 
 from . import cases, inseparable
 from .cases import Recorded
@@ -121,5 +122,5 @@ def fitted(name: str, law: str, site: str, pair: Pair) -> Model:
         if EFFECTS[name].site != "structure":
             return inseparable.best_of(name, base, train)
         return refine(try_effect(name, base, train, held).model, train)
-    line = LinearLayer.name if site == "layer" else LinearStorey.name
+    line = law_of_part(site).name
     return try_effect(name, fit_line(train, line).model, train, held).model

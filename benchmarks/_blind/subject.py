@@ -14,8 +14,8 @@ from bristle.diagnose import Diagnosis, diagnose
 from bristle.identify.fit import Model, Problem
 from bristle.identify.prepare import prepare
 from bristle.identify.search import z_scale
-from bristle.physics.damper import LAWS
 from bristle.physics.effect import EFFECTS
+from bristle.physics.laws import LAWS
 
 from .cases import ROOT, Recorded, digest_of
 from .forms import true_values

@@ -18,18 +18,19 @@ from ..data.measurement import Measurement
 from ..data.model import StudyModel
 from ..errors import StudyError
 from ..fmu.build import build, plan
+from ..fmu.catalogue import component_of_law
 from ..identify.fit import Model, Problem, Run
 from ..identify.instruments import true_motion
 from ..identify.prepare import prepare
 from ..physics.building import paper_building, read_building
 from ..physics.effect import EFFECTS
+from ..physics.laws import LAWS
 from ..physics.user import own_effects
 from ..study.identification import as_model
 from ..study.study import Study
 
 Array = NDArray[np.float64]
 
-COMPONENTS = {"bingham": "BinghamDamper", "lugre": "LuGreDamper"}
 STEP = 5e-4
 """Longest step [s] of a bench scenario: an FMU holds its inputs over a step, a prediction does not.
 
@@ -117,7 +118,7 @@ def _damper(
     starts |= _range(measurement, notes)
     own = own_effects()
     what = plan(
-        COMPONENTS[model.base_law],
+        component_of_law(model.base_law),
         name=_model_name(study.name),
         starts=starts,
         effects=[own[name] for name in effects if EFFECTS[name].own],
@@ -286,7 +287,7 @@ def _structure(
         "damper.displacement": f"structure.{level}_displacement",
         "damper.velocity": f"structure.{level}_velocity",
     }
-    if model.base_law == "bingham":
+    if LAWS[model.base_law].has("sign"):
         damper["moving_mass"] = mass
         wires["damper.holding_force"] = "structure.holding_force"
     parts = [

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..physics.codegen import Slots
 from ..physics.effect import Effect
 from ..physics.sensor import instrument
-from ..physics.weave import Layout
 
 Array = NDArray[np.float64]
 
@@ -31,24 +31,24 @@ def shown(effect: type[Effect], values: dict[str, float], signal: Array, dt: flo
     effect : Effect of the site "sensor"
     values : parameters of the effect by their own names ("gain"), in SI; missing ones default
     """
-    history, layout = _history(effect)  # type: ignore[arg-type]  # a class can be hashed
-    p, z = np.zeros(max(1, layout.p_size)), np.zeros(max(1, layout.z_size))
+    history, slots = _history(effect)  # type: ignore[arg-type]  # a class can be hashed
+    p, z = np.zeros(max(1, slots.p_size)), np.zeros(max(1, slots.z_size))
     for name, known in effect.parameters.items():
-        p[layout.parameters[f"{effect.name}.{name}"]] = values.get(name, known.value)
+        p[slots.parameters[f"{effect.name}.{name}"]] = values.get(name, known.value)
     for state in effect.starts:
-        z[layout.states[f"{effect.name}.{state}"]] = signal[0]
+        z[slots.states[f"{effect.name}.{state}"]] = signal[0]
     out = np.empty(len(signal))
     history(np.ascontiguousarray(signal, dtype=np.float64), dt, z, p, out)
     return out
 
 
 @cache
-def _history(effect: type[Effect]) -> tuple[Callable[..., None], Layout]:
+def _history(effect: type[Effect]) -> tuple[Callable[..., None], Slots]:
     """Return the compiled march of one effect's hooks over a signal."""
     from ..jit import compiled
 
-    show, layout = instrument(effect)
+    show, slots = instrument(effect)
     namespace: dict[str, Any] = {**globals(), "show": show}
     march = FunctionType(channel_history.__code__, namespace, "channel_history")
     march.__module__, march.__qualname__ = __name__, "channel_history"
-    return compiled(march), layout
+    return compiled(march), slots

@@ -12,7 +12,7 @@ import numpy as np
 from ..component.structure import StructureModel
 from ..physics.building import paper_building
 from ..physics.damper import DamperModel
-from ..physics.effect import Effect
+from ..physics.effect import Effect, laws_joined
 from .channel import shown
 from .user_effects import refused
 
@@ -70,7 +70,7 @@ def _corners(effect: type[Effect]) -> Iterator[dict[str, float]]:
 def _rests(effect: type[Effect]) -> Check:
     asked = "no force at rest" if effect.zero_at_rest else "a force at rest, as it says"
     most, at = 0.0, ""
-    for law in effect.laws:
+    for law in laws_joined(effect):
         for values in _corners(effect):
             for V in (0.0, 4.0, 8.0):
                 model = DamperModel(law, values, [effect.name])
@@ -101,7 +101,7 @@ def _cycle(
 
 def _matters(effect: type[Effect]) -> Check:
     best = 0.0
-    for law in effect.laws:
+    for law in laws_joined(effect):
         rows = [
             np.array(_cycle(law, on, {}, 0.01, 2.0, lambda t: 4.0 + 3.0 * sin(9.0 * t))[2])
             for on in ([], [effect.name])
@@ -113,7 +113,7 @@ def _matters(effect: type[Effect]) -> Check:
 
 
 def _bounds(effect: type[Effect]) -> Check:
-    for law in effect.laws:
+    for law in laws_joined(effect):
         for values in _corners(effect):
             forces = _cycle(law, [effect.name], values, 0.01, 3.0, 8.0)[2]
             if not all(isfinite(force) for force in forces):
@@ -125,7 +125,7 @@ def _energy(effect: type[Effect]) -> Check:
     asked = "a closed cycle gives no energy"
     if not effect.passive:
         return Check(asked, True, "not asked: passive = False")
-    for law in effect.laws:
+    for law in laws_joined(effect):
         for amplitude, frequency, V in ((0.001, 5.0, 6.0), (0.015, 5.0, 0.0), (0.015, 1.0, 6.0)):
             for values in _corners(effect):
                 held = _cycle(law, [effect.name], values, amplitude, frequency, V)

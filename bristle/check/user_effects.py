@@ -35,7 +35,7 @@ def refused(effect: type[Effect]) -> tuple[int, str] | None:
 
     q = Q(*(0.01 * (1 + k) for k in range(len(Q._fields))))
     z = effect.State(*(0.01 for _ in effect.states))
-    p = effect.Values(*(float(known.value) for known in effect.parameters.values()))
+    p = effect.values_of({})
     for hook, function in effect.hooks().items():
         shape = f"{len(effect.states)}_{len(effect.parameters)}"
         mark = cache_folder() / "numba" / "passed" / f"{digest(function)}_{shape}"

@@ -21,9 +21,6 @@ class {cls}(Effect):
     # "damper": between rod and fluid. "structure": base and storeys. "sensor": an instrument.
     site = "damper"
 
-    # The damper laws that it can join.
-    laws = ("bingham", "lugre")
-
     # The signals that the hooks below read from q. A damper offers x [m], v [m/s], a [m/s2] across
     # the fluid, V [V], dt [s], energy [J] dissipated so far; a structure x, v of the base, and
     # drift, drift_rate, stiffness, storey in `spring`.

@@ -131,11 +131,13 @@ def _check(arguments: argparse.Namespace) -> int:
 
 def tell(effect: type[Effect]) -> dict[str, Any]:
     """Return what users are told of an effect: class data, first line and formula of its text."""
+    from ..physics.effect import laws_joined
+
     first, _, rest = (effect.__doc__ or "").strip().partition("\n")
     return {
         "name": effect.name,
         "site": effect.site,
-        "laws": list(effect.laws) if effect.site == "damper" else [],
+        "laws": list(laws_joined(effect)),
         "about": first.strip(),
         "text": _dedented(rest),
         "expect": effect.expect,

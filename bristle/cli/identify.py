@@ -131,6 +131,8 @@ def _errors(found: Identified) -> list[str]:
 
 def _laws(found: Identified, folder: Path) -> list[str]:
     """Return the table of laws, as a section of the paper has it, and which one would do better."""
+    from ..physics.laws import base_and_variant
+
     lines = [
         f"  {'law':18} {'training':>11} {'held out':>11} {'of force':>9} {'|v| > 1 mm/s':>13} "
         f"{'starts':>8}"
@@ -142,12 +144,11 @@ def _laws(found: Identified, folder: Path) -> list[str]:
             f"{row.moving:>11.4g} N {row.agreed:>3} of {row.starts}"
         )
     own = {row.law: row.holdout if row.holdout == row.holdout else row.train for row in found.table}
-    for law in ("bingham", "lugre"):
-        standard = own.get(f"{law}_standard")
-        if standard and law in own:
-            lines.append(
-                f"  {law}: the exponential lowers the error by {1.0 - own[law] / standard:.1%}."
-            )
+    for name in own:
+        base, variant = base_and_variant(name)
+        if variant.lacks and own[name] and base.name in own:
+            gain = 1.0 - own[base.name] / own[name]
+            lines.append(f"  {base.name}: {variant.lacks} lowers the error by {gain:.1%}.")
     mine, best = found.model.law, min(own, key=lambda law: own[law])
     if mine in own and own[best] < BETTER * own[mine]:
         lines.append(

@@ -68,7 +68,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step", type=float, metavar="S", help="sampling step in s of files without a time"
     )
-    parser.add_argument("--law", default="lugre", help="the law that the model begins with")
+    parser.add_argument("--law", help="the law that the model begins with; else lugre")
     parser.add_argument("--title", default="", help="the study's title; else its name")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(act=_new)
@@ -76,13 +76,14 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 def _new(arguments: argparse.Namespace) -> int:
     from ..data.channels import ChannelSpec
-    from ..data.model import LAW_NAMES
     from ..errors import StudyError
+    from ..physics.laws import DEFAULT, law_names
     from ..study.create import create_study
     from ..study.new import parse_channel
 
-    if arguments.law not in LAW_NAMES:
-        raise StudyError(f'--law "{arguments.law}"; there are: {", ".join(LAW_NAMES)}.')
+    law = arguments.law or DEFAULT
+    if law not in law_names():
+        raise StudyError(f'--law "{law}"; there are: {", ".join(law_names())}.')
     channels = {}
     for text in arguments.channel:
         name, spec = parse_channel(text)
@@ -100,7 +101,7 @@ def _new(arguments: argparse.Namespace) -> int:
         building=arguments.building,
         channels=channels,
         title=arguments.title,
-        law=arguments.law,
+        law=law,
     )
     if arguments.json:
         _print_json(created)

@@ -8,13 +8,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ..control.inverse import (
-    bingham_force,
-    bingham_voltage,
-    estimated_deflection,
-    lugre_force,
-    lugre_voltage,
-)
+from ..control.inverse import estimate_states, force_of_law, voltage_of_law
 from ..control.linear import advance, command, table_row
 from ..control.sensing import (
     filtered_velocity,
@@ -24,6 +18,7 @@ from ..control.sensing import (
     skyhook_switch,
 )
 from ..control.switching import applied_signed, clipped_voltage, signed_voltage
+from ..physics import damper
 from ..physics.linear import Row
 from .clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
 
@@ -33,9 +28,10 @@ VOLTAGE, COMMAND_RAW, SCHEDULING = range(3)
 CLIPPED, INVERSE, SIGNED, CLIPPED_LQG, SKYHOOK_SWITCH, SKYHOOK_INVERSE = range(6)
 """Kinds of controllers."""
 
-REMEMBERED = 7
-LOW, X_BEFORE, DEFLECTION, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, -2)
-"""What the state holds behind that of the state-space law, before `ORIGIN` and `COMING`."""
+REMEMBERED = 6
+LOW, X_BEFORE, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, -2)
+"""What the state holds behind that of the state-space law and the states of the damper's law that
+is inverted, as the controller estimates them; before `ORIGIN` and `COMING`."""
 
 
 class Constants(NamedTuple):
@@ -43,8 +39,8 @@ class Constants(NamedTuple):
 
     `n`, `rows`, `v_top`, `A`, `B`, `W`, `C` are those of `control.controller.Controller`;
     `velocity_corner` [rad/s] is that of the low-passed displacement whose rate is the velocity, 0:
-    the velocity is measured; `lugre` and `p` say which law is inverted, `still` and `least_slope`
-    how; `gain` and `integral_corner` [rad/s] belong to skyhook.
+    the velocity is measured; `law` and `p` say which damper's law is inverted, `still` and
+    `least_slope` how; `gain` and `integral_corner` [rad/s] belong to skyhook.
     """
 
     kind: int
@@ -60,7 +56,7 @@ class Constants(NamedTuple):
     C: Row
     f_min: float
     anti_windup: float
-    lugre: bool
+    law: int
     p: Row
     still: float
     least_slope: float
@@ -70,7 +66,7 @@ class Constants(NamedTuple):
 
 NOTHING: dict[str, Any] = {
     "velocity_corner": 0.0, "n": 0, "rows": 1, "v_top": 0.0, "A": [], "B": [], "W": [], "C": [],
-    "f_min": 0.0, "anti_windup": 0.0, "lugre": True, "p": [], "still": 0.0, "least_slope": 1.0,
+    "f_min": 0.0, "anti_windup": 0.0, "law": 0, "p": [], "still": 0.0, "least_slope": 1.0,
     "gain": 0.0, "integral_corner": 0.0,
 }  # fmt: skip
 """What a kind does not need."""
@@ -79,7 +75,7 @@ NOTHING: dict[str, Any] = {
 def setup(time: float, **values: Any) -> tuple[Constants, list[float], int]:
     """Return constants, state and size of work, given what differs from `NOTHING`."""
     c = Constants(**{**NOTHING, **values})
-    state = [0.0] * (c.n + REMEMBERED)
+    state = [0.0] * (c.n + damper.SLOTS.law_states + REMEMBERED)
     state[ORIGIN] = time
     return c, state, c.n + 4
 
@@ -156,15 +152,15 @@ def designed(
 def inverted(u: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
     """Return the voltage [V] of the commanded force and the force [N] that it gives by the law.
 
-    Moves the estimated bristle deflection on.
+    Moves the estimated states of the law on.
     """
-    if not c.lugre:
-        voltage = bingham_voltage(u, v, c.p, c.still, c.least_slope, c.v_max)
-        return voltage, bingham_force(v, voltage, c.p)
-    z = state[DEFLECTION]
-    voltage = lugre_voltage(u, v, z, c.p, c.still, c.least_slope, c.v_max)
-    state[DEFLECTION] = estimated_deflection(z, v, c.period, c.p[6])
-    return voltage, lugre_force(z, v, voltage, c.p)
+    z = state[c.n : len(state) - REMEMBERED]
+    voltage = voltage_of_law(c.law, c.p, u, v, z, c.still, c.least_slope, c.v_max)
+    applied = force_of_law(c.law, c.p, v, voltage, z)
+    estimate_states(c.law, c.p, v, voltage, c.period, z)
+    for i in range(len(z)):
+        state[c.n + i] = z[i]
+    return voltage, applied
 
 
 def skyhook(y: float, v: float, c: Constants, state: Row) -> tuple[float, float]:

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from math import inf, isfinite
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from ..control.switching import limited
-from ..physics.damper import DamperModel, force_at, work_size
+from ..physics.codegen import hold
+from ..physics.damper import force_at, setup_of, start_states, work_size
 from ..physics.damper import step as law_step
+from ..physics.inputs import Inputs, Setup
 from ..physics.linear import Row
+from ..physics.tuples import record
+
+hold_law: Any = None
+hold(globals(), "hold_law")
 
 DISPLACEMENT, VELOCITY, VOLTAGE, HOLDING_FORCE, ACCELERATION = range(5)
 FORCE, DISSIPATED_ENERGY, STROKE_RATIO, FRICTION = range(4)
@@ -25,19 +31,12 @@ SATURATED = 1
 class Constants(NamedTuple):
     """What a damper computes with.
 
-    `law`, `p`, `on`, `moving`, `n_moving`, `advances`, `active` are those of `physics.damper.step`.
-    `moving_mass` [kg] is what the holding force holds, 0: the law slides. The acceleration is
-    `measured`, or the difference of velocity over the step. Motion and voltage are `linear` over a
-    step, or held at their newest.
+    `setup` is that of law and effects. `moving_mass` [kg] is what the holding force holds, 0: the
+    law slides. The acceleration is `measured`, or the difference of velocity over the step. Motion
+    and voltage are `linear` over a step, or held at their newest.
     """
 
-    law: int
-    p: Row
-    on: Row
-    moving: Row
-    n_moving: int
-    advances: bool
-    active: bool
+    setup: Setup
     v_max: float
     stroke: float
     moving_mass: float
@@ -52,7 +51,8 @@ def setup(
 
     Parameters
     ----------
-    law : {"bingham", "lugre"}
+    law : str
+        A damper's law, such as "bingham".
     values : dict
         Every Real parameter of the component, by name, in SI.
     effects : list of str
@@ -60,12 +60,11 @@ def setup(
     measured : bool
         Whether the acceleration is an input that is given.
     """
-    model = DamperModel(law, values, effects)
     constants = Constants(
-        model.law, model.p, model.on, model.moving, len(model.moving), model.advances,
-        model.active, values["v_max"], values["stroke"], values["moving_mass"], measured, False,
+        setup_of(law, values, effects), values["v_max"], values["stroke"], values["moving_mass"],
+        measured, False,
     )  # fmt: skip
-    return constants, model.z + [0.0] * REMEMBERED, work_size(REMEMBERED)
+    return constants, start_states(law, values) + [0.0] * REMEMBERED, work_size(REMEMBERED)
 
 
 def stick_force(holding: float, v: float, mass: float, dt: float) -> float:
@@ -83,7 +82,8 @@ def present_force(
     x, v, dt = inputs[DISPLACEMENT], inputs[VELOCITY], state[LAST_STEP]
     sticks = c.moving_mass > 0.0 and (isfinite(dt) or v == 0.0)
     stick = stick_force(inputs[HOLDING_FORCE], v, c.moving_mass, dt) if sticks else 0.0
-    return force_at(c.law, x, v, a, V, dt, state[ENERGY], stick, sticks, state, c.p, c.on, work)
+    now = record(Inputs, (x, v, a, V, dt, state[ENERGY], stick, sticks))
+    return force_at(c.setup, now, state, work)
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
@@ -122,22 +122,23 @@ def step(
     force0, energy = state[FORCE_AT_END], state[ENERGY]
     if state[VOLTAGE_AT_END] != V0:
         force0 = present_force(before, V0, a0, c, state, work)[0]
-    power0 = force0 * v0
-    if not c.linear:
-        x0, v0, a0 = x1, v1, a1
     sticks = c.moving_mass > 0.0
     stick = stick_force(now[HOLDING_FORCE], v1, c.moving_mass, dt) if sticks else 0.0
-    force, friction = law_step(
-        c.law, x0, v0, a0, V0, x1, v1, a1, V1, dt, energy, stick, sticks, state, c.p, c.on,
-        c.moving, c.n_moving, c.advances, new_state, work, c.active,
-    )  # fmt: skip
-    energy += 0.5 * dt * (power0 + force * v1)
+    end = record(Inputs, (x1, v1, a1, V1, dt, energy, stick, sticks))
+    if c.linear:
+        begin = record(Inputs, (x0, v0, a0, V0, dt, energy, stick, sticks))
+        force, friction = law_step(c.setup, begin, end, state, new_state, work)
+    elif c.setup.active:
+        force, friction = law_step(c.setup, end, end, state, new_state, work)
+    else:
+        force, friction = hold_law(c.setup.law, c.setup.p, end, state, new_state)
+    energy += 0.5 * dt * (force0 * v0 + force * v1)
     new_state[ENERGY], new_state[FORCE_AT_END] = energy, force
     new_state[ACCELERATION_AT_END], new_state[VOLTAGE_AT_END] = a1, V1
     new_state[LAST_STEP] = dt
     outputs[FORCE], outputs[FRICTION] = force, friction
     outputs[DISSIPATED_ENERGY], outputs[STROKE_RATIO] = energy, abs(x1) / c.stroke
-    if c.active and not c.linear:  # an effect may know the energy, which is a step older above
+    if c.setup.active and not c.linear:  # an effect may know the energy: above, that of before
         return output(clock[0] + dt, now, c, new_state, outputs, work)
     return SATURATED if now[VOLTAGE] != V1 else 0
 

@@ -1,15 +1,23 @@
 """The voltage at which a damper gives a commanded force.
 
-Both laws are affine in the voltage at given motion, f = f_0 + slope V, so that V = (u - f_0)/slope.
-Reconstructed from the prose of Shirazi et al. (2012), IEEE TCST 20(5), eq. (7).
+A law whose quantities are constant or linear in the voltage is affine in it at given motion,
+f = f_0 + slope V, so that V = (u - f_0)/slope. Reconstructed from the prose of Shirazi et al.
+(2012), IEEE TCST 20(5), eq. (7).
+
+`law` is the code of a law (`physics.law.law_code`), `p` are its parameters in their order, `z` its
+states as the controller estimates them: after each sample they move on by `estimate_states`.
 """
 
 from __future__ import annotations
 
-from ..physics.bingham import Bingham
-from ..physics.damper import BINGHAM_VALUES, LUGRE_VALUES
+from math import inf
+from typing import Any
+
+from ..physics import damper as _damper  # noqa: F401  (it generates what is held here)
+from ..physics.codegen import hold
+from ..physics.inputs import Inputs
 from ..physics.linear import Row
-from ..physics.lugre import LuGre
+from ..physics.tuples import record
 from .switching import limited, sign
 
 STILL = 1e-3
@@ -18,32 +26,40 @@ STILL = 1e-3
 LEAST_SLOPE = 0.5
 """Least force per volt [N/V] that is divided by; with 0.05 the voltage chatters."""
 
-_LuGreValues = LUGRE_VALUES
-_BinghamValues = BINGHAM_VALUES
-_lugre_bristle = LuGre.bristle
-_lugre_viscous = LuGre.viscous
-_bingham_yielding = Bingham.yielding
-_bingham_viscous = Bingham.viscous
-estimated_deflection = LuGre.advance
-"""The inverse's own bristle deflection [m] after a sample: (z, v, sample_period, a_0)."""
+advance_law: Any = None
+law_force: Any = None
+hold(globals(), "advance_law", "law_force")
 
 
-def lugre_force(z: float, v: float, V: float, p: Row) -> float:
-    """Return the LuGre force [N] at deflection z [m], velocity v [m/s] and voltage V [V].
+def force_of_law(law: int, p: Row, v: float, V: float, z: Row) -> float:
+    """Return a law's force [N] at velocity v [m/s], voltage V [V] and states z; sgn(0) = 1."""
+    now = record(Inputs, (0.0, v, 0.0, V, 0.0, 0.0, inf, v == 0.0))
+    return law_force(law, p, now, z)[0]  # type: ignore[no-any-return]
 
-    `p` (8,) are the law's parameters in the order of `LuGre.parameters`.
+
+def voltage_of_law(
+    law: int, p: Row, command: float, v: float, z: Row, still: float, least: float, v_max: float
+) -> float:
+    """Return the voltage [V] at which a damper of some law gives the commanded force.
+
+    Parameters
+    ----------
+    command : float
+        Force [N], positive against +x.
+    v, z
+        Velocity [m/s]; the law's states.
+    still, least, v_max : float
+        See `affine_voltage`; `STILL`, `LEAST_SLOPE` and 8 V are usual.
     """
-    values = _LuGreValues(p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7])
-    return _lugre_bristle(z, v, V, values) + _lugre_viscous(v, V, values)
+    f_0 = force_of_law(law, p, v, 0.0, z)
+    slope = force_of_law(law, p, v, 1.0, z) - f_0
+    return affine_voltage(command, v, f_0, slope, still, least, v_max)
 
 
-def bingham_force(v: float, V: float, p: Row) -> float:
-    """Return the Bingham force [N] at velocity v [m/s] and voltage V [V], sgn(0) = 1.
-
-    `p` (6,) are the law's parameters in the order of `Bingham.parameters`.
-    """
-    values = _BinghamValues(p[0], p[1], p[2], p[3], p[4], p[5])
-    return sign(v) * _bingham_yielding(V, values) + _bingham_viscous(v, V, values)
+def estimate_states(law: int, p: Row, v: float, V: float, dt: float, z: Row) -> None:
+    """Move a law's estimated states on, in place, by a sample of dt [s] at v [m/s] and V [V]."""
+    now = record(Inputs, (0.0, v, 0.0, V, dt, 0.0, 0.0, False))
+    advance_law(law, p, now, 1.0, z, z)
 
 
 def affine_voltage(
@@ -59,37 +75,3 @@ def affine_voltage(
     if abs(slope) < least:
         slope = least * sign(slope)
     return limited((command - f_0) / slope, 0.0, v_max)
-
-
-def lugre_voltage(
-    command: float, v: float, z: float, p: Row, still: float, least: float, v_max: float
-) -> float:
-    """Return the voltage [V] at which a LuGre damper gives the commanded force.
-
-    Parameters
-    ----------
-    command : float
-        Force [N], positive against +x.
-    v, z : float
-        Velocity [m/s]; bristle deflection [m], the controller's own estimate: after each sample it
-        moves on by `estimated_deflection`.
-    p : sequence of float
-        (8,) parameters of the law.
-    still, least, v_max : float
-        See `affine_voltage`; `STILL`, `LEAST_SLOPE` and 8 V are usual.
-    """
-    f_0 = lugre_force(z, v, 0.0, p)
-    slope = lugre_force(z, v, 1.0, p) - f_0
-    return affine_voltage(command, v, f_0, slope, still, least, v_max)
-
-
-def bingham_voltage(
-    command: float, v: float, p: Row, still: float, least: float, v_max: float
-) -> float:
-    """Return the voltage [V] at which a Bingham damper gives the commanded force.
-
-    As `lugre_voltage`, with `p` (6,) and no state.
-    """
-    f_0 = bingham_force(v, 0.0, p)
-    slope = bingham_force(v, 1.0, p) - f_0
-    return affine_voltage(command, v, f_0, slope, still, least, v_max)

@@ -23,15 +23,13 @@ from typing import Any
 from ..errors import UnitError
 from ..findings import unknown, written
 from ..lines import KeyPath
-from ..physics.damper import LAWS
-from ..physics.effect import CHOICES, EFFECTS, Parameter
+from ..physics.effect import EFFECTS, laws_joined
+from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
+from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..physics.user import why_left_out
 from ..units import convert
 from .files import Toml, write_whole
 
-STANDARD = {"bingham_standard": "bingham", "lugre_standard": "lugre"}
-"""Laws without the exponential, with the law whose exponent is then 0."""
-LAW_NAMES = (*LAWS, *STANDARD)
 ORIGINS = ("reconstructed", "measured", "assumed", "identified")
 _KEYS = ("schema", "law", "building", "parameters", "effects")
 _VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")
@@ -65,8 +63,8 @@ class StudyModel:
 
     @property
     def base_law(self) -> str:
-        """The law as the code knows it: "bingham" or "lugre"."""
-        return STANDARD.get(self.law, self.law)
+        """The law without its variant: "bingham" of "bingham_standard"."""
+        return base_and_variant(self.law)[0].name
 
     def flat(self) -> dict[str, Value]:
         """Return all parameters by the names of FMUs: "f_c", "gas_spring.k"."""
@@ -121,7 +119,7 @@ class StudyModel:
         return replace(self, effects={**self.effects, effect: _defaults("", effect)})
 
 
-def new_model(law: str = "lugre", effects: tuple[str, ...] = (), building: str = "") -> StudyModel:
+def new_model(law: str = DEFAULT, effects: tuple[str, ...] = (), building: str = "") -> StudyModel:
     """Return a model with every parameter at its default."""
     model = StudyModel(law, _defaults(law), {}, building)
     for effect in effects:
@@ -144,13 +142,13 @@ def read_model(path: Path, study: Path | None = None) -> StudyModel:
     toml.schema()
     toml.known((), data, _KEYS)
     law = toml.text((), data, "law")
-    if law not in LAW_NAMES:
-        toml.error(("law",), unknown("law", law, LAW_NAMES))
+    if law not in law_names():
+        toml.error(("law",), unknown("law", law, law_names()))
         toml.check()
     parameters = _values(toml, ("parameters",), toml.table((), data, "parameters"), law)
     effects: dict[str, dict[str, Value]] = {}
     for name, table in toml.table((), data, "effects").items():
-        found = _effect(toml, name, table, STANDARD.get(law, law))
+        found = _effect(toml, name, table, base_and_variant(law)[0].name)
         if found is not None:
             effects[name] = found
     _exclusions(toml, list(effects))
@@ -184,7 +182,7 @@ def model_text(model: StudyModel, beside: Path | None = None) -> str:
     for key in ("parameters", "effects"):
         if key not in document:
             document[key] = tomlkit.table(is_super_table=True)
-    _update(document["parameters"], {n: _as_toml(v) for n, v in model.parameters.items()}, False)
+    _update(document["parameters"], _listed(model.parameters, _tables(model.law)), False)
     effects = document["effects"]
     for name in [name for name in effects if name not in model.effects]:
         del effects[name]
@@ -193,18 +191,42 @@ def model_text(model: StudyModel, beside: Path | None = None) -> str:
             effects[name] = tomlkit.table()
         if "parameters" not in effects[name]:
             effects[name]["parameters"] = tomlkit.inline_table()
-        _update(effects[name]["parameters"], {n: _as_toml(v) for n, v in values.items()}, True)
+        _update(effects[name]["parameters"], _listed(values, _tables("", name)), True)
     if not model.effects:
         del document["effects"]
     return tomlkit.dumps(document)
 
 
-def _update(table: Any, wanted: Mapping[str, dict[str, Any]], inline: bool) -> None:
+def _listed(
+    values: Mapping[str, Value], tables: Mapping[str, tuple[str, ...]]
+) -> dict[str, dict[str, Any] | list[dict[str, Any]]]:
+    """Return values as a file has them: those of a table as one list."""
+    inside = {name for names in tables.values() for name in names}
+    plain = {name: _as_toml(value) for name, value in values.items() if name not in inside}
+    rows = {
+        table: [_as_toml(values[name]) for name in names]
+        for table, names in tables.items()
+        if set(names) <= set(values)
+    }
+    return {**plain, **rows}
+
+
+def _update(
+    table: Any, wanted: Mapping[str, dict[str, Any] | list[dict[str, Any]]], inline: bool
+) -> None:
     import tomlkit
 
     for name in [name for name in table if name not in wanted]:
         del table[name]
     for name, content in wanted.items():
+        if isinstance(content, list):
+            if name not in table or table[name] != content:
+                table[name] = tomlkit.array()
+                for row in content:
+                    entry = tomlkit.inline_table()
+                    entry.update(row)
+                    table[name].append(entry)
+            continue
         if name not in table:
             table[name] = tomlkit.inline_table() if inline else tomlkit.table()
         for key in _VALUE_KEYS:
@@ -231,17 +253,25 @@ def _declared(law: str, effect: str = "") -> dict[str, Parameter]:
     """Return the declarations of an effect's parameters, or of a law's."""
     if effect:
         return dict(EFFECTS[effect].parameters)
-    declared = dict(LAWS[STANDARD.get(law, law)].parameters)
-    if law in STANDARD:
-        declared["exponent"] = declared["exponent"]._replace(value=0.0)
+    base, variant = base_and_variant(law)
+    declared = dict(base.parameters)
+    for name, value in variant.values.items():
+        declared[name] = declared[name]._replace(value=value)
     return declared
+
+
+def _tables(law: str, effect: str = "") -> dict[str, tuple[str, ...]]:
+    """Return the tables of an effect, or of a law: name to the parameters that it lists."""
+    owner = EFFECTS[effect] if effect else base_and_variant(law)[0]
+    fields = fields_of(owner.parameters, owner.tables)
+    return {name: fields[name] for name in owner.tables}
 
 
 def _defaults(law: str, effect: str = "") -> dict[str, Value]:
     """Return the parameters of an effect, or of a law, at their defaults."""
     fixed: tuple[str, ...] = (*CHOICES, *(EFFECTS[effect].assumed if effect else ()))
-    if law in STANDARD and not effect:
-        fixed = (*CHOICES, "v_n")  # without the exponential there is no speed to divide by
+    if not effect:
+        fixed = (*fixed, *base_and_variant(law)[1].idle)
     return {
         name: Value(p.value, p.unit, *p.bounds, free=name not in fixed)
         for name, p in _declared(law, effect).items()
@@ -257,8 +287,8 @@ def _effect(toml: Toml, name: str, table: Any, law: str) -> dict[str, Value] | N
     if not isinstance(table, dict):
         toml.error(keys, f"is {written(table)}; a table is right.")
         return None
-    if EFFECTS[name].site == "damper" and law not in EFFECTS[name].laws:
-        joins = ", ".join(EFFECTS[name].laws)
+    if EFFECTS[name].site == "damper" and not EFFECTS[name].joins(LAWS[law]):
+        joins = ", ".join(laws_joined(EFFECTS[name]))
         toml.error(keys, f"{name} cannot join the law {law}; it joins {joins}.")
     toml.known(keys, table, ("parameters",))
     own = toml.table(keys, table, "parameters")
@@ -275,14 +305,32 @@ def _exclusions(toml: Toml, effects: list[str]) -> None:
 def _values(
     toml: Toml, keys: KeyPath, table: Mapping[str, Any], law: str, effect: str = ""
 ) -> dict[str, Value]:
-    declared, out = _declared(law, effect), _defaults(law, effect)
+    declared, out, tables = _declared(law, effect), _defaults(law, effect), _tables(law, effect)
     for name, own in table.items():
-        if name not in declared:
-            toml.error((*keys, name), unknown("parameter", name, declared))
+        if name in tables:
+            out.update(_table(toml, (*keys, name), own, tables[name], declared, out))
+        elif name not in declared:
+            toml.error((*keys, name), unknown("parameter", name, [*declared, *tables]))
         elif not isinstance(own, dict):
             toml.error((*keys, name), f"{name} is {written(own)}; {{ value = ... }} is right.")
         else:
             out[name] = _value(toml, (*keys, name), own, declared[name], out[name])
+    return out
+
+
+def _table(
+    toml: Toml, keys: KeyPath, given: Any, names: tuple[str, ...],
+    declared: Mapping[str, Parameter], defaults: Mapping[str, Value],
+) -> dict[str, Value]:  # fmt: skip
+    """Return the values of a table: a list of numbers, or of what a parameter's table may say."""
+    if not isinstance(given, list) or len(given) != len(names):
+        right = f"a list of {len(names)} values, one per knot, is right"
+        toml.error(keys, f"{keys[-1]} is {written(given)}; {right}.")
+        return {}
+    out = {}
+    for name, own in zip(names, given, strict=True):
+        entry = own if isinstance(own, dict) else {"value": own}
+        out[name] = _value(toml, (*keys[:-1], name), entry, declared[name], defaults[name])
     return out
 
 

@@ -39,8 +39,9 @@ from typing import Any, TypeVar
 
 from ..errors import BristleError, DesignError, UnitError
 from ..physics.building import paper_building, read_building
-from ..physics.damper import LAWS
-from ..physics.effect import EFFECTS
+from ..physics.effect import EFFECTS, Effect
+from ..physics.laws import DEFAULT_OF_DESIGN, Law, base_and_variant, law_names
+from ..physics.parameter import fields_of
 from ..units import convert
 from .sliding import Damper
 from .task import Scheduling, Task
@@ -138,20 +139,35 @@ def damper_from_model(
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise DesignError(f"{path}: not valid TOML: {error}.") from error
     law = str(data.get("law", ""))
-    base = law.removesuffix("_standard")
-    if data.get("schema") != 1 or base not in LAWS:
-        raise DesignError(f"{path}: schema 1 and a law of {', '.join(LAWS)} are right.")
-    units = {name: parameter.unit for name, parameter in LAWS[base].parameters.items()}
-    values = _model_values(data.get("parameters", {}), units, "", path)
+    if data.get("schema") != 1 or law not in law_names():
+        names = [name for name in law_names() if base_and_variant(name)[0].name == name]
+        raise DesignError(f"{path}: schema 1 and a law of {', '.join(names)} are right.")
+    base, _ = base_and_variant(law)
+    units = {name: parameter.unit for name, parameter in base.parameters.items()}
+    values = _model_values(_entries(data.get("parameters", {}), base), units, "", path)
     effects = data.get("effects", {})
     for name, table in effects.items():
         if name not in EFFECTS:
             raise DesignError(f"{path} [effects.{name}]: no effect is named {name!r}.")
         known = {key: parameter.unit for key, parameter in EFFECTS[name].parameters.items()}
-        values |= _model_values(table.get("parameters", {}), known, name + ".", path)
+        own = _entries(table.get("parameters", {}), EFFECTS[name])
+        values |= _model_values(own, known, name + ".", path)
     on = tuple(name for name in effects if EFFECTS[name].site == "damper")
     values = {key: value for key, value in values.items() if key.split(".")[0] in (*units, *on)}
     return _located(lambda: Damper(law, values, on, v_max, known_to), str(path))
+
+
+def _entries(table: Mapping[str, Any], owner: type[Law] | type[Effect]) -> dict[str, Any]:
+    """Return a model's parameters with the lists of tables as one entry per value."""
+    out = dict(table)
+    for name, names in fields_of(owner.parameters, owner.tables).items():
+        if name in owner.tables and isinstance(out.get(name), list):
+            rows = out.pop(name)
+            out.update(
+                (entry, row if isinstance(row, dict) else {"value": row})
+                for entry, row in zip(names, rows, strict=False)
+            )
+    return out
 
 
 def _model_values(
@@ -215,7 +231,7 @@ def _damper(table: Mapping[str, Any], folder: Path, where: str) -> Damper:
             f"{where}: parameters must be a table of numbers, effects a list of names."
         )
     values = {str(name): _number(value, str(name), where) for name, value in parameters.items()}
-    law = _text(table, "law", where) or "bingham"
+    law = _text(table, "law", where) or DEFAULT_OF_DESIGN
     return Damper(law, values, tuple(map(str, effects)), **limits)
 
 

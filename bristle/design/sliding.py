@@ -16,17 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DesignError
-from ..physics.bingham import falling
-from ..physics.damper import LAWS, DamperModel
+from ..physics.damper import DamperModel
 from ..physics.effect import EFFECTS, effects_of
+from ..physics.laws import DEFAULT_OF_DESIGN, LEAST, Law, base_and_variant, law_names
 
 Array = NDArray[np.float64]
 
-_STANDARD = "_standard"
 _LASTS = 0.25
 """How long the damper slides before its force is read [s]: coils and mounts have settled then."""
 _STEPS = 100
 _SPEEDS = 12
+_SPEED = 0.02
+"""Typical speed [m/s] of a law that has no speed of its own."""
 _NUDGE = 1e-3
 """Displacement to either side at which the damper's stiffness is read [m]."""
 
@@ -38,7 +39,7 @@ class Damper:
     Attributes
     ----------
     law : str
-        "bingham", "lugre", or either with "_standard": without the exponential.
+        A damper's law or a variant of one, such as "bingham_standard".
     values : mapping
         Name ("f_c", "gas_spring.k") to value in SI; what is missing takes the law's value.
     effects : tuple of str
@@ -49,24 +50,25 @@ class Damper:
         Largest speed [m/s] of the data behind the model; a design must not go beyond.
     """
 
-    law: str = "bingham"
+    law: str = DEFAULT_OF_DESIGN
     values: Mapping[str, float] = field(default_factory=dict)
     effects: tuple[str, ...] = ()
     v_max: float = 8.0
     known_to: float | None = None
 
     def __post_init__(self) -> None:
-        laws = [*LAWS, *(law + _STANDARD for law in LAWS)]
-        if self.law not in laws:
-            raise DesignError(f"damper: law = {self.law!r}; there are {', '.join(laws)}.")
+        if self.law not in law_names():
+            raise DesignError(f"damper: law = {self.law!r}; there are {', '.join(law_names())}.")
+        if not self.kind.exact():
+            raise DesignError(f"damper: law = {self.law!r} has no closed form of steady sliding.")
         if not (isfinite(self.v_max) and self.v_max > 0.0):
             raise DesignError(
                 f"damper: v_max = {self.v_max!r} V leaves nothing to control; it must be positive."
             )
         if self.known_to is not None and not self.known_to > 0.0:
             raise DesignError(f"damper: known_to = {self.known_to!r} m/s must be positive.")
-        known = dict(LAWS[self.base].parameters)
-        available = {effect.name: effect for effect in effects_of("damper", self.base)}
+        known = dict(self.kind.parameters)
+        available = {effect.name: effect for effect in effects_of("damper", self.kind.name)}
         for name in self.effects:
             if name not in available:
                 raise DesignError(_unknown("effect", name, available))
@@ -80,33 +82,24 @@ class Damper:
                 raise DesignError(f"damper: {name} = {value!r} lies outside {low:g} .. {high:g}.")
 
     @property
-    def base(self) -> str:
-        """The law without "_standard"."""
-        return self.law.removesuffix(_STANDARD)
+    def kind(self) -> type[Law]:
+        """The law's class, without the variant."""
+        return base_and_variant(self.law)[0]
+
+    @property
+    def speed(self) -> float:
+        """A typical speed of the law [m/s]: that over which its viscous part falls."""
+        _, over = self.kind.falling()
+        return self.parameters()[over] if over else _SPEED
 
     def parameters(self) -> dict[str, float]:
-        """Return the base law's parameters, complete, in the law's order."""
+        """Return the law's parameters, complete, in the law's order."""
+        law, variant = base_and_variant(self.law)
         values = {
             name: float(self.values.get(name, parameter.value))
-            for name, parameter in LAWS[self.base].parameters.items()
+            for name, parameter in law.parameters.items()
         }
-        if self.law.endswith(_STANDARD):
-            values["exponent"] = 0.0
-        return values
-
-    def sliding(self) -> dict[str, float]:
-        """Return f_c, f_v, c_0, c_v, v_n, exponent of steady sliding, effects left out."""
-        p = self.parameters()
-        if self.base == "bingham":
-            return p
-        return {
-            "f_c": p["sigma_a"] / p["a_0"],
-            "f_v": p["sigma_0"] / p["a_0"],
-            "c_0": p["sigma_2"],
-            "c_v": p["sigma_b"],
-            "v_n": p["v_n"],
-            "exponent": p["exponent"],
-        }
+        return {**values, **variant.values}
 
     def data(self) -> dict[str, Any]:
         """Return the damper as a table of a design file."""
@@ -122,16 +115,22 @@ class Damper:
 def coefficients(damper: Damper, r: Array, eps: float) -> tuple[Array, Array]:
     """Return d(r) [N s/m] and b(r) [N/V] at speeds r (k,) [m/s].
 
-        d = f_c/(r + eps) + c_0 e(r),   b = r (f_v/(r + eps) + c_v e(r)),   e = exp(-(r/v_n)^m)
+        d = Y_0/(r + eps) + F_0/r,   b = r (Y_V/(r + eps) + F_V/r)
 
-    Effects enter as what they add to the force in steady sliding, read from the damper itself at
-    some speeds, the mean of both directions; a slow effect as it is near its start. Elements in
+    Y, F are the law's yield force and its other force in steady sliding, without voltage and per
+    volt. Effects enter as what they add to the force in steady sliding, read from the damper itself
+    at some speeds, the mean of both directions; a slow effect as it is near its start. Elements in
     series with the fluid (mount, backlash) carry its force and are left out.
     """
-    p = damper.sliding()
-    fall = np.array([falling(float(speed), p["v_n"], p["exponent"]) for speed in r])
-    d = p["f_c"] / (r + eps) + p["c_0"] * fall
-    b = r * (p["f_v"] / (r + eps) + p["c_v"] * fall)
+    law, values = damper.kind, damper.parameters()
+    top = 1.0 if law.affine() else damper.v_max
+    speed = np.maximum(r, LEAST)
+    still, driven = (
+        np.array([law.sliding_force(values, v, V) for v in speed.tolist()]).T for V in (0.0, top)
+    )
+    per_volt = (driven - still) / top
+    d = still[0] / (r + eps) + still[1] / speed
+    b = r * (per_volt[0] / (r + eps) + per_volt[1] / speed)
     if _parallel(damper):
         speeds, still, driven = _added(damper, float(r.max()))
         jump, slope = still[0], (driven - still) / damper.v_max
@@ -145,7 +144,7 @@ def stiffness(damper: Damper) -> float:
     on = _parallel(damper)
     if not on:
         return 0.0
-    v = damper.parameters()["v_n"]
+    v = damper.speed
     force = [
         sum(_slid(damper, sign * v, 0.0, x, on) for sign in (1.0, -1.0)) for x in (-_NUDGE, _NUDGE)
     ]
@@ -159,8 +158,7 @@ def _parallel(damper: Damper) -> tuple[str, ...]:
 
 def _added(damper: Damper, top: float) -> tuple[Array, Array, Array]:
     """Return speeds (k,), and what the effects add there to the force at 0 V and at v_max [N]."""
-    v_n = damper.parameters()["v_n"]
-    speeds = np.geomspace(min(1e-2 * v_n, 1e-2 * top), top, _SPEEDS)
+    speeds = np.geomspace(min(1e-2 * damper.speed, 1e-2 * top), top, _SPEEDS)
     forces = []
     for V in (0.0, damper.v_max):
         both = [
@@ -183,9 +181,9 @@ def _slid(damper: Damper, v: float, V: float, x: float, effects: tuple[str, ...]
         for state, signal in EFFECTS[name].starts.items()
         if signal == "V"
     }
-    if damper.base == "lugre":
-        start["bristle_deflection_0"] = float(np.sign(v)) / p["a_0"]
-    model = DamperModel(damper.base, {**damper.values, **p, **start}, list(effects))
+    bent = damper.kind.sliding_states(p, v, V)
+    start |= {f"{name}_0": value for name, value in zip(damper.kind.states, bent, strict=True)}
+    model = DamperModel(damper.kind.name, {**damper.values, **p, **start}, list(effects))
     dt = _LASTS / _STEPS
     total = 0.0
     for k in range(_STEPS):

@@ -8,6 +8,7 @@ from ..data.measurement import Measurement
 from ..identify.model import Model
 from ..identify.rig import DAMPER
 from ..physics.building import Building
+from ..physics.laws import DEFAULT
 from .bench import BenchRuns
 from .damper import look_at_damper
 from .equilibrium import BuildingRuns
@@ -21,7 +22,7 @@ def diagnose(
     train: Sequence[Measurement],
     holdout: Sequence[Measurement],
     *,
-    law: str = "lugre",
+    law: str = DEFAULT,
     effects: Sequence[str] = (),
     values: Mapping[str, float] | None = None,
     held: Sequence[str] = (),
@@ -33,7 +34,7 @@ def diagnose(
     Parameters
     ----------
     train, holdout : measurements to fit to, and those that decide
-    law : {"bingham", "lugre"}
+    law : a damper's law, such as "bingham"
     effects : the effects that the model has already
     values : its parameters where they were identified before, by name in SI; else they are
         identified here

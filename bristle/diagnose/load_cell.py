@@ -10,9 +10,10 @@ from scipy.optimize import minimize_scalar
 from ..identify.assigned import corrected
 from ..identify.line import fit_line
 from ..identify.response import Response
-from ..identify.structure import LinearLayer, StructureProblem, layer_run
+from ..identify.structure import StructureProblem, layer_run
 from ..physics.building import Building
 from ..physics.effect import instrument_of
+from ..physics.laws import law_of_part
 from .candidates import judge
 from .finding import Finding
 from .rule import SITE, DecisionRule
@@ -66,7 +67,7 @@ def _search_cell(
         return StructureProblem([layer_run(corrected(r, delay, gain), building) for r in part])
 
     def cost(value: float) -> float:
-        return fit_line(problem(value, train), LinearLayer.name).cost
+        return fit_line(problem(value, train), law_of_part("layer").name).cost
 
     if what == "delay":
         dt = train[0].dt
@@ -80,7 +81,7 @@ def _search_cell(
         minimize_scalar(cost, bounds=(low, high), method="bounded", options={"maxiter": 14}).x
     )
     own, other = problem(value, train), problem(value, holdout)
-    base = fit_line(own, LinearLayer.name)
+    base = fit_line(own, law_of_part("layer").name)
     after = judge(base.model, own, other)
     finding = Finding("force", "none", (), 0.0, after.z, 0.0, detectable(other), "", base.model)
     delay, gain = (value, 1.0) if what == "delay" else (0.0, value)

@@ -17,12 +17,11 @@ from ..identify.line import fit_line
 from ..identify.model import Model, Problem, Run
 from ..identify.site_fit import joined
 from ..identify.structure import (
-    LinearLayer,
-    LinearStorey,
     StructureProblem,
     StructureRun,
 )
 from ..physics.effect import EFFECTS, effects_of
+from ..physics.laws import law_of_part
 from .candidates import Trial, judge
 from .evidence import paired
 from .finding import Finding
@@ -42,7 +41,7 @@ def look_at(
 
     `present` holds the effects that the model has at this site already, with their values.
     """
-    linear = LinearLayer if site == "layer" else LinearStorey
+    linear = law_of_part(site)
     hook = "force" if site == "layer" else "spring"
     base = fit_line(train, linear.name)
     taken: set[str] = set()

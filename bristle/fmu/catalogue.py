@@ -55,6 +55,20 @@ def source(name: str) -> Path:
         ) from None
 
 
+def component_of_law(law: str) -> str:
+    """Return the name of the component that is a damper of some law.
+
+    Raises
+    ------
+    BuildError
+        If there is none.
+    """
+    for name, path in sources().items():
+        if getattr(component_class(path), "law", "") == law:
+            return name
+    raise BuildError(f"no component is a damper of the law {law}: components/ needs one.")
+
+
 @cache
 def component_class(path: Path) -> type[Slave]:
     """Return the component class that a source file defines.

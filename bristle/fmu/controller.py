@@ -17,8 +17,7 @@ from ..component import SAMPLED, clock, controller
 from ..control import inverse
 from ..control.controller import Controller, read_controller
 from ..errors import BristleError
-from ..physics.bingham import Bingham
-from ..physics.lugre import LuGre
+from ..physics.laws import DEFAULT, LAWS, Law, law_code, laws_of
 from .component import ComponentSlave
 from .slave import Slave
 
@@ -160,11 +159,18 @@ def declare_anti_windup(slave: Slave, rate: float) -> None:
     slave.add_parameter("anti_windup", rate, "1/s", text, (0.0, 1e4))
 
 
+def invertible() -> list[type[Law]]:
+    """Return the laws that can be inverted, the default first."""
+    found = [law for law in laws_of("damper") if law.affine() and law.exact()]
+    return sorted(found, key=lambda law: law.name != DEFAULT)
+
+
 def declare_inverse(slave: Slave) -> None:
     """Declare the law that is inverted and its parameters: `lugre.sigma_a`, `bingham.f_c` ..."""
-    text = "the law that is inverted, one of lugre, bingham"
-    slave.add_parameter("inverse", "lugre", None, text)
-    for law in (LuGre, Bingham):
+    laws = invertible()
+    text = f"the law that is inverted, one of {', '.join(law.name for law in laws)}"
+    slave.add_parameter("inverse", DEFAULT, None, text)
+    for law in laws:
         for name, p in law.parameters.items():
             slave.add_parameter(f"{law.name}.{name}", p.value, p.unit, p.text, p.bounds)
     text = "no voltage below this speed"
@@ -176,12 +182,12 @@ def declare_inverse(slave: Slave) -> None:
 def inverse_law(slave: Slave) -> dict[str, Any]:
     """Return what an inverse needs of `component.controller.Constants`; ValueError if unknown."""
     chosen = slave["inverse"]
-    laws: dict[str, Any] = {"lugre": LuGre, "bingham": Bingham}
-    if chosen not in laws:
-        raise ValueError(f"inverse {chosen!r} is neither lugre nor bingham.")
+    names = [law.name for law in invertible()]
+    if chosen not in names:
+        raise ValueError(f"inverse {chosen!r} is neither {' nor '.join(names)}.")
     return {
-        "lugre": chosen == "lugre",
-        "p": [slave[f"{chosen}.{name}"] for name in laws[chosen].parameters],
+        "law": law_code(chosen),
+        "p": [slave[f"{chosen}.{name}"] for name in LAWS[chosen].parameters],
         "still": slave["still"],
         "least_slope": slave["least_slope"],
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from ..component import HELD, damper
-from ..physics.damper import LAWS
+from ..physics.laws import LAWS
 from .component import ComponentSlave
 
 
@@ -40,9 +40,9 @@ class DamperSlave(ComponentSlave):
         self.add_parameter("v_max", 8.0, "V", "largest voltage; the damper saturates", (0.0, 1e4))
         text = "mass that the damper moves; 0: no holding force, sliding law"
         self.add_parameter("moving_mass", 0.0, "kg", text, (0.0, 1e9))
-        if self.law == "lugre":
-            text = "start value of the bristle deflection"
-            self.add_parameter("bristle_deflection_0", 0.0, "m", text)
+        for name, unit in LAWS[self.law].states.items():
+            text = f"start value of the {name.replace('_', ' ')}"
+            self.add_parameter(f"{name}_0", 0.0, unit, text)
         self.add_effects("damper", self.law)
 
     def setup(self) -> tuple[Any, list[float], int]:

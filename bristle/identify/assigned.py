@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..physics.effect import EFFECTS
+from ..physics.laws import law_of_part
 from .model import Model
 from .response import Response
-from .structure import LinearLayer, LinearStorey
 
 
 def at_site(model: Model, site: str, sites: Container[str]) -> Model:
@@ -25,7 +25,7 @@ def at_site(model: Model, site: str, sites: Container[str]) -> Model:
     effects = tuple(name for name in model.effects if _acts(name, model, site, sites))
     law = model.law
     if site != "damper":
-        law = LinearLayer.name if site == "layer" else LinearStorey.name
+        law = law_of_part(site).name
     own = {n: v for n, v in model.values.items() if _belongs(n, effects, site)}
     limits = {n: v for n, v in model.limits.items() if _belongs(n, effects, site)}
     held = tuple(n for n in model.held if _belongs(n, effects, site))

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics import damper
+from ..physics.inputs import Inputs, Setup
 
 Array = NDArray[np.float64]
 
 damper_step = damper.step
-damper_step_law = damper.step_law
 damper_jump = damper.jump
 damper_evaluate = damper.evaluate
+law_step = damper.step_law
 
 
 _ONE_AT_A_TIME = Lock()
@@ -47,49 +48,45 @@ def jumps(V: Array) -> NDArray[np.bool_]:
     return found
 
 
-def force_history(
-    law: int, x: Any, v: Any, a: Any, V: Any, dt: float, z: Any, p: Any, on: Any, moving: Any,
-    n_moving: int, advances: bool, z1: Any, work: Any, out: Any,
-) -> None:  # fmt: skip
+def force_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: Any) -> None:
     """Fill `out` (n,) with the force at each sample of a motion that is linear between them.
 
-    So is the voltage, but where it jumps: see `before_jump`.
+    So is the voltage, but where it jumps: see `before_jump`. `motion` holds x, v, a, V as (n,) and
+    the step dt [s]; `z` the states at the begin, which are moved on.
     """
     size = len(z)
+    x, v, a, V, dt = motion.x, motion.v, motion.a, motion.V, motion.dt
     energy = 0.0
-    out[0] = damper_evaluate(
-        law, x[0], v[0], a[0], V[0], dt, 0.0, 0.0, False, z, p, on, work[0:size],
-        work[size : 2 * size],
-    )[0]  # fmt: skip
+    now = Inputs(x[0], v[0], a[0], V[0], dt, 0.0, 0.0, False)
+    out[0] = damper_evaluate(setup, now, z, work[0:size], work[size : 2 * size])[0]
     for k in range(1, len(x)):
         V1 = before_jump(V, k)
-        out[k] = damper_step(
-            law, x[k - 1], v[k - 1], a[k - 1], V[k - 1], x[k], v[k], a[k], V1, dt, energy, 0.0,
-            False, z, p, on, moving, n_moving, advances, z1, work,
-        )[0]  # fmt: skip
+        begin = Inputs(x[k - 1], v[k - 1], a[k - 1], V[k - 1], dt, energy, 0.0, False)
+        now = Inputs(x[k], v[k], a[k], V1, dt, energy, 0.0, False)
+        out[k] = damper_step(setup, begin, now, z, z1, work)[0]
         if V[k] != V1:
-            out[k] = damper_jump(law, x[k], v[k], a[k], V[k], dt, energy, z1, p, on, work)
+            now = Inputs(x[k], v[k], a[k], V[k], dt, energy, 0.0, False)
+            out[k] = damper_jump(setup, now, z1, work)
         energy += 0.5 * dt * (out[k - 1] * v[k - 1] + out[k] * v[k])
         for i in range(size):
             z[i] = z1[i]
 
 
-def law_history(
-    law: int, x: Any, v: Any, a: Any, V: Any, dt: float, z: Any, p: Any, on: Any, moving: Any,
-    n_moving: int, advances: bool, z1: Any, work: Any, out: Any,
-) -> None:  # fmt: skip
+def law_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: Any) -> None:
     """Do what `force_history` does where no effect is on, without the code of any effect.
 
     The law knows the voltage of its own moment only, so a jump needs no care.
     """
-    out[0] = damper_step_law(
-        law, v[0], x[0], v[0], a[0], V[0], 0.0, 0.0, 0.0, False, z, p, on, z1, work
-    )[0]
+    law, p = setup.law, setup.p
+    x, v, a, V, dt = motion.x, motion.v, motion.a, motion.V, motion.dt
+    before = Inputs(x[0], v[0], a[0], V[0], 0.0, 0.0, 0.0, False)
+    out[0] = law_step(law, p, before, before, z, z1)[0]
     for k in range(1, len(x)):
-        out[k] = damper_step_law(
-            law, v[k - 1], x[k], v[k], a[k], V[k], dt, 0.0, 0.0, False, z, p, on, z1, work
-        )[0]
-        z[0] = z1[0]
+        now = Inputs(x[k], v[k], a[k], V[k], dt, 0.0, 0.0, False)
+        out[k] = law_step(law, p, before, now, z, z1)[0]
+        before = now
+        for i in range(setup.n_own):
+            z[i] = z1[i]
 
 
 def compiled_history(effects: bool = True) -> Callable[..., None]:
@@ -98,12 +95,12 @@ def compiled_history(effects: bool = True) -> Callable[..., None]:
     The first call on a machine takes seconds, that without effects one or two.
     """
     with _ONE_AT_A_TIME:  # threads that try effects ask for it at once
-        return _compiled(damper.evaluate) if effects else _compiled_law()
+        return _compiled(damper.evaluate) if effects else _compiled_law(damper.step_law)
 
 
 @cache
 def _compiled(evaluate: Any) -> Callable[..., None]:
-    """Compile the history with this woven function: there is a new one after a new effect."""
+    """Compile the history with this generated function: there is a new one after a new effect."""
     global damper_evaluate
     from ..jit import compiled
 
@@ -113,10 +110,13 @@ def _compiled(evaluate: Any) -> Callable[..., None]:
 
 
 @cache
-def _compiled_law() -> Callable[..., None]:
+def _compiled_law(step_law: Any) -> Callable[..., None]:
+    """Compile the history of laws alone: there is a new one after a new law."""
+    global law_step
     from ..jit import compiled
 
-    function: Callable[..., None] = compiled(law_history)
+    law_step = step_law
+    function: Callable[..., None] = compiled(law_history, ("codegen.step_law", "falling.falling"))
     return function
 
 
@@ -125,7 +125,8 @@ class Bench:
 
     Parameters
     ----------
-    law : {"bingham", "lugre"}
+    law : str
+        A damper's law, such as "bingham".
     effects : list of str
         The effects that are on.
     """
@@ -133,14 +134,8 @@ class Bench:
     def __init__(self, law: str, effects: list[str]) -> None:
         self.law = law
         self.effects = list(effects)
-        layout = damper.LAYOUT
-        self._code = damper.LAW_CODES[law]
-        self._on = np.array([e.name in effects for e in layout.effects], dtype=np.bool_)
-        moving = damper.moving_states(law, self.effects)
-        self._n_moving = len(moving)
-        self._moving = np.array([*moving, *[0] * (layout.z_size - len(moving))], dtype=np.int64)
-        self._advances = damper.advances(self.effects)
-        self._history = compiled_history(bool(self._on.any()))
+        self._setup = damper.setup_of(law, {}, self.effects, np.array, _slots)
+        self._history = compiled_history(self._setup.active)
 
     def force(
         self, x: Array, v: Array, a: Array, V: Array, dt: float, values: dict[str, float]
@@ -150,19 +145,21 @@ class Bench:
         `values` are the parameters by name in SI; missing ones take their defaults. The start
         values of states end in `_0`; those that start with a signal take its first value.
         """
-        layout = damper.LAYOUT
-        p = np.array(damper.pack(self.law, values))
-        z = np.zeros(layout.z_size)
-        z[0] = values.get("bristle_deflection_0", 0.0)
+        setup = self._setup._replace(p=np.array(damper.pack(self.law, values)))
         first = {"x": x[0], "v": v[0], "a": a[0], "V": V[0]}
-        for effect in layout.effects:
-            for state in effect.states:
-                name = f"{effect.name}.{state}"
-                begin = first.get(effect.starts.get(state, ""), 0.0)
-                z[layout.states[name]] = values.get(name + "_0", begin)
+        begun = {
+            f"{effect.name}.{state}_0": first[signal]
+            for effect in damper.SLOTS.effects
+            for state, signal in effect.starts.items()
+            if signal in first
+        }
+        z = np.array(damper.start_states(self.law, {**begun, **values}))
         out = np.empty(len(x))
-        self._history(
-            self._code, x, v, a, V, dt, z, p, self._on, self._moving, self._n_moving,
-            self._advances, np.zeros_like(z), np.zeros(damper.work_size()), out,
-        )  # fmt: skip
+        motion = Inputs(x, v, a, V, dt, 0.0, 0.0, False)
+        self._history(setup, motion, z, np.zeros_like(z), np.zeros(damper.work_size()), out)
         return out
+
+
+def _slots(numbers: list[Any]) -> NDArray[Any]:
+    """Return switches or slots as arrays of one kind, whatever their number."""
+    return np.array(numbers, dtype=np.bool_ if isinstance(numbers[0], bool) else np.int64)

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.effect import EFFECTS
+from ..physics.laws import LAWS
 from .model import (
-    DRIVEN,
-    OTHER_LAWS,
     Model,
     Problem,
     Run,
@@ -31,7 +30,6 @@ from .search import HUBER_AT_ONE, descend, jacobian, loss
 from .starts import start_model, start_models
 
 __all__ = [
-    "OTHER_LAWS",
     "Expected",
     "Fit",
     "Model",
@@ -276,7 +274,8 @@ def identify(
         for own in _parameters(effect)
     } | dict(values or {})
     model = Model(law, effects, given, held, dict(limits or {}))
-    silent = tuple(name for name in DRIVEN[law] if name not in held) if steady(problem) else ()
+    driven = LAWS[law].driven() if steady(problem) else ()
+    silent = tuple(name for name in driven if name not in held)
     model = without(model, silent)
     trials = start_models(problem, model, starts)
     expected = problem.expectation(trials[0])

@@ -7,8 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..physics.inputs import Inputs
+from ..physics.laws import LAWS, Law
 from .fit import Fit
-from .model import OTHER_LAWS, Model, Run
+from .model import Model, Run
 from .structure import StructureProblem
 
 Array = NDArray[np.float64]
@@ -19,9 +21,9 @@ def fit_line(problem: StructureProblem, law: str) -> Fit:
 
     The weights are those of Huber's loss at the expected noise.
     """
-    names = list(OTHER_LAWS[law].parameters)
+    names = list(LAWS[law].parameters)
     model = Model(law, (), dict.fromkeys(names, 0.0))
-    columns = [_columns(run, names) for run in problem.runs]
+    columns = [_columns(run, LAWS[law]) for run in problem.runs]
     A = np.concatenate(columns)
     force = np.concatenate([run.force for run in problem.runs])
     noise = [max(run.noise, 1e-300) for run in problem.runs]
@@ -60,6 +62,10 @@ def _line_std(problem: StructureProblem, model: Model, columns: list[Array]) -> 
     return dict(zip(model.values, np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
-def _columns(run: Run, names: list[str]) -> Array:
-    one = {"k": run.x, "c": run.v, "added_mass": run.a, "offset": np.ones_like(run.x)}
-    return np.column_stack([one[name] for name in names])
+def _columns(run: Run, law: type[Law]) -> Array:
+    """Return the force (n, p) of each parameter of a linear law at 1, the others at zero."""
+    zero = np.zeros_like(run.x)
+    q = Inputs(run.x, run.v, run.a, run.V, run.dt, 0.0, 0.0, False)
+    none = dict.fromkeys(law.parameters, 0.0)
+    own = [law.hooks()["force"](q, (), law.at({**none, name: 1.0})) for name in law.parameters]
+    return np.column_stack([zero + force for force in own])

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.damper import LAWS
-from ..physics.effect import CHOICES, EFFECTS, Parameter
+from ..physics.effect import EFFECTS
+from ..physics.laws import LAWS, Law
+from ..physics.parameter import CHOICES, Parameter
 from .bench import Bench
 from .instruments import earlier, pure_delay, shown_force, true_motion
 
 Array = NDArray[np.float64]
-
-OTHER_LAWS: dict[str, Any] = {}
-"""Laws that no damper has, by name: those of a building's parts join here."""
-
-DRIVEN = {"bingham": ("f_v", "c_v"), "lugre": ("sigma_0", "sigma_b")}
-"""Parameters that act through the voltage alone."""
 
 _AROUND = np.array([1.0, 2.0, 3.0, 2.0, 1.0]) / 9.0
 
@@ -76,11 +70,16 @@ class Model:
         names = [name for name in law_parameters(self.law) if name not in CHOICES]
         for effect in self.effects:
             joined = EFFECTS[effect]
-            fixed = (*CHOICES, *joined.assumed, *(joined.bristles if self.law != "lugre" else ()))
+            idle = () if self.law_class.has("bristle") else joined.bristles
+            fixed = (*CHOICES, *joined.assumed, *idle)
             names += [f"{effect}.{name}" for name in joined.parameters if name not in fixed]
-        if "v_n" in names and self.value("exponent") == 0.0:
-            names.remove("v_n")  # the standard law does not know it
-        return [name for name in names if name not in self.held]
+        held = {*self.held, *self.law_class.idle(self.values)}
+        return [name for name in names if name not in held]
+
+    @property
+    def law_class(self) -> type[Law]:
+        """The law's class."""
+        return LAWS[self.law]
 
     def value(self, name: str) -> float:
         """Return a parameter's value, its default where none is given."""
@@ -103,8 +102,7 @@ def parameter(law: str, name: str) -> Parameter:
 
 def law_parameters(law: str) -> dict[str, Parameter]:
     """Return the declarations of a law's own parameters by name."""
-    declared: dict[str, Parameter] = (LAWS[law] if law in LAWS else OTHER_LAWS[law]).parameters
-    return declared
+    return LAWS[law].parameters
 
 
 class Problem:

@@ -174,7 +174,7 @@ def compiled_forces() -> Callable[..., None]:
 
 @cache
 def _compiled(effect_forces_now: Any) -> Callable[..., None]:
-    """Compile with the woven functions of now: there are new ones after a new effect."""
+    """Compile with the generated functions of now: there are new ones after a new effect."""
     global effect_forces, contact_force, advance_effects
     from ..jit import compiled
 
@@ -196,8 +196,8 @@ class Along:
     """
 
     def __init__(self, effects: list[str], storey: int) -> None:
-        layout = structure.LAYOUT
-        self.on = np.array([e.name in effects for e in layout.effects], dtype=np.bool_)
+        slots = structure.SLOTS
+        self.on = np.array([e.name in effects for e in slots.effects], dtype=np.bool_)
         self.active = bool(self.on.any())
         self._storey = storey
         self._forces = compiled_forces()
@@ -209,9 +209,9 @@ class Along:
         out = np.zeros(len(x))
         if not self.active:
             return out
-        layout = structure.LAYOUT
-        p = np.zeros(max(1, layout.p_size))
-        for name, slot in layout.parameters.items():
+        slots = structure.SLOTS
+        p = np.zeros(max(1, slots.p_size))
+        for name, slot in slots.parameters.items():
             effect, own = name.split(".", 1)
             p[slot] = values.get(name, EFFECTS[effect].parameters[own].value)
         n = max(1, self._storey)

@@ -11,18 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.effect import EFFECTS, Sizes
-from ..physics.law_parts import yield_parameters
+from ..physics.laws import LAWS
 from .fit import Model, Problem
 from .search import HUBER, loss
 from .search_context import Expected, Search, residuals
 
 Array = NDArray[np.float64]
 
-FALL = {"bingham": ("c_0", "c_v"), "lugre": ("sigma_2", "sigma_b")}
-"""The parts of the laws that fall with speed: a fit without an effect of speed inflates them."""
-
 RELAXED = ((0.3, 2.0), (0.05, 10.0))
-"""Size and width of that part, as factors, where a start makes room for an effect of speed."""
+"""Size and width, as factors, of the part of a law that falls with speed, where a start makes room
+for an effect of speed: a fit without it inflates that part."""
 
 THIN = 6
 """Of what has no memory every so many samples suffice for a search."""
@@ -41,10 +39,11 @@ def initial_guesses(effect: str, base: Model, problem: Problem) -> list[Model]:
     could: so some of its starts have that part small and wide.
     """
     bases = [dict(base.values)]
-    if EFFECTS[effect].needs == ("v",) and not {*FALL[base.law], "v_n"} & set(base.held):
+    falling, over = base.law_class.falling()
+    if EFFECTS[effect].needs == ("v",) and over and not {*falling, over} & set(base.held):
         for size, width in RELAXED:
-            relaxed = {name: size * base.value(name) for name in FALL[base.law]}
-            bases.append({**base.values, **relaxed, "v_n": width * base.value("v_n")})
+            relaxed = {name: size * base.value(name) for name in falling}
+            bases.append({**base.values, **relaxed, over: width * base.value(over)})
     joined = replace(base, effects=(*base.effects, effect), limits=_limits(effect, base, problem))
     return [
         replace(joined, values=_tied(effect, base.law, {**given, **own}, problem))
@@ -101,14 +100,14 @@ def _limits(effect: str, base: Model, problem: Problem) -> dict[str, tuple[float
 def _tied(effect: str, law: str, values: dict[str, float], problem: Problem) -> dict[str, float]:
     """Return start values with those that follow from others, the law's yield force included."""
     joined = EFFECTS[effect]
-    p = joined.Values(*(values[f"{effect}.{name}"] for name in joined.parameters))
+    p = joined.values_of({name: values[f"{effect}.{name}"] for name in joined.parameters})
     if joined.start_ties:
         sizes = Sizes(*(problem.size(unit) for unit in ("m", "m/s", "V", "N")))
         tied = joined.tie(p, sizes)  # type: ignore[attr-defined]
         for name, value in zip(joined.start_ties, tied, strict=True):
             values[f"{effect}.{name}"] = float(value)
     if hasattr(joined, "yield_share"):
-        for name in yield_parameters(law):
+        for name in LAWS[law].yield_parameters():
             if name in values:
                 values[name] /= joined.yield_share(p)
     return values
@@ -154,7 +153,7 @@ def _kind(effects: Sequence[str], law: str) -> str:
     joined = [EFFECTS[name] for name in effects]
     if any(effect.joint for effect in joined):
         return "joint"
-    if law != "bingham" or any(effect.states or effect.site == "sensor" for effect in joined):
+    if LAWS[law].states or any(effect.states or effect.site == "sensor" for effect in joined):
         return "memory"
     return "none"
 

@@ -1,12 +1,13 @@
 """Where fits begin: over a net of the few shape parameters, with the linear ones solved for.
 
-Given v_n, and a_0 of the bristles, both laws are linear in all else. So the best of a whole net
-costs little, whatever the size of the rig (variable projection: Golub & Pereyra 1973, SIAM
+Given its shape parameters (`physics.law.Shape`) a law is linear in all else. So the best of a whole
+net costs little, whatever the size of the rig (variable projection: Golub & Pereyra 1973, SIAM
 J. Numer. Anal. 10(2), 413-432).
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 from itertools import product
 
@@ -14,15 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from ..physics.damper import LAWS
-from ..physics.effect import CHOICES
+from ..physics.law import Shape
+from ..physics.parameter import CHOICES
 from .model import Array, Model, Problem, Run
 
-SHAPES = ("v_n", "a_0")
-"""Parameters in which the laws are not linear."""
-
-_V_N = np.geomspace(0.05, 5.0, 11)  # of the typical speed
-_A_0 = np.geomspace(0.5, 500.0, 13)  # of the inverse of the typical travel
 _NEAR_REST = 3.0  # errors of the velocity within which a sign law tells nothing
 _AT_LEAST = 1e-3  # of the typical size: what a start gives a parameter that came out as zero
 
@@ -42,14 +38,18 @@ def start_models(problem: Problem, model: Model, count: int) -> list[Model]:
     """
     net = _Net(problem, model)
     cost, linear = net.solve()
-    picked: list[tuple[int, int]] = []
+    picked: list[Node] = []
     for flat in np.argsort(cost, axis=None):
-        i, j = (int(q) for q in np.unravel_index(flat, cost.shape))
-        if all(max(abs(i - p), abs(j - q)) > 1 for p, q in picked):
-            picked.append((i, j))
+        node = tuple(int(q) for q in np.unravel_index(flat, cost.shape))
+        if all(max(abs(a - b) for a, b in zip(node, p, strict=True)) > 1 for p in picked):
+            picked.append(node)
         if len(picked) == count:
             break
-    return [net.model(place, linear[place]) for place in picked]
+    return [net.model(node, linear[node]) for node in picked]
+
+
+Node = tuple[int, ...]
+"""A place in the net: which value of each shape parameter."""
 
 
 class _Net:
@@ -57,43 +57,57 @@ class _Net:
 
     def __init__(self, problem: Problem, model: Model) -> None:
         self.problem, self.model_0 = problem, model
-        names = [name for name in LAWS[model.law].parameters if name not in CHOICES]
-        self.linear = [name for name in names if name not in SHAPES]
-        standard = model.value("exponent") == 0.0
-        self.v_n = self._nodes("v_n", _V_N * problem.size("m/s"))
-        if standard:
-            self.v_n = self.v_n[:1]
-        self.a_0 = np.ones(1)
-        if model.law == "lugre":
-            self.a_0 = self._nodes("a_0", _A_0 * problem.size("1/m"))
+        self.law = model.law_class
+        self.linear = list(self.law.linear())
+        idle = self.law.idle(model.values)
+        self.grids = {
+            name: self._nodes(name, shape)[: 1 if name in idle else None]
+            for name, shape in self.law.shapes.items()
+        }
+        shapes = self.law.shapes
+        # Which shape parameters a column depends on: it is the same at all nodes of the others.
+        self.bends = {
+            name: [name in shapes[shape].shapes for shape in self.grids] for name in self.linear
+        }
         columns: list[Array] = []
-        self.place: dict[tuple[str, int], int] = {}
+        self.place: dict[tuple[str, Node], int] = {}
         for name in self.linear:
-            viscous = name in ("c_0", "c_v", "sigma_2", "sigma_b")
-            for k, shape in enumerate(self.v_n if viscous else self.a_0):
-                self.place[name, k] = len(columns)
-                columns.append(self._column(name, "v_n" if viscous else "a_0", float(shape)))
-        self.viscous = [name in ("c_0", "c_v", "sigma_2", "sigma_b") for name in self.linear]
+            for node in self._all_nodes(self.bends[name]):
+                self.place[name, node] = len(columns)
+                columns.append(self._column(name, node))
         weight = self._weight()
         C = np.array(columns) * weight
         f = np.concatenate([run.force for run in problem.runs]) * weight
         self.gram, self.right, self.square = C @ C.T, C @ f, float(f @ f)
 
-    def _nodes(self, name: str, values: Array) -> Array:
+    def _nodes(self, name: str, shape: Shape) -> Array:
         model = self.model_0
         if name in model.held:
             return np.array([model.value(name)])
         low, high = model.bounds(name)
+        size = self.problem.size(self.law.parameters[name].unit)
+        values = np.geomspace(shape.low, shape.high, shape.nodes) * size
         return np.unique(np.clip(values, low, high))
 
-    def _column(self, name: str, shape: str, value: float) -> Array:
+    def _all_nodes(self, counts: list[bool] | None = None) -> Iterator[Node]:
+        """Yield the nodes of the net, or of the part of it in which some shapes count."""
+        used = counts or [True] * len(self.grids)
+        sizes = [
+            len(grid) if own else 1 for grid, own in zip(self.grids.values(), used, strict=True)
+        ]
+        yield from product(*map(range, sizes))
+
+    def _column(self, name: str, node: Node) -> Array:
         """Return the force over all runs of one linear parameter at 1, the others at zero."""
         values = {**dict.fromkeys(self.linear, 0.0), name: 1.0}
-        values["exponent"] = self.model_0.value("exponent")
-        if shape in LAWS[self.model_0.law].parameters:
-            values[shape] = value
-        own = Model(self.model_0.law, (), values)
-        return np.concatenate([self.problem.predict(own, run) for run in self.problem.runs])
+        for choice in self.law.parameters:
+            if choice in CHOICES:
+                values[choice] = self.model_0.value(choice)
+        for (shape, grid), own, k in zip(self.grids.items(), self.bends[name], node, strict=True):
+            if own:
+                values[shape] = float(grid[k])
+        alone = Model(self.model_0.law, (), values)
+        return np.concatenate([self.problem.predict(alone, run) for run in self.problem.runs])
 
     def _weight(self) -> NDArray[np.float64]:
         """Return the weight of each sample: none near rest for a law with a sign, or not measured.
@@ -103,7 +117,7 @@ class _Net:
         parts = []
         for run in self.problem.runs:
             weight = np.full(len(run.v), 1.0 / run.noise)
-            if self.model_0.law == "bingham" and len(run.draws):
+            if self.law.has("sign") and len(run.draws):
                 error = float(np.std(run.draws[:, :, 1]))
                 weight[np.abs(run.v) < _NEAR_REST * error] = 0.0
             if run.measured is not None:
@@ -112,19 +126,19 @@ class _Net:
             parts.append(weight)
         return np.concatenate(parts)
 
-    def solve(self) -> tuple[Array, dict[tuple[int, int], Array]]:
+    def solve(self) -> tuple[Array, dict[Node, Array]]:
         """Return the cost at each node and the linear parameters there."""
-        cost = np.empty((len(self.v_n), len(self.a_0)))
+        cost = np.empty(tuple(len(grid) for grid in self.grids.values()))
         linear = {}
-        for i, j in product(range(len(self.v_n)), range(len(self.a_0))):
-            cost[i, j], linear[i, j] = self._solve_at(i, j)
+        for node in self._all_nodes():
+            cost[node], linear[node] = self._solve_at(node)
         return cost, linear
 
-    def _solve_at(self, i: int, j: int) -> tuple[float, Array]:
+    def _solve_at(self, node: Node) -> tuple[float, Array]:
         model = self.model_0
         at = [
-            self.place[name, i if viscous else j]
-            for name, viscous in zip(self.linear, self.viscous, strict=True)
+            self.place[name, tuple(k if own else 0 for k, own in zip(node, bends, strict=True))]
+            for name, bends in self.bends.items()
         ]
         G, b = self.gram[np.ix_(at, at)], self.right[at]
         theta = np.array([model.value(name) for name in self.linear])
@@ -143,17 +157,16 @@ class _Net:
         own = theta[free]
         return self.square - 2.0 * float(b @ own) + float(own @ G @ own), theta
 
-    def model(self, place: tuple[int, int], theta: Array) -> Model:
+    def model(self, node: Node, theta: Array) -> Model:
         """Return the start at a node: within the bounds, no parameter exactly at zero."""
         model = self.model_0
         values = dict(model.values)
         values.update(dict(zip(self.linear, theta.tolist(), strict=True)))
-        values["v_n"] = float(self.v_n[place[0]])
-        if model.law == "lugre":
-            values["a_0"] = float(self.a_0[place[1]])
-        for name in (*self.linear, *SHAPES):
-            if name in values and name not in model.held:
-                unit = LAWS[model.law].parameters[name].unit
+        for (name, grid), k in zip(self.grids.items(), node, strict=True):
+            values[name] = float(grid[k])
+        for name in (*self.linear, *self.grids):
+            if name not in model.held:
+                unit = self.law.parameters[name].unit
                 low, high = model.bounds(name)
                 least = _AT_LEAST * self.problem.size(unit)
                 values[name] = min(max(values[name], low, least), high)

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +17,10 @@ from numpy.typing import NDArray
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
-from ..physics.effect import EFFECTS, Parameter
-from .model import OTHER_LAWS, Model, Problem, Run
+from ..physics.effect import EFFECTS
+from ..physics.inputs import Inputs
+from ..physics.laws import DEFAULT, base_and_variant
+from .model import Model, Problem, Run
 from .response import Response, base_equilibrium, responses, shear
 from .response_kernels import Along
 
@@ -31,37 +32,6 @@ base may be held there, and the force is then whatever holds it."""
 
 BESIDE = 3
 """Samples on either side of such a one that are left out with it."""
-
-_WIDE = (-1e12, 1e12)
-_STIFFNESS = Parameter(1000.0, "N/m", (0.0, 1e12), "stiffness")
-_DAMPING = Parameter(0.0, "N.s/m", _WIDE, "damping beyond the building's")
-_OFFSET = Parameter(0.0, "N", _WIDE, "constant force: an accelerometer's or load cell's zero")
-
-
-class LinearLayer:
-    """Linear isolation layer: F = k x + c v + added_mass a + offset."""
-
-    name: ClassVar[str] = "linear_layer"
-    parameters: ClassVar[dict[str, Parameter]] = {
-        "k": _STIFFNESS,
-        "c": _DAMPING,
-        "added_mass": Parameter(0.0, "kg", _WIDE, "mass of the base beyond the building's"),
-        "offset": _OFFSET,
-    }
-
-
-class LinearStorey:
-    """Linear storey: F = k drift + c drift_rate + offset."""
-
-    name: ClassVar[str] = "linear_storey"
-    parameters: ClassVar[dict[str, Parameter]] = {
-        "k": _STIFFNESS,
-        "c": _DAMPING,
-        "offset": _OFFSET,
-    }
-
-
-OTHER_LAWS.update({law.name: law for law in (LinearLayer, LinearStorey)})
 
 
 @dataclass(frozen=True)
@@ -108,9 +78,9 @@ class StructureProblem(Problem):
         assert isinstance(run, StructureRun)
         structure = tuple(e for e in model.effects if EFFECTS[e].site == "structure")
         damper = tuple(e for e in model.effects if EFFECTS[e].site != "structure")
-        linear = model.law in OTHER_LAWS
-        # A Bingham law is a function of the motion at each sample, a LuGre law of its history.
-        memory = model.law not in (*OTHER_LAWS, "bingham") or any(
+        law = model.law_class
+        # A law without states is a function of the motion at each sample, others of its history.
+        memory = bool(law.states) or any(
             EFFECTS[e].states or EFFECTS[e].site == "sensor" for e in model.effects
         )
         assert run.whole is not None
@@ -119,13 +89,12 @@ class StructureProblem(Problem):
         if draw is not None:
             e = seen.draws[draw]
             x, v, a = x + e[:, 0], v + e[:, 1], a + e[:, 2]
-        if linear:
-            stiffness = model.value("k")
-            force = stiffness * x + model.value("c") * v + model.value("offset")
-            if model.law == LinearLayer.name:
-                force = force + model.value("added_mass") * a
+        stiffness = 0.0
+        if law.site == "structure":
+            stiffness = model.value(law.stiffness)
+            q = Inputs(x, v, a, seen.V, seen.dt, 0.0, 0.0, False)
+            force: Array = law.hooks()["force"](q, (), law.at(model.values))
         else:
-            stiffness = 0.0
             force = super().predict(replace(model, effects=damper), seen, draw)
         if structure:
             along = self.along(structure)
@@ -218,8 +187,8 @@ def damper_run(
     """Return the damper's motion and force, measured or from equilibrium.
 
     Of the base's own equilibrium and the sum over all levels the one with less noise is taken; the
-    first needs the storey above to be linear (`linear_storeys`). For a Bingham law samples at which
-    the base may be held are left out.
+    first needs the storey above to be linear (`linear_storeys`). Where a law's friction jumps with
+    direction samples at which the base may be held are left out.
     """
     motion = (response.x[0], response.v[0], response.a[0] - response.ground, response.V)
     if response.force is not None:
@@ -234,7 +203,7 @@ def damper_run(
 
 def blind_at_rest(law: str) -> bool:
     """Return whether a law tells nothing where the base may be held: it has a sign there."""
-    return law.startswith("bingham")
+    return base_and_variant(law)[0].has("sign")
 
 
 def reconstructed(
@@ -269,7 +238,7 @@ def _error(response: Response, level: int) -> Array:
 
 
 def structure_problems(
-    train: list[Measurement], holdout: list[Measurement], building: Building, law: str = "lugre"
+    train: list[Measurement], holdout: list[Measurement], building: Building, law: str = DEFAULT
 ) -> dict[str, tuple[StructureProblem, StructureProblem]]:
     """Return the problems of a building's runs, each for training and held-out runs.
 
@@ -289,7 +258,7 @@ def structure_problems(
 
 
 def problems_of(
-    train: list[Response], holdout: list[Response], building: Building, law: str = "lugre",
+    train: list[Response], holdout: list[Response], building: Building, law: str = DEFAULT,
     linear_storeys: bool = True,
 ) -> dict[str, tuple[StructureProblem, StructureProblem]]:  # fmt: skip
     """Return the problems of responses; see `structure_problems`."""

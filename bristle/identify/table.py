@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError
-from .model import DRIVEN, Model, Problem, Run, steady, without
+from ..physics.laws import base_and_variant, law_names
+from .model import Model, Problem, Run, steady, without
 from .search import descend
 from .starts import start_models
 
@@ -30,8 +31,6 @@ ORDER = 4
 
 REST = 1e-3
 """Speed [m/s] below which a law with a sign is not valid: the damper may be stuck there."""
-
-LAWS_OF_TABLE = ("bingham", "lugre", "bingham_standard", "lugre_standard")
 
 _ALIKE = 1e-3
 _QUADRATIC = 1e3  # residuals divided by this stay where the search's loss is quadratic
@@ -102,7 +101,7 @@ def error_table(
     holdout: Problem | None,
     cutoff: float = CUTOFF,
     *,
-    laws: tuple[str, ...] = LAWS_OF_TABLE,
+    laws: tuple[str, ...] | None = None,
     starts: int = 4,
 ) -> list[LawError]:
     """Return the errors of the laws, in the order asked for.
@@ -111,8 +110,10 @@ def error_table(
     ----------
     train, holdout : the runs that laws are fitted to, and those they are judged on, if any
     cutoff : Hz, of the low-pass on measured and predicted force; 0 for none
+    laws : names of laws and of their variants; None for all
     """
-    train.bench(Model("bingham"))  # compiled once, before threads ask for it
+    laws = law_names() if laws is None else laws
+    train.bench(Model(base_and_variant(laws[0])[0].name))  # compiled before threads ask for it
     with ThreadPoolExecutor(cpu_count()) as pool:
         return list(pool.map(lambda law: _law_error(train, holdout, cutoff, law, starts), laws))
 
@@ -120,10 +121,10 @@ def error_table(
 def _law_error(
     train: Problem, holdout: Problem | None, cutoff: float, law: str, starts: int
 ) -> LawError:
-    base = law.removesuffix("_standard")
-    model = Model(base, (), {"exponent": 0.0 if base != law else 1.0})
+    base, variant = base_and_variant(law)
+    model = Model(base.name, (), dict(variant.values))
     if steady(train):
-        model = without(model, DRIVEN[base])
+        model = without(model, base.driven())
     ends = [_fit_filtered(train, one, cutoff) for one in start_models(train, model, starts)]
     best, cost = min(ends, key=lambda end: end[1])
     judged = holdout if holdout is not None and holdout.runs else train

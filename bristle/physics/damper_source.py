@@ -1,160 +1,288 @@
-"""The text of a damper's functions, woven from the hooks of all effects.
+"""The text of a damper's functions, generated from the hooks of all laws and effects.
 
-The laws' own calls stand where the hooks of the effects meet them: first what changes the voltage
-and the motion, then the factors, then the forces, then what the states make of all that.
+A law's own calls stand where the hooks of the effects meet them: first what changes the voltage and
+the motion, then the factors, then the forces, then what the states make of all that.
 """
 
 from __future__ import annotations
 
-from .bingham import Bingham
-from .lugre import LuGre
-from .weave import Layout, switched
+from .codegen import Slots, switched, switched_laws
+from .law import Law
+from .tuples import law_state, law_values
+
+_FACTORS = {"limit": " * yield_factor * slip_length", "viscous": " * viscous_factor"}
+_NOW = "    x, v, a, V, dt, energy, halt, halts = now"
+_SETUP = "    law, p, on = setup.law, setup.p, setup.on"
+_ROD = ["    rod_x = x", "    rod_v = v"]
 
 
-def motion_source(layout: Layout) -> str:
+def motion_source(slots: Slots) -> str:
     """Return `inner_motion`: the motion across the fluid, behind what gives way."""
     q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
     lines = [
-        "def inner_motion(x, v, a, V, dt, energy, z, p, on):",
-        "    rod_x = x",
-        "    rod_v = v",
-        *switched(layout, "motion", "x, v = {call}", **q),
+        "def inner_motion(setup, now, z):",
+        "    p, on = setup.p, setup.on",
+        _NOW,
+        *_ROD,
+        *switched(slots, "motion", "x, v = {call}", **q),
         "    return x, v",
     ]
     return "\n".join(lines)
 
 
-def reach_source(layout: Layout) -> str:
-    """Return `slip_reach`: the factor on the travel before sliding."""
-    q = {name: name for name in ("x", "v", "dt", "energy", "rod_x", "rod_v")}
+def voltage_source(slots: Slots) -> str:
+    """Return `felt_voltage`: the voltage that the fluid feels."""
+    q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
     lines = [
-        "def slip_reach(x, v, dt, energy, z, p, on):",
-        "    rod_x = x",
-        "    rod_v = v",
-        "    reach = 1.0",
-        *switched(layout, "reach", "reach *= {call}", **q),
-        "    return reach",
+        "def felt_voltage(setup, now, z):",
+        "    p, on = setup.p, setup.on",
+        _NOW,
+        *_ROD,
+        *switched(slots, "voltage", "V = {call}", **q),
+        "    return V",
     ]
     return "\n".join(lines)
 
 
-def series_source(layout: Layout) -> str:
-    """Return `series_element`: where the states of the joint are that is switched on."""
+def slip_length_source(slots: Slots) -> str:
+    """Return `slip_length_factor`: the factor on the travel before sliding, at a motion."""
+    q = {name: name for name in ("x", "v", "dt", "energy", "rod_x", "rod_v")}
+    lines = [
+        "def slip_length_factor(setup, now, z):",
+        "    p, on = setup.p, setup.on",
+        _NOW,
+        *_ROD,
+        "    slip_length = 1.0",
+        *switched(slots, "reach", "slip_length *= {call}", **q),
+        "    return slip_length",
+    ]
+    return "\n".join(lines)
+
+
+def series_source(slots: Slots) -> str:
+    """Return `series_element`: where the states of the series element are that is switched on."""
     lines = ["def series_element(on):"]
-    for effect in layout.effects:
+    for effect in slots.effects:
         if effect.joint:
-            slots = [str(layout.states[effect.name + "." + name]) for name in effect.joint]
-            lines.append(f"    if on[{layout.switches[effect.name]}]:  # {effect.name}")
-            lines.append(f"        return {', '.join(slots)}")
+            places = [str(slots.states[effect.name + "." + name]) for name in effect.joint]
+            lines.append(f"    if on[{slots.switches[effect.name]}]:  # {effect.name}")
+            lines.append(f"        return {', '.join(places)}")
     return "\n".join([*lines, "    return -1, -1"])
 
 
-def evaluate_source(layout: Layout, name: str) -> str:
-    """Return `evaluate` under some name: force, friction and the rates of the states."""
+def advance_law_source(slots: Slots) -> str:
+    """Return `advance_law`: the law's own states after a step at the motion of `now`, exactly."""
+
+    def own(law: type[Law]) -> list[str]:
+        if law.hook("advance") is None:
+            return []
+        return [
+            f"k = {law_values(law, 'slip_length')}",
+            f"{_targets(law, 'z_next')} = {law.name}_advance(now, {law_state(law)}, k)",
+        ]
+
+    lines = [
+        "def advance_law(law, p, now, slip_length, z, z_next):",
+        "    V = now.V",
+        *switched_laws(slots, own),
+        "    return",
+    ]
+    return "\n".join(lines)
+
+
+def _targets(law: type[Law], name: str) -> str:
+    return "".join(f"{name}[{k}], " for k in range(len(law.states))).rstrip()
+
+
+def _forces(law: type[Law], factors: bool = True) -> str:
+    """Return the source of a law's force but for friction with a sign, at `q`, `s`, `k`."""
+    own = dict(_FACTORS) if factors else {}
+    if factors:
+        # Bristles that slip later bend further and carry more; what has none must be told so.
+        own["yielding"] = " * yield_factor" + ("" if law.has("bristle") else " * slip_length")
+    hooks = ("yielding", "damping", "viscous", "elastic")
+    terms = [f"{law.name}_{hook}(q, s, k){own.get(hook, '')}" for hook in hooks if law.hook(hook)]
+    return " + ".join(terms) or "0.0"
+
+
+def _friction(limit: str) -> list[str]:
+    return [
+        f"limit = {limit}",
+        "if halts:",
+        "    friction = min(max(halt - rest, -limit), limit)",
+        "elif v > 0.0:",
+        "    friction = limit",
+        "elif v < 0.0:",
+        "    friction = -limit",
+    ]
+
+
+def law_force_source(slots: Slots) -> str:
+    """Return `law_force`: force and friction of the law alone, without any effect."""
+
+    def own(law: type[Law]) -> list[str]:
+        lines = [f"s = {law_state(law)}", f"k = {law_values(law)}", f"rest = {_forces(law, False)}"]
+        return [*lines, *(_friction(f"{law.name}_limit(q, s, k)") if law.has("sign") else [])]
+
+    lines = [
+        "def law_force(law, p, q, z):",
+        "    v, V, halt, halts = q.v, q.V, q.stick_force, q.sticks",
+        "    friction = 0.0",
+        "    rest = 0.0",
+        *switched_laws(slots, own),
+        "    return friction + rest, friction",
+    ]
+    return "\n".join(lines)
+
+
+def step_law_source(slots: Slots) -> str:
+    """Return `step_law`: a step of the law alone; force and friction at its end."""
+    middle = (
+        "m = record(Inputs, (0.5 * (begin.x + q.x), 0.5 * (begin.v + q.v), q.a, V, q.dt, q.energy, "
+        "halt, halts))"
+    )
+    return _law_steps(slots, "def step_law(law, p, begin, q, z, z1):", [middle])
+
+
+def hold_law_source(slots: Slots) -> str:
+    """Return `hold_law`: `step_law` with the inputs held over the step."""
+    return _law_steps(slots, "def hold_law(law, p, q, z, z1):", ["m = q"])
+
+
+def _law_steps(slots: Slots, head: str, middle: list[str]) -> str:
+    def own(law: type[Law]) -> list[str]:
+        lines = [f"k = {law_values(law)}"]
+        if law.hook("advance") is not None:
+            advanced = f"{law.name}_advance(m, {law_state(law)}, k)"
+            lines += [*middle, f"{_targets(law, 'z1')} = {advanced}"]
+        lines += [f"s = {law_state(law).replace('z[', 'z1[')}", f"rest = {_forces(law, False)}"]
+        return [*lines, *(_friction(f"{law.name}_limit(q, s, k)") if law.has("sign") else [])]
+
+    lines = [
+        head,
+        "    v, V, halt, halts = q.v, q.V, q.stick_force, q.sticks",
+        "    friction = 0.0",
+        "    rest = 0.0",
+        *switched_laws(slots, own),
+        "    return friction + rest, friction",
+    ]
+    return "\n".join(lines)
+
+
+def evaluate_source(slots: Slots) -> str:
+    """Return `evaluate`: force, friction and the rates of the states."""
     signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v", "halt")
     q = {name: name for name in signals}
-    lugre = ", ".join(f"p[{i}]" for i in range(len(LuGre.parameters)))
-    bingham = ", ".join(f"p[{i}]" for i in range(len(Bingham.parameters)))
+
+    def own(law: type[Law]) -> list[str]:
+        lines = [
+            f"s = {law_state(law)}",
+            f"k = {law_values(law, 'slip_length')}",
+            f"rest = ({_forces(law)}) * factor + added",
+        ]
+        if law.has("sign"):
+            limit = f"{law.name}_limit(q, s, k){_FACTORS['limit']} * factor"
+            first, if_sticks, *others = _friction(limit)
+            lines += [first, "if directed:", "    friction = limit * direction"]
+            lines += ["el" + if_sticks, *others]
+        if law.hook("rate") is not None:
+            lines.append(f"{_targets(law, 'dz')} = {law.name}_rate(q, s, k)")
+        return lines
+
     lines = [
-        f"def {name}(law, x, v, a, V, dt, energy, halt, halts, z, p, on, dz, z_next):",
-        "    rod_x = x",
-        "    rod_v = v",
+        "def evaluate(setup, now, z, dz, z_next):",
+        _SETUP,
+        _NOW,
+        *_ROD,
         "    force = 0.0",
-        *switched(layout, "voltage", "V = {call}", **q),
-        *switched(layout, "motion", "x, v = {call}", **q),
-        "    yield_factor = 1.0",
-        "    viscous_factor = 1.0",
-        "    reach = 1.0",
-        "    added = 0.0",
+        *switched(slots, "voltage", "V = {call}", **q),
+        *switched(slots, "motion", "x, v = {call}", **q),
+        *_factors(slots, q),
         "    direction = 0.0",
         "    directed = False",
-        *switched(layout, "yield_factor", "yield_factor *= {call}", **q),
-        *switched(layout, "viscous_factor", "viscous_factor *= {call}", **q),
-        *switched(layout, "reach", "reach *= {call}", **q),
-        *switched(layout, "yield_force", "direction = {call}; directed = True", **q),
-        *switched(layout, "force", "added += {call}", **q),
-        "    factor = 1.0",
-        *switched(layout, "factor", "factor *= {call}", **q),
-        "    if law == 1:",
-        f"        lugre = LuGreP({lugre})",
-        "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
-        "        friction = 0.0",
-        "        bristle = LuGre_bristle(z[0], v, V, lugre, reach, yield_factor)",
-        "        rest = (bristle + viscous) * factor + added",
-        "        dz[0] = LuGre_rate(z[0], v, lugre, reach)",
-        "    else:",
-        f"        bingham = BinghamP({bingham})",
-        "        rest = Bingham_viscous(v, V, bingham) * viscous_factor * factor + added",
-        "        limit = Bingham_yielding(V, bingham) * yield_factor * reach * factor",
-        "        if directed:",
-        "            friction = limit * direction",
-        "        elif halts:",
-        "            friction = min(max(halt - rest, -limit), limit)",
-        "        elif v > 0.0:",
-        "            friction = limit",
-        "        elif v < 0.0:",
-        "            friction = -limit",
-        "        else:",
-        "            friction = 0.0",
+        *switched(slots, "yield_force", "direction = {call}; directed = True", **q),
+        *_added(slots, q),
+        "    friction = 0.0",
+        "    rest = 0.0",
+        "    q = record(Inputs, (x, v, a, V, dt, energy, halt, halts))",
+        *switched_laws(slots, own),
         "    force = friction + rest",
-        *switched(layout, "rate", "{dz}= {call}", **q),
-        *switched(layout, "advance", "{z_next}= {call}", **q),
-        *switched(layout, "reaction", "force = {call}; friction = 0.0", **q),
+        *switched(slots, "rate", "{dz}= {call}", **q),
+        *switched(slots, "advance", "{z_next}= {call}", **q),
+        *switched(slots, "reaction", "force = {call}; friction = 0.0", **q),
         "    return force, friction",
     ]
     return "\n".join(lines)
 
 
-def pull_source(layout: Layout) -> str:
-    """Return the source of what accelerates a joint: `evaluate` without all that it can lack.
-
-    The speed of a joint is found by trials, so nothing is called more often.
-    """
-    joints = [effect for effect in layout.effects if effect.joint]
-    names = [f"{effect.name}.{state}" for effect in joints for state in effect.joint]
-    layout = layout.reading({name: ("travel", "joint")[i % 2] for i, name in enumerate(names)})
-    signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v")
-    q = {name: name for name in signals}
-    lugre = ", ".join(f"p[{i}]" for i in range(len(LuGre.parameters)))
-    bingham = ", ".join(f"p[{i}]" for i in range(len(Bingham.parameters)))
-    lines = [
-        "def joint_pull(",
-        "    law, x, v, a, V, dt, energy, way, middle, travel, joint, z, p, on",
-        "):",
-        "    rod_x = x",
-        "    rod_v = v",
-        "    force = 0.0",
-        *switched(layout, "voltage", "V = {call}", **q),
-        *switched(layout, "motion", "x, v = {call}", **q),
+def _factors(slots: Slots, q: dict[str, str]) -> list[str]:
+    return [
         "    yield_factor = 1.0",
         "    viscous_factor = 1.0",
-        "    reach = 1.0",
-        "    half_reach = 1.0",
+        "    slip_length = 1.0",
+        *switched(slots, "yield_factor", "yield_factor *= {call}", **q),
+        *switched(slots, "viscous_factor", "viscous_factor *= {call}", **q),
+        *switched(slots, "reach", "slip_length *= {call}", **q),
+    ]
+
+
+def _added(slots: Slots, q: dict[str, str]) -> list[str]:
+    return [
         "    added = 0.0",
-        "    direction = way",
-        *switched(layout, "yield_factor", "yield_factor *= {call}", **q),
-        *switched(layout, "viscous_factor", "viscous_factor *= {call}", **q),
-        *switched(layout, "reach", "reach *= {call}", **q),
-        *switched(layout, "reach", "half_reach *= {call}", **{**q, "v": "middle"}),
-        *switched(layout, "yield_force", "direction = {call}", **q),
-        *switched(layout, "force", "added += {call}", **q),
+        *switched(slots, "force", "added += {call}", **q),
         "    factor = 1.0",
-        *switched(layout, "factor", "factor *= {call}", **q),
-        "    if law == 1:",
-        f"        lugre = LuGreP({lugre})",
-        "        bristle = LuGre_advance(z[0], middle, dt, lugre.a_0 / half_reach)",
-        "        viscous = LuGre_viscous(v, V, lugre) * viscous_factor",
-        "        bent = LuGre_bristle(bristle, v, V, lugre, reach, yield_factor)",
-        "        force = (bent + viscous) * factor + added",
-        "    else:",
-        f"        bingham = BinghamP({bingham})",
-        "        viscous = Bingham_viscous(v, V, bingham) * viscous_factor",
-        "        limit = Bingham_yielding(V, bingham) * yield_factor * reach",
-        "        force = (limit * direction + viscous) * factor + added",
+        *switched(slots, "factor", "factor *= {call}", **q),
+    ]
+
+
+def net_force_source(slots: Slots) -> str:
+    """Return what accelerates a series mass: `evaluate` without all that it can lack.
+
+    The speed of a series mass is found by trials, so nothing is called more often. `way` is the
+    direction of friction, `middle` the velocity in the middle of the step; `deflection` and `speed`
+    stand for the states of the series element.
+    """
+    series = [effect for effect in slots.effects if effect.joint]
+    names = [f"{effect.name}.{state}" for effect in series for state in effect.joint]
+    slots = slots.reading({name: ("deflection", "speed")[i % 2] for i, name in enumerate(names)})
+    signals = ("x", "v", "a", "V", "dt", "energy", "force", "rod_x", "rod_v")
+    q = {name: name for name in signals}
+
+    def own(law: type[Law]) -> list[str]:
+        lines = [f"s = {law_state(law)}"]
+        if law.hook("advance") is not None:
+            lines += [
+                f"k = {law_values(law, 'half_slip_length')}",
+                "m = record(Inputs, (x, middle, a, V, dt, energy, 0.0, False))",
+                f"s = record({law.name}_Z, {law.name}_advance(m, s, k))",
+            ]
+        lines.append(f"k = {law_values(law, 'slip_length')}")
+        forces = _forces(law)
+        if law.has("sign"):
+            friction = f"{law.name}_limit(q, s, k){_FACTORS['limit']} * direction"
+            forces = friction if forces == "0.0" else f"{friction} + {forces}"
+        return [*lines, f"force = ({forces}) * factor + added"]
+
+    lines = [
+        "def net_force(setup, now, way, middle, deflection, speed, z):",
+        _SETUP,
+        _NOW,
+        *_ROD,
+        "    force = 0.0",
+        *switched(slots, "voltage", "V = {call}", **q),
+        *switched(slots, "motion", "x, v = {call}", **q),
+        *_factors(slots, q),
+        "    half_slip_length = 1.0",
+        *switched(slots, "reach", "half_slip_length *= {call}", **{**q, "v": "middle"}),
+        "    direction = way",
+        *switched(slots, "yield_force", "direction = {call}", **q),
+        *_added(slots, q),
+        "    q = record(Inputs, (x, v, a, V, dt, energy, 0.0, False))",
+        *switched_laws(slots, own),
         "    pull = 0.0",
     ]
-    for effect in joints:
+    for effect in series:
         place = list(effect.states).index(effect.joint[1])
-        only = layout.only(lambda one, wanted=effect: one is wanted)  # type: ignore[misc]
+        only = slots.only(lambda one, wanted=effect: one is wanted)  # type: ignore[misc]
         lines += switched(only, "rate", f"pull = {{call}}[{place}]", **q)
     return "\n".join([*lines, "    return pull"])

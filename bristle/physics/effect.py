@@ -8,16 +8,19 @@ runs in plain Python and under numba.
 
 from __future__ import annotations
 
-from collections import namedtuple
+from collections.abc import Mapping
 from typing import Any, Callable, ClassVar, NamedTuple
 
 from ..errors import PhysicsError
+from . import laws as _laws  # noqa: F401  (importing it registers the laws)
 from .effect_check import check_search, check_verdict
+from .law import LAWS, PARTS, Law, laws_of
+from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
+from .parameter import Table as Table
+from .parameter import all_parameters, check_numbers, fields_of, named
+from .parameter import interpolate as interpolate
 
 SITES = ("damper", "structure", "sensor")
-
-CHOICES = ("exponent", "mass", "which")
-"""Parameters that choose a form or regularise: no fit moves them."""
 
 CHANNELS = ("force", "velocity")
 """Channels whose instrument a sensor's effect may be."""
@@ -38,6 +41,19 @@ HOOKS = (
     "advance",
     "channel",
 )
+
+
+ACTS_ON = {
+    "voltage": "command",
+    "yield_factor": "yield",
+    "reach": "yield",
+    "yield_force": "sign",
+    "viscous_factor": "viscous",
+}
+"""The part of a law that a hook acts on; the other hooks join any law."""
+
+_ALL_LAWS_OF_ONCE = ("bingham", "lugre")
+"""Effects named the laws that they join until laws had parts; those that name all join any."""
 
 
 class Q(NamedTuple):
@@ -77,15 +93,6 @@ class Sizes(NamedTuple):
     force: float  # N
 
 
-class Parameter(NamedTuple):
-    """A number of a law or effect: default value, SI unit, bounds of what is physical, meaning."""
-
-    value: float
-    unit: str
-    bounds: tuple[float, float]
-    text: str
-
-
 EFFECTS: dict[str, type[Effect]] = {}
 
 
@@ -94,12 +101,20 @@ class Effect:
 
     Class data
     ----------
-    name, site, laws
-        `laws` names the damper laws that the effect can join.
+    name, site
     needs
         Names of the signals in `q` that the hooks use.
-    states, parameters
-        `{name: unit}` and `{name: Parameter}`; start values of states are zero.
+    states, parameters, tables
+        `{name: unit}`, `{name: Parameter}`, `{name: Table}`; start values of states are zero. Once
+        the class is defined `parameters` also lists the values of its tables, as `curve[1]`.
+    acts_on
+        Parts of a law (`law.PARTS`) that it must have for the effect to join, beside those that the
+        effect's hooks act on (`ACTS_ON`).
+    kind
+        What it is a case of: "spring", "lag", "series element", "inertia" ... A law that contains
+        one is not offered another. Its own name where nothing is said.
+    laws
+        Read from files of before laws had parts: the laws that the effect joins, if not all.
     starts
         States that begin with the value of a signal where a measurement begins: {state: signal}.
     bristles
@@ -162,10 +177,13 @@ class Effect:
 
     name: ClassVar[str] = ""
     site: ClassVar[str] = "damper"
-    laws: ClassVar[tuple[str, ...]] = ("bingham", "lugre")
+    laws: ClassVar[tuple[str, ...]] = ()
+    acts_on: ClassVar[tuple[str, ...]] = ()
+    kind: ClassVar[str] = ""
     needs: ClassVar[tuple[str, ...]] = ()
     states: ClassVar[dict[str, str]] = {}
     parameters: ClassVar[dict[str, Parameter]] = {}
+    tables: ClassVar[dict[str, Table]] = {}
     starts: ClassVar[dict[str, str]] = {}
     bristles: ClassVar[tuple[str, ...]] = ()
     assumed: ClassVar[tuple[str, ...]] = ()
@@ -196,8 +214,9 @@ class Effect:
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         if cls.name:
-            cls.State = namedtuple("State", tuple(cls.states))  # type: ignore[misc]
-            cls.Values = namedtuple("Values", tuple(cls.parameters))  # type: ignore[misc]
+            cls.parameters = all_parameters(cls.parameters, cls.tables)
+            cls.State = named("State", tuple(cls.states))
+            cls.Values = named("Values", tuple(cls.fields()))
             _check(cls)
             _refuse_twin(cls)
             EFFECTS[cls.name] = cls
@@ -206,6 +225,36 @@ class Effect:
     def hooks(cls) -> dict[str, Callable[..., Any]]:
         """Return the hooks that this effect defines, in the order of `HOOKS`."""
         return {hook: getattr(cls, hook) for hook in HOOKS if hasattr(cls, hook)}
+
+    @classmethod
+    def fields(cls) -> dict[str, tuple[str, ...]]:
+        """Return what `p` holds: field to the parameters in it, several for a table."""
+        return fields_of(cls.parameters, cls.tables)
+
+    @classmethod
+    def values_of(cls, values: Mapping[str, float]) -> Any:
+        """Return the `p` of the hooks from values by name; missing ones take their defaults."""
+        given = {name: float(values.get(name, p.value)) for name, p in cls.parameters.items()}
+        return cls.Values(
+            *(
+                tuple(given[name] for name in names) if field in cls.tables else given[field]
+                for field, names in cls.fields().items()
+            )
+        )
+
+    @classmethod
+    def joins(cls, law: type[Law]) -> bool:
+        """Return whether the effect can join a law: it has the parts, and not the effect in it."""
+        if cls.site != law.site:
+            return False
+        if cls.laws and law.name not in cls.laws and not set(cls.laws) >= set(_ALL_LAWS_OF_ONCE):
+            return False
+        if (cls.kind or cls.name) in law.contains:
+            return False
+        if cls.joint and not law.exact():  # the bristle beside a joint is advanced exactly
+            return False
+        parts = {*cls.acts_on, *(ACTS_ON[hook] for hook in cls.hooks() if hook in ACTS_ON)}
+        return all(law.has(part) for part in parts)
 
     @classmethod
     def first_line(cls) -> str:
@@ -240,10 +289,10 @@ def _check(effect: type[Effect]) -> None:
         raise PhysicsError(f"{where}: joint = {effect.joint}; the names of two states are right.")
     if not (effect.__doc__ or "").strip():
         raise PhysicsError(f"{where}: a first docstring line tells users what it is.")
-    for name, parameter in effect.parameters.items():
-        low, high = parameter.bounds
-        if not low <= parameter.value <= high:
-            raise PhysicsError(f"{where}: {name} = {parameter.value} lies outside {(low, high)}.")
+    wrong = [part for part in effect.acts_on if part not in PARTS]
+    if wrong:
+        raise PhysicsError(f"{where}: acts_on {wrong}; laws have parts {PARTS}.")
+    check_numbers(where, effect.parameters, effect.tables)
     check_search(effect, where)
     check_verdict(effect, where)
 
@@ -263,8 +312,13 @@ def effects_of(site: str, law: str = "") -> tuple[type[Effect], ...]:
     return tuple(
         effect
         for _, effect in sorted(EFFECTS.items())
-        if effect.site == site and (not law or law in effect.laws)
+        if effect.site == site and (not law or effect.joins(LAWS[law]))
     )
+
+
+def laws_joined(effect: type[Effect]) -> tuple[str, ...]:
+    """Return the names of the laws that an effect of a damper can join; none for other sites."""
+    return tuple(law.name for law in laws_of("damper") if effect.joins(law))
 
 
 def instrument_of(channel: str, fault: str) -> str:

@@ -8,7 +8,8 @@ from itertools import product
 from math import copysign, inf, isfinite
 from typing import Any, Callable
 
-from .effect import CHOICES, Effect, Q, Sizes
+from .effect import Effect, Q, Sizes
+from .parameter import CHOICES
 
 """Parameters that are choices of a form: they may make a hook jump."""
 
@@ -60,7 +61,7 @@ def probe(effect: type[Effect]) -> None:
 
 def _start(effect: type[Effect], values: dict[str, float]) -> None:
     """Call what gives start values, at the bounds too; FlawError if that is not right."""
-    p = effect.Values(**values)
+    p = effect.values_of(values)
     sizes = Sizes(x=5e-3, v=0.07, V=5.0, force=4.0)
     for name, given, count in (
         ("tie", (p, sizes), len(effect.start_ties)),
@@ -118,7 +119,7 @@ def _call(
     """Return what a hook gives, as a tuple; FlawError if that is not right."""
     function: Callable[..., Any] = getattr(effect, hook)
     line = function.__code__.co_firstlineno + 1
-    p = effect.Values(**values)
+    p = effect.values_of(values)
     try:
         found = function(q, z, p)
     except Exception as error:
@@ -168,6 +169,8 @@ def _at_signal(
 
 
 def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> None:
+    moving: dict[str, bool] = {}
+    field_of = {name: field for field, names in effect.fields().items() for name in names}
     for name, parameter in effect.parameters.items():
         low, high = parameter.bounds
         if not (low > 0.0 and high > 100.0 * low):  # near the default: bounds may be far away
@@ -181,9 +184,12 @@ def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> Non
                 moved = moved or given(0.0) != given(1.0)
             else:
                 moved = _refuse_jump(effect, hook, given, 0.0, 1.0, f"p.{name}", 24) or moved
+        # Of a table some knots may lie where no signal of this small rig comes.
+        moving[field_of[name]] = moving.get(field_of[name], False) or moved
+    for field, moved in moving.items():
         if not moved:
             line = getattr(effect, next(iter(effect.hooks()))).__code__.co_firstlineno
-            raise FlawError(f"p.{name} moves nothing: no measurement could tell it.", line)
+            raise FlawError(f"p.{field} moves nothing: no measurement could tell it.", line)
 
 
 def _at_parameter(

@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .building import Building
+from .codegen import Slots, generate
 from .linear import Row, inverse, multiply, phi_functions
 from .structure_source import advance_source, contact_source, forces_source
-from .weave import Layout, weave
 
 EFFECT_STEP = 5e-4
 """Longest substep [s] of a structure with effects."""
@@ -127,20 +127,20 @@ def holding_force(n: int, C: Row, K: Row, mass: float, x: Row, a_g: float, other
     return total
 
 
-def reweave() -> None:
-    """Weave the structure's functions anew; call it after effects were registered late."""
-    global LAYOUT, effect_forces, contact_force, advance_effects
-    LAYOUT = Layout("structure", 0, 0)
-    effect_forces = weave("effect_forces", forces_source(LAYOUT), LAYOUT)
-    contact_force = weave("contact_force", contact_source(LAYOUT), LAYOUT)
-    advance_effects = weave("advance_effects", advance_source(LAYOUT), LAYOUT)
+def regenerate() -> None:
+    """Generate the structure's functions anew; call it after effects were registered late."""
+    global SLOTS, effect_forces, contact_force, advance_effects
+    SLOTS = Slots("structure")
+    effect_forces = generate("effect_forces", forces_source(SLOTS), SLOTS)
+    contact_force = generate("contact_force", contact_source(SLOTS), SLOTS)
+    advance_effects = generate("advance_effects", advance_source(SLOTS), SLOTS)
 
 
-LAYOUT: Layout
+SLOTS: Slots
 effect_forces: Any
 contact_force: Any
 advance_effects: Any
-reweave()
+regenerate()
 
 
 def step(
@@ -243,22 +243,22 @@ def resting_contact(
 
 def pack(values: dict[str, float]) -> list[float]:
     """Return the flat parameters of all effects; missing ones take their defaults."""
-    p = [0.0] * LAYOUT.p_size
-    for effect in LAYOUT.effects:
+    p = [0.0] * SLOTS.p_size
+    for effect in SLOTS.effects:
         for name, parameter in effect.parameters.items():
             key = effect.name + "." + name
-            p[LAYOUT.parameters[key]] = values.get(key, parameter.value)
+            p[SLOTS.parameters[key]] = values.get(key, parameter.value)
     return p
 
 
 def state_size(n: int) -> int:
     """Return how many states the effects have: those of the first level, then each level's own."""
-    return LAYOUT.z_size * (n + 1)
+    return SLOTS.z_size * (n + 1)
 
 
 def start_states(n: int, values: dict[str, float]) -> list[float]:
     """Return the states of n levels at the begin; `values` names start values, "EFFECT.STATE_0"."""
-    return [values.get(name + "_0", 0.0) for name in LAYOUT.states] * (n + 1)
+    return [values.get(name + "_0", 0.0) for name in SLOTS.states] * (n + 1)
 
 
 def work_size(n: int) -> int:

@@ -1,4 +1,4 @@
-"""The text of a structure's functions, woven from the hooks of its effects.
+"""The text of a structure's functions, generated from the hooks of its effects.
 
 Effects of the isolation layer act on the first level. Those of the storeys are called for each,
 with its drift and with states of its own: behind the layer's in `z`, a block for every level.
@@ -6,7 +6,7 @@ with its drift and with states of its own: behind the layer's in `z`, a block fo
 
 from __future__ import annotations
 
-from .weave import Layout, switched
+from .codegen import Slots, switched
 
 _SHARED = {"dt": "dt", "energy": "energy", "halt": "halt"}
 _ISOLATION = {
@@ -35,16 +35,16 @@ def _each_storey(*body: str) -> list[str]:
     ]
 
 
-def _of_storeys(layout: Layout) -> Layout:
-    """Return the layout of the effects of storeys, each storey with states of its own."""
-    part = layout.only(lambda effect: "spring" in effect.hooks())
-    return part.at(f" + (i + 1) * {layout.z_size}")
+def _of_storeys(slots: Slots) -> Slots:
+    """Return the slots of the effects of storeys, each storey with states of its own."""
+    part = slots.only(lambda effect: "spring" in effect.hooks())
+    return part.at(f" + (i + 1) * {slots.z_size}")
 
 
-def forces_source(layout: Layout) -> str:
+def forces_source(slots: Slots) -> str:
     """Return `effect_forces`: what all effects but contacts exert on the levels."""
-    smooth = layout.only(lambda effect: not effect.contact)
-    storeys = switched(_of_storeys(layout), "spring", "pull += {call}", **_STOREY)
+    smooth = slots.only(lambda effect: not effect.contact)
+    storeys = switched(_of_storeys(slots), "spring", "pull += {call}", **_STOREY)
     lines = [
         "def effect_forces(n, isolated, stiffnesses, x, dt, energy, halt, z, p, on, forces):",
         "    for i in range(n):",
@@ -61,9 +61,9 @@ def forces_source(layout: Layout) -> str:
     return "\n".join(lines)
 
 
-def contact_source(layout: Layout) -> str:
+def contact_source(slots: Slots) -> str:
     """Return `contact_force`: the force of friction and stops on the first level."""
-    contact = layout.only(lambda effect: effect.contact)
+    contact = slots.only(lambda effect: effect.contact)
     lines = [
         "def contact_force(n, isolated, stiffnesses, x, dt, energy, halt, z, p, on):",
         "    total = 0.0",
@@ -73,10 +73,10 @@ def contact_source(layout: Layout) -> str:
     return "\n".join(lines)
 
 
-def advance_source(layout: Layout) -> str:
+def advance_source(slots: Slots) -> str:
     """Return `advance_effects`: the states after a step, at one motion of all levels."""
-    base = layout.only(lambda effect: "force" in effect.hooks() or "spring" not in effect.hooks())
-    storeys = _of_storeys(layout)
+    base = slots.only(lambda effect: "force" in effect.hooks() or "spring" not in effect.hooks())
+    storeys = _of_storeys(slots)
     lines = [
         "def advance_effects(",
         "    n, isolated, stiffnesses, x, dt, energy, halt, force, z, p, on, z_next",
@@ -88,12 +88,12 @@ def advance_source(layout: Layout) -> str:
     return "\n".join(lines)
 
 
-def _advanced(layout: Layout, **q: str) -> list[str]:
+def _advanced(slots: Slots, **q: str) -> list[str]:
     """Return the source that advances the states of effects, by Euler's rule where they flow."""
-    lines = switched(layout, "rate", "{z_next}= {call}", **q)
-    for effect in layout.effects:
+    lines = switched(slots, "rate", "{z_next}= {call}", **q)
+    for effect in slots.effects:
         if "rate" in effect.hooks():
-            slots = layout.slots(effect)
-            lines.append(f"    if on[{layout.switches[effect.name]}]:")
-            lines += [f"        z_next[{k}] = z[{k}] + dt * z_next[{k}]" for k in slots]
-    return [*lines, *switched(layout, "advance", "{z_next}= {call}", **q)]
+            places = slots.places(effect)
+            lines.append(f"    if on[{slots.switches[effect.name]}]:")
+            lines += [f"        z_next[{k}] = z[{k}] + dt * z_next[{k}]" for k in places]
+    return [*lines, *switched(slots, "advance", "{z_next}= {call}", **q)]

@@ -24,7 +24,8 @@ from .effect import EFFECTS, HOOKS, Effect, Q
 from .probe import FlawError, probe
 
 PACKAGE = "bristle_own_effects"
-_MODULES = {"math": set(dir(math)), "bristle.physics.effect": {"Effect", "Parameter"}}
+_OFFERED = ("Effect", "Parameter", "Table", "interpolate")
+_MODULES = {"math": set(dir(math)), "bristle.physics.effect": set(_OFFERED)}
 _BUILTINS = {"abs", "min", "max", "float", "int", "bool", "round", "range", "dict", "tuple", "str"}
 _BUILTINS |= {"staticmethod", "True", "False", "None", "__name__"}
 _REFUSED = {
@@ -80,7 +81,7 @@ def load_effects(folder: Path) -> list[Loaded]:
         found.append(loaded)
         changed = changed or new
     if changed:
-        _reweave()
+        _regenerate()
     return found
 
 
@@ -96,7 +97,7 @@ def load_effect(path: Path) -> type[Effect]:
         raise PhysicsError(f"{path}: there is no such file with an effect.")
     loaded, new = _load(path.resolve(), path)
     if new:
-        _reweave()
+        _regenerate()
     if loaded.effect is None:
         raise PhysicsError(loaded.error)
     return loaded.effect
@@ -120,19 +121,19 @@ def leave_out(effect: type[Effect], why: str) -> None:
         if loaded.effect is effect:
             _forget(path)
             _known[path] = digest, Loaded(loaded.path, None, why)
-    _reweave()
+    _regenerate()
 
 
 def unload_effects() -> None:
     """Take every effect of a user's out of the library: it is as it came."""
     gone = [_forget(path) for path in list(_known)]
     if any(gone):
-        _reweave()
+        _regenerate()
 
 
-def _reweave() -> None:
-    damper.reweave()
-    structure.reweave()
+def _regenerate() -> None:
+    damper.regenerate()
+    structure.regenerate()
 
 
 def _forget(path: Path) -> bool:
@@ -241,11 +242,12 @@ def _only_one(module: ModuleType, path: Path, tree: ast.Module) -> type[Effect]:
 def _check(effect: type[Effect], tree: ast.Module) -> None:
     """Refuse class data that the rest of the package could not work with."""
     line = next(node.lineno for node in tree.body if isinstance(node, ast.ClassDef))
-    for name, parameter in effect.parameters.items():
+    for name in effect.fields():
         if not name.isidentifier() or name == "on" or name.endswith("_0"):
             raise FlawError(
                 f'a parameter cannot be named "{name}"; a word such as "k" is right.', line
             )
+    for name, parameter in effect.parameters.items():
         if not all(math.isfinite(bound) for bound in parameter.bounds):
             raise FlawError(f"the bounds of {name}, {parameter.bounds}, must be finite.", line)
     spelled = [p.unit for p in effect.parameters.values()] + list(effect.states.values())
@@ -260,7 +262,7 @@ def _check(effect: type[Effect], tree: ast.Module) -> None:
 
 def _read(tree: ast.Module) -> None:
     """Refuse what a hook must not do, as far as the text shows it."""
-    names = set(_BUILTINS) | {"Effect", "Parameter"}
+    names = set(_BUILTINS) | set(_OFFERED)
     for statement in tree.body:
         names |= _defined(statement)
     for node in ast.walk(tree):

@@ -12,6 +12,7 @@ from math import sqrt
 from ..errors import BristleError, PhysicsError
 from ..findings import Findings
 from ..physics.effect import EFFECTS
+from ..physics.laws import laws_of
 from .connections import Wire
 from .library import Library
 from .parts import Part, Run
@@ -221,21 +222,14 @@ def _voltage(damper: Part, network: Network, findings: Findings) -> None:
 def slopes(damper: Part, voltage: float) -> tuple[float, float]:
     """Return the slopes of a damper's force as v -> 0: over velocity [N.s/m], over travel [N/m].
 
-    LuGre: sigma_1 + sigma_2 + sigma_b V and sigma_a + sigma_0 V, the bristles; Bingham: c_0 + c_v V
-    and 0, its jump aside. (0, 0) for a law that is neither.
+    Of the law whose parameters the damper has, its jump aside; (0, 0) where that is none we know.
     """
-    return (
-        _linear(damper, ("sigma_1", "sigma_2"), "sigma_b", voltage)
-        or _linear(damper, ("c_0",), "c_v", voltage),
-        _linear(damper, ("sigma_a",), "sigma_0", voltage),
-    )
-
-
-def _linear(damper: Part, constants: tuple[str, ...], per_volt: str, voltage: float) -> float:
-    """Return the sum of some parameters, one of them per volt; 0 where the law lacks them."""
-    values = [damper.real(name) for name in (*constants, per_volt)]
-    numbers = [value for value in values if value is not None]
-    return sum(numbers[:-1]) + numbers[-1] * voltage if len(numbers) == len(values) else 0.0
+    for law in laws_of("damper"):
+        values = {name: damper.real(name) for name in law.parameters}
+        given = {name: value for name, value in values.items() if value is not None}
+        if given and all(name in given for name in law.linear()):
+            return law.slopes_at_rest(given, voltage)
+    return 0.0, 0.0
 
 
 def longest_step(algorithm: str, mass: float, c: float, k: float) -> float:

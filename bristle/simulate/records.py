@@ -18,7 +18,6 @@ from ..component import structure as structure_component
 from ..fmu.controller import MEASURED
 from ..physics import damper, structure
 from ..physics.building import MAX_FLOORS
-from ..physics.lugre import LuGre
 from ..physics.signals import PARAMETERS
 
 LEVELS = MAX_FLOORS + 1
@@ -54,17 +53,17 @@ def damper_record() -> np.dtype[np.void]:
     found, tried, excess belong to the sweeps; `jumps` says that its voltage has. `sharing` dampers
     bring the first level of structure `on_structure` (-1: none) to rest together.
     """
-    size, effects = damper.LAYOUT.z_size, len(damper.LAYOUT.effects)
+    size, effects = damper.SLOTS.z_size, len(damper.SLOTS.effects)
     states = size + damper_component.REMEMBERED
     forces = ("smooth", "smooth_1", "smooth_2", "found", "tried", "excess")
     return np.dtype(
         [
-            *((name, _INT) for name in ("law", "n_moving", "on_structure", "first")),
+            *((name, _INT) for name in ("law", "n_moving", "n_own", "on_structure", "first")),
             *((name, _FLOAT) for name in ("v_max", "stroke", "moving_mass", "sharing", *forces)),
-            *((name, _FLAG) for name in ("active", "advances", "measured", "jumps")),
+            *((name, _FLAG) for name in ("active", "advances", "signed", "measured", "jumps")),
             *_inputs(5),
             *((name, _FLOAT, (states,)) for name in ("state", "new_state")),
-            ("p", _FLOAT, (damper.LAYOUT.p_size,)),
+            ("p", _FLOAT, (damper.SLOTS.p_size,)),
             ("moving", _INT, (size,)),
             ("on", _SWITCH, (max(1, effects),)),
             ("work", _FLOAT, (damper.work_size(damper_component.REMEMBERED),)),
@@ -80,7 +79,7 @@ def structure_record() -> np.dtype[np.void]:
     without friction at the begin. It is `followed` by a component that reads more than its motion.
     """
     n = LEVELS
-    lay = structure.LAYOUT
+    slots_of_effects = structure.SLOTS
     states = 3 * n + 1 + structure.state_size(n)
     slots = ("first", "friction", "extra_friction", "holding")
     return np.dtype(
@@ -94,8 +93,8 @@ def structure_record() -> np.dtype[np.void]:
             *((name, _FLOAT, (n * n,)) for name in ("m_inverse", "damping", "stiffness")),
             ("phi", _FLOAT, (4 * n * n,)),
             *((name, _FLOAT, (2 * n * (n + 1),)) for name in ("held", "ramp")),
-            ("p", _FLOAT, (max(1, lay.p_size),)),
-            ("on", _SWITCH, (max(1, len(lay.effects)),)),
+            ("p", _FLOAT, (max(1, slots_of_effects.p_size),)),
+            ("on", _SWITCH, (max(1, len(slots_of_effects.effects)),)),
             ("work", _FLOAT, (structure_component.room(n),)),
         ],
         align=True,
@@ -116,14 +115,17 @@ def sampled_record() -> np.dtype[np.void]:
     own = ("gains", "biases", "deviation", "quantisation", "corner", "share")
     return np.dtype(
         [
-            *((name, _INT) for name in ("kind", "n", "rows", "seed", "size", "coming", "first")),
+            *(
+                (name, _INT)
+                for name in ("kind", "law", "n", "rows", "seed", "size", "coming", "first")
+            ),
             *((name, _INT) for name in places),
             *((name, _FLOAT) for name in ("period", *numbers, "gain", "integral_corner")),
-            *((name, _FLAG) for name in ("aligned", "senses", "lugre")),
+            *((name, _FLAG) for name in ("aligned", "senses")),
             *_inputs(m),
             *((name, _FLOAT, (m,)) for name in own),
             *((name, _INT, (m,)) for name in ("length", "ring")),
-            ("p", _FLOAT, (len(LuGre.parameters),)),
+            ("p", _FLOAT, (damper.SLOTS.law_parameters,)),
         ],
         align=True,
     )

@@ -13,7 +13,6 @@ from ..data import ground_motion_file
 from ..errors import ScenarioError
 from ..fmu import catalogue
 from ..fmu.slave import Slave
-from ..physics.damper import BINGHAM
 from ..physics.signals import CONSTANT
 from ..scenario.scenario import Component, Scenario
 from . import records
@@ -153,12 +152,14 @@ class System:
         names = self.names["damper"]
         found = np.zeros(len(names), records.damper_record())
         pushed = [self._pushed_by(name) for name in names]
-        codes = [self.slaves[name].constants.law for name in names]
-        sticking = [i for i, law in zip(pushed, codes, strict=True) if law == BINGHAM]
+        signs = [self.slaves[name].constants.setup.signed for name in names]
+        sticking = [i for i, signed in zip(pushed, signs, strict=True) if signed]
         for record, name, on in zip(found, names, pushed, strict=True):
             c, state = self.slaves[name].constants, self.slaves[name].state
-            _copy(record, c, ("law", "n_moving", "active", "advances", "v_max", "stroke"))
-            _fill(record, state=state, new_state=state, p=c.p, on=c.on, moving=c.moving)
+            _copy(record, c.setup, ("law", "n_moving", "n_own", "active", "advances", "signed"))
+            _copy(record, c, ("v_max", "stroke"))
+            own = c.setup
+            _fill(record, state=state, new_state=state, p=own.p, on=own.on, moving=own.moving)
             record["inputs"], record["first"] = self._inputs(name), self._first(name)
             given = (name, "acceleration") in self.source_of
             record["measured"] = c.measured or given

@@ -26,6 +26,8 @@ from ..component.damper import (
 )
 from ..component.structure import DAMPER_FORCE, EXTRA_FORCE
 from ..control.switching import limited
+from ..physics.inputs import Setup
+from ..physics.laws import laws_of
 
 ROUNDING = clock.ROUNDING
 DamperConstants, StructureConstants = damper.Constants, structure.Constants
@@ -48,12 +50,16 @@ INLINE = (
     *("time_loop.play", "time_loop.start", "time_loop.begin", "time_loop.move"),
     *("time_loop.correct", "time_loop.accept", "time_loop.gather"),
     *("time_loop.damper_constants", "time_loop.structure_constants"),
-    *("damper.step", "damper.stick_force", "damper.step_law", "switching.limited"),
+    *("damper.step", "damper.stick_force", "switching.limited"),
     *("structure.step", "structure.settle", "structure.output", "structure.show_motion"),
     *("structure.free_step", "structure.add_force", "structure.copy"),
-    *("controller.step", "controller.sample", "sensors.step", "codegen.evaluate_law"),
-    *("lugre.LuGre.advance", "lugre.LuGre.viscous", "lugre.LuGre.bristle", "bingham.falling"),
-    *("weave.evaluate_law",),
+    *("controller.step", "controller.sample", "sensors.step"),
+    *("codegen.step_law", "falling.falling"),
+    *(
+        f"{hook.__module__.rpartition('.')[2]}.{hook.__qualname__}"
+        for law in laws_of("damper")
+        for hook in law.hooks().values()
+    ),
 )
 """What becomes part of its caller: it is short or has one caller. Saves time, twice."""
 
@@ -256,7 +262,7 @@ def take_command(c, at, h, constants, memory, s):
     law = ControllerConstants(
         c.kind, c.period, c.v_max, c.velocity_corner, n, c.rows, c.v_top,
         constants[c.A : c.A + size * n], constants[c.B : c.B + size],
-        constants[c.W : c.W + size], constants[c.C : c.C + size], c.f_min, c.anti_windup, c.lugre,
+        constants[c.W : c.W + size], constants[c.C : c.C + size], c.f_min, c.anti_windup, c.law,
         c.p[:], c.still, c.least_slope, c.gain, c.integral_corner,
     )  # fmt: skip
     state, work = memory[c.state : c.work], memory[c.work : c.end]
@@ -328,10 +334,10 @@ def gather(slots, s, values):
 
 def damper_constants(d):
     """Return what a damper's functions compute with."""
-    return DamperConstants(
-        d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.active, d.v_max, d.stroke,
-        d.moving_mass, d.measured, True,
-    )  # fmt: skip
+    setup = Setup(
+        d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.n_own, d.signed, d.active
+    )
+    return DamperConstants(setup, d.v_max, d.stroke, d.moving_mass, d.measured, True)
 
 
 def structure_constants(b):

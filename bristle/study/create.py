@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..data.channels import ChannelSpec
 from ..data.guess import Guess
+from ..physics.laws import DEFAULT
 from .new import make_folder
 from .study import Study
 
@@ -30,7 +31,7 @@ def create_study(
     building: Path | str | None = None,
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
-    law: str = "lugre",
+    law: str = DEFAULT,
 ) -> Created:
     """Make a study's folder from files; it appears when it is whole.
 

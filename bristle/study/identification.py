@@ -10,13 +10,14 @@ import numpy as np
 
 from ..data.checks.clipping import saturated_share
 from ..data.measurement import Measurement
-from ..data.model import LAW_NAMES, STANDARD, StudyModel, new_model
+from ..data.model import StudyModel, new_model
 from ..errors import StudyError
 from ..identify.fit import Fit, Model
 from ..identify.residuals import robust_z
 from ..identify.rig import DAMPER, Rig, bench_rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
 from ..identify.table import LawError, error_table
+from ..physics.laws import DEFAULT, base_and_variant, law_names
 from ..units import convert
 from .identified import Identified
 from .rig import rig_of
@@ -168,7 +169,7 @@ def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
 
 def identify_frames(
     frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame],
-    law: str = "lugre",
+    law: str = DEFAULT,
     *,
     effects: tuple[str, ...] = (),
     holdout: Mapping[str, pd.DataFrame] | list[pd.DataFrame] | None = None,
@@ -194,7 +195,7 @@ def identify_frames(
     held = measurements_of_frames(holdout, "held out") if holdout else []
     if not train:
         raise StudyError("no frame is given; one run or more is right.")
-    model = _of_law(new_model(law, effects) if law in LAW_NAMES else new_model(), law)
+    model = _of_law(new_model(law, effects) if law in law_names() else new_model(), law)
     notes = () if held else ("No run is held out: errors are those of the fit itself.",)
     runs = Runs(train, held, notes)
     return _identify(bench_rig(train, held), runs, model, FitTask(cutoff, starts, table))
@@ -229,13 +230,17 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
     """Return the model with another law, its effects kept where they can join."""
     if law is None or law == model.law:
         return model
-    if law not in LAW_NAMES:
-        raise StudyError(f'law "{law}"; there are: {", ".join(LAW_NAMES)}.')
+    if law not in law_names():
+        raise StudyError(f'law "{law}"; there are: {", ".join(law_names())}.')
     from ..physics.effect import EFFECTS
 
     other = new_model(law, (), model.building)
-    base = STANDARD.get(law, law)
-    unfit = [name for name in model.effects if base not in EFFECTS[name].laws]
+    base, _ = base_and_variant(law)
+    unfit = [
+        name
+        for name in model.effects
+        if EFFECTS[name].site == base.site and not EFFECTS[name].joins(base)
+    ]
     if unfit:
         raise StudyError(f'{", ".join(unfit)} cannot join the law "{law}": undo the step first.')
     return replace(other, effects=dict(model.effects))

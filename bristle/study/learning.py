@@ -10,7 +10,8 @@ from ..data.model import StudyModel
 from ..diagnose import Diagnosis, diagnose, diagnose_rig
 from ..diagnose.faults import SensorFault
 from ..errors import StudyError
-from ..physics.effect import EFFECTS
+from ..physics.effect import EFFECTS, laws_joined
+from ..physics.laws import DEFAULT, LAWS
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified
@@ -131,9 +132,9 @@ def _refuse(model: StudyModel, name: str) -> None:
     effect = EFFECTS[name]
     if name in model.effects:
         raise StudyError(f"{name} is in the model already.")
-    if effect.site == "damper" and model.base_law not in effect.laws:
+    if effect.site == "damper" and not effect.joins(LAWS[model.base_law]):
         raise StudyError(
-            f"{name} cannot join the law {model.law}; it joins {', '.join(effect.laws)}."
+            f"{name} cannot join the law {model.law}; it joins {', '.join(laws_joined(effect))}."
         )
     for other in model.effects:
         if other in effect.excludes or name in EFFECTS[other].excludes:
@@ -195,7 +196,7 @@ def learn(
 
 def diagnose_frames(
     frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame],
-    law: str = "lugre",
+    law: str = DEFAULT,
     *,
     effects: tuple[str, ...] = (),
     holdout: Mapping[str, pd.DataFrame] | list[pd.DataFrame] | None = None,

@@ -17,6 +17,7 @@ from ..data.read import read_table
 from ..data.table import Table
 from ..errors import BristleError, StudyError, UnitError
 from ..physics.building import read_building
+from ..physics.laws import DEFAULT
 from ..units import canonical
 from .history import History, Step
 from .settings import RunFile, Settings, write_settings
@@ -46,7 +47,7 @@ def make_folder(
     building: Path | str | None = None,
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
-    law: str = "lugre",
+    law: str = DEFAULT,
 ) -> Made:
     """Make a study's folder from files; see `bristle.study.create.create_study`."""
     if folder.exists():

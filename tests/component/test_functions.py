@@ -40,11 +40,16 @@ def set_up(name: str, given: dict[str, Any]) -> Any:
     return slave
 
 
+def all_to(value: Any, to: Any) -> Any:
+    """Return constants with every sequence in them made by `to`; a record stays one."""
+    if hasattr(value, "_fields"):
+        return type(value)(*(all_to(inner, to) for inner in value))
+    return to(value) if isinstance(value, (list, tuple)) else value
+
+
 def driven(slave: Any, start: Any, step: Any, output: Any, to: Any) -> np.ndarray:
     """Return the outputs of a run of 200 steps, each stepped and then shown again."""
-    kinds = type(slave.constants)
-    arrays = [to(v) if isinstance(v, (list, tuple)) else v for v in slave.constants]
-    c = kinds(*arrays)
+    c = all_to(slave.constants, to)
     state, new, work = to(slave.state), to(slave.state), to([0.0, *slave._work])
     shown = to(slave._given)
     sampled = slave._new_state is slave.state

@@ -16,10 +16,12 @@ from scipy.integrate import quad
 import bristle.control
 from bristle.control import inverse, linear, sensing, switching
 from bristle.jit import compiled
-from bristle.physics.lugre import LuGre
+from bristle.physics.laws import law_code
+from bristle.physics.laws.lugre import LuGre
 
 P = [parameter.value for parameter in LuGre.parameters.values()]
 BINGHAM_P = [1.3, 0.83, 100.0, 20.0, 0.02, 1.0]
+BINGHAM, LUGRE = law_code("bingham"), law_code("lugre")
 LIMITS = (inverse.STILL, inverse.LEAST_SLOPE, 8.0)
 
 speeds = st.floats(inverse.STILL, 0.5)
@@ -40,9 +42,9 @@ INVERSE_TABLE = [
 
 @pytest.mark.parametrize(("u", "v", "z", "voltage", "force"), INVERSE_TABLE)
 def test_lugre_inverse_table(u: float, v: float, z: float, voltage: float, force: float) -> None:
-    V = inverse.lugre_voltage(u, v, z, P, *LIMITS)
+    V = inverse.voltage_of_law(LUGRE, P, u, v, [z], *LIMITS)
     assert pytest.approx(voltage, abs=5e-9) == V
-    assert inverse.lugre_force(z, v, V, P) == pytest.approx(force, abs=5e-9)
+    assert inverse.force_of_law(LUGRE, P, v, V, [z]) == pytest.approx(force, abs=5e-9)
 
 
 @given(v=speeds, sign=signs, share=st.floats(-1.0, 1.0), V=st.floats(0.0, 8.0))
@@ -50,8 +52,12 @@ def test_lugre_inverse_gives_back_the_voltage(
     v: float, sign: float, share: float, V: float
 ) -> None:
     v, z = sign * v, share / 500.0
-    slope = inverse.lugre_force(z, v, 1.0, P) - inverse.lugre_force(z, v, 0.0, P)
-    found = inverse.lugre_voltage(inverse.lugre_force(z, v, V, P), v, z, P, *LIMITS)
+    slope = inverse.force_of_law(LUGRE, P, v, 1.0, [z]) - inverse.force_of_law(
+        LUGRE, P, v, 0.0, [z]
+    )
+    found = inverse.voltage_of_law(
+        LUGRE, P, inverse.force_of_law(LUGRE, P, v, V, [z]), v, [z], *LIMITS
+    )
     if abs(slope) >= inverse.LEAST_SLOPE:
         assert found == pytest.approx(V, abs=1e-12 * 10.0 / inverse.LEAST_SLOPE)
     else:
@@ -60,24 +66,26 @@ def test_lugre_inverse_gives_back_the_voltage(
 
 @given(v=speeds, sign=signs, V=st.floats(0.0, 8.0))
 def test_bingham_inverse_gives_back_the_voltage(v: float, sign: float, V: float) -> None:
-    force = inverse.bingham_force(sign * v, V, BINGHAM_P)
-    found = inverse.bingham_voltage(force, sign * v, BINGHAM_P, *LIMITS)
+    force = inverse.force_of_law(BINGHAM, BINGHAM_P, sign * v, V, [0.0])
+    found = inverse.voltage_of_law(BINGHAM, BINGHAM_P, force, sign * v, [0.0], *LIMITS)
     assert found == pytest.approx(V, abs=1e-10)
 
 
 @given(u=st.floats(0.0, 1e3), v=speeds, sign=signs)
 def test_no_inverse_asks_a_damper_to_push(u: float, v: float, sign: float) -> None:
     z = sign / 500.0
-    assert inverse.lugre_voltage(-sign * u, sign * v, z, P, *LIMITS) == 0.0
-    assert inverse.bingham_voltage(-sign * u, sign * v, BINGHAM_P, *LIMITS) == 0.0
+    assert inverse.voltage_of_law(LUGRE, P, -sign * u, sign * v, [z], *LIMITS) == 0.0
+    assert inverse.voltage_of_law(BINGHAM, BINGHAM_P, -sign * u, sign * v, [0.0], *LIMITS) == 0.0
 
 
 def test_estimated_deflection_is_exact_and_bounded() -> None:
-    z, v, h = 0.0, 0.3, 0.02  # a_0 v h = 3: explicit Euler would diverge
+    z, v, h = [0.0], 0.3, 0.02  # a_0 v h = 3: explicit Euler would diverge
     for k in range(50):
-        z = inverse.estimated_deflection(z, v, h, 500.0)
-        assert z == pytest.approx((1.0 - exp(-500.0 * v * h * (k + 1))) / 500.0, rel=1e-12)
-    assert inverse.estimated_deflection(1e-3, 0.0, h, 500.0) == 1e-3
+        inverse.estimate_states(LUGRE, P, v, 4.0, h, z)
+        assert z[0] == pytest.approx((1.0 - exp(-500.0 * v * h * (k + 1))) / 500.0, rel=1e-12)
+    z = [1e-3]
+    inverse.estimate_states(LUGRE, P, 0.0, 4.0, h, z)
+    assert z == [1e-3]
 
 
 @pytest.mark.parametrize(
@@ -176,9 +184,8 @@ def test_skyhook_brakes_and_never_pushes() -> None:
     assert sensing.skyhook_switch(0.1, 0.0, 8.0) == 0.0
 
 
-lugre_voltage, bingham_voltage = inverse.lugre_voltage, inverse.bingham_voltage
-lugre_force, bingham_force = inverse.lugre_force, inverse.bingham_force
-deflection = inverse.estimated_deflection
+voltage_of_law, force_of_law = inverse.voltage_of_law, inverse.force_of_law
+estimate_states = inverse.estimate_states
 clipped, signed, applied = (
     switching.clipped_voltage,
     switching.signed_voltage,
@@ -190,13 +197,15 @@ leaky_integral, skyhook_command = sensing.leaky_integral, sensing.skyhook_comman
 skyhook_switch = sensing.skyhook_switch
 
 
-def every_law(u, v, z, p, bingham_p, A, B, W, C, x, spare, out):  # type: ignore[no-untyped-def]
+def every_law(u, v, z, p, bingham_p, A, B, W, C, x, spare, bent, out):  # type: ignore[no-untyped-def]
     """Call every law once; one function, so that numba compiles them together."""
-    out[0] = lugre_voltage(u, v, z, p, 1e-3, 0.5, 8.0)
-    out[1] = bingham_voltage(u, v, bingham_p, 1e-3, 0.5, 8.0)
-    out[2] = lugre_force(z, v, out[0], p)
-    out[3] = bingham_force(v, out[1], bingham_p)
-    out[4] = deflection(z, v, 0.002, p[6])
+    bent[0] = z
+    out[0] = voltage_of_law(LUGRE, p, u, v, bent, 1e-3, 0.5, 8.0)
+    out[1] = voltage_of_law(BINGHAM, bingham_p, u, v, bent, 1e-3, 0.5, 8.0)
+    out[2] = force_of_law(LUGRE, p, v, out[0], bent)
+    out[3] = force_of_law(BINGHAM, bingham_p, v, out[1], bent)
+    estimate_states(LUGRE, p, v, out[0], 0.002, bent)
+    out[4] = bent[0]
     out[5] = clipped(u, out[2], 0.5, 8.0)
     out[6] = signed(u, v, 8.0)
     out[7] = applied(out[6], v)
@@ -222,9 +231,18 @@ def test_python_and_numba_agree() -> None:
         slow_out, fast_out = [0.0] * 17, np.zeros(17)
         lists = [table.tolist() for table in tables]
         every_law(
-            float(u), float(v), float(z), P, BINGHAM_P, *lists, state.tolist(), [0.0] * 2, slow_out
+            float(u),
+            float(v),
+            float(z),
+            P,
+            BINGHAM_P,
+            *lists,
+            state.tolist(),
+            [0.0] * 2,
+            [0.0],
+            slow_out,
         )
-        arrays = (np.array(P), np.array(BINGHAM_P), *tables, state.copy(), np.zeros(2))
+        arrays = (np.array(P), np.array(BINGHAM_P), *tables, state.copy(), np.zeros(2), np.zeros(1))
         fast(u, v, z, *arrays, fast_out)
         np.testing.assert_allclose(fast_out, slow_out, rtol=1e-12, atol=1e-12)
 

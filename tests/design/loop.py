@@ -22,7 +22,8 @@ from bristle.control.controller import Controller
 from bristle.data import read_ground_motion
 from bristle.jit import compiled
 from bristle.physics.building import paper_building
-from bristle.physics.lugre import LuGre
+from bristle.physics.laws import law_code
+from bristle.physics.laws.lugre import LuGre
 
 Array = NDArray[np.float64]
 
@@ -35,11 +36,9 @@ BINGHAM_P = (1.3, 0.83, 100.0, 20.0, 0.02, 1.0)
 clipped_voltage = switching.clipped_voltage
 signed_voltage = switching.signed_voltage
 applied_signed = switching.applied_signed
-lugre_voltage = inverse.lugre_voltage
-bingham_voltage = inverse.bingham_voltage
-bingham_force = inverse.bingham_force
-lugre_force = inverse.lugre_force
-estimated_deflection = inverse.estimated_deflection
+LUGRE_CODE, BINGHAM_CODE = law_code("lugre"), law_code("bingham")
+voltage_of_law, force_of_law = inverse.voltage_of_law, inverse.force_of_law
+estimate_states = inverse.estimate_states
 table_row, command, advance = linear.table_row, linear.command, linear.advance
 STILL, LEAST_SLOPE = inverse.STILL, inverse.LEAST_SLOPE
 
@@ -71,8 +70,8 @@ def simulate(  # type: ignore[no-untyped-def]
     """Fill out (samples + 1, 4) with y, base displacement, force, voltage at each sample."""
     stiffness, damping, mass = matrices[:3], matrices[3:6], matrices[6]
     h = 0.002 / 10
-    x, at, k1, k2, k3, k4, state, spare = work
-    deflection, V = 0.0, level
+    x, at, k1, k2, k3, k4, state, spare, bent = work
+    V = level
     for k in range(samples + 1):
         v, y = x[3], 0.0
         for j in range(3):
@@ -85,12 +84,12 @@ def simulate(  # type: ignore[no-untyped-def]
             if law == 1 or law == 5:
                 V = clipped_voltage(u, measured, 0.5, 8.0)
             elif law == 2:
-                V = lugre_voltage(u, v, deflection, p, STILL, LEAST_SLOPE, 8.0)
-                applied = lugre_force(deflection, v, V, p)
-                deflection = estimated_deflection(deflection, v, 0.002, p[6])
+                V = voltage_of_law(LUGRE_CODE, p, u, v, bent, STILL, LEAST_SLOPE, 8.0)
+                applied = force_of_law(LUGRE_CODE, p, v, V, bent)
+                estimate_states(LUGRE_CODE, p, v, V, 0.002, bent)
             elif law == 3:
-                V = bingham_voltage(u, v, bingham_p, STILL, LEAST_SLOPE, 8.0)
-                applied = bingham_force(v, V, bingham_p)
+                V = voltage_of_law(BINGHAM_CODE, bingham_p, u, v, bent, STILL, LEAST_SLOPE, 8.0)
+                applied = force_of_law(BINGHAM_CODE, bingham_p, v, V, bent)
             else:
                 V = signed_voltage(u, v, 8.0)
                 applied = applied_signed(V, v)
@@ -147,7 +146,7 @@ def run(
         flats = [
             np.array(values) for values in (controller.A, controller.B, controller.W, controller.C)
         ]
-    work = (*(np.zeros(7) for _ in range(6)), np.zeros(n), np.zeros(n))
+    work = (*(np.zeros(7) for _ in range(6)), np.zeros(n), np.zeros(n), np.zeros(1))
     _compiled()(
         law, ground, samples, matrices, n, rows, v_top, *flats, rate, np.array(P),
         np.array(BINGHAM_P), level, work, out,

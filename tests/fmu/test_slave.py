@@ -15,8 +15,8 @@ from fresh import fresh
 
 from bristle import units
 from bristle.fmu import build, catalogue
-from bristle.physics.damper import LAWS
 from bristle.physics.effect import effects_of
+from bristle.physics.laws import LAWS
 
 DAMPERS = ["BinghamDamper", "LuGreDamper"]
 CONTROLLERS = ["ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped", "Skyhook"]

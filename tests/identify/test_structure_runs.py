@@ -11,7 +11,6 @@ from bristle.identify.line import fit_line
 from bristle.identify.model import Model
 from bristle.identify.response import base_equilibrium, jumps, respond, shear
 from bristle.identify.structure import (
-    LinearLayer,
     damper_run,
     layer_run,
     reconstructed,
@@ -20,6 +19,7 @@ from bristle.identify.structure import (
     structure_problems,
     thinned,
 )
+from bristle.physics.laws.linear_layer import LinearLayer
 
 
 @pytest.fixture(scope="module")

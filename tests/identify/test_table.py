@@ -8,7 +8,8 @@ import pytest
 from bristle.errors import RecordError
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Problem, Run
-from bristle.identify.table import LAWS_OF_TABLE, error_table, low_pass
+from bristle.identify.table import error_table, low_pass
+from bristle.physics.laws import law_names
 
 DT, N = 0.004, 3000
 T = np.arange(N) * DT
@@ -42,7 +43,7 @@ def test_the_filter_has_no_phase_and_halves_the_power_twice_at_its_cut_off():
 def test_the_law_that_made_the_data_has_the_least_error():
     train, held = problem("lugre", {}, 1), problem("lugre", {}, 2)
     rows = {row.law: row for row in error_table(train, held, starts=2)}
-    assert tuple(rows) == LAWS_OF_TABLE
+    assert tuple(rows) == law_names()
     assert min(rows.values(), key=lambda row: row.holdout).law == "lugre"
     assert rows["lugre"].share < 0.01
     assert rows["lugre"].model.values["a_0"] == pytest.approx(500.0, rel=0.02)

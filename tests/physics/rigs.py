@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from bristle.physics import damper
-from bristle.physics.damper import LAW_CODES, DamperModel
+from bristle.physics.damper import DamperModel
+from bristle.physics.inputs import Inputs
 
 LAWS = ("bingham", "lugre")
 NO_LAW = {
@@ -42,14 +43,12 @@ class Bench:
         self, law: str, values: Mapping[str, float] | None = None, effects: Iterable[str] = ()
     ) -> None:
         effects = list(effects)
-        self.law = LAW_CODES[law]
         self.model = DamperModel(law, dict(values or {}), effects)
-        self.moving = damper.moving_states(law, effects)
         self.last: tuple[float, float, float] | None = None
         self._work = [0.0] * damper.work_size()
 
     def state(self, name: str) -> float:
-        return self.model.z[damper.LAYOUT.states[name] if name != "bristle" else 0]
+        return self.model.z[damper.SLOTS.states[name] if name != "bristle" else 0]
 
     def move(self, x: float, v: float, V: float, dt: float) -> float:
         """Move on over dt [s] to x, v, V; return the force there."""
@@ -57,10 +56,10 @@ class Bench:
         z1 = [0.0] * len(self.model.z)
         a = (v - v0) / dt
         m = self.model
-        force, _ = damper.step(
-            self.law, x0, v0, a, V0, x, v, a, V, dt, 0.0, 0.0, False, m.z, m.p, m.on,
-            self.moving, len(self.moving), m.advances, z1, self._work,
-        )  # fmt: skip
+        begin = Inputs(x0, v0, a, V0, dt, 0.0, 0.0, False)
+        end = Inputs(x, v, a, V, dt, 0.0, 0.0, False)
+        # As one that has effects takes it: without any, all their switches are asked.
+        force, _ = damper.step(m.setup._replace(active=True), begin, end, m.z, z1, self._work)
         m.z = z1
         self.last = (x, v, V)
         return float(force)

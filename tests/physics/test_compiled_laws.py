@@ -12,6 +12,7 @@ from bristle.jit import compiled
 from bristle.physics import damper, structure
 from bristle.physics.building import paper_building
 from bristle.physics.effect import EFFECTS, effects_of
+from bristle.physics.inputs import Inputs
 from bristle.physics.signals import KINDS, PARAMETERS, rate, value
 
 DAMPER_CASES = [
@@ -62,10 +63,8 @@ def damper_run(
 ) -> np.ndarray:
     """Return force, friction and states of 150 steps; `to` makes the sequences."""
     model = damper.DamperModel(law, {"exponent": exponent}, effects)
-    moving = damper.moving_states(law, effects)
-    z, p, on = to(model.z), to(model.p), to(model.on)
-    slots = to(moving or [0])
-    work = to([0.0] * damper.work_size())
+    setup = damper.setup_of(law, {"exponent": exponent}, effects, to, to)
+    z, work = to(model.z), to([0.0] * damper.work_size())
     found = []
     last = (0.0, 0.0, 0.0, 4.0)
     for k in range(1, 151):
@@ -79,10 +78,8 @@ def damper_run(
         )
         z1 = to([0.0] * len(model.z))
         halt = 6.0 * now[1] if halts else 0.0
-        pair = step(
-            damper.LAW_CODES[law], *last, *now, dt, 0.0, halt, halts, z, p, on, slots, len(moving),
-            damper.advances(effects), z1, work,
-        )  # fmt: skip
+        begin, end = (Inputs(*at, dt, 0.0, halt, halts) for at in (last, now))
+        pair = step(setup._replace(active=True), begin, end, z, z1, work)
         z, last = z1, now
         found.append([*pair, *z])
     return np.array(found)

@@ -19,7 +19,7 @@ from bristle import units
 from bristle.component.structure import StructureModel
 from bristle.errors import ScenarioError
 from bristle.physics.building import paper_building
-from bristle.physics.effect import EFFECTS, HOOKS, SITES, Effect, Q, effects_of
+from bristle.physics.effect import EFFECTS, HOOKS, SITES, Effect, Q, effects_of, laws_joined
 from bristle.scenario.scenario import load_scenario
 from bristle.simulate.run import run
 
@@ -37,7 +37,7 @@ ALL = [EFFECTS[name] for name in sorted(EFFECTS)]
 each_effect = pytest.mark.parametrize("effect", ALL, ids=lambda e: e.name)
 each_damper_effect = pytest.mark.parametrize(
     ("effect", "law"),
-    [(e, law) for e in ALL if e.site == "damper" for law in e.laws],
+    [(e, law) for e in ALL if e.site == "damper" for law in laws_joined(e)],
     ids=lambda value: getattr(value, "name", value),
 )
 each_structure_effect = pytest.mark.parametrize(
@@ -97,8 +97,8 @@ def test_it_stands_in_a_file_of_its_name(effect: type[Effect]) -> None:
 @each_effect
 def test_site_and_laws_are_known(effect: type[Effect]) -> None:
     assert effect.site in SITES
-    assert effect.laws
-    assert set(effect.laws) <= set(LAWS)
+    assert set(laws_joined(effect)) <= set(LAWS)
+    assert bool(laws_joined(effect)) == (effect.site == "damper")
     assert effect.name not in effect.excludes
 
 
@@ -163,7 +163,7 @@ def test_its_hooks_are_pure_functions_in_order(effect: type[Effect]) -> None:
 def test_hooks_return_as_many_values_as_they_must(effect: type[Effect]) -> None:
     q = Q(*(0.01 * (i + 1) for i in range(len(Q._fields))))
     z = effect.State(*(0.001 for _ in effect.states))
-    p = effect.Values(*(parameter.value for parameter in effect.parameters.values()))
+    p = effect.values_of({})
     counts = {"rate": len(effect.states), "advance": len(effect.states), "motion": 2}
     for hook, function in effect.hooks().items():
         returned = function(q, z, p)

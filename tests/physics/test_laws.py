@@ -13,13 +13,29 @@ from published import MODEL
 from rigs import LAWS, Bench, force_at, loop_energy, sine
 from scipy.integrate import solve_ivp
 
-from bristle.physics.bingham import Bingham, falling
 from bristle.physics.damper import DamperModel
-from bristle.physics.lugre import LuGre
+from bristle.physics.falling import falling
+from bristle.physics.inputs import Inputs
+from bristle.physics.laws.bingham import Bingham
+from bristle.physics.laws.lugre import LuGre
 
 BINGHAM = SimpleNamespace(**{k: v.value for k, v in Bingham.parameters.items()})
 LUGRE = SimpleNamespace(**{k: v.value for k, v in LuGre.parameters.items()})
 A_0 = LUGRE.a_0
+
+
+def moving(v: float, dt: float = 0.0) -> Inputs:
+    """Return what a law's hooks take as q."""
+    return Inputs(0.0, v, 0.0, 0.0, dt, 0.0, 0.0, False)
+
+
+def bristle_rate(z: float, v: float) -> float:
+    return float(LuGre.rate(moving(v), LuGre.State(z), LuGre.at({}))[0])
+
+
+def advanced(z: float, v: float, dt: float) -> float:
+    """Return the bristle deflection [m] after dt [s] at a velocity v [m/s]."""
+    return float(LuGre.advance(moving(v, dt), LuGre.State(z), LuGre.at({}))[0])
 
 
 @pytest.mark.parametrize(("law", "values"), [("bingham", BINGHAM), ("lugre", LUGRE)])
@@ -36,16 +52,17 @@ def test_listed_forces(row: list[float]) -> None:
     v, V, z, bingham, lugre, rate = row
     assert force_at("bingham", v=v, V=V) == pytest.approx(bingham, abs=5e-10)
     assert force_at("lugre", v=v, V=V, z=z) == pytest.approx(lugre, abs=5e-10)
-    assert LuGre.rate(z, v, LUGRE) == pytest.approx(rate, abs=1e-15)
+    assert bristle_rate(z, v) == pytest.approx(rate, abs=1e-15)
 
 
 def test_the_bump_stands_out_more_at_low_voltage() -> None:
     listed = MODEL["bump"]
     for V, ratio in zip(listed["voltages"], listed["ratios"], strict=True):
         speeds = np.linspace(0.0, 0.2, 20001)
-        viscous = [Bingham.viscous(v, V, BINGHAM) for v in speeds]
+        p = Bingham.at({}, V)
+        viscous = [Bingham.viscous(moving(v), (), p) for v in speeds]
         assert speeds[int(np.argmax(viscous))] == pytest.approx(BINGHAM.v_n, abs=1e-5)
-        assert max(viscous) / Bingham.yielding(V, BINGHAM) == pytest.approx(ratio, abs=0.005)
+        assert max(viscous) / Bingham.limit(moving(0.1), (), p) == pytest.approx(ratio, abs=0.005)
 
 
 @given(v=st.floats(-1.0, 1.0), V=st.floats(0.0, 8.0))
@@ -59,7 +76,7 @@ def test_laws_are_odd_in_velocity(v: float, V: float) -> None:
 def test_steady_sliding_of_lugre_is_bingham(v: float, sign: float, V: float) -> None:
     lugre = force_at("lugre", v=sign * v, V=V, z=sign / A_0)
     assert lugre == pytest.approx(force_at("bingham", v=sign * v, V=V), rel=1e-12)
-    assert LuGre.rate(sign / A_0, sign * v, LUGRE) == pytest.approx(0.0, abs=1e-15)
+    assert bristle_rate(sign / A_0, sign * v) == pytest.approx(0.0, abs=1e-15)
 
 
 @given(v=st.floats(-1.0, 1.0), V=st.floats(0.0, 8.0))
@@ -111,22 +128,22 @@ def test_force_at_constant_velocity() -> None:
     share=st.floats(0.0, 1.0),
 )
 def test_the_bristles_step_is_exact(z: float, v: float, dt: float, share: float) -> None:
-    whole = LuGre.advance(z, v, dt, A_0)
-    parted = LuGre.advance(LuGre.advance(z, v, share * dt, A_0), v, (1.0 - share) * dt, A_0)
+    whole = advanced(z, v, dt)
+    parted = advanced(advanced(z, v, share * dt), v, (1.0 - share) * dt)
     assert whole == pytest.approx(parted, abs=1e-17 + 1e-12 * abs(whole) + 2e-12 * abs(v * dt))
 
 
 @pytest.mark.parametrize(("z", "v"), [(0.0, 0.05), (0.002, -0.3), (-0.001, 1e-4), (0.0015, 0.0)])
 def test_the_bristles_step_against_a_tight_integration(z: float, v: float) -> None:
     exact = solve_ivp(
-        lambda _t, y: [LuGre.rate(y[0], v, LUGRE)],
+        lambda _t, y: [bristle_rate(y[0], v)],
         (0.0, 0.1),
         [z],
         "DOP853",
         rtol=1e-12,
         atol=1e-16,
     ).y[0, -1]
-    assert LuGre.advance(z, v, 0.1, A_0) == pytest.approx(exact, rel=1e-9, abs=1e-15)
+    assert advanced(z, v, 0.1) == pytest.approx(exact, rel=1e-9, abs=1e-15)
 
 
 @given(
@@ -138,7 +155,7 @@ def test_the_bristle_never_bends_beyond_sliding(
 ) -> None:
     z /= A_0
     for v, dt in motion:
-        z = LuGre.advance(z, v, dt, A_0)
+        z = advanced(z, v, dt)
         assert abs(z) <= (1.0 + 1e-12) / A_0
 
 
@@ -157,7 +174,7 @@ def test_the_bristle_stays_bounded_on_the_bench(motion: list[tuple[float, float,
 @given(z=st.floats(-0.002, 0.002), v=st.floats(-2.0, 2.0), V=st.floats(0.0, 8.0))
 def test_lugre_is_passive_at_constant_voltage(z: float, v: float, V: float) -> None:
     stiffness = LUGRE.sigma_a + LUGRE.sigma_0 * V
-    stored = stiffness * z * LuGre.rate(z, v, LUGRE)  # d/dt of stiffness z^2/2
+    stored = stiffness * z * bristle_rate(z, v)  # d/dt of stiffness z^2/2
     lost = force_at("lugre", v=v, V=V, z=z) * v - stored
     viscous = (LUGRE.sigma_2 + LUGRE.sigma_b * V) * v**2 * exp(-abs(v) / LUGRE.v_n)
     parts = (
@@ -218,7 +235,7 @@ def test_sine_loop_of_the_laws(row: list[float]) -> None:
 
     times = 4.0 * period + period * np.arange(4001) / 4000
     solution = solve_ivp(
-        lambda t, z: [LuGre.rate(z[0], float(velocity(t)), LUGRE)],
+        lambda t, z: [bristle_rate(z[0], float(velocity(t)))],
         (0.0, times[-1]), [0.0], "LSODA", times, rtol=1e-11, atol=1e-15, max_step=period / 50,
     )  # fmt: skip
     z, v = solution.y[0], velocity(times)

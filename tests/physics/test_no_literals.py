@@ -8,14 +8,17 @@ from pathlib import Path
 
 import pytest
 
-from bristle.physics.damper import LAWS
 from bristle.physics.effect import EFFECTS
+from bristle.physics.laws import LAWS, law_names
 
 PACKAGE = Path(__file__).resolve().parents[2] / "bristle"
 EXEMPT = ("physics", "paper")
 """Where laws and effects are at home, and where a published model is rebuilt by name."""
 
-KINDS = {"effects": EFFECTS, "laws": LAWS}
+KINDS = {
+    "effects": set(EFFECTS),
+    "laws": {*law_names("damper"), *law_names("structure")},
+}
 ELSEWHERE = {
     ("data/checks/motion.py", "delay"): "a kind of finding: a channel that comes late",
     ("diagnose/corrected.py", "delay"): "a kind of sensor fault",
@@ -23,8 +26,8 @@ ELSEWHERE = {
     ("diagnose/model_based_faults.py", "delay"): "a kind of sensor fault",
     ("diagnose/sensors.py", "delay"): "a kind of sensor fault",
     ("diagnose/equilibrium.py", "delay"): "a kind of sensor fault",
-    ("simulate/layout.py", "delay"): "a field of the engine's record: a sensor's parameter",
-    ("simulate/system.py", "delay"): "a field of the engine's record: a sensor's parameter",
+    ("simulate/records.py", "delay"): "a field of the engine's record: a source's parameter",
+    ("simulate/system.py", "delay"): "a field of the engine's record: a source's parameter",
 }
 """Files in which such a word means something else, and what."""
 
@@ -38,6 +41,13 @@ def literals(text: str) -> Iterator[tuple[int, str]]:
                 yield node.lineno, name
 
 
+def classes(text: str, names: set[str]) -> Iterator[tuple[int, str]]:
+    """Yield line and name of each use of a class by one of these names."""
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Name) and node.id in names:
+            yield node.lineno, node.id
+
+
 def selections(names: set[str]) -> list[tuple[str, int, str]]:
     """Return file, line and name of all strings in the package that are one of these names."""
     return [
@@ -49,10 +59,21 @@ def selections(names: set[str]) -> list[tuple[str, int, str]]:
     ]
 
 
-@pytest.mark.parametrize("kind", ["effects"])
+@pytest.mark.parametrize("kind", ["effects", "laws"])
 def test_no_literal_selects_by_name(kind: str) -> None:
-    found = selections(set(KINDS[kind]))
+    found = selections(KINDS[kind])
     assert not [place for place in found if (place[0], place[2]) not in ELSEWHERE]
+
+
+def test_no_class_of_a_law_or_effect_is_named() -> None:
+    own = {one.__name__ for one in (*EFFECTS.values(), *LAWS.values())}
+    found = [
+        (path.relative_to(PACKAGE).as_posix(), line, name)
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if path.relative_to(PACKAGE).parts[0] not in EXEMPT
+        for line, name in classes(path.read_text(encoding="utf-8"), own)
+    ]
+    assert not found
 
 
 def test_every_exemption_is_needed() -> None:

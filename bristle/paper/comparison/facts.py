@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...physics.building import frequencies, paper_building
-from ...physics.lugre import LuGre
+from ...physics.laws import law_code
+from ...physics.laws.lugre import LuGre
 from .experiment import Motion
 
 if TYPE_CHECKING:
@@ -51,10 +52,11 @@ def facts(designs: dict[str, Controller], motions: list[Motion]) -> dict[str, An
 
 def steady_force(v: float, V: float) -> float:
     """Return the LuGre force [N] in steady sliding at v [m/s] and V [V]."""
-    from ...control.inverse import lugre_force
+    from ...control.inverse import force_of_law
 
     p = [parameter.value for parameter in LuGre.parameters.values()]
-    return lugre_force(1.0 / LuGre.parameters["a_0"].value, v, V, p)
+    bent = 1.0 / LuGre.parameters["a_0"].value
+    return force_of_law(law_code(LuGre.name), p, v, V, [bent])
 
 
 def first_damping_ratio(building: Any) -> float:

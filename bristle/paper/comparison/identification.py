@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...physics.lugre import LuGre
+from ...control.inverse import estimate_states
+from ...physics.laws import law_code
+from ...physics.laws.lugre import LuGre
 from ..runs import Runs
 
 if TYPE_CHECKING:
@@ -121,10 +123,14 @@ def least(error: Callable[[Any], float], start: list[float]) -> float:
 
 def deflection(v: Array, a_0: float) -> Array:
     """Return the bristle deflection (n,) [m] from 0 on, the velocity linear between samples."""
-    z, found = 0.0, [0.0]
+    law, p = (
+        law_code(LuGre.name),
+        [{"a_0": a_0}.get(n, one.value) for n, one in LuGre.parameters.items()],
+    )
+    z, found = [0.0], [0.0]
     for mean in (0.5 * (v[1:] + v[:-1])).tolist():
-        z = LuGre.advance(z, mean, STEP, a_0)
-        found.append(z)
+        estimate_states(law, p, mean, 0.0, STEP, z)
+        found.append(z[0])
     return np.array(found)
 
 

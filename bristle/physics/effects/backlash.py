@@ -14,6 +14,7 @@ class Backlash(Effect):
 
     name = "backlash"
     site = "damper"
+    kind = "series element"
     needs = ("rod_x", "rod_v", "force")
     passive = True
     zero_at_rest = True

@@ -17,6 +17,7 @@ class CoilLag(Effect):
 
     name = "coil_lag"
     site = "damper"
+    kind = "lag"
     needs = ("V", "dt")
     passive = True
     zero_at_rest = True

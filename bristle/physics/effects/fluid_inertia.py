@@ -26,6 +26,7 @@ class FluidInertia(Effect):
 
     name = "fluid_inertia"
     site = "damper"
+    kind = "inertia"
     needs = ("v", "a", "dt")
     passive = True
     zero_at_rest = True

@@ -15,6 +15,7 @@ class GasSpring(Effect):
 
     name = "gas_spring"
     site = "damper"
+    kind = "spring"
     needs = ("x",)
     passive = True
     zero_at_rest = False

@@ -17,6 +17,7 @@ class MountCompliance(Effect):
 
     name = "mount_compliance"
     site = "damper"
+    kind = "series element"
     needs = ("rod_x", "rod_v", "force")
     passive = True
     zero_at_rest = True

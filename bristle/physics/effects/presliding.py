@@ -16,7 +16,6 @@ class Presliding(Effect):
 
     name = "presliding"
     site = "damper"
-    laws = ("bingham",)
     needs = ("v", "dt")
     passive = True
     zero_at_rest = True

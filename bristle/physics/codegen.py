@@ -1,0 +1,182 @@
+"""Generates one plain function per site from the hooks of all registered laws and effects.
+
+numba cannot loop over a list of different functions, and a Python loop over them would be slow.
+So the loop is written out once as source, with a run-time switch per law and effect: the same text
+runs in plain Python inside FMUs and, compiled, on the fast path. Numbers live in flat sequences,
+`p` for parameters, `z` for states, `on` for switches; `Slots` say which is where. The first slots
+of `p` and `z` belong to the law, as many as the largest law needs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from copy import copy
+from typing import Any
+
+from .effect import Effect, Q, effects_of
+from .inputs import Inputs
+from .law import Law, laws_of
+from .parameter import climb
+from .tuples import listed, made, record
+
+
+class Slots:
+    """Where each effect of a site keeps its switch, states and parameters in the flat sequences.
+
+    Attributes
+    ----------
+    laws : tuple of Law classes, by code; none where the site's law is not generated
+    effects : tuple of Effect classes, by name
+    law_parameters, law_states : int
+        How many slots in front of `p` and `z` belong to the law.
+    parameters, states : dict
+        Name, such as "gas_spring.k", to its index in `p` or `z`.
+    switches : dict
+        Effect name to its index in `on`.
+    elsewhere : dict
+        State name to the variable that holds it in generated source, for those not read from `z`.
+    block : str
+        Source of what is added to a state's index: where the states of one of several places begin.
+    """
+
+    def __init__(self, site: str, with_effects: bool = True) -> None:
+        self.laws = laws_of(site) if site == "damper" else ()
+        self.effects = effects_of(site) if with_effects else ()
+        self.parameters: dict[str, int] = {}
+        self.states: dict[str, int] = {}
+        self.switches: dict[str, int] = {}
+        self.elsewhere: dict[str, str] = {}
+        self.block = ""
+        self.law_parameters = max((len(law.parameters) for law in self.laws), default=0)
+        self.law_states = max((len(law.states) for law in self.laws), default=0)
+        self.p_size = self.law_parameters
+        self.z_size = self.law_states
+        for effect in self.effects:
+            self.switches[effect.name] = len(self.switches)
+            for name in effect.parameters:
+                self.parameters[effect.name + "." + name] = self.p_size
+                self.p_size += 1
+            for name in effect.states:
+                self.states[effect.name + "." + name] = self.z_size
+                self.z_size += 1
+
+    def only(self, keep: Callable[[type[Effect]], bool]) -> Slots:
+        """Return the same slots with those effects alone that are to be kept."""
+        part = copy(self)
+        part.effects = tuple(effect for effect in self.effects if keep(effect))
+        return part
+
+    def reading(self, elsewhere: dict[str, str]) -> Slots:
+        """Return the same slots with states that are read from variables: name to variable."""
+        part = copy(self)
+        part.elsewhere = elsewhere
+        return part
+
+    def at(self, block: str) -> Slots:
+        """Return the same slots with every state's index further by what `block` says."""
+        part = copy(self)
+        part.block = block
+        return part
+
+    def places(self, effect: type[Effect]) -> list[str]:
+        """Return the source of the indices of the effect's states in `z`."""
+        return [f"{self.states[effect.name + '.' + name]}{self.block}" for name in effect.states]
+
+    def values(self, effect: type[Effect]) -> str:
+        """Return the source that makes the effect's parameter tuple from `p`."""
+        at = {name: f"p[{self.parameters[effect.name + '.' + name]}]" for name in effect.parameters}
+        return made(f"{effect.name}_P", listed(effect.fields(), effect.tables, at))
+
+    def state(self, effect: type[Effect]) -> str:
+        """Return the source that makes the effect's state tuple, from `z` where nothing else is."""
+        sources = [
+            self.elsewhere.get(effect.name + "." + name, f"z[{place}]")
+            for name, place in zip(effect.states, self.places(effect))
+        ]
+        return made(f"{effect.name}_Z", sources)
+
+
+def call(effect: type[Effect], hook: str, slots: Slots, q: str) -> str:
+    """Return the source of one call of a hook."""
+    return f"{effect.name}_{hook}({q}, {slots.state(effect)}, {slots.values(effect)})"
+
+
+def q_source(**given: str) -> str:
+    """Return the source of a `Q` in which every signal that is not given is zero."""
+    return made("Q", [given.get(name, "0.0") for name in Q._fields])
+
+
+def switched(slots: Slots, hook: str, line: str, **q: str) -> list[str]:
+    """Return `if on[...]: LINE` for every effect of the slots with that hook.
+
+    `line` holds `{call}` where the hook's value belongs, and `{dz}` or `{z_next}` for the
+    assignment targets of the effect's states; `q` names the variables that feed `Q`. An effect
+    that changes the voltage keeps to the voltage that it was given, in `rate` and `advance` too.
+    """
+    lines = []
+    for effect in slots.effects:
+        if hook not in effect.hooks():
+            continue
+        if hook == "voltage":
+            lines.append(f"    V_{effect.name} = V")
+        if "voltage" in effect.hooks():
+            q["V"] = "V_" + effect.name
+        elif "V" in q:
+            q["V"] = "V"
+        places = slots.places(effect)
+        lines.append(f"    if on[{slots.switches[effect.name]}]:  # {effect.name}")
+        text = line.format(
+            call=call(effect, hook, slots, q_source(**q)),
+            dz="".join(f"dz[{place}], " for place in places),
+            z_next="".join(f"z_next[{place}], " for place in places),
+        )
+        lines.append("        " + text)
+    return lines
+
+
+def switched_laws(slots: Slots, lines: Callable[[type[Law]], list[str]]) -> list[str]:
+    """Return `if law == CODE: LINES` for every law of the slots that has lines."""
+    out: list[str] = []
+    for code, law in enumerate(slots.laws):
+        own = lines(law)
+        if own:
+            out.append(f"    {'elif' if out else 'if'} law == {code}:  # {law.name}")
+            out += ["        " + line for line in own]
+    return out
+
+
+def generate(name: str, source: str, slots: Slots) -> Any:
+    """Compile generated source; return the function `name` with the hooks in its globals."""
+    namespace: dict[str, Any] = {"Q": Q, "Inputs": Inputs, "record": record, "climb": climb}
+    namespace["__name__"] = __name__
+    owners: tuple[type[Law] | type[Effect], ...] = (*slots.laws, *slots.effects)
+    for owner in owners:
+        namespace[owner.name + "_P"] = owner.Values
+        namespace[owner.name + "_Z"] = owner.State
+        for hook, function in owner.hooks().items():
+            namespace[owner.name + "_" + hook] = function
+    exec(compile(source, f"<generated {name}>", "exec"), namespace)
+    function = namespace[name]
+    function.source = source
+    return function
+
+
+_HOLDERS: list[tuple[dict[str, Any], tuple[str, ...]]] = []
+_HANDED_OUT: dict[str, Any] = {}
+
+
+def hold(namespace: dict[str, Any], *names: str) -> None:
+    """Put generated functions into a module's globals, now and whenever they are made anew.
+
+    A function that numba compiles finds what it calls among its module's globals, so each module
+    that calls generated functions holds them.
+    """
+    _HOLDERS.append((namespace, names))
+    namespace.update({name: _HANDED_OUT[name] for name in names if name in _HANDED_OUT})
+
+
+def hand_out(functions: Mapping[str, Any]) -> None:
+    """Give the functions that were generated to the modules that hold them."""
+    _HANDED_OUT.update(functions)
+    for namespace, names in _HOLDERS:
+        namespace.update({name: functions[name] for name in names if name in functions})

@@ -1,0 +1,92 @@
+"""How a law's quantity depends on the command, the voltage V [V] of the coil.
+
+A form is a declaration: `command = {"yield_force": Linear("f_c", "f_v")}` in a law says that its
+hooks find p.yield_force = f_c + f_v V at the voltage that the damper feels. One line of arithmetic
+is generated from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+Place = Callable[[str], str]
+"""Name of a parameter to the source of its value; of a table to the source of its tuple."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """Base of all forms; the fields of a form name parameters of the law.
+
+    Attributes
+    ----------
+    affine : bool
+        Whether the quantity is linear in the voltage: such a law can be inverted.
+    """
+
+    affine: ClassVar[bool] = True
+
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the parameters, or of the table, that make the quantity."""
+        return tuple(str(getattr(self, field.name)) for field in fields(self))
+
+    def driven(self) -> tuple[str, ...]:
+        """Return the parameters that act through the voltage alone."""
+        return self.names()[1:]
+
+    def source(self, at: Place, knots: str) -> str:
+        """Return the source of the quantity at V; `knots` is that of the table's knots."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Constant(Form):
+    """The same at every voltage."""
+
+    level: str
+
+    def source(self, at: Place, knots: str) -> str:
+        """Return the source of level."""
+        return at(self.level)
+
+
+@dataclass(frozen=True)
+class Linear(Form):
+    """level + slope V."""
+
+    level: str
+    slope: str
+
+    def source(self, at: Place, knots: str) -> str:
+        """Return the source of level + slope V."""
+        return f"{at(self.level)} + {at(self.slope)} * V"
+
+
+@dataclass(frozen=True)
+class Quadratic(Form):
+    """level + slope V + bend V^2."""
+
+    level: str
+    slope: str
+    bend: str
+    affine: ClassVar[bool] = False
+
+    def source(self, at: Place, knots: str) -> str:
+        """Return the source of level + slope V + bend V^2."""
+        return f"{at(self.level)} + V * ({at(self.slope)} + V * {at(self.bend)})"
+
+
+@dataclass(frozen=True)
+class Monotone(Form):
+    """A table over the voltage that never falls: its first value, then what it gains to each knot.
+
+    The table's knots are voltages [V], its bounds begin at 0. See `parameter.climb`.
+    """
+
+    table: str
+    affine: ClassVar[bool] = False
+
+    def source(self, at: Place, knots: str) -> str:
+        """Return the source of the climbing line at V."""
+        return f"climb(V, {knots}, {at(self.table)})"

@@ -1,0 +1,403 @@
+"""A damper's law, or that of a building's part: one class in one file, which registers itself.
+
+A law is the plain model that effects join. It declares its numbers, how they depend on the command,
+which parts it has, and hooks: pure functions of `q` the motion (`inputs.Inputs`), `z` the law's
+states and `p` its parameters, as those of effects are. Whatever needs to know something of a law
+asks its class; nothing knows a law by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, NamedTuple
+
+from ..errors import PhysicsError
+from .command import Constant, Form, Monotone
+from .inputs import Inputs
+from .parameter import CHOICES, Parameter, Table, all_parameters, check_numbers, fields_of, named
+from .tuples import FACTORS, values_of_law
+
+SITES = ("damper", "structure")
+
+PARTS = ("yield", "sign", "bristle", "viscous", "spring", "command")
+"""What a law may have, and effects may act on.
+
+    yield     a force to be overcome before it slides
+    sign      this force jumps with the direction of motion, and at rest it is what holds the motion
+    bristle   this force is carried by what bends before it slips
+    viscous   a force that grows with speed
+    spring    a force that grows with displacement
+    command   something depends on the command; found from `command`
+"""
+
+HOOKS = {
+    "limit": "sign",
+    "yielding": "yield",
+    "damping": "bristle",
+    "viscous": "viscous",
+    "elastic": "spring",
+}
+"""The hooks that give a force [N], each with the part of which it is the force."""
+
+ALL_HOOKS = (*HOOKS, "rate", "advance", "force")
+
+FOREVER = 1e15
+"""Time [s] after which sliding is steady at any speed."""
+
+LEAST = 1e-12
+"""Speed [m/s] and travel [m] at which a law's slopes at rest are read."""
+
+
+MOST = 1e6
+"""Voltage [V] at which everything that a voltage moves has moved."""
+
+
+class Shape(NamedTuple):
+    """A parameter in which a law is not linear: where fits look for it, and what it shapes.
+
+    `nodes` values from `low` to `high` are looked at, spaced by equal ratios: factors on the
+    typical size of the rig. `shapes` are the linear parameters whose force it shapes, `falls`
+    whether their force falls with speed over it.
+    """
+
+    low: float
+    high: float
+    nodes: int
+    shapes: tuple[str, ...]
+    falls: bool = False
+
+
+class Variant(NamedTuple):
+    """A law of its own name that is another with some values fixed: `NAME_standard`.
+
+    `values` are fixed, `idle` the parameters that mean nothing then, `lacks` says in words what the
+    variant does without.
+    """
+
+    values: Mapping[str, float]
+    idle: tuple[str, ...] = ()
+    lacks: str = ""
+
+
+LAWS: dict[str, type[Law]] = {}
+
+
+class Law:
+    """Base of every law; defining a subclass with a `name` registers it.
+
+    Class data
+    ----------
+    name, site
+        "damper", or "structure" for the law of a building's part.
+    parameters, tables, states
+        `{name: Parameter}`, `{name: Table}`, `{name: unit}`. Start values of states are zero or the
+        parameter `STATE_0`. Once the class is defined `parameters` also lists the values of its
+        tables, as `curve[1]`.
+    command
+        `{quantity: form}`, how quantities depend on the voltage (see `command`). In a hook the
+        quantity is p.NAME, and the parameters that make it are not there.
+    parts, contains
+        `PARTS` that the law has: an effect joins laws with the parts that it acts on. `contains`
+        names the kinds of effects that the law has in it already; they are not offered beside it.
+    shapes
+        `{parameter: Shape}`: the parameters in which the force is not linear. All others are
+        linear, but `parameter.CHOICES`.
+    variants
+        `{suffix: Variant}`.
+    place, stiffness
+        Of a building's part: "layer" or "storey", and the parameter that is its linear stiffness.
+    source
+        Where it is from, with the year.
+
+    Hooks
+    -----
+    Static pure functions of q, z, p, each of which may be left out.
+
+    limit
+        Force [N] at which the law slides; needs the part "sign".
+    yielding
+        The yield force [N] where the law gives it itself, signed: by bristles, or smoothly.
+    damping
+        Force [N] of the bristles' own damping, which factors on the yield force leave alone.
+    viscous, elastic
+        Forces [N] that grow with speed, with displacement.
+    rate
+        Rates of the states, as a tuple. A law with states has it.
+    advance
+        States after q.dt at constant velocity q.v, as a tuple, where that is known exactly. It sees
+        `p` at the voltage of the step's end. A law that has states and none of it moves by `rate`.
+    force
+        Of a building's part: its force [N], at arrays as well.
+    """
+
+    name: ClassVar[str] = ""
+    site: ClassVar[str] = "damper"
+    parameters: ClassVar[dict[str, Parameter]] = {}
+    tables: ClassVar[dict[str, Table]] = {}
+    states: ClassVar[dict[str, str]] = {}
+    command: ClassVar[dict[str, Form]] = {}
+    parts: ClassVar[tuple[str, ...]] = ()
+    contains: ClassVar[tuple[str, ...]] = ()
+    shapes: ClassVar[dict[str, Shape]] = {}
+    variants: ClassVar[dict[str, Variant]] = {}
+    place: ClassVar[str] = ""
+    stiffness: ClassVar[str] = ""
+    source: ClassVar[str] = ""
+    State: ClassVar[Any]
+    Values: ClassVar[Any]
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        if not cls.name:
+            return
+        cls.parameters = all_parameters(cls.parameters, cls.tables)
+        if any(not isinstance(form, Constant) for form in cls.command.values()):
+            cls.parts = tuple(dict.fromkeys((*cls.parts, "command")))
+        _check(cls)
+        cls.State = named("State", tuple(cls.states))
+        cls.Values = named("Values", cls.seen())
+        LAWS[cls.name] = cls
+
+    @classmethod
+    def has(cls, part: str) -> bool:
+        """Return whether the law has one of `PARTS`."""
+        return part in cls.parts
+
+    @classmethod
+    def hook(cls, name: str) -> Callable[..., Any] | None:
+        """Return a hook, None where the law leaves it out."""
+        return getattr(cls, name, None)
+
+    @classmethod
+    def hooks(cls) -> dict[str, Callable[..., Any]]:
+        """Return the hooks that the law defines."""
+        return {name: getattr(cls, name) for name in ALL_HOOKS if hasattr(cls, name)}
+
+    @classmethod
+    def seen(cls) -> tuple[str, ...]:
+        """Return the fields of `p`: quantities, then the parameters and tables that make none."""
+        used = {name for form in cls.command.values() for name in form.names()}
+        own = [name for name in fields_of(cls.parameters, cls.tables) if name not in used]
+        return (*cls.command, *own, *(FACTORS if cls.has("bristle") else ()))
+
+    @classmethod
+    def linear(cls) -> tuple[str, ...]:
+        """Return the names of the parameters in which the force is linear."""
+        return tuple(n for n in cls.parameters if n not in CHOICES and n not in cls.shapes)
+
+    @classmethod
+    def driven(cls) -> tuple[str, ...]:
+        """Return the names of the parameters that act through the voltage alone."""
+        names: list[str] = []
+        for form in cls.command.values():
+            if isinstance(form, Monotone):
+                count = len(cls.tables[form.table].knots)
+                names += [f"{form.table}[{k}]" for k in range(2, count + 1)]
+            else:
+                names += form.driven()
+        return tuple(names)
+
+    @classmethod
+    def yield_parameters(cls) -> tuple[str, ...]:
+        """Return the linear parameters that the yield force is made of."""
+        return tuple(n for n in cls.linear() if _moves(cls, n, ("limit", "yielding")))
+
+    @classmethod
+    def sliding_states(cls, values: Mapping[str, float], v: float, V: float) -> Any:
+        """Return the states after long sliding at v [m/s] and V [V], of a law that is `exact`."""
+        advance = cls.hook("advance")
+        if advance is None:
+            return ()
+        rest = cls.State(*(0.0 for _ in cls.states))
+        return cls.State(*advance(_motion(v, V, FOREVER), rest, cls.at(values, V)))
+
+    @classmethod
+    def sliding_force(cls, values: Mapping[str, float], v: float, V: float) -> tuple[float, float]:
+        """Return the yield force [N] and all other force [N] in steady sliding at v > 0 [m/s].
+
+        Of a law that is `exact`.
+        """
+        q, z, p = _motion(v, V), cls.sliding_states(values, v, V), cls.at(values, V)
+        found = {name: own(q, z, p) for name in HOOKS if (own := cls.hook(name))}
+        held = sum(found.pop(name, 0.0) for name in ("limit", "yielding"))
+        return held, sum(found.values())
+
+    @classmethod
+    def slopes_at_rest(cls, values: Mapping[str, float], V: float) -> tuple[float, float]:
+        """Return the slopes of the force as v -> 0 at V [V]: per speed [N.s/m], per travel [N/m].
+
+        A jump with direction is left out. Travel is that of the rod and of all states in metres.
+        """
+        p, rest = cls.at(values, V), dict.fromkeys(cls.states, 0.0)
+        bent = {name: LEAST if unit == "m" else 0.0 for name, unit in cls.states.items()}
+        hooks = [own for name in HOOKS if name != "limit" and (own := cls.hook(name))]
+        moving, still = _motion(LEAST, V), _motion(0.0, V)._replace(x=LEAST)
+        speed = sum(own(moving, cls.State(**rest), p) for own in hooks)
+        travel = sum(own(still, cls.State(**bent), p) for own in hooks)
+        return speed / LEAST, travel / LEAST
+
+    @classmethod
+    def falling(cls) -> tuple[tuple[str, ...], str]:
+        """Return the parameters whose force falls with speed, and the one that says over which.
+
+        Empty where nothing falls.
+        """
+        for name, shape in cls.shapes.items():
+            if shape.falls:
+                return shape.shapes, name
+        return (), ""
+
+    @classmethod
+    def idle(cls, values: Mapping[str, float]) -> tuple[str, ...]:
+        """Return the names of the parameters that mean nothing at these values of others."""
+        return tuple(
+            name
+            for variant in cls.variants.values()
+            if all(
+                values.get(key, cls.parameters[key].value) == value
+                for key, value in variant.values.items()
+            )
+            for name in variant.idle
+        )
+
+    @classmethod
+    def affine(cls) -> bool:
+        """Return whether the force is linear in the voltage: then controllers can invert it."""
+        return cls.has("command") and all(form.affine for form in cls.command.values())
+
+    @classmethod
+    def exact(cls) -> bool:
+        """Return whether the law has no states, or moves them by `advance`."""
+        return not cls.states or cls.hook("advance") is not None
+
+    @classmethod
+    def first_line(cls) -> str:
+        """Return the first line of the docstring, which users read."""
+        return (cls.__doc__ or "").strip().splitlines()[0]
+
+    @classmethod
+    def at(cls, values: Mapping[str, float], V: float = 0.0) -> Any:
+        """Return the `p` of the hooks at a voltage V [V]; missing values take their defaults."""
+        return values_of_law(cls, values, V)
+
+
+def _motion(v: float, V: float, dt: float = 0.0) -> Inputs:
+    return Inputs(0.0, v, 0.0, V, dt, 0.0, 0.0, False)
+
+
+def _moves(law: type[Law], name: str, hooks: tuple[str, ...]) -> bool:
+    """Return whether a force, all other linear parameters at zero, is there with one alone."""
+    q = Inputs(1e-3, 0.02, 0.1, 1.0, 1e-3, 0.0, 0.0, False)
+    z = law.State(*(1e-4 for _ in law.states)) if law.states else ()
+    none = dict.fromkeys(law.linear(), 0.0)
+    p = law.at({**none, name: 1.0}, MOST)  # beyond all knots of a table over the voltage
+    return any(function(q, z, p) for hook in hooks if (function := law.hook(hook)))
+
+
+def _check(law: type[Law]) -> None:
+    """Refuse a law whose class data could not work, when it is defined."""
+    where = f"law {law.name!r} ({law.__module__}.{law.__qualname__})"
+    if law.site not in SITES:
+        raise PhysicsError(f"{where}: site {law.site!r} is none of {SITES}.")
+    if not law.name.isidentifier():
+        raise PhysicsError(f"{where}: a name is one word of letters, digits and _.")
+    known = LAWS.get(law.name)
+    if known is not None and known.__module__ != law.__module__:
+        raise PhysicsError(
+            f"{where}: the name is taken by {known.__module__}.{known.__qualname__}."
+        )
+    wrong = [part for part in law.parts if part not in PARTS]
+    if wrong:
+        raise PhysicsError(f"{where}: parts {wrong}; there are {PARTS}.")
+    if not law.first_line():
+        raise PhysicsError(f"{where}: a first docstring line tells users what it is.")
+    check_numbers(where, law.parameters, law.tables)
+    _check_names(law, where)
+    _check_hooks(law, where)
+
+
+def _check_names(law: type[Law], where: str) -> None:
+    """Refuse forms, shapes and variants that name what the law has not."""
+    places = {**dict.fromkeys(law.parameters), **dict.fromkeys(law.tables)}
+    for quantity, form in law.command.items():
+        lacking = [name for name in form.names() if name not in places]
+        if lacking:
+            raise PhysicsError(f"{where}: command of {quantity} names {lacking}, no parameters.")
+        if isinstance(form, Monotone) and form.table not in law.tables:
+            raise PhysicsError(f"{where}: command of {quantity}: {form.table} is no table.")
+        if quantity in places and quantity not in form.names():
+            raise PhysicsError(f"{where}: {quantity} is a quantity and a parameter.")
+    for name, shape in law.shapes.items():
+        lacking = [n for n in (name, *shape.shapes) if n not in law.parameters]
+        if lacking:
+            raise PhysicsError(f"{where}: shapes names {lacking}, no parameters of it.")
+    for suffix, variant in law.variants.items():
+        lacking = [n for n in (*variant.values, *variant.idle) if n not in law.parameters]
+        if lacking:
+            raise PhysicsError(f"{where}: variant {suffix} names {lacking}, no parameters of it.")
+
+
+def _check_hooks(law: type[Law], where: str) -> None:
+    if law.site == "structure":
+        if law.hook("force") is None:
+            raise PhysicsError(f"{where}: the law of a building's part has the hook `force`.")
+        return
+    given = [hook for hook in HOOKS if law.hook(hook) is not None]
+    if not given:
+        raise PhysicsError(f"{where}: defines none of the hooks {list(HOOKS)}.")
+    lacking = [HOOKS[hook] for hook in given if not law.has(HOOKS[hook])]
+    if lacking:
+        raise PhysicsError(f"{where}: has the hooks {given}; its parts must name {lacking}.")
+    if law.has("sign") and law.hook("limit") is None:
+        raise PhysicsError(f"{where}: the part sign needs the hook `limit`.")
+    if law.states and law.hook("rate") is None:
+        raise PhysicsError(f"{where}: has states and no `rate`.")
+    if not law.states and (law.hook("rate") or law.hook("advance")):
+        raise PhysicsError(f"{where}: has `rate` or `advance` and no states.")
+
+
+def laws_of(site: str = "damper") -> tuple[type[Law], ...]:
+    """Return the registered laws of a site, in the order in which they were defined."""
+    return tuple(law for law in LAWS.values() if law.site == site)
+
+
+def law_code(name: str) -> int:
+    """Return the number of a damper's law, by which compiled code tells them apart."""
+    return [law.name for law in laws_of("damper")].index(name)
+
+
+def law_names(site: str = "damper") -> tuple[str, ...]:
+    """Return the names of the laws of a site, then those of their variants: "bingham_standard"."""
+    laws = laws_of(site)
+    return (
+        *(law.name for law in laws),
+        *(f"{law.name}_{suffix}" for law in laws for suffix in law.variants),
+    )
+
+
+def base_and_variant(name: str) -> tuple[type[Law], Variant]:
+    """Return the law of a name, and the variant of it that the name stands for.
+
+    Raises
+    ------
+    PhysicsError
+        If there is no such law.
+    """
+    if name in LAWS:
+        return LAWS[name], Variant({})
+    for law in LAWS.values():
+        for suffix, variant in law.variants.items():
+            if name == f"{law.name}_{suffix}":
+                return law, variant
+    raise PhysicsError(f'no law is named "{name}". There are: {", ".join(law_names())}.')
+
+
+def law_of_part(part: str) -> type[Law]:
+    """Return the law of a building's part: "layer", "storey1", "storey2" ..."""
+    return next(law for law in laws_of("structure") if part.rstrip("0123456789") == law.place)
+
+
+def forget_law(law: type[Law]) -> None:
+    """Take a law out of the library: for tests, and what registers laws of its own."""
+    if LAWS.get(law.name) is law:
+        del LAWS[law.name]

@@ -1,0 +1,121 @@
+"""Numbers of laws and effects: parameters, tables of them, and how a table is read."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from ..errors import PhysicsError
+
+CHOICES = ("exponent", "mass", "which")
+"""Parameters that choose a form or regularise: no fit moves them."""
+
+
+class Parameter(NamedTuple):
+    """A number of a law or effect: default value, SI unit, bounds of what is physical, meaning."""
+
+    value: float
+    unit: str
+    bounds: tuple[float, float]
+    text: str
+
+
+class Table(NamedTuple):
+    """A row of numbers of a law or effect, one per knot; the knots are fixed, the values fitted.
+
+    `knots` ascend, in SI; `values` are the defaults, `unit` and `bounds` theirs. Each value is a
+    parameter of its own, named `curve[1]`, `curve[2]` ...; a hook reads all as the tuple `p.curve`.
+    """
+
+    knots: tuple[float, ...]
+    values: tuple[float, ...]
+    unit: str
+    bounds: tuple[float, float]
+    text: str
+
+
+def interpolate(x: float, knots: tuple[float, ...], values: tuple[float, ...]) -> float:
+    """Return the value at x of the broken line through (knots, values).
+
+    Beyond the first and the last knot it keeps the value there.
+    """
+    if x <= knots[0]:
+        return values[0]
+    for k in range(1, len(knots)):
+        if x < knots[k]:
+            share = (x - knots[k - 1]) / (knots[k] - knots[k - 1])
+            return values[k - 1] + share * (values[k] - values[k - 1])
+    return values[len(knots) - 1]
+
+
+def climb(x: float, knots: tuple[float, ...], rises: tuple[float, ...]) -> float:
+    """Return the value at x of the broken line that begins at rises[0] and then gains each rise.
+
+    It climbs by rises[k] between the knots k - 1 and k: where no rise is negative it never falls.
+    """
+    total = rises[0]
+    for k in range(1, len(knots)):
+        share = (x - knots[k - 1]) / (knots[k] - knots[k - 1])
+        total += rises[k] * min(max(share, 0.0), 1.0)
+    return total
+
+
+def entries(name: str, table: Table) -> dict[str, Parameter]:
+    """Return the parameters that a table stands for: `name[1]`, `name[2]` ..."""
+    return {
+        f"{name}[{k}]": Parameter(value, table.unit, table.bounds, f"{table.text}, at {knot:g}")
+        for k, (knot, value) in enumerate(zip(table.knots, table.values), 1)
+    }
+
+
+def all_parameters(
+    parameters: Mapping[str, Parameter], tables: Mapping[str, Table]
+) -> dict[str, Parameter]:
+    """Return a class's parameters and, after them, the values of its tables."""
+    found = dict(parameters)
+    for name, table in tables.items():
+        found.update(entries(name, table))
+    return found
+
+
+def check_numbers(
+    where: str, parameters: Mapping[str, Parameter], tables: Mapping[str, Table]
+) -> None:
+    """Refuse numbers that could not work.
+
+    Raises
+    ------
+    PhysicsError
+        If a default lies outside its bounds, or a table's knots do not ascend or match its values.
+    """
+    for name, table in tables.items():
+        knots = tuple(table.knots)
+        if not name.isidentifier():
+            raise PhysicsError(f"{where}: a table cannot be named {name!r}; a word is right.")
+        if len(knots) < 2 or any(b <= a for a, b in zip(knots, knots[1:])):
+            raise PhysicsError(
+                f"{where}: the knots of {name}, {knots}, must be two or more, ascending."
+            )
+        if len(table.values) != len(knots):
+            raise PhysicsError(
+                f"{where}: {name} has {len(knots)} knots and {len(table.values)} values."
+            )
+    for name, parameter in parameters.items():
+        low, high = parameter.bounds
+        if not low <= parameter.value <= high:
+            raise PhysicsError(f"{where}: {name} = {parameter.value} lies outside {(low, high)}.")
+
+
+def fields_of(
+    parameters: Mapping[str, Parameter], tables: Mapping[str, Table]
+) -> dict[str, tuple[str, ...]]:
+    """Return what a hook's `p` holds: field to the parameters in it, several for a table."""
+    listed = {name: tuple(entries(name, table)) for name, table in tables.items()}
+    inside = {entry for names in listed.values() for entry in names}
+    return {**{name: (name,) for name in parameters if name not in inside}, **listed}
+
+
+def named(kind: str, fields: Sequence[str]) -> Any:
+    """Return a named tuple class; what is used inside hooks is one."""
+    return namedtuple(kind, tuple(fields))
