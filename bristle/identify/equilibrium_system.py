@@ -44,6 +44,7 @@ def ratios_of(building: Building) -> Array:
 
 
 def modes_of(building: Building, stiffness: Array) -> Modes:
+    """Return the modes of a building with other stiffnesses (n,) [N/m]."""
     values, shapes = eigh(stiffness_matrix(building, stiffness), np.array(building.M))
     return Modes(np.sqrt(np.maximum(values, 1e-12)), shapes)
 

@@ -69,6 +69,7 @@ class StructureProblem(Problem):
         return StructureProblem(runs, self.storey, self.reconstructed)
 
     def along(self, effects: tuple[str, ...]) -> Along:
+        """Return what gives the forces of these effects along a motion, made at first use."""
         if effects not in self._along:
             self._along[effects] = Along(list(effects), self.storey)
         return self._along[effects]

@@ -32,6 +32,7 @@ class Layout:
     numeric: list[bool]
 
     def split(self, line: str) -> list[str]:
+        """Return the fields of a line."""
         if not self.delimiter:
             return line.split()
         if '"' in line:

@@ -23,6 +23,7 @@ from .numbers import (
 
 
 def rig(n: Numbers) -> Verdict:
+    """Decide whether sample rate, force, stroke, stiffness and frequencies are the stated ones."""
     f = n.facts
     frequencies = f["frequencies"]
     holds = (
@@ -42,6 +43,7 @@ def rig(n: Numbers) -> Verdict:
 
 
 def flattening(n: Numbers) -> Verdict:
+    """Decide whether the steady force falls again at high speed."""
     steady = n.facts["steady"]
     holds = all(c[-1] < 0.98 * max(c) and c[-1] <= c[-2] for c in steady.values())
     said = "; ".join(f"{V:g} V: {max(c):.2f} to {c[-1]:.2f} N" for V, c in steady.items())
@@ -53,6 +55,7 @@ def flattening(n: Numbers) -> Verdict:
 
 
 def jump(n: Numbers) -> Verdict:
+    """Decide whether the force rises over that at high speed, the less the higher the voltage."""
     rises = {V: max(curve) / curve[-1] - 1.0 for V, curve in n.facts["steady"].items()}
     values = list(rises.values())
     holds = min(values) > 0.05 and all(a > b for a, b in pairwise(values))
@@ -63,6 +66,7 @@ def jump(n: Numbers) -> Verdict:
 
 
 def stiction(n: Numbers) -> Verdict:
+    """Decide whether stiction shows in the peaks at the low voltage and not at the high one."""
     lugre: Any = n.peaks[n.peaks["law"] == "LuGre"].groupby("voltage [V]")
     over = {
         float(V): (float(part["height [m/s2]"].median()), float(part["crest [m/s2]"].iloc[0]))
@@ -79,6 +83,7 @@ def stiction(n: Numbers) -> Verdict:
 
 
 def better_law(n: Numbers) -> Verdict:
+    """Decide whether the LuGre law fits better than the Bingham law."""
     parts = {s: n.fits[n.fits["specimen"] == s].set_index("law")["share"] for s in STIFFNESS}
     ratios = {s: (float(p["LuGre"]), float(p["Bingham"])) for s, p in parts.items()}
     said = "; ".join(
@@ -93,6 +98,7 @@ def better_law(n: Numbers) -> Verdict:
 
 
 def modified_law(n: Numbers) -> Verdict:
+    """Decide whether the exponential lowers the error of both laws as far as stated."""
     gains = {s: (100 * gain(n.fits, s, "Bingham"), 100 * gain(n.fits, s, "LuGre"))
              for s in STIFFNESS}  # fmt: skip
     close = [abs(b - 5.0) <= POINTS and abs(u - 15.0) <= POINTS for b, u in gains.values()]
@@ -118,6 +124,7 @@ def _curves(n: Numbers) -> dict[str, dict[float, float]]:
 
 
 def optimum(n: Numbers) -> Verdict:
+    """Decide whether the stated voltages are as good as the best, intensity by intensity."""
     curves = _curves(n)
     excess = {g: curves[g][V] / min(curves[g].values()) - 1.0 for g, V in OPTIMA.items()}
     said = ", ".join(
@@ -133,6 +140,7 @@ def optimum(n: Numbers) -> Verdict:
 
 
 def four_volts(n: Numbers) -> Verdict:
+    """Decide whether 4 V is near the best at more intensities than any other voltage."""
     curves = _curves(n)
     good: dict[float, int] = {}
     for curve in curves.values():

@@ -87,14 +87,17 @@ class Verdict:
 
 
 def verdict_word(holds: bool) -> str:
+    """Return the verdict's word for a statement that holds, or does not."""
     return REPRODUCED if holds else NOT
 
 
 def near(value: float, wanted: float, share: float) -> bool:
+    """Return whether a value lies within a share [1] of the one that is wanted."""
     return abs(value - wanted) <= share * abs(wanted)
 
 
 def named(case: Key) -> str:
+    """Return a case in words: its motion and its intensity [g]."""
     return f"{case[0]} {case[1]:g} g"
 
 
@@ -115,6 +118,7 @@ def grouped(cases: list[Key]) -> dict[str, list[Key]]:
 
 
 def cases_text(cases: list[Key]) -> str:
+    """Return cases in words, by motion, the weakest first."""
     return "; ".join(
         f"{motion} {', '.join(f'{intensity:g}' for _, intensity in sorted(group))} g"
         for motion, group in grouped(cases).items()
