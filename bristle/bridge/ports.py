@@ -55,6 +55,8 @@ def map_ports(
 
     Parameters
     ----------
+    description : Description
+        The FMU's.
     signals : mapping
         Names of what was measured, or follows from it, to SI units.
     maps : mapping

@@ -18,7 +18,15 @@ Array = NDArray[np.float64]
 
 
 def channel_history(signal, dt, z, p, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (n,) with what the instrument shows of a signal (n,) sampled every dt [s]."""
+    """Fill `out` (n,) with what the instrument shows of a signal (n,) sampled every dt [s].
+
+    Parameters
+    ----------
+    signal, out : (n,) in the channel's unit
+    dt : sampling step [s]
+    z : (states,) of the effect, moved on in place
+    p : flat parameters of the effect [SI]
+    """
     for k in range(len(signal)):
         out[k] = show(signal[k], dt, z, p)  # type: ignore[name-defined]  # noqa: F821
 
@@ -30,6 +38,8 @@ def shown(effect: type[Effect], values: dict[str, float], signal: Array, dt: flo
     ----------
     effect : Effect of the site "sensor"
     values : parameters of the effect by their own names ("gain"), in SI; missing ones default
+    signal : (n,) in the channel's unit
+    dt : sampling step [s]
     """
     history, slots = _history(effect)  # type: ignore[arg-type]  # a class can be hashed
     p, z = np.zeros(max(1, slots.p_size)), np.zeros(max(1, slots.z_size))

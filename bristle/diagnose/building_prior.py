@@ -48,7 +48,9 @@ def within_prior(
     ----------
     model : the damper's law, fitted to the force that the building as it is makes
     responses : the training runs
+    building : the building as its file has it
     law, straight : see `identify.structure.damper_run`
+    rule : how well a building's numbers are known, and how far they may move
     """
     slopes = _slopes(responses, building, law, straight, rule)
     shift = np.zeros(2 * building.size - 1)

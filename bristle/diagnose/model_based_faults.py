@@ -57,7 +57,9 @@ def model_based_fault(
     Parameters
     ----------
     before : the model without further effects, fitted to `train` and judged on `held_out`
+    train, held_out : runs to fit to, and those that decide
     drive : {"voltage", "current"}, the channel that is the runs' drive
+    rule : the numbers that decide
     """
     if before.z < 1.0 + rule.gain:
         return None

@@ -79,8 +79,10 @@ def opening(
 
     Parameters
     ----------
+    train, holdout : runs to fit to, and those that decide
     present : the model as it is
     identified : whether its values were fitted before: they are then refined, not sought anew
+    say : is told what is being done
     """
     say("looking for sensor faults")
     faults = sensor_faults([*train, *holdout])

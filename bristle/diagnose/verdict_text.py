@@ -33,6 +33,7 @@ def of_sites(
 
     Parameters
     ----------
+    kind, effects : of the verdict, as in verdict.json
     sites : the site of each effect
     alike : what acts like an effect where no load cell tells, and why
     coordinate : along which an unknown residual is organised

@@ -88,6 +88,7 @@ def fit_rig(
 
     Parameters
     ----------
+    rig : the sites with their runs
     model : the damper's law with the effects of all sites
     starts : how many starting points are tried for the damper's law
     also : values in SI by name from which one more fit begins at each site; the better one counts

@@ -30,7 +30,7 @@ def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, al
     Parameters
     ----------
     model : the damper's law with the effects of all sites
-    sites : all sites that the runs show
+    site, sites : the one to fit, and all sites that the runs show
     count : how many starting points are tried for the damper's law
     also : values in SI by name from which one more fit begins; the better one counts
     """

@@ -111,6 +111,7 @@ def error_table(
     train, holdout : the runs that laws are fitted to, and those they are judged on, if any
     cutoff : Hz, of the low-pass on measured and predicted force; 0 for none
     laws : names of laws and of their variants; None for all
+    starts : how many starting points are tried for each
     """
     laws = law_names() if laws is None else laws
     train.bench(Model(base_and_variant(laws[0])[0].name))  # compiled before threads ask for it

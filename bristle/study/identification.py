@@ -52,6 +52,7 @@ def identify_study(
 
     Parameters
     ----------
+    study : the folder, opened
     law : another law to take than the model's; its effects stay where they can join it
     model : a model to take in place of the present one
     cutoff : Hz, of the low-pass for the table of errors; None takes the study's
@@ -183,8 +184,10 @@ def identify_frames(
     ----------
     frames : one frame per run, with columns named by channel: `time`, `displacement`, `velocity`,
         `voltage` or `current`, `force`, in SI, or in the unit that a title gives: `force [kN]`
+    law, effects : names of the damper's law and of the effects that are on
     holdout : runs to judge on; None splits a single run in time, and else judges on the training
         runs alone
+    cutoff, starts, table : as `identify_study` takes them
 
     Raises
     ------

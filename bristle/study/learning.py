@@ -97,6 +97,8 @@ def add_effects(
 
     Parameters
     ----------
+    study : the folder, opened
+    names : of the effects
     why : the reason for the history; else the verdict at hand, or "by hand"
     found : the diagnosis that named them: the fit then begins from its values
 
@@ -207,6 +209,7 @@ def diagnose_frames(
     ----------
     frames, holdout : as `identify_frames` takes them; without `holdout` a single run is split in
         time, and of several the last third is held out
+    law, effects : names of the damper's law and of the effects that the model has already
 
     Raises
     ------

@@ -49,7 +49,17 @@ def make_folder(
     title: str = "",
     law: str = DEFAULT,
 ) -> Made:
-    """Make a study's folder from files; see `bristle.study.create.create_study`."""
+    """Make a study's folder from files.
+
+    Parameters
+    ----------
+    folder, files, rig, building, channels, title, law : see `bristle.study.create.create_study`
+
+    Raises
+    ------
+    StudyError, RecordError
+        As `create_study`.
+    """
     if folder.exists():
         raise StudyError(f"{folder}: is there already. Take another name, or remove it.")
     if not files:

@@ -181,6 +181,8 @@ class Study:
         ----------
         what, why : str
             As in "add gas_spring", "verdict of the diagnosis: ...".
+        model : StudyModel
+            The model that is written to model.toml.
         before, after : mapping
             Errors of the two models by name, on training and held-out runs.
 

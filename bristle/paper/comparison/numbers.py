@@ -65,7 +65,14 @@ class Numbers:
         return float(index.loc[(*case, law), quantity])
 
     def lower(self, case: Key, law: str, other: str, quantity: str) -> float:
-        """Return by how many percent a law's number lies below another's."""
+        """Return by how many percent a law's number lies below another's.
+
+        Parameters
+        ----------
+        case : motion and intensity [g]
+        law, other : names of the two laws
+        quantity : column of the table, such as `PEAK_Y`
+        """
         return 100.0 * (1.0 - self.value(case, law, quantity) / self.value(case, other, quantity))
 
     def weak(self) -> list[Key]:
@@ -130,6 +137,13 @@ def by_record(n: Numbers, holds: Callable[[Key], bool], measured: str, why: str 
 
     It is not reproduced where it fails on El Centro, and undecidable where it holds on that and
     fails on a Northridge record, for another station may have been meant.
+
+    Parameters
+    ----------
+    n : the numbers of all cases
+    holds : whether the order holds in a case, a motion and its intensity [g]
+    measured : the numbers behind it, in a sentence
+    why : what to know of it, in sentences
     """
     failed = [case for case in n.cases() if not holds(case)]
     count = f"holds in {len(n.cases()) - len(failed)} of {len(n.cases())} cases"

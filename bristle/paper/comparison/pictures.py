@@ -99,7 +99,17 @@ def anti_windup(c: Comparison) -> Page:
 
 def histories(c: Comparison, motion: str, column: str, what: str, unit: str, factor: float,
               laws: tuple[str, ...], figure: str) -> Page:  # fmt: skip
-    """Draw one response over time at a weak and a strong intensity, a panel per law."""
+    """Draw one response over time at a weak and a strong intensity, a panel per law.
+
+    Parameters
+    ----------
+    c : the runs
+    motion : name of the ground motion
+    column, factor : of the results, and what brings its SI values to `unit`
+    what, unit : name and unit of the response, for title and axes
+    laws : a panel for each
+    figure : number of the paper's figure
+    """
     listed = next(m for m in c.motions if m.name == motion).intensities
     weak, strong = listed[0], 0.6 if 0.6 in listed else listed[-1]
     peaks = {
