@@ -54,11 +54,11 @@ def shown(effect: type[Effect], values: dict[str, float], signal: Array, dt: flo
 
 @cache
 def _history(effect: type[Effect]) -> tuple[Callable[..., None], Slots]:
-    """Return the compiled march of one effect's hooks over a signal."""
+    """Return the compiled time loop of one effect's hooks over a signal."""
     from ..jit import compiled
 
     show, slots = instrument(effect)
     namespace: dict[str, Any] = {**globals(), "show": show}
-    march = FunctionType(channel_history.__code__, namespace, "channel_history")
-    march.__module__, march.__qualname__ = __name__, "channel_history"
-    return compiled(march), slots
+    time_loop = FunctionType(channel_history.__code__, namespace, "channel_history")
+    time_loop.__module__, time_loop.__qualname__ = __name__, "channel_history"
+    return compiled(time_loop), slots

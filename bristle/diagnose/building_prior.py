@@ -30,8 +30,8 @@ TURNS, SETTLED = 3, 0.1
 """How often law and building are fitted in turn at most, and the step that ends it, in standard
 deviations: they depend on each other but weakly."""
 
-TOLD = 0.005
-"""Change of a number, as a share, from which it is told."""
+LEAST_CHANGE = 0.005
+"""Change of a number, as a share, from which it is reported."""
 
 
 def within_prior(
@@ -94,7 +94,9 @@ def moved_numbers(before: Building, after: Building) -> list[str]:
         for where, a, b in zip(below, before.stiffnesses, after.stiffnesses, strict=True)
     ]
     pairs += [(f"mass of {name}", before.M[i][i], after.M[i][i]) for i, name in enumerate(names)]
-    changed = [f"{what} {b / a - 1.0:+.1%}" for what, a, b in pairs if abs(b / a - 1.0) > TOLD]
+    changed = [
+        f"{what} {b / a - 1.0:+.1%}" for what, a, b in pairs if abs(b / a - 1.0) > LEAST_CHANGE
+    ]
     if not changed:
         return []
     return [

@@ -40,9 +40,9 @@ def inconsistent_runs(
     good = [name for name in z if name not in bad]
     if not bad:
         return ""
-    told = ", ".join(f"{name} ({z[name]:.3g})" for name in bad)
+    worst = ", ".join(f"{name} ({z[name]:.3g})" for name in bad)
     return (
-        f"One model does not explain all runs: its error in times the noise is largest in {told}, "
+        f"One model does not explain all runs: its error in times the noise is largest in {worst}, "
         f"while {_list(good)} it explains. Were they taken on one rig, with one setting?"
     )
 
@@ -71,10 +71,10 @@ def groups(model: Model, train: Problem, held_out: Problem, rule: DecisionRule =
             found.append([run])
     if len(found) < 2 or min(len(group) for group in found) < 2:
         return ""
-    told = "; ".join(_list([run.name for run in group]) for group in found)
+    named = "; ".join(_list([run.name for run in group]) for group in found)
     return (
         "One model does not explain all runs together, but with values of their own it explains "
-        f"each of these groups: {told}. Were they taken on one rig, with one setting?"
+        f"each of these groups: {named}. Were they taken on one rig, with one setting?"
     )
 
 

@@ -62,11 +62,11 @@ def load_cell(
         return None
     name = instrument_of("force", "delay") if delay else FORCE_GAIN
     right = tuple([corrected(r, delay, gain) for r in part] for part in (train, holdout))
-    told = replace(
+    faulty = replace(
         finding, site="force", kind="effect", effects=(name,), z_before=layer.z_before, share=share,
         coordinate=f"{delay:.3g} s" if delay else f"{gain:.4g}",
     )  # fmt: skip
-    return told, right  # type: ignore[return-value]
+    return faulty, right  # type: ignore[return-value]
 
 
 def _search_cell(

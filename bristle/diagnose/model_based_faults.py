@@ -121,11 +121,11 @@ def _zero_of_force(
         return None
     own = f"{carrier.name}.{carrier.offset}"
     others = tuple(f"{carrier.name}.{n}" for n in carrier.parameters if n != carrier.offset)
-    begun = replace(
+    start = replace(
         base, effects=(*base.effects, carrier.name), held=(*base.held, *others),
         values={**base.values, **dict.fromkeys(others, 0.0), own: offset},
     )  # fmt: skip
-    fitted = refine(begun, train)
+    fitted = refine(start, train)
     offset = fitted.value(own)
     plain = {k: v for k, v in fitted.values.items() if k not in (own, *others)}
     right = [_shifted(problem, offset) for problem in (train, held_out)]

@@ -82,7 +82,7 @@ def shortened(problem: StructureProblem, seconds: float) -> StructureProblem:
     """Return the problem with the first so many seconds of each run, itself if none is longer."""
     if all(len(_whole(run).x) * run.dt <= seconds for run in problem.runs):
         return problem
-    return problem.of([_begin_of(run, round(seconds / run.dt)) for run in problem.runs])
+    return problem.of([_first_samples(run, round(seconds / run.dt)) for run in problem.runs])
 
 
 def _whole(run: Run) -> Run:
@@ -91,7 +91,7 @@ def _whole(run: Run) -> Run:
     return run.whole
 
 
-def _begin_of(run: Run, samples: int) -> StructureRun:
+def _first_samples(run: Run, samples: int) -> StructureRun:
     """Return the first samples of a run, from rest: what a law remembers begins there."""
     assert isinstance(run, StructureRun)
     keep = run.keep[run.keep < samples]

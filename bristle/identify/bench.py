@@ -165,13 +165,13 @@ class Bench:
         """
         setup = self._setup._replace(p=np.array(damper.pack(self.law, values)))
         first = {"x": x[0], "v": v[0], "a": a[0], "V": V[0]}
-        begun = {
+        initial = {
             f"{effect.name}.{state}_0": first[signal]
             for effect in damper.SLOTS.effects
             for state, signal in effect.starts.items()
             if signal in first
         }
-        z = np.array(damper.start_states(self.law, {**begun, **values}))
+        z = np.array(damper.start_states(self.law, {**initial, **values}))
         out = np.empty(len(x))
         motion = Inputs(x, v, a, V, dt, 0.0, 0.0, False)
         self._history(setup, motion, z, np.zeros_like(z), np.zeros(damper.work_size()), out)

@@ -82,8 +82,8 @@ def earlier(
     """
     whole = int(late / dt)
     rest = late - whole * dt
-    x, v, a, V = (_held(signal, whole) for signal in motion)
-    V_before, a_before = _held(V, 1), _held(a, 1)
+    x, v, a, V = (_delayed(signal, whole) for signal in motion)
+    V_before, a_before = _delayed(V, 1), _delayed(a, 1)
     between = V - (V - V_before) * rest / dt
     V = np.where(jumps(V), V_before, between) if rest > 0.0 else V
     return (
@@ -94,7 +94,7 @@ def earlier(
     )
 
 
-def _held(signal: Array, count: int) -> Array:
+def _delayed(signal: Array, count: int) -> Array:
     """Return a signal (n,) shifted by a number of samples, its first value held."""
     if count == 0:
         return signal

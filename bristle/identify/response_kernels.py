@@ -171,17 +171,19 @@ def forces_along(
         if k > 0:
             level[n - 1] = 0.5 * (x[k - 1] + x[k])
             level[2 * n - 1] = 0.5 * (v[k - 1] + v[k])
-            halt = 1e300 if level[2 * n - 1] > 0.0 else -1e300
-            advance_effects(n, isolated, stiffnesses, level, dt, 0.0, halt, 0.0, z, p, on, z1)
+            stick_force = 1e300 if level[2 * n - 1] > 0.0 else -1e300
+            advance_effects(
+                n, isolated, stiffnesses, level, dt, 0.0, stick_force, 0.0, z, p, on, z1
+            )
             for i in range(len(z)):
                 z[i] = z1[i]
         level[n - 1] = x[k]
         level[2 * n - 1] = v[k]
-        halt = 1e300 if v[k] > 0.0 else -1e300
-        effect_forces(n, isolated, stiffnesses, level, dt, 0.0, halt, z, p, on, forces)
+        stick_force = 1e300 if v[k] > 0.0 else -1e300
+        effect_forces(n, isolated, stiffnesses, level, dt, 0.0, stick_force, z, p, on, forces)
         out[k] = forces[n - 1]
         if n == 1:
-            out[k] += contact_force(n, isolated, stiffnesses, level, dt, 0.0, halt, z, p, on)
+            out[k] += contact_force(n, isolated, stiffnesses, level, dt, 0.0, stick_force, z, p, on)
 
 
 def compiled_forces() -> Callable[..., None]:

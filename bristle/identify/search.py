@@ -207,8 +207,8 @@ def _step(
     normal: Array, gradient: Array, damping: float, theta: Array, low: Array, high: Array
 ) -> Array:
     """Return the damped step, zero where a parameter stands at a bound that it would leave."""
-    held = ((theta <= low) & (gradient > 0.0)) | ((theta >= high) & (gradient < 0.0))
-    free = np.flatnonzero(~held)
+    at_bound = ((theta <= low) & (gradient > 0.0)) | ((theta >= high) & (gradient < 0.0))
+    free = np.flatnonzero(~at_bound)
     step = np.zeros_like(theta)
     if len(free):
         matrix = normal[np.ix_(free, free)].copy()

@@ -187,8 +187,8 @@ def sliding(response: Response) -> NDArray[np.bool_]:
     Beside a stop or a start the velocity is smoothed over a bend, and less certain than elsewhere.
     """
     moves = np.abs(response.v[0]) > SLIDING * float(response.std[0, 1])
-    held = np.convolve(~moves, np.ones(2 * BESIDE + 1), mode="same") > 0.5
-    return ~held
+    at_rest = np.convolve(~moves, np.ones(2 * BESIDE + 1), mode="same") > 0.5
+    return ~at_rest
 
 
 def damper_run(

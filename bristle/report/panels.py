@@ -259,9 +259,9 @@ def _ordered(names: Any) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _short(words: str) -> str:
+def _short(text: str) -> str:
     """Return "low speed\n(below 12 mm/s)" of "at low speed (below 12 mm/s)"."""
-    return words.removeprefix("at ").replace(" (", "\n(")
+    return text.removeprefix("at ").replace(" (", "\n(")
 
 
 __all__ = [

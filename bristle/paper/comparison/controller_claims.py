@@ -60,14 +60,16 @@ def inverses(n: Numbers) -> Verdict:
 
     peaks, values = [peak(c) for c in n.cases()], [rms(c) for c in n.cases()]
     better = sum(value > 0.0 for value in values)
-    said = (
+    measured = (
         f"with the LuGre inverse the RMS of y is lower in {better} of {len(values)} cases (by "
         f"{min(values):.0f} to {max(values):.0f} %), its peak in {sum(p > 0 for p in peaks)} (by "
         f"{min(peaks):.0f} to {max(peaks):.0f} %)"
     )
     share = (sum(p > 0 for p in peaks) + better) / (2 * len(values))
     verdict = REPRODUCED if share > 0.75 else NOT if share <= 0.5 else UNDECIDABLE
-    return Verdict(verdict, said, "The plant is a LuGre damper, which its inverse knows exactly.")
+    return Verdict(
+        verdict, measured, "The plant is a LuGre damper, which its inverse knows exactly."
+    )
 
 
 def roll_off(n: Numbers) -> Verdict:

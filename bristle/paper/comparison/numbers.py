@@ -147,11 +147,11 @@ def by_record(n: Numbers, holds: Callable[[Key], bool], measured: str, why: str 
     """
     failed = [case for case in n.cases() if not holds(case)]
     count = f"holds in {len(n.cases()) - len(failed)} of {len(n.cases())} cases"
-    said = f"{count}. {measured}"
+    text = f"{count}. {measured}"
     if not failed:
-        return Verdict(REPRODUCED, said, why)
+        return Verdict(REPRODUCED, text, why)
     where = f"Fails at {cases_text(failed)}."
     if any(case[0] == EL_CENTRO for case in failed):
-        return Verdict(NOT, said, f"{where} {why}".strip())
+        return Verdict(NOT, text, f"{where} {why}".strip())
     open_ = "The text does not name the Northridge station, and the order depends on the record."
-    return Verdict(UNDECIDABLE, said, f"{where} {open_} {why}".strip())
+    return Verdict(UNDECIDABLE, text, f"{where} {open_} {why}".strip())

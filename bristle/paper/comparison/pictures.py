@@ -258,10 +258,10 @@ def voltages(c: Comparison) -> Page:
         loop.plot(1e3 * own["structure.base_velocity"], own["damper.force"], color=COLOUR[law],
                   linewidth=0.5)  # fmt: skip
         loop.set_title("force [N]")
-        for panel, words in ((axes, "time [s]"), (loop, "velocity [mm/s]")):
+        for panel, axis_name in ((axes, "time [s]"), (loop, "velocity [mm/s]")):
             panel.tick_params(labelbottom=row == 2)
             if row == 2:
-                panel.set_xlabel(words, loc="right", labelpad=0)
+                panel.set_xlabel(axis_name, loc="right", labelpad=0)
     return page
 
 
