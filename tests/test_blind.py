@@ -340,7 +340,7 @@ def test_a_building_is_recorded_as_its_task_says_and_its_file_is_the_drawing(mon
 
 def test_a_site_is_sought_where_all_rivals_can_act():
     class Found:
-        problems = dict.fromkeys(("storey1", "layer", "damper"))
+        findings = dict.fromkeys(("storey1", "layer", "damper"))
         reconstructed = False
 
     found: Any = Found()
