@@ -36,18 +36,22 @@ class Findings:
         self.found: list[Finding] = []
 
     def add(self, level: Level, path: KeyPath, text: str) -> None:
+        """Add a finding at the line of a key, once."""
         line, before = self._place(path)
         finding = Finding(line, level, before + text)
         if finding not in self.found:
             self.found.append(finding)
 
     def error(self, path: KeyPath, text: str) -> None:
+        """Add what must be put right."""
         self.add("error", path, text)
 
     def warning(self, path: KeyPath, text: str) -> None:
+        """Add what is allowed and probably a mistake."""
         self.add("warning", path, text)
 
     def note(self, path: KeyPath, text: str) -> None:
+        """Add what is good to know."""
         self.add("note", path, text)
 
     def in_order(self) -> list[Finding]:

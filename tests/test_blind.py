@@ -340,7 +340,7 @@ def test_a_building_is_recorded_as_its_task_says_and_its_file_is_the_drawing(mon
 
 def test_a_site_is_sought_where_all_rivals_can_act():
     class Found:
-        problems = dict.fromkeys(("storey1", "layer", "damper"))
+        findings = dict.fromkeys(("storey1", "layer", "damper"))
         reconstructed = False
 
     found: Any = Found()
@@ -348,7 +348,7 @@ def test_a_site_is_sought_where_all_rivals_can_act():
     assert building._site("storey_softening", [], found) == "storey1"
     assert building._site("stribeck", ["coil_lag"], found) == "damper"
     assert building._site("duffing", ["gas_spring"], found) == "", "at different sites"
-    found.problems, found.reconstructed = dict.fromkeys(("storey1", "damper")), True
+    found.findings, found.reconstructed = dict.fromkeys(("storey1", "damper")), True
     assert building._site("duffing", ["gas_spring"], found) == "damper"
 
 

@@ -15,7 +15,7 @@ from benchmarks._blind import plan
 from benchmarks._blind.plan import Task
 from benchmarks._calibrate import page, replay, trials, varied
 from benchmarks._calibrate.trials import NotStoredError, Stored
-from bristle.diagnose import decision, diagnosis, sites
+from bristle.diagnose import damper, decision, sites
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.decision import decide
 from bristle.diagnose.rule import BENCH, DRIVE, SENSOR, SITE, DecisionRule
@@ -70,7 +70,7 @@ def fields_read(*functions: object) -> set[str]:
 
 
 def test_every_field_that_a_decision_reads_is_varied() -> None:
-    read = fields_read(decision, diagnosis.is_organised, diagnosis.kind_of)
+    read = fields_read(decision, damper.is_organised, damper.kind_of)
     assert read | {"least_excess"} == set(varied.BENCH_VALUES)
     site = (sites.decide_site, sites.lowers, sites.better, sites.equals, sites._rivals)
     assert fields_read(*site) | {"least_excess"} == set(varied.SITE_VALUES)

@@ -57,7 +57,8 @@ def sensitivity(rows: list[Traded]) -> str:
     still = len(fields) - len(moved)
     return (
         f"Counts change with {', '.join(f'`{name}`' for name in moved)}. Of the other {still} "
-        "fields these cases say nothing: none lies near their borders."
+        "fields these cases say nothing, for none lies near their borders: the table has no row of "
+        "them."
     )
 
 
@@ -66,20 +67,24 @@ def _moves(rows: list[Traded]) -> bool:
 
 
 def table(rows: list[Traded], base: DecisionRule) -> str:
-    """Return one line per field: its values, and under each the counts."""
+    """Return a line per field that moves a count or leaves cases out: its values, and counts."""
     used = {what: of for what, of in COLUMNS.items() if any(of(row)[1] for row in rows)}
     most = {what: max(of(row)[1] for row in rows) for what, of in used.items()}
     titles = [f"{what} of {most[what]}" for what in used]
     lines = [["field", "values", *titles], ["---"] * (2 + len(used))]
     for name, group in groupby(rows, key=lambda row: row.field):
         own = list(group)
+        left = sum(row.left for row in own)
+        if not (left or _moves(own)):
+            continue
         today = [row.value == getattr(base, name) for row in own]
         cells = [f"{row.value:g}" for row in own]
-        left = sum(row.left for row in own)
         lines.append(
             [f"`{name}`" + (f" ({left} left out)" if left else ""), _marked(cells, today)]
             + [_marked([str(of(row)[0]) for row in own], today) for of in used.values()]
         )
+    if len(lines) == 2:
+        return ""
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 

@@ -78,9 +78,9 @@ def _connected(address: str) -> Any:
     try:
         return connect(address, timeout=CONNECT, set_as_default=False)
     except (OSError, ValueError, RuntimeError) as error:
-        words = " ".join(str(error).split()) or type(error).__name__
+        text = " ".join(str(error).split()) or type(error).__name__
         raise EnsembleError(
-            f"--cluster {address}: no Dask scheduler answers ({words}). "
+            f"--cluster {address}: no Dask scheduler answers ({text}). "
             "An address such as tcp://host:8786 is right."
         ) from None
 
@@ -97,9 +97,9 @@ def _threads(client: Any, address: str) -> int:
     try:
         versions = client.run(_version)
     except Exception as error:  # whatever a worker answers that cannot load this module
-        words = " ".join(str(error).split()) or type(error).__name__
+        text = " ".join(str(error).split()) or type(error).__name__
         raise EnsembleError(
-            f"--cluster {address}: a worker cannot run bristle ({words}). Install bristle "
+            f"--cluster {address}: a worker cannot run bristle ({text}). Install bristle "
             f"{__version__} there."
         ) from error
     for name, version in versions.items():
@@ -154,5 +154,5 @@ def _outcome(run: int, future: Any) -> Outcome:
     error = future.exception()
     if type(error).__name__ == "KilledWorker":
         return Outcome(run, reason=f"{_KILLED}the workers that ran it have died.")
-    words = " ".join(str(error).split())
-    return Outcome(run, reason=f"{type(error).__name__}: {words}")
+    text = " ".join(str(error).split())
+    return Outcome(run, reason=f"{type(error).__name__}: {text}")

@@ -258,8 +258,8 @@ class _Reader:
                 continue
             for statistic in statistics:
                 if statistic not in STATISTICS:
-                    words = unknown("statistic", str(statistic), STATISTICS)
-                    self.error(keys, f'"{name}": {words}')
+                    text = unknown("statistic", str(statistic), STATISTICS)
+                    self.error(keys, f'"{name}": {text}')
                 else:
                     outputs.append(Output(name, statistic, columns[name].unit or ""))
         if not outputs and not self.wrong:

@@ -105,13 +105,13 @@ def _start(plan: Plan, others: list[_Process]) -> _Process:
     context: Any = multiprocessing.get_context("fork" if forks else "spawn")
     ours, theirs = context.Pipe()
     inherited = [ours, *(p.pipe for p in others)] if forks else []
-    process = context.Process(target=_serve, args=(plan, theirs, inherited), daemon=True)
+    process = context.Process(target=_run_members, args=(plan, theirs, inherited), daemon=True)
     process.start()
     theirs.close()
     return _Process(process, ours)
 
 
-def _serve(plan: Plan, pipe: Connection, inherited: list[Connection]) -> None:
+def _run_members(plan: Plan, pipe: Connection, inherited: list[Connection]) -> None:
     """Answer run numbers with outcomes until the other end is closed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches all; the parent decides
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

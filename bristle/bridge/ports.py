@@ -55,6 +55,8 @@ def map_ports(
 
     Parameters
     ----------
+    description : Description
+        The FMU's.
     signals : mapping
         Names of what was measured, or follows from it, to SI units.
     maps : mapping
@@ -125,17 +127,17 @@ def _match(
 
 def channel_of(variable: Variable) -> str:
     """Return the channel that a port's name means, "" where it means none."""
-    told = meaning(variable.name.rpartition(".")[2], variable.unit)
-    if told is None or told.rank == 0:
+    meant = meaning(variable.name.rpartition(".")[2], variable.unit)
+    if meant is None or meant.rank == 0:
         return ""
-    if told.quantity == "drift":
-        return f"drift{told.number or 1}"
-    if told.place == "ground":
-        return f"ground_{told.quantity}"
-    if told.place:
-        end = "_absolute" if told.quantity == "acceleration" else ""
-        return f"{told.place}_{told.quantity}{end}"
-    return told.quantity
+    if meant.quantity == "drift":
+        return f"drift{meant.number or 1}"
+    if meant.place == "ground":
+        return f"ground_{meant.quantity}"
+    if meant.place:
+        end = "_absolute" if meant.quantity == "acceleration" else ""
+        return f"{meant.place}_{meant.quantity}{end}"
+    return meant.quantity
 
 
 def _port(variable: Variable, signal: str, reason: str, signals: Mapping[str, str]) -> Port:

@@ -52,6 +52,13 @@ def signals_of(
 
     Columns that are no known channel are there under their own names, if they have a unit.
 
+    Parameters
+    ----------
+    table : the measurement, not converted yet
+    channels : channels that are known, by name; the others are guessed
+    rig : {"bench", "structure"}, which decides the channels that are looked for
+    seed : of the draws of the inputs' error; piece k takes seed + k
+
     Raises
     ------
     RecordError

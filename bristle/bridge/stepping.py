@@ -70,8 +70,8 @@ def step_through(
         code = _run(work, timeout)
         trouble = work / "trouble.json"
         if trouble.is_file():
-            told = json.loads(trouble.read_text())
-            raise (FmuError if told["kind"] == "FmuError" else RunError)(told["text"])
+            failure = json.loads(trouble.read_text())
+            raise (FmuError if failure["kind"] == "FmuError" else RunError)(failure["text"])
         if code is None:
             raise RunError(
                 f"{job.fmu}: the run took longer than {timeout:g} s and was ended. --timeout gives "
@@ -158,13 +158,13 @@ def _one_pass(job: Job, description: Any, folder: Path, step: float, inputs: Arr
         rows = np.empty((count, len(job.outputs)))
         first = instance.get(job.outputs)
         rows[0] = [float(first[name]) for name in job.outputs]
-        _march(instance, job, step, np.ascontiguousarray(inputs.T), rows)
+        _time_loop(instance, job, step, np.ascontiguousarray(inputs.T), rows)
     finally:
         instance.close()
     return rows
 
 
-def _march(instance: Any, job: Job, step: float, inputs: Array, rows: Array) -> None:
+def _time_loop(instance: Any, job: Job, step: float, inputs: Array, rows: Array) -> None:
     """Fill `rows` (n, outputs) from the second on, with prepared C calls."""
     variables = instance.description.variables
     into = [variables[name].reference for name in job.inputs]

@@ -18,7 +18,15 @@ Array = NDArray[np.float64]
 
 
 def channel_history(signal, dt, z, p, out):  # type: ignore[no-untyped-def]
-    """Fill `out` (n,) with what the instrument shows of a signal (n,) sampled every dt [s]."""
+    """Fill `out` (n,) with what the instrument shows of a signal (n,) sampled every dt [s].
+
+    Parameters
+    ----------
+    signal, out : (n,) in the channel's unit
+    dt : sampling step [s]
+    z : (states,) of the effect, moved on in place
+    p : flat parameters of the effect [SI]
+    """
     for k in range(len(signal)):
         out[k] = show(signal[k], dt, z, p)  # type: ignore[name-defined]  # noqa: F821
 
@@ -30,6 +38,8 @@ def shown(effect: type[Effect], values: dict[str, float], signal: Array, dt: flo
     ----------
     effect : Effect of the site "sensor"
     values : parameters of the effect by their own names ("gain"), in SI; missing ones default
+    signal : (n,) in the channel's unit
+    dt : sampling step [s]
     """
     history, slots = _history(effect)  # type: ignore[arg-type]  # a class can be hashed
     p, z = np.zeros(max(1, slots.p_size)), np.zeros(max(1, slots.z_size))
@@ -44,11 +54,11 @@ def shown(effect: type[Effect], values: dict[str, float], signal: Array, dt: flo
 
 @cache
 def _history(effect: type[Effect]) -> tuple[Callable[..., None], Slots]:
-    """Return the compiled march of one effect's hooks over a signal."""
+    """Return the compiled time loop of one effect's hooks over a signal."""
     from ..jit import compiled
 
     show, slots = instrument(effect)
     namespace: dict[str, Any] = {**globals(), "show": show}
-    march = FunctionType(channel_history.__code__, namespace, "channel_history")
-    march.__module__, march.__qualname__ = __name__, "channel_history"
-    return compiled(march), slots
+    time_loop = FunctionType(channel_history.__code__, namespace, "channel_history")
+    time_loop.__module__, time_loop.__qualname__ = __name__, "channel_history"
+    return compiled(time_loop), slots

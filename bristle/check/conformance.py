@@ -108,8 +108,8 @@ def _matters(effect: type[Effect]) -> Check:
         ]
         change = float(np.sqrt(np.mean((rows[1] - rows[0]) ** 2) / np.mean(rows[0] ** 2)))
         best = max(best, change)
-    said = f"{100.0 * best:.3g} % of the force RMS on a damper of 10 N, at its defaults"
-    return Check("switched on it changes the force by more than 1 %", best > 0.01, said)
+    text = f"{100.0 * best:.3g} % of the force RMS on a damper of 10 N, at its defaults"
+    return Check("switched on it changes the force by more than 1 %", best > 0.01, text)
 
 
 def _bounds(effect: type[Effect]) -> Check:
@@ -128,15 +128,15 @@ def _energy(effect: type[Effect]) -> Check:
     for law in laws_joined(effect):
         for amplitude, frequency, V in ((0.001, 5.0, 6.0), (0.015, 5.0, 0.0), (0.015, 1.0, 6.0)):
             for values in _corners(effect):
-                held = _cycle(law, [effect.name], values, amplitude, frequency, V)
+                cycle = _cycle(law, [effect.name], values, amplitude, frequency, V)
                 last = round(1.0 / frequency / STEP)
-                v, force = np.array(held[1][-last:]), np.array(held[2][-last:])
+                v, force = np.array(cycle[1][-last:]), np.array(cycle[2][-last:])
                 work = float(STEP * np.sum(v * force))
                 scale = amplitude * max(1e-9, float(np.abs(force).max()))
                 if work < -1e-3 * scale:
                     where = f"{law}, {1e3 * amplitude:g} mm at {frequency:g} Hz, {V:g} V"
-                    said = f"{work:.3g} J at {where}, {values or 'defaults'}"
-                    return Check(asked, False, said)
+                    text = f"{work:.3g} J at {where}, {values or 'defaults'}"
+                    return Check(asked, False, text)
     return Check(asked, True)
 
 

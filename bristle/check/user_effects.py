@@ -22,9 +22,9 @@ def usable(effects: Iterable[user.Loaded]) -> list[user.Loaded]:
     for loaded in effects:
         flaw = refused(loaded.effect) if loaded.effect is not None else None
         if flaw is not None and loaded.effect is not None:
-            said = f"{loaded.path}, line {flaw[0]}: {flaw[1]}"
-            user.leave_out(loaded.effect, said)
-            loaded = user.Loaded(loaded.path, None, said)
+            message = f"{loaded.path}, line {flaw[0]}: {flaw[1]}"
+            user.leave_out(loaded.effect, message)
+            loaded = user.Loaded(loaded.path, None, message)
         out.append(loaded)
     return out
 

@@ -63,7 +63,7 @@ class {cls}(Effect):
 
 def template(name: str) -> str:
     """Return the text of a file with an effect of this name, which works as it is."""
-    words = name.split("_")
-    title = " ".join(words).strip().capitalize()
-    cls = "".join(word[:1].upper() + word[1:] for word in words)
+    parts = name.split("_")
+    title = " ".join(parts).strip().capitalize()
+    cls = "".join(word[:1].upper() + word[1:] for word in parts)
     return TEMPLATE.format(name=name, title=title, cls=cls)

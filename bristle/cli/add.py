@@ -53,8 +53,8 @@ def text(added: Added, folder: Path) -> str:
     for row in found.parameters():
         if row["name"].partition(".")[0] in added.effects:
             half = row["interval95"]
-            told = f"+- {half:.2g}" if half is not None else row["how"]
-            lines.append(f"  {row['name']:28} {row['value']:>12.5g} {row['unit']:10} {told}")
+            interval = f"+- {half:.2g}" if half is not None else row["how"]
+            lines.append(f"  {row['name']:28} {row['value']:>12.5g} {row['unit']:10} {interval}")
     if "z_holdout" in after and after["z_holdout"] >= before["z_holdout"]:
         lines += ["", "The error on runs not seen did not fall:  bristle undo " + str(folder)]
     return "\n".join([*lines, "", f"Next:  bristle diagnose {folder}"])

@@ -75,7 +75,7 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         import json
 
-        answer = {"file": str(target.absolute()), "built": not fresh, **_told(description)}
+        answer = {"file": str(target.absolute()), "built": not fresh, **_port_counts(description)}
         print(json.dumps(answer, indent=2))
     else:
         _print(target, description, fresh)
@@ -99,7 +99,7 @@ def _build(what: Plan, target: Path) -> None:
         raise BuildError(f"{target}: cannot be written: {error.strerror or error}.") from error
 
 
-def _told(description: Description) -> dict[str, Any]:
+def _port_counts(description: Description) -> dict[str, Any]:
     ports = {
         kind: [{"name": v.name, "unit": v.unit} for v in description.of(causality)]
         for kind, causality in (("inputs", "input"), ("outputs", "output"))

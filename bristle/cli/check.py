@@ -79,8 +79,8 @@ def _print_plain(file: str, findings: list[Finding]) -> None:
         word = f"\033[{_COLOURS[level]}m{level}\033[0m" if colour else level
         print(f"{place}: {word}: {text}")
     counts = {level: sum(finding.level == level for finding in findings) for level in _COLOURS}
-    told = ", ".join(f"{n} {level}{'s' * (n > 1)}" for level, n in counts.items() if n)
+    counted = ", ".join(f"{n} {level}{'s' * (n > 1)}" for level, n in counts.items() if n)
     if counts["error"]:
-        print(f"{file}: {told}")
+        print(f"{file}: {counted}")
     else:
-        print(f"{file}: ok{', ' + told if told else ''}")
+        print(f"{file}: ok{', ' + counted if counted else ''}")

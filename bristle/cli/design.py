@@ -129,8 +129,8 @@ def _print_poles(facts: dict[str, Any]) -> None:
 
 def _margins(found: dict[str, Any]) -> str:
     up, down, phase = (found[key] for key in ("gain_up", "gain_down", "phase"))
-    said = [f"distance from -1 {found['modulus']:.3g}"]
-    said.append(f"gain times {up:.3g}" if up is not None else "any larger gain")
-    said.append(f"gain times {down:.3g}" if down is not None else "any smaller gain")
-    said.append(f"phase {phase:.3g} deg" if phase is not None else "any phase")
-    return ", ".join(said)
+    texts = [f"distance from -1 {found['modulus']:.3g}"]
+    texts.append(f"gain times {up:.3g}" if up is not None else "any larger gain")
+    texts.append(f"gain times {down:.3g}" if down is not None else "any smaller gain")
+    texts.append(f"phase {phase:.3g} deg" if phase is not None else "any phase")
+    return ", ".join(texts)

@@ -43,17 +43,17 @@ def main(arguments: argparse.Namespace) -> int:
         raise PhysicsError(f'"{arguments.name} {arguments.target}": one name, or new, check.')
     left_out = _read_own(arguments.study)
     if arguments.name:
-        told: Any = tell(_find(arguments.name, EFFECTS, left_out))
+        found: Any = tell(_find(arguments.name, EFFECTS, left_out))
     else:
-        told = [tell(effect) for _, effect in sorted(EFFECTS.items())]
+        found = [tell(effect) for _, effect in sorted(EFFECTS.items())]
     if arguments.json:
         import json
 
-        print(json.dumps(told, indent=2))
+        print(json.dumps(found, indent=2))
     elif arguments.name:
-        _print_one(told)
+        _print_one(found)
     else:
-        _print_table(told)
+        _print_table(found)
     for text in left_out.values():
         print(f"left out: {text}", file=sys.stderr)
     return 0
@@ -178,19 +178,19 @@ def _find(name: str, known: dict[str, type[Effect]], left_out: dict[str, str]) -
     raise PhysicsError(f'no effect is named "{name}". There are: {", ".join(sorted(known))}.{hint}')
 
 
-def _print_one(told: dict[str, Any]) -> None:
-    joins = f", joins {' and '.join(told['laws'])}" if told["laws"] else ""
-    print(f"{told['name']} ({told['site']}{joins}): {told['about']}\n")
-    print(told["text"])
-    print(f"\nWhen it is missing: {told['expect']}.\nSource: {told['source']}.\n")
-    for name, about in told["parameters"].items():
+def _print_one(found: dict[str, Any]) -> None:
+    joins = f", joins {' and '.join(found['laws'])}" if found["laws"] else ""
+    print(f"{found['name']} ({found['site']}{joins}): {found['about']}\n")
+    print(found["text"])
+    print(f"\nWhen it is missing: {found['expect']}.\nSource: {found['source']}.\n")
+    for name, about in found["parameters"].items():
         low, high = about["bounds"]
         value = f"{about['value']:g} {about['unit']}" if about["unit"] != "1" else about["value"]
-        print(f"  {told['name']}.{name} = {value}  ({low:g} to {high:g}): {about['text']}")
-    if told["site"] == "sensor":
+        print(f"  {found['name']}.{name} = {value}  ({low:g} to {high:g}): {about['text']}")
+    if found["site"] == "sensor":
         print("\nIn a model that is held against measurements; never inside a damper.")
     else:
-        site, name = told["site"], told["name"]
+        site, name = found["site"], found["name"]
         print(f'\nIn a scenario, among the parameters of a {site}:  "{name}.on" = true')
 
 

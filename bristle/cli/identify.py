@@ -104,10 +104,10 @@ def _parameters(found: Identified) -> list[str]:
         half = row["interval95"]
         if half is not None:
             size = abs(row["value"])
-            told = f"+- {half:.2g}" + (f"  {100.0 * half / size:.2g} %" if size else "")
+            interval = f"+- {half:.2g}" + (f"  {100.0 * half / size:.2g} %" if size else "")
         else:
-            told = row["how"]
-        rows.append(f"  {row['name']:24} {row['value']:>12.6g} {row['unit']:11} {told}")
+            interval = row["how"]
+        rows.append(f"  {row['name']:24} {row['value']:>12.6g} {row['unit']:11} {interval}")
     return [f"  {'parameter':24} {'value':>12} {'unit':11} 95 % interval", *rows]
 
 

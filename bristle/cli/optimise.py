@@ -149,14 +149,14 @@ def _print(found: Passive, files: dict[str, Path]) -> None:
         values = "".join(f"{row[k]:9.4g}" for k in at)
         print(f"{motion.name:{width}}  {best.voltage:10.2f} V {best.value:7.4g} {values}")
     print("for all of them")
-    for goal, words in _GOALS.items():
+    for goal, text in _GOALS.items():
         optimum = found.goals[goal]
         value = (
             f"at most {100 * (optimum.value - 1):.1f} % above"
             if goal == "regret"
             else f"{optimum.value:.4g}"
         )
-        print(f"  {words}: {optimum.voltage:.2f} V ({value})")
+        print(f"  {text}: {optimum.voltage:.2f} V ({value})")
     print(f"{found.runs} runs")
     for path in files.values():
         print(f"  {path}")

@@ -44,7 +44,7 @@ def main(arguments: argparse.Namespace) -> int:
         }
         print(json.dumps(answer, indent=2, ensure_ascii=False))
         return 0
-    stairs = Staircase(content.treads)
+    stairs = Staircase(content.history_steps)
     if sys.stdout.isatty():
         from rich.console import Console
 

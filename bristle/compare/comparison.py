@@ -119,6 +119,8 @@ def compare(
         How many draws of the inputs' error are carried through the model.
     seen : bool
         Whether the model was fitted to these runs; the sentences then say so.
+    seed : int
+        Of the random signs of blocks that say what chance would give.
 
     Returns
     -------
@@ -144,7 +146,18 @@ def compare_predictions(
 ) -> Comparison:
     """Compare one output, measured and predicted, whatever predicted it; see `compare`.
 
-    `others` are the errors at the other sites of a building.
+    Parameters
+    ----------
+    predictions : one per run, of the same output at the same site
+    seen : whether the model was fitted to these runs; None where that is not known
+    seed : of the random signs of blocks
+    flips : how many random patterns of signs say what chance would give
+    others : the errors at the other sites of a building
+
+    Raises
+    ------
+    RecordError
+        If there is no run, or one is too short, not finite or without noise.
     """
     refuse(predictions)
     normalised = [one.normalised for one in predictions]

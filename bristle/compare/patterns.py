@@ -167,6 +167,8 @@ def residual_patterns(
         The same in its unit, for the means in bins.
     coordinates : list of mapping
         Name to (n,); a coordinate must be there in all runs to count.
+    flips, seed : int
+        How many random signs of blocks say what chance would give, and their seed.
     """
     finder = Finder(residuals, raw, coordinates, flips, seed)
     return finder.ranked(finder.normalised)
@@ -343,10 +345,17 @@ def _rank(name: str) -> int:
 def dependence(
     residual: Array, coordinate: Array, bins: int = BINS, flips: int = 299, seed: int = 0
 ) -> tuple[float, float]:
-    """Return how much of a residual (n,) a coordinate (n,) organises, and the most by chance.
+    """Return how much of a residual a coordinate organises, and the most by chance.
 
     Both are roots of shares of the residual's power, as a correlation is; chance is the 99 %
     quantile under random signs of blocks.
+
+    Parameters
+    ----------
+    residual : (n,) over the noise expected of a true model, or in any unit
+    coordinate : (n,) in any unit
+    bins : not needed; those of `Finder` are taken
+    flips, seed : how many random patterns of signs are drawn, and their seed
     """
     finder = Finder([residual], [residual], [{"it": coordinate}], flips, seed)
     if "it" not in finder.bins:

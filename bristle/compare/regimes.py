@@ -60,15 +60,15 @@ def regimes(
     out = []
     for s, V in cells:
         chosen = np.ones(len(r), dtype=bool)
-        words = []
+        names = []
         for kind in (s, V):
             if kind is not None:
                 chosen &= kind[1]
-                words.append(kind[0])
+                names.append(kind[0])
         if chosen.sum() >= _FEWEST:
             name = [kind[0] if kind else "" for kind in (s, V)]
             out.append(
-                Regime(" and ".join(words), name[0], name[1], z_scale(r[chosen]), int(chosen.sum()))
+                Regime(" and ".join(names), name[0], name[1], z_scale(r[chosen]), int(chosen.sum()))
             )
     return out
 

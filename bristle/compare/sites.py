@@ -36,6 +36,8 @@ def compare_sites(
         Site to its runs.
     site : str
         The one to compare at length; "" for that of the largest z.
+    seen, seed
+        As `compare_predictions` takes them.
 
     Raises
     ------

@@ -27,7 +27,15 @@ TOO_MANY_SAMPLES = -1
 
 
 def first_sample(time: float, period: float, origin: float, coming: float) -> int:
-    """Return the first sample [1] that a step from `time` [s] takes, not before the coming one."""
+    """Return the number of the first sample that a step takes.
+
+    Parameters
+    ----------
+    time : begin of the step [s]
+    period : time between two samples [s]
+    origin : time of sample 0 [s]
+    coming : number of the next sample [1]; no sample before it is taken again
+    """
     return max(int(coming), ceil((time - origin) / period - ROUNDING))
 
 
@@ -44,9 +52,16 @@ def step_code(dt: float, period: float, samples: float) -> int:
 
 
 def measure(instant: float, dt: float, period: float, before: Row, now: Row, measured: Row) -> None:
-    """Fill `measured` with the inputs at an instant [s] after the step's begin, linear over it.
+    """Fill `measured` with the inputs at an instant of a step, linear over it.
 
     At the step's end they are those now, to the last digit.
+
+    Parameters
+    ----------
+    instant : time since the begin of the step [s]
+    dt, period : length of the step and time between two samples [s]
+    before, now : (m,) inputs at begin and end, each in its own unit
+    measured : (m,) filled
     """
     share = instant / dt
     if share > 1.0 - ROUNDING * period / dt:

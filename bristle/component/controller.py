@@ -81,7 +81,24 @@ def setup(time: float, **values: Any) -> tuple[Constants, list[float], int]:
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
-    """Take the first sample from a law at rest."""
+    """Take the first sample from a law at rest.
+
+    Parameters
+    ----------
+    time : time of sample 0 [s]
+    inputs : (4,) floor acceleration [m/s2], base displacement [m], base velocity [m/s], damper
+        force [N]
+    c : Constants
+    state : (n + `SLOTS.law_states` + 6,) states of the state-space law, of the damper's law that is
+        inverted, and what is remembered; filled
+    outputs : (3,) voltage [V], raw command [N or V] and scheduling velocity [m/s], filled
+    work : (n + 4,) room to work
+
+    Returns
+    -------
+    int
+        0.
+    """
     for i in range(len(state)):
         state[i] = 0.0
     state[ORIGIN], state[COMING] = time, 1.0
@@ -93,7 +110,23 @@ def step(
     clock: tuple[float, float, int], before: Row, now: Row, c: Constants, state: Row,
     new_state: Row, outputs: Row, work: Row,
 ) -> int:  # fmt: skip
-    """Take the samples that the step ends on or passes; `new_state` is `state` itself."""
+    """Take the samples that the step ends on or passes.
+
+    Parameters
+    ----------
+    clock : tuple
+        Time at the begin [s], dt [s], sweep (not used).
+    before, now : (4,) inputs at begin and end, as in `start`
+    c : Constants
+    state, new_state : one and the same sequence, as in `start`, moved on in place
+    outputs : (3,) as in `start`, filled where a sample is taken
+    work : (n + 4,) room to work
+
+    Returns
+    -------
+    int
+        0, `LONG_STEP` or `TOO_MANY_SAMPLES` of `clock`.
+    """
     time, dt, _ = clock
     origin, coming = state[ORIGIN], state[COMING]
     last = last_sample(time + dt, c.period, origin)
@@ -109,12 +142,27 @@ def step(
 
 
 def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
-    """Hold the outputs: none follows an input."""
+    """Hold the outputs: none follows an input.
+
+    Parameters
+    ----------
+    time, inputs, c, state, outputs, work
+        As in `start`; nothing is read or filled.
+    """
     return 0
 
 
 def sample(k: int, measured: Row, c: Constants, state: Row, outputs: Row, spare: Row) -> None:
-    """Take sample k: fill the outputs and move the state on, in place."""
+    """Take one sample: fill the outputs and move the state on, in place.
+
+    Parameters
+    ----------
+    k : number of the sample, 0 the first
+    measured : (4,) inputs at its instant, as in `start`
+    c : Constants
+    state, outputs : as in `start`
+    spare : (n,) or more, room to work
+    """
     y, v = measured[FLOOR_ACCELERATION], measured[BASE_VELOCITY]
     if c.velocity_corner > 0.0:
         x = measured[BASE_DISPLACEMENT]
@@ -133,7 +181,22 @@ def sample(k: int, measured: Row, c: Constants, state: Row, outputs: Row, spare:
 def designed(
     y: float, v: float, f: float, c: Constants, state: Row, spare: Row
 ) -> tuple[float, float]:
-    """Return voltage [V] and raw command of a state-space law, and move its state on."""
+    """Return voltage and raw command of a state-space law, and move its state on.
+
+    Parameters
+    ----------
+    y, v, f : floor acceleration [m/s2], velocity across the damper [m/s], damper force [N]
+    c : Constants
+    state : as in `start`, moved on in place
+    spare : (n,) or more, room to work
+
+    Returns
+    -------
+    voltage : float
+        V.
+    u : float
+        Command before limits and inverse: N; V where the kind is `SIGNED`.
+    """
     row = table_row(v, c.v_top, c.rows) if c.rows > 1 else 0
     u = command(c.n, c.C, row, state)
     if c.kind == INVERSE:
@@ -150,9 +213,20 @@ def designed(
 
 
 def inverted(u: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
-    """Return the voltage [V] of the commanded force and the force [N] that it gives by the law.
+    """Return the voltage of a commanded force, and the force that it gives by the law.
 
     Moves the estimated states of the law on.
+
+    Parameters
+    ----------
+    u, v : commanded force [N], velocity across the damper [m/s]
+    c : Constants
+    state : as in `start`
+
+    Returns
+    -------
+    voltage, applied : float
+        V; N.
     """
     z = state[c.n : len(state) - REMEMBERED]
     voltage = voltage_of_law(c.law, c.p, u, v, z, c.still, c.least_slope, c.v_max)
@@ -164,7 +238,19 @@ def inverted(u: float, v: float, c: Constants, state: Row) -> tuple[float, float
 
 
 def skyhook(y: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
-    """Return voltage [V] and command [N] of the skyhook law, and move its integral on."""
+    """Return voltage and command of the skyhook law, and move its integral on.
+
+    Parameters
+    ----------
+    y, v : floor acceleration [m/s2], velocity across the damper [m/s]
+    c : Constants
+    state : as in `start`, moved on in place
+
+    Returns
+    -------
+    voltage, u : float
+        V; N.
+    """
     total, before = state[ABSOLUTE], state[Y_BEFORE]
     absolute = leaky_integral(total, before, y, c.integral_corner, c.period)
     state[ABSOLUTE], state[Y_BEFORE] = absolute, y

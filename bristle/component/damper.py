@@ -68,9 +68,14 @@ def setup(
 
 
 def stick_force(holding: float, v: float, mass: float, dt: float) -> float:
-    """Return the force [N] that brings a mass [kg] at v [m/s] to rest within dt [s].
+    """Return the force [N] that brings a mass to rest within a step.
 
-    `holding` is the force [N] at which its velocity stays.
+    Parameters
+    ----------
+    holding : force at which its velocity stays [N]
+    v : its velocity [m/s]
+    mass : kg
+    dt : length of the step [s]
     """
     return holding + mass * v / dt
 
@@ -78,7 +83,16 @@ def stick_force(holding: float, v: float, mass: float, dt: float) -> float:
 def present_force(
     inputs: Row, V: float, a: float, c: Constants, state: Row, work: Row
 ) -> tuple[float, float]:
-    """Return force and friction [N] at these inputs, V [V] and a [m/s2], without moving on."""
+    """Return force and friction [N] at these inputs, without moving on.
+
+    Parameters
+    ----------
+    inputs : (5,) as in `start`; V and a take the place of voltage and acceleration among them
+    V, a : voltage within its limits [V], acceleration [m/s2]
+    c : Constants
+    state : as in `start`, kept
+    work : room to work, of the size that `setup` returns
+    """
     x, v, dt = inputs[DISPLACEMENT], inputs[VELOCITY], state[LAST_STEP]
     sticks = c.moving_mass > 0.0 and (isfinite(dt) or v == 0.0)
     stick = stick_force(inputs[HOLDING_FORCE], v, c.moving_mass, dt) if sticks else 0.0
@@ -87,7 +101,23 @@ def present_force(
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
-    """Begin without energy and without a step behind; states of the law are those given."""
+    """Begin without energy and without a step behind.
+
+    Parameters
+    ----------
+    time : s, not used
+    inputs : (5,) displacement [m], velocity [m/s], voltage [V], holding force [N],
+        acceleration [m/s2]
+    c : Constants
+    state : (`SLOTS.z_size` + 5,) the states of law and effects as given; the last five are filled
+    outputs : (4,) force [N], dissipated energy [J], stroke ratio [1], friction [N], filled
+    work : room to work, of the size that `setup` returns
+
+    Returns
+    -------
+    int
+        0 or `SATURATED`.
+    """
     state[ENERGY], state[LAST_STEP] = 0.0, inf
     state[ACCELERATION_AT_END] = inputs[ACCELERATION] if c.measured else 0.0
     code = output(time, inputs, c, state, outputs, work)
@@ -96,7 +126,15 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
 
 
 def remember(inputs: Row, c: Constants, state: Row, outputs: Row) -> None:
-    """Take the present voltage and force for those from which the next step begins."""
+    """Take the present voltage and force for those from which the next step begins.
+
+    Parameters
+    ----------
+    inputs : (5,) as in `start`
+    c : Constants
+    state : as in `start`, its last five filled
+    outputs : (4,) as in `start`, those at these inputs
+    """
     state[FORCE_AT_END] = outputs[FORCE]
     state[VOLTAGE_AT_END] = limited(inputs[VOLTAGE], 0.0, c.v_max)
     if c.measured:
@@ -111,6 +149,21 @@ def step(
 
     A voltage that has jumped since the last step acts from the begin of this one on: the energy's
     trapezoid begins at the force that the damper then has.
+
+    Parameters
+    ----------
+    clock : tuple
+        Time at the begin [s], dt [s], sweep (not used).
+    before, now : (5,) inputs at begin and end, as in `start`
+    c : Constants
+    state, new_state : states at begin (kept) and end (filled), as in `start`
+    outputs : (4,) as in `start`, filled
+    work : room to work, of the size that `setup` returns
+
+    Returns
+    -------
+    int
+        0 or `SATURATED`.
     """
     dt = clock[1]
     x0, v0 = before[DISPLACEMENT], before[VELOCITY]
@@ -144,7 +197,22 @@ def step(
 
 
 def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
-    """Let the force follow motion and voltage, the states held."""
+    """Let the force follow motion and voltage, the states held.
+
+    Parameters
+    ----------
+    time : s, not used
+    inputs : (5,) as in `start`
+    c : Constants
+    state : as in `start`, kept
+    outputs : (4,) as in `start`, filled
+    work : room to work, of the size that `setup` returns
+
+    Returns
+    -------
+    int
+        0 or `SATURATED`.
+    """
     V = limited(inputs[VOLTAGE], 0.0, c.v_max)
     a = inputs[ACCELERATION] if c.measured else state[ACCELERATION_AT_END]
     outputs[FORCE], outputs[FRICTION] = present_force(inputs, V, a, c, state, work)

@@ -60,6 +60,13 @@ def setup(
     """Return constants, state and size of work.
 
     The state holds the rings, then the low-passed signal of every channel, then the signals before.
+
+    Parameters
+    ----------
+    time : time of sample 0 [s]
+    period : time between two samples [s]
+    seed : int, chooses the noise
+    channels : (m,) sequence of Channel
     """
     lags = [channel.delay / period for channel in channels]
     lengths = [floor(lag) + 2 for lag in lags]  # a ring holds both neighbours of the instant
@@ -79,7 +86,22 @@ def setup(
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
-    """Take the first sample; the signals are taken to have stood since ever."""
+    """Take the first sample; the signals are taken to have stood since ever.
+
+    Parameters
+    ----------
+    time : time of sample 0 [s]
+    inputs : (m,) signals, each in its own unit
+    c : Constants
+    state : as `setup` returns it, filled
+    outputs : (m,) readings, filled
+    work : (m,) not used
+
+    Returns
+    -------
+    int
+        0.
+    """
     state[ORIGIN], state[COMING] = time, 1.0
     for j in range(len(inputs)):
         outputs[j] = reading(j, 0, inputs[j], c, state)
@@ -90,7 +112,23 @@ def step(
     clock: tuple[float, float, int], before: Row, now: Row, c: Constants, state: Row,
     new_state: Row, outputs: Row, work: Row,
 ) -> int:  # fmt: skip
-    """Take the samples that the step ends on or passes; `new_state` is `state` itself."""
+    """Take the samples that the step ends on or passes.
+
+    Parameters
+    ----------
+    clock : tuple
+        Time at the begin [s], dt [s], sweep (not used).
+    before, now : (m,) signals at begin and end, each in its own unit
+    c : Constants
+    state, new_state : one and the same sequence, as `setup` returns it, moved on in place
+    outputs : (m,) readings, filled where a sample is taken
+    work : (m,) room to work
+
+    Returns
+    -------
+    int
+        0, `LONG_STEP` or `TOO_MANY_SAMPLES` of `clock`.
+    """
     time, dt, _ = clock
     origin, coming = state[ORIGIN], state[COMING]
     last = last_sample(time + dt, c.period, origin)
@@ -106,12 +144,26 @@ def step(
 
 
 def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
-    """Hold the readings: none follows an input."""
+    """Hold the readings: none follows an input.
+
+    Parameters
+    ----------
+    time, inputs, c, state, outputs, work
+        As in `start`; nothing is read or filled.
+    """
     return 0
 
 
 def reading(j: int, k: int, value: float, c: Constants, state: Row) -> float:
-    """Return what channel j shows at sample k of a signal, and move its state on, in place."""
+    """Return what a channel shows of a signal at a sample, in the signal's unit.
+
+    Parameters
+    ----------
+    j, k : number of the channel; number of the sample, 0 the first
+    value : the signal at the sample's instant
+    c : Constants
+    state : as `setup` returns it; the channel's part is moved on in place
+    """
     begin, length = c.ring[j], c.length[j]
     low, before = c.size + j, c.size + len(c.gains) + j
     if k == 0:

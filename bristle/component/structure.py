@@ -1,5 +1,7 @@
 """A building under ground motion and the forces of devices on its first level."""
 
+# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
+
 from __future__ import annotations
 
 from typing import NamedTuple
@@ -99,7 +101,23 @@ def discretise(dt: float, c: Constants) -> Constants:
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
-    """Begin at rest, in balance with nothing yet: the state follows no input."""
+    """Begin at rest, in balance with nothing yet: the state follows no input.
+
+    Parameters
+    ----------
+    time : s, not used
+    inputs : (3,) ground acceleration [m/s2], damper force [N], extra force [N]
+    c : Constants
+    state : as `setup` returns it, kept
+    outputs : displacement [m], velocity [m/s], absolute acceleration [m/s2] of each of the n
+        levels; the drifts [m], n of them or, isolated, n - 1; the holding force [N]; filled
+    work : (`room(n)`,) room to work
+
+    Returns
+    -------
+    int
+        0.
+    """
     show_motion(c, state, outputs)
     return output(time, inputs, c, state, outputs, work)
 
@@ -112,6 +130,22 @@ def step(
 
     A caller that sweeps, `c.linear`, gets the motion, drifts included; on what it keeps it calls
     `settle` before it asks for the other outputs.
+
+    Parameters
+    ----------
+    clock : tuple
+        Time at the begin [s], dt [s], sweep: 0 for the first of a step.
+    before, now : (3,) inputs at begin and end, as in `start`
+    c : Constants
+        With the matrices of a step of dt, as `discretise` returns them.
+    state, new_state : states at begin (kept) and end (filled), as `setup` returns them
+    outputs : as in `start`, filled
+    work : (`room(n)`,) room to work, kept from one sweep of a step to the next
+
+    Returns
+    -------
+    int
+        0.
     """
     n, size = c.n, 2 * c.n
     a0, a1 = before[GROUND_ACCELERATION], now[GROUND_ACCELERATION]
@@ -139,7 +173,13 @@ def effect_steps(
 ) -> None:
     """Advance motion and states of effects over the substeps of a step.
 
-    Ground acceleration [m/s2] and force [N] go linearly from a0, f0 to a1, f1.
+    Parameters
+    ----------
+    a0, a1 : ground acceleration at begin and end [m/s2], linear between
+    f0, f1 : force of the devices on the first level at begin and end [N], linear between
+    c : Constants
+    state, new_state : states at begin (kept) and end (filled), as `setup` returns them
+    work : (`room(n)`,) room to work
     """
     n, size, states = c.n, 2 * c.n, len(state) - 3 * c.n - 1
     room = work[0 : 6 * n]
@@ -190,6 +230,20 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
 
     A contact that sticks carries what the devices' force leaves of the holding force, for the
     devices hold first; the level then has the ground's acceleration.
+
+    Parameters
+    ----------
+    time : s, not used
+    inputs : (3,) as in `start`
+    c : Constants
+    state : as `setup` returns it, after `settle`; kept
+    outputs : as in `start`; displacements, velocities and drifts stay, the others are filled
+    work : not used
+
+    Returns
+    -------
+    int
+        0.
     """
     n, end = c.n, len(state) - c.n - 1
     force = inputs[DAMPER_FORCE] + inputs[EXTRA_FORCE]
@@ -199,8 +253,10 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
         force += resting_contact(
             n, c.isolated, c.stiffnesses, state, stick, state[2 * n : end], c.p, c.on
         )
+    m_inverse, at = c.m_inverse, 2
     for i in range(n):
-        outputs[PER_LEVEL * i + 2] = state[end + i] - c.m_inverse[i * n] * force
+        outputs[at] = state[end + i] - m_inverse[i * n] * force
+        at += PER_LEVEL
     drifts = n - 1 if c.isolated else n
     outputs[PER_LEVEL * n + drifts] = hold - inputs[EXTRA_FORCE]
     return 0
@@ -234,7 +290,14 @@ class StructureModel:
         settle(self.constants, self._state, self._work)
 
     def step(self, dt: float, a0: float, a1: float, force: float) -> None:
-        """Advance over dt [s]: a_g linear from a0 to a1 [m/s2], the devices' force [N] held."""
+        """Advance over one step, the ground acceleration linear and the devices' force held.
+
+        Parameters
+        ----------
+        dt : length of the step [s]
+        a0, a1 : ground acceleration at begin and end [m/s2]
+        force : of the devices on the first level [N], positive against +x
+        """
         if dt != self._h:
             self.constants, self._h = discretise(dt, self.constants), dt
         new, inputs = list(self._state), ((a0, 0.0, 0.0), (a1, force, 0.0))

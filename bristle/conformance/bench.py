@@ -93,7 +93,22 @@ class Bench:
     def run(
         self, instance: Instance, first: int = 0, last: int | None = None, drive: bool | None = None
     ) -> list[Values]:
-        """Step from communication point `first` to `last` and return the outputs after each."""
+        """Step an instance and return the outputs after each step.
+
+        Parameters
+        ----------
+        instance : Instance
+            In step mode.
+        first, last : int
+            Communication points where the run begins and ends; `last` None: where the plan ends.
+        drive : bool or None
+            Whether the inputs move; None: as planned.
+
+        Raises
+        ------
+        UnexpectedError
+            If the FMU answers a call with anything but OK or Warning.
+        """
         rows = []
         for k in range(first, self.plan.steps if last is None else last):
             if self.plan.driven if drive is None else drive:

@@ -3,6 +3,8 @@
 Runs in the child process beside code that nobody has vouched for: standard library only.
 """
 
+# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
+
 from __future__ import annotations
 
 import ctypes
@@ -136,7 +138,14 @@ class Library:
     def instantiate(
         self, name: str, guid: str, resources: str, *, logging: bool = False
     ) -> Instance | None:  # fmt: skip
-        """Return a new instance for co-simulation, None if the FMU refuses."""
+        """Return a new instance for co-simulation, None if the FMU refuses.
+
+        Parameters
+        ----------
+        name, guid : of the instance; of the model description
+        resources : URI of the unpacked resources
+        logging : whether the FMU logs for debugging
+        """
         handle = self.call(
             "fmi2Instantiate",
             name.encode(),

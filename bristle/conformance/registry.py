@@ -63,7 +63,21 @@ def probe(
     bare: bool = False,
     house: bool = False,
 ) -> Callable[[Callable[[Bench], Finding]], Callable[[Bench], Finding]]:
-    """Enter a function into the list of probes."""
+    """Return a decorator that enters a function into the list of probes.
+
+    Parameters
+    ----------
+    name : str
+        Name of the row, used once.
+    tried, standard : str
+        What is tried, and the rule that it holds the FMU to, for the row.
+    needs : "file", "library" or "run"
+        What must have worked before; see `Probe`.
+    unless : callable
+        Returns why the probe does not apply to a plan, or None.
+    bare, house : bool
+        Whether it runs without site-packages; whether the rule is bristle's own.
+    """
 
     def enter(function: Callable[[Bench], Finding]) -> Callable[[Bench], Finding]:
         PROBES[name] = Probe(name, tried, standard, function, needs, unless, bare, house)

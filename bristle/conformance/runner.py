@@ -40,7 +40,27 @@ def judge(
     beside: Path | None,
     progress: Callable[[str], None] | None,
 ) -> Report:
-    """Try all probes, or `only` some; see `bristle.conformance.conform`."""
+    """Try the probes of an FMU, each in a process of its own, and return what was seen.
+
+    Parameters
+    ----------
+    path : Path
+        The .fmu file.
+    timeout : float
+        Time limit of one probe [s].
+    only : collection of str or None
+        Names of the probes to try; None: all.
+    beside : Path or None
+        Another FMU to load into the same process; None: a trivial one of our own.
+    progress : callable or None
+        Called with the name of each probe before it starts.
+
+    Raises
+    ------
+    FmuError
+        If a file cannot or must not be opened, a probe is unknown, or the time limit is not
+        positive and finite.
+    """
     if not 0.0 < timeout < math.inf:
         raise FmuError(f"the time limit is {timeout} s; it must be positive and finite.")
     unknown = sorted(set(only or ()) - set(PROBES))
@@ -59,7 +79,19 @@ def judge(
 
 
 def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: float) -> Plan:
-    """Unpack an FMU into `folder`/fmu and plan how to try it."""
+    """Unpack an FMU and plan how to try it.
+
+    Parameters
+    ----------
+    path, root : the .fmu file and its parsed modelDescription.xml
+    folder : where it is unpacked, into `fmu`; the probes work in `work` beside that
+    timeout : time limit of one probe [s]
+
+    Raises
+    ------
+    FmuError
+        If the file cannot or must not be unpacked.
+    """
     work = folder / "work"
     work.mkdir(parents=True)
     plan = Plan(str(path.resolve()), str(extract(path, folder / "fmu")), str(work), timeout)

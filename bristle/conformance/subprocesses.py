@@ -55,9 +55,20 @@ class Nursery:
             self._mother.communicate()
 
     def run(self, probe: str, timeout: float, *, anew: bool, bare: bool) -> int | None:
-        """Return how a probe's process ended, None if it had to be killed after `timeout` s.
+        """Return how a probe's process ended: its exit code, None if it had to be killed.
 
         As in subprocess, an exit code is positive and a signal negative.
+
+        Parameters
+        ----------
+        probe : name of the probe
+        timeout : time limit [s]
+        anew, bare : whether Python starts anew for it; whether without site-packages, anew as well
+
+        Raises
+        ------
+        FmuError
+            If the process that starts the probes has ended.
         """
         self._count += 1
         folder = self._work / f"cwd{self._count}"

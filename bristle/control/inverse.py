@@ -32,7 +32,14 @@ hold(globals(), "advance_law", "law_force")
 
 
 def force_of_law(law: int, p: Row, v: float, V: float, z: Row) -> float:
-    """Return a law's force [N] at velocity v [m/s], voltage V [V] and states z; sgn(0) = 1."""
+    """Return a law's force [N]; sgn(0) = 1.
+
+    Parameters
+    ----------
+    law, p : code of the law; (m,) its parameters
+    v, V : velocity [m/s], voltage [V]
+    z : (k,) states of the law
+    """
     now = record(Inputs, (0.0, v, 0.0, V, 0.0, 0.0, inf, v == 0.0))
     return law_force(law, p, now, z)[0]  # type: ignore[no-any-return]
 
@@ -44,12 +51,10 @@ def voltage_of_law(
 
     Parameters
     ----------
-    command : float
-        Force [N], positive against +x.
-    v, z
-        Velocity [m/s]; the law's states.
-    still, least, v_max : float
-        See `affine_voltage`; `STILL`, `LEAST_SLOPE` and 8 V are usual.
+    law, p : code of the law; (m,) its parameters
+    command : force [N], positive against +x
+    v, z : velocity [m/s]; (k,) states of the law
+    still, least, v_max : see `affine_voltage`; `STILL`, `LEAST_SLOPE` and 8 V are usual
     """
     f_0 = force_of_law(law, p, v, 0.0, z)
     slope = force_of_law(law, p, v, 1.0, z) - f_0
@@ -57,7 +62,15 @@ def voltage_of_law(
 
 
 def estimate_states(law: int, p: Row, v: float, V: float, dt: float, z: Row) -> None:
-    """Move a law's estimated states on, in place, by a sample of dt [s] at v [m/s] and V [V]."""
+    """Move a law's estimated states on by a sample.
+
+    Parameters
+    ----------
+    law, p : code of the law; (m,) its parameters
+    v, V : velocity [m/s] and voltage [V], held over the sample
+    dt : length of the sample [s]
+    z : (k,) states of the law, moved on in place
+    """
     now = record(Inputs, (0.0, v, 0.0, V, dt, 0.0, 0.0, False))
     advance_law(law, p, now, 1.0, z, z)
 
@@ -65,10 +78,16 @@ def estimate_states(law: int, p: Row, v: float, V: float, dt: float, z: Row) -> 
 def affine_voltage(
     command: float, v: float, f_0: float, slope: float, still: float, least: float, v_max: float
 ) -> float:
-    """Return the voltage [V] of a force f_0 [N] + slope [N/V] V that comes nearest to a command.
+    """Return the voltage [V] of a force f_0 + slope V that comes nearest to a command.
 
-    Zero below the speed `still` [m/s]; a slope smaller than `least` [N/V] is taken as `least`, with
-    its sign (plus at zero).
+    Parameters
+    ----------
+    command : force [N]
+    v : velocity [m/s]
+    f_0, slope : force at 0 V [N] and its slope over voltage [N/V]
+    still : speed [m/s] below which the voltage is zero
+    least : smallest slope [N/V]; a smaller one is taken as this, with its sign (plus at zero)
+    v_max : largest voltage [V]; the smallest is 0
     """
     if abs(v) < still:
         return 0.0

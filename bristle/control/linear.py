@@ -21,7 +21,15 @@ def table_row(v: float, v_top: float, rows: int) -> int:
 
 
 def command(n: int, C: Row, row: int, x: Row) -> float:
-    """Return u = C x, with x (n,)."""
+    """Return u = C x, in the unit of the design's command.
+
+    Parameters
+    ----------
+    n : number of states
+    C : (rows n,) flat
+    row : which row of the table counts
+    x : (n,) state
+    """
     at = row * n
     total = 0.0
     for j in range(n):
@@ -32,7 +40,17 @@ def command(n: int, C: Row, row: int, x: Row) -> float:
 def advance(
     n: int, A: Row, B: Row, W: Row, row: int, x: Row, y: float, w: float, spare: Row
 ) -> None:
-    """Move the state x (n,) on by one sample, in place; `spare` (n,) is room to work."""
+    """Move the state on by one sample, in place.
+
+    Parameters
+    ----------
+    n : number of states
+    A, B, W : (rows n n,), (rows n,), (rows n,) flat
+    row : which row of the table counts
+    x : (n,) state, moved on in place
+    y, w : floor acceleration [m/s2]; the second input
+    spare : (n,) or more, room to work
+    """
     at = row * n
     for i in range(n):
         total = B[at + i] * y + W[at + i] * w

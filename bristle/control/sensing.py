@@ -32,10 +32,17 @@ def filtered_velocity(filtered: float, now: float, corner: float) -> float:
 
 
 def leaky_integral(total: float, before: float, now: float, corner: float, h: float) -> float:
-    """Return an integral that forgets at `corner` [rad/s] after a sample of h [s].
+    """Return an integral after a sample: it forgets at a corner frequency.
 
     Exact for a signal linear between samples; of an acceleration it is the velocity above `corner`,
     without the drift of a sensor's bias.
+
+    Parameters
+    ----------
+    total : the integral at the last sample, in the signal's unit times s
+    before, now : the signal at the last sample and at this one
+    corner : corner frequency [rad/s]
+    h : sample period [s]
     """
     mean = low_passed(total * corner, before, now, corner, h)
     return mean / corner

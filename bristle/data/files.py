@@ -106,7 +106,15 @@ class Toml:
             self.error(("schema",), f"schema is {found}; this version reads 1.")
 
     def text(self, keys: KeyPath, table: Mapping[str, Any], key: str, default: str = "") -> str:
-        """Return a text of a table, noting what is none."""
+        """Return a text of a table, noting what is none.
+
+        Parameters
+        ----------
+        keys : where the table stands in the file; () for the file itself
+        table : the table as read
+        key : the key of the text in it
+        default : returned where the key is missing or holds no text
+        """
         value = table.get(key, default)
         if not isinstance(value, str):
             self.error((*keys, key), f"{key} = {written(value)}; a text is right.")

@@ -63,8 +63,8 @@ def evenly(
     ----------
     time : (n,) s, as recorded
     channels : name to (n,), NaN where a value is missing
-    lines : (n,) where each sample stands in the file, called `place`
-    name : the file, for messages
+    lines : (n,) where each sample stands in the file
+    name, place : the file, and what its `lines` count ("line" or "row"), for messages
 
     Raises
     ------

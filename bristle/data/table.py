@@ -81,7 +81,15 @@ def from_arrays(
     units: Mapping[str, str | None] | None = None,
     notes: tuple[str, ...] = (),
 ) -> Table:
-    """Return the table of named arrays (n,); what holds no numbers is named in `words`."""
+    """Return the table of named arrays (n,); what holds no numbers is named in `words`.
+
+    Parameters
+    ----------
+    data : title to (n,) of any type, in the column's own unit
+    source : where the arrays are from, for messages
+    units : title to unit; without one the unit in the title counts, if it has one
+    notes : what to know of the table, in sentences
+    """
     units = units or {}
     size = len(next(iter(data.values()))) if data else 0
     columns = titles(list(data), [units.get(name) or "" for name in data])

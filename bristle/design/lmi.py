@@ -222,6 +222,13 @@ def eigenvalues(s: Solution, plants: list[Plant], r: Array, gamma: float) -> tup
 
     Over both signs of the rate. Below zero the bound gamma is proved there; between grid points the
     hats are interpolated.
+
+    Parameters
+    ----------
+    s : the solution to check
+    plants : k plants in the solver's units, one per speed
+    r : (k,) m/s
+    gamma : bound on the closed-loop norm, in the solver's units
     """
     X, Y = s.X(r), s.Y(r)
     hats = s.hats(r)

@@ -186,9 +186,20 @@ def generalized(
 def family(
     building: Building, weights: Weights, gains: Array, dampings: Array, stiffness: float = 0.0
 ) -> list[Plant]:
-    """Return the generalized plants of several gains (k,) and dampings (k,); see `generalized`.
+    """Return the generalized plants of several gains and dampings; see `generalized`.
 
     Gains and dampings enter affinely: three plants make them all.
+
+    Parameters
+    ----------
+    building : Building
+    weights : Weights
+    gains : (k,) array
+        Force per unit of command [N or N/V].
+    dampings : (k,) array
+        What the damper adds on the first level without a command [N s/m].
+    stiffness : float
+        The same [N/m], one for all plants.
     """
     origin = generalized(building, weights, 0.0, 0.0, stiffness)
     by_gain = generalized(building, weights, 1.0, 0.0, stiffness)

@@ -37,11 +37,18 @@ class Bank(NamedTuple):
 
 
 def reconstruct(s: Solution, plants: list[Plant], r: Array, units: Units) -> Bank:
-    """Return the controllers at speeds r (k,), whose plants (in the units) these are.
+    """Return the controllers at several speeds.
 
     N M^T = I - X Y with M = Y, N = Y^-1 - X(r) where Y is constant, and N = X, M^T = X^-1 - Y(r)
     where X is: either way no rate of the speed enters. A direct path D22 from command to
     measurement is taken out of y inside the controller.
+
+    Parameters
+    ----------
+    s : the solution of the inequalities
+    plants : k plants in `units`, one per speed
+    r : (k,) m/s
+    units : what command and measurement were divided by; the controllers are free of it
     """
     X, Y = s.X(r), s.Y(r)
     Ah, Bh, Ch = s.hats(r)

@@ -57,6 +57,13 @@ def check_poles(bank: Bank, r: Array, h: float) -> dict[str, float]:
 def check_sampled_loop(plants: list[Plant], discrete: Bank, r: Array, h: float) -> float:
     """Refuse a controller whose sampled loop, with the plant held at each speed, is unstable.
 
+    Parameters
+    ----------
+    plants : k plants in SI, one per speed
+    discrete : the k controllers in discrete time
+    r : (k,) m/s, for the message
+    h : sample period [s]
+
     Returns
     -------
     float

@@ -30,8 +30,8 @@ TURNS, SETTLED = 3, 0.1
 """How often law and building are fitted in turn at most, and the step that ends it, in standard
 deviations: they depend on each other but weakly."""
 
-TOLD = 0.005
-"""Change of a number, as a share, from which it is told."""
+LEAST_CHANGE = 0.005
+"""Change of a number, as a share, from which it is reported."""
 
 
 def within_prior(
@@ -48,7 +48,9 @@ def within_prior(
     ----------
     model : the damper's law, fitted to the force that the building as it is makes
     responses : the training runs
+    building : the building as its file has it
     law, straight : see `identify.structure.damper_run`
+    rule : how well a building's numbers are known, and how far they may move
     """
     slopes = _slopes(responses, building, law, straight, rule)
     shift = np.zeros(2 * building.size - 1)
@@ -92,7 +94,9 @@ def moved_numbers(before: Building, after: Building) -> list[str]:
         for where, a, b in zip(below, before.stiffnesses, after.stiffnesses, strict=True)
     ]
     pairs += [(f"mass of {name}", before.M[i][i], after.M[i][i]) for i, name in enumerate(names)]
-    changed = [f"{what} {b / a - 1.0:+.1%}" for what, a, b in pairs if abs(b / a - 1.0) > TOLD]
+    changed = [
+        f"{what} {b / a - 1.0:+.1%}" for what, a, b in pairs if abs(b / a - 1.0) > LEAST_CHANGE
+    ]
     if not changed:
         return []
     return [

@@ -75,7 +75,12 @@ def judge(
 ) -> Trial:
     """Return how a fitted model does on the runs that it was fitted to and on the others.
 
-    `noise` is what to expect there of a true model where that is not worth drawing for this one.
+    Parameters
+    ----------
+    model : the model as fitted
+    train, held_out : runs that it was fitted to, and those that decide
+    noise : what a true model would show on `train` and on `held_out`, where it is not worth drawing
+        for this model; None draws it
     """
     fitted, expected = noise or (train.expectation(model), held_out.expectation(model))
     z = residuals(held_out, model, expected)
@@ -127,13 +132,20 @@ def screened(effect: str, context: SearchContext, guesses: Sequence[Candidate]) 
 def short_search(
     effect: str, context: SearchContext, guesses: Sequence[Candidate], fewer: bool = False
 ) -> Candidate:
-    """Search shortly from the best starts, from half as many `fewer`; return the best of the ends.
+    """Search shortly from the best starts; return the best of the ends.
 
     Its loss is that on the training runs.
 
     All parameters move at once: with the law's held, an effect that the law has taken up vanishes.
     Where impacts make the way rough the first step says little of a start: all go a short way, and
     those that came farthest go on.
+
+    Parameters
+    ----------
+    effect : name of the effect that joins
+    context : the model that it joins, on its training runs
+    guesses : starts of the search, the best first
+    fewer : whether to go from half as many starts
     """
     screening = context.screening(effect)
 
@@ -162,8 +174,15 @@ def try_all(
     """Try every effect that can join the model, on all cores; best on the held-out runs first.
 
     Every effect is searched shortly from its best starts; those that gain a fair share of what the
-    best one gains on the training runs are refined. With `most`, only so many are searched, those
-    that a screening promises most of, from fewer starts: for a second effect.
+    best one gains on the training runs are refined.
+
+    Parameters
+    ----------
+    base : the fitted model that effects join
+    train, held_out : runs to fit to, and those that decide
+    shown : channels whose instruments' effects are tried as well
+    most : how many effects are searched, those that a screening promises most of, from fewer
+        starts: for a second effect; None for all
     """
     context = SearchContext(base, train)
     there = held_out.expectation(base)
@@ -194,7 +213,14 @@ def try_all(
 
 
 def try_members(pair: Trial, base: Model, train: Problem, held_out: Problem) -> list[Trial]:
-    """Try each new effect of a model alone, its search begun from the values found together."""
+    """Try each new effect of a model alone, its search begun from the values found together.
+
+    Parameters
+    ----------
+    pair : the trial of the model with all new effects
+    base : the model without them
+    train, held_out : runs to fit to, and those that decide
+    """
     out = []
     for name in pair.effects:
         if name in base.effects:

@@ -76,8 +76,14 @@ def beyond_range(
 ) -> NDArray[np.bool_]:
     """Return which samples (n,) of a signal may have been cut off.
 
-    What is cut may get its `noise` behind the cut: then it stands a little inside of it, too.
-    `level` is where the channel was seen to be cut: a run may touch it a few times only.
+    What is cut may get its noise behind the cut: then it stands a little inside of it, too.
+
+    Parameters
+    ----------
+    values : (n,) in the channel's unit
+    noise : standard deviation of the channel, in the same unit
+    level : size at which the channel was seen to be cut: a run may touch it a few times only
+    rule : the numbers that decide
     """
     lost = np.zeros(len(values), dtype=np.bool_)
     for way in (1.0, -1.0):

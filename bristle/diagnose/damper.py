@@ -124,7 +124,14 @@ def excused_by_sensor(
 ) -> Finding:
     """Return a damper's finding, not unknown where an instrument already known explains it.
 
-    `most` is the z that it accounts for; what an effect of the library lowers is not excused.
+    What an effect of the library lowers is not excused.
+
+    Parameters
+    ----------
+    found : the finding at the damper, with its trial before
+    most : z that the instrument accounts for
+    reason : what the instrument does, as a sentence for the verdict
+    rule : the numbers that decide
     """
     before = found.before
     assert before is not None
@@ -141,6 +148,12 @@ def left_by_filter(
     """Return the z that a late and rounded force may leave once our delay is in the model.
 
     As for any effect of another form: it must explain `rule.share` of the excess without.
+
+    Parameters
+    ----------
+    law : name of the damper's law
+    train, held_out : the damper's runs to fit to, and those that decide
+    rule : the numbers that decide
     """
     bare = judge(fit_damper(train, Model(law)).model, train, held_out)
     return float(np.sqrt(1.0 + (1.0 - rule.share) * rule.excess(bare.z)))

@@ -90,8 +90,8 @@ def diagnose_rig(
     runs.correct(findings)
     opened = runs.open_damper()
     if isinstance(opened, Insufficient):
-        told = " ".join(opened.reasons)
-        return Diagnosis("insufficient", (), told, sensors=opened.faults, noise=opened.noise)
+        text = " ".join(opened.reasons)
+        return Diagnosis("insufficient", (), text, sensors=opened.faults, noise=opened.noise)
     if opened is not None:
         findings[DAMPER] = runs.excused(look_at_damper(opened, say), findings)
     return runs.verdict(findings)

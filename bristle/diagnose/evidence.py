@@ -50,6 +50,7 @@ def paired(
     first, second : (n,) losses of two models on the same samples
     chance : probability left outside the interval, half on either side
     block : samples per block, longer than the residuals' correlation
+    draws, seed : how many resamplings of the blocks, and their seed
     """
     difference = first - second
     blocks = np.array([part.mean() for part in parts_of(difference, block)])

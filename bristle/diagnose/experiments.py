@@ -150,7 +150,7 @@ def _contrast(rivals: Sequence[_Rival], run: Run) -> float:
         for i, (other, _) in enumerate(seen):
             if i != j:
                 apart = other - own
-                pull = J.T @ apart
-                taken = float(pull @ np.linalg.lstsq(normal, pull, rcond=None)[0])
+                gradient = J.T @ apart
+                taken = float(gradient @ np.linalg.lstsq(normal, gradient, rcond=None)[0])
                 least = min(least, max(0.0, float(apart @ apart) - taken))
     return float(np.sqrt(least / len(run.x)))

@@ -28,11 +28,11 @@ class SensorFault:
 
     def as_dict(self) -> dict[str, object]:
         """Return what verdict.json holds of it."""
-        told = {
+        entry = {
             "channel": self.channel, "fault": self.fault, "value": self.value, "std": self.std,
             "words": self.words,
         }  # fmt: skip
-        return {**told, "either": self.either} if self.either else told
+        return {**entry, "either": self.either} if self.either else entry
 
 
 def instruments_of(sensors: Sequence[SensorFault]) -> tuple[str, ...]:

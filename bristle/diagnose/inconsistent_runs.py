@@ -19,6 +19,17 @@ def inconsistent_runs(
 
     For a model that the held-out runs do not contradict, while those that it was fitted to do: two
     rigs mixed, a setting changed between runs, or an effect that acts in some of them alone.
+
+    Parameters
+    ----------
+    model : the model as fitted to `train`
+    train, held_out : runs that it was fitted to, and the others
+    rule : the numbers that decide
+
+    Returns
+    -------
+    str
+        "" where the model explains all runs.
     """
     z = {
         run.name: _z(model, problem.of([run]))
@@ -29,9 +40,9 @@ def inconsistent_runs(
     good = [name for name in z if name not in bad]
     if not bad:
         return ""
-    told = ", ".join(f"{name} ({z[name]:.3g})" for name in bad)
+    worst = ", ".join(f"{name} ({z[name]:.3g})" for name in bad)
     return (
-        f"One model does not explain all runs: its error in times the noise is largest in {told}, "
+        f"One model does not explain all runs: its error in times the noise is largest in {worst}, "
         f"while {_list(good)} it explains. Were they taken on one rig, with one setting?"
     )
 
@@ -41,6 +52,12 @@ def groups(model: Model, train: Problem, held_out: Problem, rule: DecisionRule =
 
     For a model that leaves the runs unexplained together: where it explains each of two or three
     groups by itself, two rigs were mixed or a setting was changed, and no effect is missing.
+
+    Parameters
+    ----------
+    model : law and effects; it is refitted to each group
+    train, held_out : the runs to group, in this order
+    rule : the numbers that decide
     """
     found: list[list[Run]] = []
     for run in chain(train.runs, held_out.runs):
@@ -54,10 +71,10 @@ def groups(model: Model, train: Problem, held_out: Problem, rule: DecisionRule =
             found.append([run])
     if len(found) < 2 or min(len(group) for group in found) < 2:
         return ""
-    told = "; ".join(_list([run.name for run in group]) for group in found)
+    named = "; ".join(_list([run.name for run in group]) for group in found)
     return (
         "One model does not explain all runs together, but with values of their own it explains "
-        f"each of these groups: {told}. Were they taken on one rig, with one setting?"
+        f"each of these groups: {named}. Were they taken on one rig, with one setting?"
     )
 
 

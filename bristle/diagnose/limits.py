@@ -38,7 +38,15 @@ def untestable(
     """Return the effects that these runs do not excite, or that refitting the model absorbs.
 
     Each effect is added at default size and scaled to `rule.typical`; what the sensitivities to the
-    model's own parameters cannot take up must reach `visible`, the detectable share.
+    model's own parameters cannot take up must reach `visible`.
+
+    Parameters
+    ----------
+    model : the fitted model that effects join
+    problem : the runs
+    expected : what a true model would show on each run; see `Problem.expectation`
+    visible : the detectable share of the force RMS; see `detectable`
+    rule : the numbers that decide
     """
     free = model.free()
     search = Search(problem, model, expected, free)

@@ -32,8 +32,20 @@ def load_cell(
 ) -> tuple[Finding, tuple[list[Response], list[Response]]] | None:
     """Return the finding that the load cell is late or wrongly scaled, with the forces set right.
 
-    Equilibrium knows when and how large the force is. None where no delay and no gain explains
-    the layer better than its own effects do.
+    Equilibrium knows when and how large the force is.
+
+    Parameters
+    ----------
+    layer : the finding at the isolation layer, with the trials of its effects
+    train, holdout : responses to fit to, and those that decide
+    building : whose masses, damping and stiffnesses equilibrium takes
+    rule : the numbers that decide
+
+    Returns
+    -------
+    tuple or None
+        The finding, then the training and held-out responses with the force corrected. None where
+        no delay and no gain explains the layer better than its own effects do.
     """
     best: tuple[float, float, float, Finding] | None = None
     for what in ("delay", "gain"):
@@ -50,11 +62,11 @@ def load_cell(
         return None
     name = instrument_of("force", "delay") if delay else FORCE_GAIN
     right = tuple([corrected(r, delay, gain) for r in part] for part in (train, holdout))
-    told = replace(
+    faulty = replace(
         finding, site="force", kind="effect", effects=(name,), z_before=layer.z_before, share=share,
         coordinate=f"{delay:.3g} s" if delay else f"{gain:.4g}",
     )  # fmt: skip
-    return told, right  # type: ignore[return-value]
+    return faulty, right  # type: ignore[return-value]
 
 
 def _search_cell(

@@ -57,7 +57,9 @@ def model_based_fault(
     Parameters
     ----------
     before : the model without further effects, fitted to `train` and judged on `held_out`
+    train, held_out : runs to fit to, and those that decide
     drive : {"voltage", "current"}, the channel that is the runs' drive
+    rule : the numbers that decide
     """
     if before.z < 1.0 + rule.gain:
         return None
@@ -119,11 +121,11 @@ def _zero_of_force(
         return None
     own = f"{carrier.name}.{carrier.offset}"
     others = tuple(f"{carrier.name}.{n}" for n in carrier.parameters if n != carrier.offset)
-    begun = replace(
+    start = replace(
         base, effects=(*base.effects, carrier.name), held=(*base.held, *others),
         values={**base.values, **dict.fromkeys(others, 0.0), own: offset},
     )  # fmt: skip
-    fitted = refine(begun, train)
+    fitted = refine(start, train)
     offset = fitted.value(own)
     plain = {k: v for k, v in fitted.values.items() if k not in (own, *others)}
     right = [_shifted(problem, offset) for problem in (train, held_out)]

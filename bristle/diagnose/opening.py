@@ -79,8 +79,10 @@ def opening(
 
     Parameters
     ----------
+    train, holdout : runs to fit to, and those that decide
     present : the model as it is
     identified : whether its values were fitted before: they are then refined, not sought anew
+    say : is told what is being done
     """
     say("looking for sensor faults")
     faults = sensor_faults([*train, *holdout])
@@ -91,8 +93,8 @@ def opening(
     say("smoothing the motion")
     left = [_left(corrected(runs, faults)) for runs in (train, holdout)]
     if not all(left):
-        told = ("No run has enough samples that are not clipped.", *words_of(faults))
-        return Insufficient(told, tuple(faults), noise)
+        reasons = ("No run has enough samples that are not clipped.", *words_of(faults))
+        return Insufficient(reasons, tuple(faults), noise)
     problem, held_out = bench_rig(left[0], left[1], DRAWS).sites(present)[DAMPER].pair
     say("fitting the present model")
     base = refine(present, problem) if identified else _identified(present, problem)

@@ -42,8 +42,21 @@ def remaining_residual(
 ) -> tuple[str, list[ResidualPattern]]:
     """Return the coordinate that organises what no effect explains, and all patterns of it.
 
-    What an effect can mimic may hide what no effect can: where `rest`, the patterns of the residual
-    of `before`, is not clear, what the nearest effect leaves is looked at.
+    What an effect can mimic may hide what no effect can: where `rest` is not clear, what the
+    nearest effect leaves is looked at.
+
+    Parameters
+    ----------
+    before : the trial of the model without a further effect
+    trials : those of single effects, any order
+    rest : patterns of the residual of `before`, the most telling first
+    held_out : runs that decide
+    rule : the numbers that decide
+
+    Returns
+    -------
+    tuple
+        Name of the coordinate ("" where there is no pattern), and the patterns it was chosen from.
     """
     nearest = min(trials, key=lambda trial: trial.z, default=before)
     if _clear(rest, rule) or not missing(before, nearest, rule):
@@ -77,6 +90,18 @@ def most_telling(
     A residual that rings with the time since a reversal belongs to a resonance that reversals
     strike. Significance chooses among patterns that tell about as much: one along which the data
     fall into few blocks may carry most of the residual all the same.
+
+    Parameters
+    ----------
+    rest : patterns of the residual, the most telling first
+    trial : whose residual it is
+    held_out : runs that decide
+    rule : the numbers that decide
+
+    Returns
+    -------
+    str
+        Name of the coordinate; "" without a pattern.
     """
     telling = [pattern for pattern in rest if pattern.p <= rule.chance] or list(rest)
     if not telling:

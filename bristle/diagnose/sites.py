@@ -39,7 +39,12 @@ def look_at(
 ) -> Finding:
     """Return what a layer's or storey's problem shows.
 
-    `present` holds the effects that the model has at this site already, with their values.
+    Parameters
+    ----------
+    site : "layer", "storey1", "storey2" ...
+    train, held_out : the site's runs to fit to, and those that decide
+    present : the effects that the model has at this site already, with their values; None if none
+    rule : the numbers that decide
     """
     linear = law_of_part(site)
     hook = "force" if site == "layer" else "spring"
@@ -62,7 +67,14 @@ def look_at(
 def try_effect(
     effect: str, base: Model, train: StructureProblem, held_out: StructureProblem
 ) -> Trial:
-    """Refit a model with one more effect of the structure from several starts; judge the best."""
+    """Refit a model with one more effect of the structure from several starts; judge the best.
+
+    Parameters
+    ----------
+    effect : name of the effect
+    base : the fitted model that it joins
+    train, held_out : the site's runs to fit to, and those that decide
+    """
     return judge(joined(effect, base, train), train, held_out)
 
 
@@ -70,7 +82,7 @@ def shortened(problem: StructureProblem, seconds: float) -> StructureProblem:
     """Return the problem with the first so many seconds of each run, itself if none is longer."""
     if all(len(_whole(run).x) * run.dt <= seconds for run in problem.runs):
         return problem
-    return problem.of([_begin_of(run, round(seconds / run.dt)) for run in problem.runs])
+    return problem.of([_first_samples(run, round(seconds / run.dt)) for run in problem.runs])
 
 
 def _whole(run: Run) -> Run:
@@ -79,7 +91,7 @@ def _whole(run: Run) -> Run:
     return run.whole
 
 
-def _begin_of(run: Run, samples: int) -> StructureRun:
+def _first_samples(run: Run, samples: int) -> StructureRun:
     """Return the first samples of a run, from rest: what a law remembers begins there."""
     assert isinstance(run, StructureRun)
     keep = run.keep[run.keep < samples]
@@ -102,7 +114,16 @@ def judge_site(
     held_out: StructureProblem,
     rule: DecisionRule = SITE,
 ) -> Finding:
-    """Return the finding that a site's trials lead to; held-out runs decide."""
+    """Return the finding that a site's trials lead to; held-out runs decide.
+
+    Parameters
+    ----------
+    site : "layer", "storey1", "storey2" ...
+    before : the trial of the model without a further effect
+    trials : those of single effects, best first
+    held_out : the site's runs that decide
+    rule : the numbers that decide
+    """
     kind, effects = decide_site(before, trials, rule)
     named = trials[0] if trials and lowers(before, trials[0], rule) else before
     share = 1.0 - rule.excess(named.z) / rule.excess(before.z)

@@ -260,9 +260,9 @@ def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
     for finding in findings.values():
         if _is_gain(finding):
             gain = float(finding.coordinate)
-            said = (
+            text = (
                 f"The load cell shows {gain:.4g} times the force that equilibrium asks for "
                 f"(z {finding.z_before:.3g} before, {finding.z_after:.3g} with that set right)."
             )
-            out.append(SensorFault("force", "gain", gain, float("nan"), said))
+            out.append(SensorFault("force", "gain", gain, float("nan"), text))
     return out

@@ -12,14 +12,14 @@ from .remaining_residual import sentences
 
 def of_damper(found: Finding, faults: Sequence[SensorFault]) -> str:
     """Return the verdict on a bench: the damper's reasons, and what the channels show."""
-    told = [*found.reasons, *words_of(faults)]
+    texts = [*found.reasons, *words_of(faults)]
     if found.kind == "none":
-        told.append(
+        texts.append(
             f"An effect that leaves {found.detectable:.2%} of the force would have been seen."
         )
     if found.kind == "unknown":
-        told += sentences(found.coordinate, found.patterns)
-    return " ".join(told)
+        texts += sentences(found.coordinate, found.patterns)
+    return " ".join(texts)
 
 
 def of_sites(
@@ -33,23 +33,24 @@ def of_sites(
 
     Parameters
     ----------
+    kind, effects : of the verdict, as in verdict.json
     sites : the site of each effect
     alike : what acts like an effect where no load cell tells, and why
     coordinate : along which an unknown residual is organised
     """
-    told = []
+    texts = []
     if kind == "none":
-        told.append("No effect is missing at any site that these runs test.")
+        texts.append("No effect is missing at any site that these runs test.")
     elif kind == "effect":
-        told.append(f"Missing: {', '.join(f'{e} ({sites[e]})' for e in effects)}.")
+        texts.append(f"Missing: {', '.join(f'{e} ({sites[e]})' for e in effects)}.")
     elif kind == "class":
         others = [twin for twin in alike if twin not in EFFECTS]
-        told.append(
+        texts.append(
             f"Missing is one of {', '.join([*effects, *others])}; these runs cannot say which."
         )
     else:
-        told.append(f"Something is missing that no effect explains, along {coordinate}.")
-        told += [f"Besides, {e} is missing ({sites[e]})." for e in effects if e in sites]
+        texts.append(f"Something is missing that no effect explains, along {coordinate}.")
+        texts += [f"Besides, {e} is missing ({sites[e]})." for e in effects if e in sites]
     for reason in alike.values():
-        told.append(f"Without a measured force {reason}: a load cell at the damper would tell.")
-    return " ".join(told)
+        texts.append(f"Without a measured force {reason}: a load cell at the damper would tell.")
+    return " ".join(texts)

@@ -138,7 +138,15 @@ class Page:
         column_gap: float = 0.7,
         **ratios: Any,
     ) -> GridSpec:
-        """Return a grid for panels; distances in inches, from the edges of the room for panels."""
+        """Return a grid for panels; distances in inches, from the edges of the room for panels.
+
+        Parameters
+        ----------
+        rows, columns : how many panels
+        left, right, top, bottom : from the edges to the panels [in], room for their labels
+        row_gap, column_gap : between panels [in]
+        ratios : passed on to matplotlib's `add_gridspec`, such as `width_ratios`
+        """
         inner_width = self.width - left - right
         inner_height = self.height - self.head - self.foot - top - bottom
         panel_width = (inner_width - (columns - 1) * column_gap) / columns
@@ -216,7 +224,16 @@ def zero_lines(axes: Axes) -> None:
 def label(
     axes: Axes, text: str, x: float, y: float, colour: Any, inline: bool = False, **also: Any
 ) -> None:
-    """Write a label beside the line that it names, or into it, in the colour of the line."""
+    """Write a label beside the line that it names, or into it, in the colour of the line.
+
+    Parameters
+    ----------
+    axes, text : where and what to write
+    x, y : the point that is labelled, in the units of the axes
+    colour : of the line
+    inline : whether the text stands in the line, on white, and not beside it
+    also : passed on to matplotlib's `annotate`, such as `xytext` [points from the point]
+    """
     from matplotlib.patheffects import withStroke
 
     settings: dict[str, Any] = {"fontsize": 8.5, "xytext": (0, 0), **also}

@@ -70,7 +70,19 @@ def member_names(archive: zipfile.ZipFile) -> list[str]:
 
 
 def read_member(path: Path, archive: zipfile.ZipFile, name: str, limit: int) -> bytes:
-    """Return one member's bytes, at most `limit` of them; FmuError if there are more."""
+    """Return one member's bytes.
+
+    Parameters
+    ----------
+    path, archive : the .fmu file, for the message; the same, open
+    name : of the member, with forward slashes
+    limit : most bytes that it may hold
+
+    Raises
+    ------
+    FmuError
+        If there is no such member, or it is larger.
+    """
     for info in archive.infolist():
         if _name(info) == name:
             with archive.open(info) as stream:

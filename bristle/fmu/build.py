@@ -339,6 +339,21 @@ def ensure(
     """Return a built-in component's FMU, built on first use and reused while its digest holds.
 
     One that is made from a building, a controller file or effects is named by their content.
+
+    Parameters
+    ----------
+    component : str
+        A built-in component.
+    building, controller : path or None
+        Building file of a Structure; file of a designed controller; None: the component's own,
+        if it has one.
+    effects : iterable of path
+        Files with effects of the user's own.
+
+    Raises
+    ------
+    BuildError, DesignError, PhysicsError
+        If a name or a file is wrong, or the FMU cannot be built.
     """
     effects = tuple(effects)
     if building is None and controller is None and not effects:

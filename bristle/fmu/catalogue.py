@@ -109,7 +109,25 @@ def instantiate(
     controller: Path | None = None,
     effects: Iterable[Path] = (),
 ) -> Slave:
-    """Return a component as a Python object, as an FMU's binary would make it."""
+    """Return a component as a Python object, as an FMU's binary would make it.
+
+    Parameters
+    ----------
+    name : str
+        A name of `component_names()`.
+    building, controller : path or None
+        Building file of a Structure; file of a designed controller; None: the component's own,
+        if it has one.
+    instance : str
+        Name of the instance; "": that of the component.
+    effects : iterable of path
+        Files with effects of a user's own.
+
+    Raises
+    ------
+    BuildError, DesignError, PhysicsError
+        If there is no such component; if a file is wrong.
+    """
     from ..physics.user import load_effect
 
     baked: dict[str, Any] = {"building": read_building_data(building)} if building else {}

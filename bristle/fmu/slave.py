@@ -150,9 +150,14 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         start: float = 0.0,
         optional: bool = False,
     ) -> None:
-        """Declare a Real input; an optional one may stay unconnected.
+        """Declare a Real input.
 
-        `over_step` says how it is taken over a step, one of `component.OVER_STEP`.
+        Parameters
+        ----------
+        name, unit, text : its name, unit and description
+        over_step : how it is taken over a step, one of `component.OVER_STEP`
+        start : value that it has until it is set, in its unit
+        optional : whether it may stay unconnected
         """
         if over_step not in OVER_STEP:
             raise TypeError(f"{name}: {over_step!r} is none of {', '.join(OVER_STEP)}.")
@@ -182,9 +187,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         bounds: tuple[float | None, float | None] = (None, None),
         nominal: float | None = None,
     ) -> None:
-        """Declare a Real output, or an Integer one where `unit` is None.
+        """Declare an output: Real, or Integer without a unit.
 
-        `depends` names the inputs that it follows as soon as they are set.
+        Parameters
+        ----------
+        name, text : its name and description
+        unit : of a Real one; None: it is an Integer
+        depends : names of the inputs that it follows as soon as they are set
+        bounds : lowest and highest value in its unit, None: no bound
+        nominal : usual size in its unit, None: not said
         """
         common = {
             "causality": Fmi2Causality.output,
@@ -209,7 +220,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         text: str,
         bounds: tuple[float | None, float | None] = (None, None),
     ) -> None:
-        """Declare a fixed parameter, of the type of its value."""
+        """Declare a fixed parameter, of the type of its value.
+
+        Parameters
+        ----------
+        name, text : its name and description
+        value : start value in its unit: a float, int, bool or str
+        unit : None: it has none
+        bounds : lowest and highest value in its unit, None: no bound; not for a bool or str
+        """
         common = {
             "causality": Fmi2Causality.parameter,
             "variability": Fmi2Variability.fixed,
@@ -252,16 +271,19 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         stop_time: float | None = None,
         tolerance: float | None = None,
     ) -> None:
+        """Take the start time [s]; neither stop time nor tolerance matters here."""
         self.time = start_time
         self._stale = True
 
     def enter_initialization_mode(self) -> None:
+        """Begin the initialisation: once, until the instance is reset."""
         if self._mode != _INSTANTIATED:
             self._stop(WRONG_MODE, "initialisation entered twice; reset the instance first.")
             return
         self._mode = _INITIALISING
 
     def exit_initialization_mode(self) -> None:
+        """Build the model from its parameters and show the first outputs; steps may follow."""
         if self._mode != _INITIALISING:
             self._stop(WRONG_MODE, "initialisation left without being entered.")
             return
@@ -270,9 +292,11 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._mode = STEPPING
 
     def terminate(self) -> None:
+        """End the run; the last values can still be read."""
         self._mode = _TERMINATED
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Step from `current_time` [s] over `step_size` [s]; False, with a fault, if it cannot."""
         if self.fault:
             return False
         if self._mode != STEPPING:
@@ -317,6 +341,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return False
 
     def log(self, msg: str, status: Any = Fmi2Status.ok, *more: Any) -> None:
+        """Log a message as it stands."""
         # Hosts take a message for the format of a printf: a "%s" in a path would read wild memory.
         super().log(msg.replace("%", "%%"), status, *more)
 
@@ -386,6 +411,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         return [vr if 0 <= vr < len(self._values) else self._index["fault"] for vr in vrs]
 
     def get_real(self, vrs: list[int]) -> list[float]:
+        """Return the values of Real variables by their references."""
         if self._stale:
             self._follow()
         values = self._values
@@ -397,6 +423,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             ]
 
     def get_integer(self, vrs: list[int]) -> list[int]:
+        """Return the values of Integer variables by their references."""
         if self._stale:
             self._follow()
         values = self._values
@@ -406,12 +433,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             return [int(self._values[self._index["fault"]]) for _ in self._known(vrs)]
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
+        """Return the values of Boolean variables by their references."""
         return [bool(self._values[vr]) for vr in self._known(vrs)]
 
     def get_string(self, vrs: list[int]) -> list[str]:
+        """Return the values of String variables by their references."""
         return [str(self._values[vr]) for vr in self._known(vrs)]
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
+        """Set Real variables by their references."""
         if self._mode == STEPPING:
             inputs, store = self._inputs, self._values
             for vr, value in zip(vrs, values):
@@ -425,12 +455,15 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             self._set_any(vrs, values, float)
 
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        """Set Integer variables by their references."""
         self._set_any(vrs, values, int)
 
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        """Set Boolean variables by their references."""
         self._set_any(vrs, values, bool)
 
     def set_string(self, vrs: list[int], values: list[str]) -> None:
+        """Set String variables by their references."""
         self._set_any(vrs, values, str)
 
     def _set_any(self, vrs: list[int], values: Iterable[Any], kind: type) -> None:

@@ -9,6 +9,8 @@ from ..physics.record import read_two_column
 from ..physics.signals import CSV, KINDS, PARAMETERS, STEPS, read_steps
 from .component import ComponentSlave
 
+_output = source.output
+
 
 class SourceSlave(ComponentSlave):
     """A component whose outputs depend on time alone."""
@@ -20,7 +22,7 @@ class SourceSlave(ComponentSlave):
 
     def refresh(self) -> None:
         given = self._given
-        source.output(self.time, given, self.constants, given, given, given)
+        _output(self.time, given, self.constants, given, given, given)
         self._values[self._shown_first : self._shown_after] = given
 
 

@@ -51,8 +51,16 @@ def jumps(V: Array) -> NDArray[np.bool_]:
 def force_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: Any) -> None:
     """Fill `out` (n,) with the force at each sample of a motion that is linear between them.
 
-    So is the voltage, but where it jumps: see `before_jump`. `motion` holds x, v, a, V as (n,) and
-    the step dt [s]; `z` the states at the begin, which are moved on.
+    So is the voltage, but where it jumps: see `before_jump`.
+
+    Parameters
+    ----------
+    setup : the damper, its parameters in SI
+    motion : x, v, a, V as (n,) [m, m/s, m/s2, V] and the step dt [s]
+    z : (states,) at the begin, moved on in place
+    z1 : room for as many states
+    work : room for `damper.work_size()` floats
+    out : (n,) N, filled
     """
     size = len(z)
     x, v, a, V, dt = motion.x, motion.v, motion.a, motion.V, motion.dt
@@ -76,6 +84,11 @@ def law_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: A
     """Do what `force_history` does where no effect is on, without the code of any effect.
 
     The law knows the voltage of its own moment only, so a jump needs no care.
+
+    Parameters
+    ----------
+    setup, motion, z, z1, out : as in `force_history`
+    work : not needed here
     """
     law, p = setup.law, setup.p
     x, v, a, V, dt = motion.x, motion.v, motion.a, motion.V, motion.dt
@@ -140,20 +153,25 @@ class Bench:
     def force(
         self, x: Array, v: Array, a: Array, V: Array, dt: float, values: dict[str, float]
     ) -> Array:
-        """Return the force (n,) [N] for a motion x, v, a (n,) [m, m/s, m/s2] and V (n,) [V].
+        """Return the force (n,) [N] for a motion and a voltage.
 
-        `values` are the parameters by name in SI; missing ones take their defaults. The start
-        values of states end in `_0`; those that start with a signal take its first value.
+        Parameters
+        ----------
+        x, v, a : (n,) m, m/s, m/s2
+        V : (n,) V
+        dt : sampling step [s]
+        values : parameters by name in SI; missing ones take their defaults. The start values of
+            states end in `_0`; those that start with a signal take its first value
         """
         setup = self._setup._replace(p=np.array(damper.pack(self.law, values)))
         first = {"x": x[0], "v": v[0], "a": a[0], "V": V[0]}
-        begun = {
+        initial = {
             f"{effect.name}.{state}_0": first[signal]
             for effect in damper.SLOTS.effects
             for state, signal in effect.starts.items()
             if signal in first
         }
-        z = np.array(damper.start_states(self.law, {**begun, **values}))
+        z = np.array(damper.start_states(self.law, {**initial, **values}))
         out = np.empty(len(x))
         motion = Inputs(x, v, a, V, dt, 0.0, 0.0, False)
         self._history(setup, motion, z, np.zeros_like(z), np.zeros(damper.work_size()), out)

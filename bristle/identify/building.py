@@ -166,8 +166,8 @@ def _finish(
     n, m, covariance = building.size, ended.system.rows, ended.covariance
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
     std_k = np.concatenate([np.full(first, np.inf), std[:m]])
-    told = free & (np.arange(n) >= first)
-    std_zeta = np.where(told, ended.std_zeta, np.inf)
+    identifiable = free & (np.arange(n) >= first)
+    std_zeta = np.where(identifiable, ended.std_zeta, np.inf)
     given = np.array(building.stiffnesses)
     levels, lost, notes = building.levels(), [], []
     for i in range(n):
@@ -176,7 +176,7 @@ def _finish(
             stiffness[i], std_k[i] = given[i], np.inf
     before = ratios_of(building)
     for r in range(n):
-        if not told[r]:
+        if not identifiable[r]:
             lost.append(f"damping ratio of mode {r + 1}")
             zeta[r] = before[r]
         elif zeta[r] < 0.0:

@@ -29,13 +29,16 @@ def building_text(fit: StructureFit, origin: Sequence[str] = ()) -> str:
         masses = [row[i] for i, row in enumerate(building.M)]
         ratios = np.maximum(fit.damping_ratios, 0.0)
         lines += ["", f"masses = {_row(masses)}  # kg, as given", ""]
-        lines += _told("stiffnesses", "N/m", building.stiffnesses, fit.std_stiffnesses)
-        lines += ["", *_told("modal", "1", ratios, fit.std_damping_ratios)]
+        lines += _with_intervals("stiffnesses", "N/m", building.stiffnesses, fit.std_stiffnesses)
+        lines += ["", *_with_intervals("modal", "1", ratios, fit.std_damping_ratios)]
     else:
         lines += ["", "# kg, N s/m, N/m; stiffnesses and modal damping ratios as identified:"]
-        lines += [f"# {line}" for line in _told("", "N/m", fit.stiffnesses, fit.std_stiffnesses)]
         lines += [
-            f"# {line}" for line in _told("", "1", fit.damping_ratios, fit.std_damping_ratios)
+            f"# {line}" for line in _with_intervals("", "N/m", fit.stiffnesses, fit.std_stiffnesses)
+        ]
+        lines += [
+            f"# {line}"
+            for line in _with_intervals("", "1", fit.damping_ratios, fit.std_damping_ratios)
         ]
         for letter, matrix in (("M", building.M), ("C", building.C), ("K", building.K)):
             lines += ["", f"{letter} = [", *(f"  {_row(row)}," for row in matrix), "]"]
@@ -54,7 +57,7 @@ def is_chain(building: Building) -> bool:
     return diagonal and bool(np.allclose(K, chain, rtol=0.0, atol=1e-9 * np.abs(K).max()))
 
 
-def _told(key: str, unit: str, values: Sequence[float] | Array, std: Array) -> list[str]:
+def _with_intervals(key: str, unit: str, values: Sequence[float] | Array, std: Array) -> list[str]:
     """Return the lines of a list, one value each, with half of its 95 % interval."""
     rows = [
         f"  {float(value)!r}, "

@@ -29,6 +29,7 @@ def smooth_drive(V: Array, noise: float, dt: float, draws: int, seed: int) -> tu
     V : (n,) V or A
     noise : standard deviation in the same unit
     dt : sampling step [s]
+    draws, seed : how many draws of the error, and their seed
     """
     generator = np.random.default_rng(seed)
     error = np.zeros((draws, len(V)))

@@ -44,6 +44,7 @@ def ratios_of(building: Building) -> Array:
 
 
 def modes_of(building: Building, stiffness: Array) -> Modes:
+    """Return the modes of a building with other stiffnesses (n,) [N/m]."""
     values, shapes = eigh(stiffness_matrix(building, stiffness), np.array(building.M))
     return Modes(np.sqrt(np.maximum(values, 1e-12)), shapes)
 
@@ -144,7 +145,22 @@ class EquilibriumSystem:
 def cross_products(
     runs: list[Response], building: Building, stiffness: Array, zeta: Array, first: int, plain: bool
 ) -> Array:
-    """Return cross products (blocks, 2 n + 1, 3 n + 2) of instruments with signals, all runs."""
+    """Return cross products (blocks, 2 n + 1, 3 n + 2) of instruments with signals, all runs.
+
+    Parameters
+    ----------
+    runs : responses of the building, of n levels
+    building : its masses and matrices
+    stiffness : (n,) N/m below each level, as it stands
+    zeta : (n,) damping ratios of the modes, as they stand
+    first : 1 where the force on the first level is unknown, else 0; see `simulated`
+    plain : whether the measured motion is its own instrument, and not the simulated one
+
+    Raises
+    ------
+    RecordError
+        If a run has too few samples for two blocks.
+    """
     parts = []
     for run in runs:
         n = building.size

@@ -115,6 +115,14 @@ def fit(
 ) -> Fit:
     """Fit the free parameters of a model to the problem's runs.
 
+    Parameters
+    ----------
+    problem : the runs
+    model : where the search starts
+    expectation : what a true model would show on each run; None draws it for `model`
+    max_evaluations : most Jacobians of the search
+    with_std : whether to make the standard deviations, too
+
     Returns
     -------
     Fit
@@ -165,8 +173,8 @@ def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) 
             low, high = found.model.bounds(name)
             moved = found.model.value(name) * np.exp(aside * generator.standard_normal())
             values[name] = float(np.clip(moved, low, high))
-        begun = replace(found.model, values=values)
-        ends.append(fit(problem, begun, expectation=expected, with_std=False))
+        start = replace(found.model, values=values)
+        ends.append(fit(problem, start, expectation=expected, with_std=False))
     best = min(ends, key=lambda one: one.cost)
     if best is not found:
         best = fit(problem, best.model, expectation=expected, max_evaluations=4)
@@ -259,6 +267,9 @@ def identify(
 
     Parameters
     ----------
+    problem : the runs
+    law, effects : names of the law and of the effects that are on
+    starts : how many starting points are tried
     values : parameters of effects to begin with, and those of `held` ones [SI]
     held, limits : see `Model`
 

@@ -43,7 +43,16 @@ def own(effect: type[Effect], values: dict[str, float]) -> dict[str, float]:
 def shown_force(
     effects: tuple[str, ...], values: dict[str, float], force: Array, dt: float
 ) -> Array:
-    """Return what the instruments among `effects` show of a force (n,) [N]."""
+    """Return what the instruments of the force show of it (n,) [N].
+
+    Parameters
+    ----------
+    effects : names of the effects that are on; those that are no instrument of the force are
+        left out
+    values : parameters in SI by name, effect.parameter; missing ones take their defaults
+    force : (n,) N
+    dt : sampling step [s]
+    """
     for effect in sensors(effects, "force"):
         force = shown(effect, own(effect, values), force, dt)
     return force
@@ -73,8 +82,8 @@ def earlier(
     """
     whole = int(late / dt)
     rest = late - whole * dt
-    x, v, a, V = (_held(signal, whole) for signal in motion)
-    V_before, a_before = _held(V, 1), _held(a, 1)
+    x, v, a, V = (_delayed(signal, whole) for signal in motion)
+    V_before, a_before = _delayed(V, 1), _delayed(a, 1)
     between = V - (V - V_before) * rest / dt
     V = np.where(jumps(V), V_before, between) if rest > 0.0 else V
     return (
@@ -85,7 +94,7 @@ def earlier(
     )
 
 
-def _held(signal: Array, count: int) -> Array:
+def _delayed(signal: Array, count: int) -> Array:
     """Return a signal (n,) shifted by a number of samples, its first value held."""
     if count == 0:
         return signal
@@ -95,7 +104,16 @@ def _held(signal: Array, count: int) -> Array:
 def true_motion(
     effects: tuple[str, ...], values: dict[str, float], v: Array, a: Array, dt: float
 ) -> tuple[Array, Array]:
-    """Return the velocity and acceleration (n,) [m/s, m/s2] behind those of a velocity channel."""
+    """Return the velocity and acceleration (n,) [m/s, m/s2] behind those of a velocity channel.
+
+    Parameters
+    ----------
+    effects : names of the effects that are on; those that are no instrument of the velocity are
+        left out
+    values : parameters in SI by name, effect.parameter; missing ones take their defaults
+    v, a : (n,) m/s, m/s2, as the instrument shows them
+    dt : sampling step [s]
+    """
     for effect in sensors(effects, "velocity"):
         there = own(effect, values)
         v, a = taken_back(effect, there, v, dt), taken_back(effect, there, a, dt)
@@ -103,10 +121,17 @@ def true_motion(
 
 
 def taken_back(effect: type[Effect], values: dict[str, float], reading: Array, dt: float) -> Array:
-    """Return the signal (n,) that an instrument shows as this reading (n,).
+    """Return the signal (n,) that an instrument shows as this reading.
 
     The instrument's response to a single pulse is divided out in the frequency domain; where it
     answers with less than `LEAST` of its most, only in part (Tikhonov).
+
+    Parameters
+    ----------
+    effect : Effect of the site "sensor"
+    values : parameters of the effect by their own names ("gain"), in SI; missing ones default
+    reading : (n,) in the channel's unit
+    dt : sampling step [s]
     """
     n = len(reading)
     lead = max(8, round(LEAD / dt))

@@ -27,12 +27,12 @@ def kalman_smooth(
 
     Parameters
     ----------
-    y : (n, 2) displacement and velocity; what is not finite was not measured
-    r : (2,) variances; have : (2,) whether a channel is there at all
+    y : (n, 2) displacement and velocity [m, m/s]; what is not finite was not measured
+    r, have : (2,) variances [m2, m2/s2]; (2,) whether a channel is there at all
     dt, jerk : step [s], intensity of the jerk [m2/s5]
     backward : whether to smooth, by the recursion of Bryson & Frazier (1963), and to fill
-    state, cov : (n, 3) the motion, (3,) its variances in the middle; loss (2,) mean squares of the
-        normalised innovations, filled either way
+    state, cov : (n, 3) the motion [m, m/s, m/s2]; (3,) its variances in the middle
+    loss : (2,) mean squares of the normalised innovations, filled either way
     """
     n = len(y) if backward else 1
     total: float = _compiled()(

@@ -76,12 +76,12 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     # Where one of two channels of the motion is lost, the other one tells it.
     alone = tuple(c for c in ("displacement", "velocity") if measurement.has(c))
     needed = ("force", drive or "", *(alone if len(alone) == 1 else ()))
-    told = measurement.told(*needed)
+    known = measurement.told(*needed)
     force = measurement["force"]
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
         _noise_of_force(measurement), error, _begin(motion.x, force, dt),
-        None if told.all() else told,
+        None if known.all() else known,
     )  # fmt: skip
 
 

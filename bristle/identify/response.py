@@ -115,6 +115,13 @@ def responses(
     looser smoother trades a little noise for much of that. The draws of its error are made once per
     level.
 
+    Parameters
+    ----------
+    measurements : runs of one rig, with one sampling step
+    building : whose levels were measured
+    draws, seed : how many draws of the smoother's error, and their seed
+    looser : factor of the jerk's intensity [1]
+
     Raises
     ------
     RecordError

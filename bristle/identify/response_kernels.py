@@ -41,9 +41,14 @@ def _gain(P, B, h1, h2, A, G):  # type: ignore[no-untyped-def]
 def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no-untyped-def]
     """Kalman filter and smoother for [x, v, a] under white jerk; return -log likelihood.
 
-    `y` (n, 3) measured x, v, a; `r` (3,) their variances, `have` (3,) which of them count; `jerk`
-    (n,) the intensity [m2/s5] on the way to each sample. Fills `state` (n, 3) and, away from the
-    ends, the variances `cov` (3,).
+    Parameters
+    ----------
+    y : (n, 3) measured x, v, a [m, m/s, m/s2]
+    r, have : (3,) their variances; (3,) which of them count
+    dt : sampling step [s]
+    jerk : (n,) intensity on the way to each sample [m2/s5]
+    backward : whether to smooth, and to fill `state` and `cov`
+    state, cov : (n, 3) the motion; (3,) its variances away from the ends
     """
     n = len(y)
     h1, h2 = dt, 0.5 * dt * dt
@@ -147,24 +152,38 @@ def forces_along(
 ) -> None:  # fmt: skip
     """Fill `out` (m,) with what effects add to the force of the highest of n levels.
 
-    The levels below rest: x, v (m,) are this level's motion relative to the one below. A contact
-    slides wherever the motion is not zero: whoever asks leaves out the samples at rest.
+    The levels below rest. A contact slides wherever the motion is not zero: whoever asks leaves out
+    the samples at rest.
+
+    Parameters
+    ----------
+    n : levels up to the one that moves
+    stiffnesses : (n,) N/m below each level
+    isolated : whether the first level is the base on its isolation layer
+    x, v : (m,) motion relative to the level below [m, m/s]
+    dt : sampling step [s]
+    z : states of all effects, moved on in place
+    p, on : flat parameters of all effects [SI], and (effects,) whether each is on
+    level, forces, z1 : room for (2 n,), (n,) floats and for as many states
+    out : (m,) N, filled
     """
     for k in range(len(x)):
         if k > 0:
             level[n - 1] = 0.5 * (x[k - 1] + x[k])
             level[2 * n - 1] = 0.5 * (v[k - 1] + v[k])
-            halt = 1e300 if level[2 * n - 1] > 0.0 else -1e300
-            advance_effects(n, isolated, stiffnesses, level, dt, 0.0, halt, 0.0, z, p, on, z1)
+            stick_force = 1e300 if level[2 * n - 1] > 0.0 else -1e300
+            advance_effects(
+                n, isolated, stiffnesses, level, dt, 0.0, stick_force, 0.0, z, p, on, z1
+            )
             for i in range(len(z)):
                 z[i] = z1[i]
         level[n - 1] = x[k]
         level[2 * n - 1] = v[k]
-        halt = 1e300 if v[k] > 0.0 else -1e300
-        effect_forces(n, isolated, stiffnesses, level, dt, 0.0, halt, z, p, on, forces)
+        stick_force = 1e300 if v[k] > 0.0 else -1e300
+        effect_forces(n, isolated, stiffnesses, level, dt, 0.0, stick_force, z, p, on, forces)
         out[k] = forces[n - 1]
         if n == 1:
-            out[k] += contact_force(n, isolated, stiffnesses, level, dt, 0.0, halt, z, p, on)
+            out[k] += contact_force(n, isolated, stiffnesses, level, dt, 0.0, stick_force, z, p, on)
 
 
 def compiled_forces() -> Callable[..., None]:
@@ -205,7 +224,15 @@ class Along:
     def force(
         self, x: Array, v: Array, dt: float, stiffness: float, values: dict[str, float]
     ) -> Array:
-        """Return the effects' force (m,) [N] for x, v (m,) [m, m/s]; `stiffness` [N/m] linear."""
+        """Return the effects' force (m,) [N] along a motion.
+
+        Parameters
+        ----------
+        x, v : (m,) motion relative to the level below [m, m/s]
+        dt : sampling step [s]
+        stiffness : of the linear spring there [N/m]
+        values : parameters in SI by name, effect.parameter; missing ones take their defaults
+        """
         out = np.zeros(len(x))
         if not self.active:
             return out

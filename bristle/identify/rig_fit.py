@@ -43,11 +43,13 @@ class RigFit:
         values, std, lost = dict(model.values), {}, list[str]()
         damper = self.fits.get(DAMPER)
         for name in dict.fromkeys(name for found in self.fits.values() for name in found.std):
-            told = [found for found in self.fits.values() if name in found.std]
-            if "." not in name and damper not in told:
+            identifiable = [found for found in self.fits.values() if name in found.std]
+            if "." not in name and damper not in identifiable:
                 continue
-            values[name], std[name] = _mean([(f.model.value(name), f.std[name]) for f in told])
-            lost += [name] if all(name in f.unidentified for f in told) else []
+            values[name], std[name] = _mean(
+                [(f.model.value(name), f.std[name]) for f in identifiable]
+            )
+            lost += [name] if all(name in f.unidentified for f in identifiable) else []
         if damper is None:
             lost = [*Model(model.law).free(), *lost]
         else:
@@ -64,20 +66,20 @@ class RigFit:
         out = []
         for name, found in self.fits.items():
             if self.sites[name].is_line:
-                told = [
+                texts = [
                     f"{own} = {found.model.value(own):.5g} +- {1.96 * found.std[own]:.2g} {unit}"
                     for own, unit in (("k", "N/m"), ("c", "N s/m")) if own in found.std
                 ]  # fmt: skip
-                out.append(f"{name}: " + ", ".join(told) + " (fitted along, not in model.toml).")
+                out.append(f"{name}: " + ", ".join(texts) + " (fitted along, not in model.toml).")
         return out
 
 
-def _mean(told: list[tuple[float, float]]) -> tuple[float, float]:
+def _mean(estimates: list[tuple[float, float]]) -> tuple[float, float]:
     """Return the mean of values with their standard deviations, and its own."""
-    if len(told) == 1:
-        return told[0]
-    weight = np.array([1.0 / max(std, 1e-300) ** 2 for _, std in told])
-    mean = float(np.dot(weight, [value for value, _ in told]) / weight.sum())
+    if len(estimates) == 1:
+        return estimates[0]
+    weight = np.array([1.0 / max(std, 1e-300) ** 2 for _, std in estimates])
+    mean = float(np.dot(weight, [value for value, _ in estimates]) / weight.sum())
     return mean, float(weight.sum() ** -0.5)
 
 
@@ -88,6 +90,7 @@ def fit_rig(
 
     Parameters
     ----------
+    rig : the sites with their runs
     model : the damper's law with the effects of all sites
     starts : how many starting points are tried for the damper's law
     also : values in SI by name from which one more fit begins at each site; the better one counts
@@ -133,12 +136,12 @@ def errors_of(models: SiteModels, cutoff: float) -> dict[str, float]:
     out: dict[str, float] = {}
     for role in ROLES:
         each = [(model, site.problem_of(role)) for site, model in models.values()]
-        held = [(model, problem) for model, problem in each if problem is not None]
-        if not held:
+        pairs = [(model, problem) for model, problem in each if problem is not None]
+        if not pairs:
             continue
-        out[f"z_{role}"] = max(robust_z(problem, model) for model, problem in held)
-        squares = [error_rms(problem, model, cutoff) ** 2 for model, problem in held]
-        forces = [force_rms(problem.runs, cutoff) ** 2 for _, problem in held]
+        out[f"z_{role}"] = max(robust_z(problem, model) for model, problem in pairs)
+        squares = [error_rms(problem, model, cutoff) ** 2 for model, problem in pairs]
+        forces = [force_rms(problem.runs, cutoff) ** 2 for _, problem in pairs]
         out[f"rms_{role}"] = float(np.sqrt(sum(squares)))
         out[f"share_{role}"] = out[f"rms_{role}"] / float(np.sqrt(sum(forces)))
     return out

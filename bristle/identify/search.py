@@ -177,11 +177,16 @@ def jacobian(
     high: Array,
     rough: bool = False,
 ) -> Array:
-    """Return the derivatives of `residuals` at theta (n, p) by differences, inside the bounds.
+    """Return the derivatives (n, p) of `residuals` at theta by differences, inside the bounds.
 
-    `rough`: an impact that a nudge moves to the next sample leaves a spike that says nothing about
-    the rest of the curve and outweighs it. Such entries are cut, at a multiple of what nine tenths
-    of a column stay below.
+    Parameters
+    ----------
+    residuals : theta (p,) to normalised residuals (n,)
+    theta, r : (p,) where to differentiate, and the residuals (n,) there
+    low, high : (p,) bounds
+    rough : whether events such as impacts make the residuals jump. An impact that a nudge moves to
+        the next sample leaves a spike that says nothing about the rest of the curve and outweighs
+        it: such entries are cut, at a multiple of what nine tenths of a column stay below
     """
     size = _ROUGH_NUDGE if rough else _NUDGE
     J = np.empty((len(r), len(theta)))
@@ -202,8 +207,8 @@ def _step(
     normal: Array, gradient: Array, damping: float, theta: Array, low: Array, high: Array
 ) -> Array:
     """Return the damped step, zero where a parameter stands at a bound that it would leave."""
-    held = ((theta <= low) & (gradient > 0.0)) | ((theta >= high) & (gradient < 0.0))
-    free = np.flatnonzero(~held)
+    at_bound = ((theta <= low) & (gradient > 0.0)) | ((theta >= high) & (gradient < 0.0))
+    free = np.flatnonzero(~at_bound)
     step = np.zeros_like(theta)
     if len(free):
         matrix = normal[np.ix_(free, free)].copy()

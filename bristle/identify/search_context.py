@@ -71,12 +71,12 @@ class Search:
         return self.at(found.theta), found
 
 
-def refine(begun: Model, train: Problem, sweeps: int = 12) -> Model:
+def refine(start: Model, train: Problem, sweeps: int = 12) -> Model:
     """Fit all free parameters, the noise expected of the model renewed on the way.
 
     Where the way is rough a search ends early: it begins again as long as that pays.
     """
-    model, cost = begun, float("inf")
+    model, cost = start, float("inf")
     for turn in range(MOST_TURNS):
         search = Search(train, model, train.expectation(model), model.free())
         model, ended = search.run(max(3, sweeps // 2) if turn == 0 else sweeps)

@@ -28,10 +28,16 @@ def stiffness_matrix(building: Building, stiffness: Array) -> Array:
 def simulated(
     run: Response, building: Building, stiffness: Array, zeta: Array, first: int
 ) -> tuple[Array, Array]:
-    """Return the displacements and velocities (n, samples) that a building shows to a run.
+    """Return the displacements and velocities (n, samples) [m, m/s] that a building shows to a run.
 
-    Where the force on the first level is unknown (`first` 1), that level's measured motion drives
-    the rest.
+    Parameters
+    ----------
+    run : the response whose ground motion, force and first state are taken
+    building : its masses and matrices, of n levels
+    stiffness : (n,) N/m below each level, in place of the building's
+    zeta : (n,) damping ratios of the modes
+    first : 1 where the force on the first level is unknown: that level's measured motion then
+        drives the rest; else 0
     """
     M, K = np.array(building.M), stiffness_matrix(building, stiffness)
     start_x, start_v = run.x[:, 0], run.v[:, 0]

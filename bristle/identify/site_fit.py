@@ -30,7 +30,7 @@ def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, al
     Parameters
     ----------
     model : the damper's law with the effects of all sites
-    sites : all sites that the runs show
+    site, sites : the one to fit, and all sites that the runs show
     count : how many starting points are tried for the damper's law
     also : values in SI by name from which one more fit begins; the better one counts
     """
@@ -60,12 +60,12 @@ def _fit_law(own: Model, site: Site, count: int, also: Values) -> Fit:
 
 def _fit_grown(bare: Model, own: Model, layer: list[str], site: Site) -> Fit:
     """Return a law fitted without the layer's effects, which then join one by one."""
-    begun = fit_damper(site.train, bare)
-    grown = begun.model
+    without = fit_damper(site.train, bare)
+    grown = without.model
     for name in layer:
         grown = joined(name, grown, _structure(site))
     whole = refine(replace(grown, effects=own.effects, held=own.held), site.train)
-    return replace(fit(site.train, whole), starts=begun.starts, agreed=begun.agreed)
+    return replace(fit(site.train, whole), starts=without.starts, agreed=without.agreed)
 
 
 def fit_damper(problem: Problem, present: Model) -> Fit:
@@ -118,11 +118,11 @@ def _structure(site: Site) -> StructureProblem:
 def joined(effect: str, base: Model, train: StructureProblem) -> Model:
     """Return a model fitted with one more effect of the structure, the best of several starts."""
     few = thinned(train)
-    light = few.expectation(base)
-    begun = [
-        fit(few, model, expectation=light, max_evaluations=QUICK, with_std=False)
+    screening_noise = few.expectation(base)
+    searched = [
+        fit(few, model, expectation=screening_noise, max_evaluations=QUICK, with_std=False)
         for model in initial_guesses(effect, base, train)
     ]
-    best = min(begun, key=lambda one: one.cost).model
+    best = min(searched, key=lambda one: one.cost).model
     expected = train.expectation(base)
     return fit(train, best, expectation=expected, max_evaluations=25, with_std=False).model

@@ -118,8 +118,17 @@ def posterior_draws(
 
     The error of a linear smoother S is noise that it lets pass, and motion that it takes for noise:
     x - S y = (1 - S) x - S n. The first is drawn by smoothing simulated noise. The second is the
-    same in every draw: it is taken from the `motion` that was found, where it is given, for what
+    same in every draw: it is taken from the motion that was found, where it is given, for what
     laboratories prescribe is far smoother than white jerk; else from random motions of this jerk.
+
+    Parameters
+    ----------
+    n, dt : number of samples, sampling step [s]
+    noise : standard deviations of displacement and velocity [m, m/s]
+    jerk : intensity of the white jerk [m2/s5]
+    have : whether displacement and velocity were measured
+    draws, seed : how many draws, and their seed
+    motion : the motion that was found, (n,); None where there is none
     """
     generator = np.random.default_rng(seed)
     r = np.array([max(noise[0], 1e-15) ** 2, max(noise[1], 1e-15) ** 2])
@@ -201,7 +210,14 @@ def _left_out(motion: Motion, draw: Array, r: Array, have: NDArray[np.bool_], dt
 
 
 def random_motion(generator: np.random.Generator, n: int, dt: float, jerk: float) -> Array:
-    """Return a motion (n, 3) of white jerk, from rest [m, m/s, m/s2]; `jerk` in m2/s5."""
+    """Return a motion (n, 3) of white jerk, from rest [m, m/s, m/s2].
+
+    Parameters
+    ----------
+    generator : source of the random numbers, moved on
+    n, dt : number of samples, sampling step [s]
+    jerk : intensity [m2/s5]
+    """
     Q = np.array(
         [
             [dt**4 / 20.0, dt**3 / 8.0, dt**2 / 6.0],

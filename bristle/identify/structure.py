@@ -69,6 +69,7 @@ class StructureProblem(Problem):
         return StructureProblem(runs, self.storey, self.reconstructed)
 
     def along(self, effects: tuple[str, ...]) -> Along:
+        """Return what gives the forces of these effects along a motion, made at first use."""
         if effects not in self._along:
             self._along[effects] = Along(list(effects), self.storey)
         return self._along[effects]
@@ -106,7 +107,16 @@ def structure_run(
     name: str, dt: float, motion: tuple[Array, Array, Array, Array], force: Array, noise: float,
     draws: Array, keep: NDArray[np.bool_] | None = None,
 ) -> StructureRun:  # fmt: skip
-    """Return a run of the samples in `keep` (n,); the first ones are the smoother's and skipped."""
+    """Return a run of the samples that count; the first ones are the smoother's and skipped.
+
+    Parameters
+    ----------
+    name, dt : name of the run, sampling step [s]
+    motion : x, v, a, V, each (n,) [m, m/s, m/s2, V]
+    force, noise : (n,) N, and its standard deviation [N]
+    draws : (d, n, 4) draws of the error of x, v, a, V
+    keep : (n,) which samples count; None for all
+    """
     whole = Run(name, dt, *motion, force, noise, draws)
     if keep is None:
         index, skip = np.arange(len(force)), whole.skip
@@ -177,8 +187,8 @@ def sliding(response: Response) -> NDArray[np.bool_]:
     Beside a stop or a start the velocity is smoothed over a bend, and less certain than elsewhere.
     """
     moves = np.abs(response.v[0]) > SLIDING * float(response.std[0, 1])
-    held = np.convolve(~moves, np.ones(2 * BESIDE + 1), mode="same") > 0.5
-    return ~held
+    at_rest = np.convolve(~moves, np.ones(2 * BESIDE + 1), mode="same") > 0.5
+    return ~at_rest
 
 
 def damper_run(
@@ -186,9 +196,15 @@ def damper_run(
 ) -> StructureRun:
     """Return the damper's motion and force, measured or from equilibrium.
 
-    Of the base's own equilibrium and the sum over all levels the one with less noise is taken; the
-    first needs the storey above to be linear (`linear_storeys`). Where a law's friction jumps with
-    direction samples at which the base may be held are left out.
+    Of the base's own equilibrium and the sum over all levels the one with less noise is taken.
+    Where a law's friction jumps with direction samples at which the base may be held are left out.
+
+    Parameters
+    ----------
+    response : the run, its motion smoothed
+    building : whose equilibrium gives the force where it was not measured
+    law : name of the damper's law
+    linear_storeys : whether storeys are linear, as the base's own equilibrium needs
     """
     motion = (response.x[0], response.v[0], response.a[0] - response.ground, response.V)
     if response.force is not None:
@@ -242,6 +258,12 @@ def structure_problems(
 ) -> dict[str, tuple[StructureProblem, StructureProblem]]:
     """Return the problems of a building's runs, each for training and held-out runs.
 
+    Parameters
+    ----------
+    train, holdout : measurements to fit to, and those that decide
+    building : that was measured
+    law : name of the damper's law
+
     Returns
     -------
     dict
@@ -261,7 +283,13 @@ def problems_of(
     train: list[Response], holdout: list[Response], building: Building, law: str = DEFAULT,
     linear_storeys: bool = True,
 ) -> dict[str, tuple[StructureProblem, StructureProblem]]:  # fmt: skip
-    """Return the problems of responses; see `structure_problems`."""
+    """Return the problems of responses; see `structure_problems`.
+
+    Parameters
+    ----------
+    train, holdout : responses to fit to, and those that decide
+    building, law, linear_storeys : see `damper_run`
+    """
     both = (train, holdout)
     everything = [*train, *holdout]
     measured = all(r.force is not None for r in everything)

@@ -111,6 +111,7 @@ def error_table(
     train, holdout : the runs that laws are fitted to, and those they are judged on, if any
     cutoff : Hz, of the low-pass on measured and predicted force; 0 for none
     laws : names of laws and of their variants; None for all
+    starts : how many starting points are tried for each
     """
     laws = law_names() if laws is None else laws
     train.bench(Model(base_and_variant(laws[0])[0].name))  # compiled before threads ask for it
@@ -127,16 +128,16 @@ def _law_error(
         model = without(model, base.driven())
     ends = [_fit_filtered(train, one, cutoff) for one in start_models(train, model, starts)]
     best, cost = min(ends, key=lambda end: end[1])
-    judged = holdout if holdout is not None and holdout.runs else train
-    errors = filtered_errors(judged, best, cutoff)
+    deciding = holdout if holdout is not None and holdout.runs else train
+    errors = filtered_errors(deciding, best, cutoff)
     moving = [
-        e[np.abs(run.v[run.skip :]) >= REST] for e, run in zip(errors, judged.runs, strict=True)
+        e[np.abs(run.v[run.skip :]) >= REST] for e, run in zip(errors, deciding.runs, strict=True)
     ]
-    force = [low_pass(run.force, run.dt, cutoff)[run.skip :] for run in judged.runs]
+    force = [low_pass(run.force, run.dt, cutoff)[run.skip :] for run in deciding.runs]
     held_out = _rms(errors)
     return LawError(
         law, best, _rms(filtered_errors(train, best, cutoff)),
-        held_out if judged is not train else float("nan"), _rms(moving), held_out / _rms(force),
+        held_out if deciding is not train else float("nan"), _rms(moving), held_out / _rms(force),
         len(ends), sum(end[1] <= cost * (1.0 + _ALIKE) for end in ends),
     )  # fmt: skip
 

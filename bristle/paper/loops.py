@@ -64,15 +64,15 @@ def over_frequencies(runs: Runs) -> Drawing:
         f"{peaks[0]:.1f} to {peaks[-1]:.1f} N once the bristles lack travel"
     )
     subtitle = (
-        f"4 V; the same {1e3 * SPEED:g} mm/s at most, so {_travel(FREQUENCIES[0])} mm of amplitude "
-        f"at {FREQUENCIES[0]:g} Hz and {_travel(FREQUENCIES[-1])} mm at {FREQUENCIES[-1]:g} Hz, "
+        f"4 V; the same {1e3 * SPEED:g} mm/s at most, so {_stroke(FREQUENCIES[0])} mm of amplitude "
+        f"at {FREQUENCIES[0]:g} Hz and {_stroke(FREQUENCIES[-1])} mm at {FREQUENCIES[-1]:g} Hz, "
         f"where the bristles slide at 2 mm (1/a_0); last of {CYCLES} cycles."
     )
     page = Page(9.0, 6.9, title, subtitle, RECONSTRUCTED)
     return _draw(page, table, "frequency [Hz]", "Hz", _name_at_zero)
 
 
-def _travel(frequency: float) -> str:
+def _stroke(frequency: float) -> str:
     return f"{1e3 * SPEED / (2.0 * pi * frequency):.1f}"
 
 

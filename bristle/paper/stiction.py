@@ -156,8 +156,8 @@ def _accelerations(
     axes.plot(at[inside], seen["acceleration [m/s2]"][inside], "o", color=VERMILION, markersize=5)
     force = float(np.sqrt(np.mean(np.square(frame["damper.force"].loc[SETTLED:]))))
     axes.set_title(f"{case[0]}, {case[1]:g} V: base acceleration [m/s²]")
-    words = f"damper force {force:.1f} N RMS"
-    label(axes, words, 1.0, 1.0, GREY, xycoords="axes fraction", xytext=(0, -3), ha="right",
+    text = f"damper force {force:.1f} N RMS"
+    label(axes, text, 1.0, 1.0, GREY, xycoords="axes fraction", xytext=(0, -3), ha="right",
           va="top", fontsize=8)  # fmt: skip
     axes.set_xlim(*_WINDOW)
     axes.margins(y=0.12)
@@ -198,8 +198,8 @@ def _heights(
     axes.set_xlim(0.0, VOLTAGES[-1])
     label(axes, "median", VOLTAGES[1], middle[1], BLUE, xytext=(6, 4))
     label(axes, "from smallest to largest", VOLTAGES[1], high[1], GREY, xytext=(6, -2), fontsize=8)
-    words = "crest of a pure sine as large as the acceleration"
-    label(axes, words, VOLTAGES[5], crest[5], GREY, xytext=(0, 5), fontsize=8)
+    text = "crest of a pure sine as large as the acceleration"
+    label(axes, text, VOLTAGES[5], crest[5], GREY, xytext=(0, 5), fontsize=8)
 
 
 def _names(law: str, voltage: float) -> dict[str, Any]:

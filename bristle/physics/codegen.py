@@ -97,7 +97,15 @@ class Slots:
 
 
 def call(effect: type[Effect], hook: str, slots: Slots, q: str) -> str:
-    """Return the source of one call of a hook."""
+    """Return the source of one call of a hook.
+
+    Parameters
+    ----------
+    effect : Effect class that has the hook
+    hook : name of the hook, such as "force"
+    slots : Slots, say where the effect's states and parameters are
+    q : source of the signals, as `q_source` returns it
+    """
     return f"{effect.name}_{hook}({q}, {slots.state(effect)}, {slots.values(effect)})"
 
 

@@ -5,6 +5,8 @@ advances the state over a time step and gives the force at its end. Both take re
 and flat sequences (`codegen.Slots`): lists inside FMUs, arrays under numba.
 """
 
+# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
+
 from __future__ import annotations
 
 from collections.abc import Sequence
@@ -68,6 +70,7 @@ def step(
 
     Parameters
     ----------
+    setup : Setup
     begin, end : Inputs
         At begin and end of the step of end.dt [s], which `begin` names too. Give the end twice
         where the input is held: with the newest motion held the bristle leads by half a step and
@@ -125,7 +128,11 @@ def without_time(now: Inputs) -> Inputs:
 def force_at(setup: Setup, now: Inputs, z: Row, work: Row) -> tuple[float, float]:
     """Return force and friction [N] at a state, as `evaluate` does; nothing moves on.
 
-    `work` holds as many floats as `z`, or more.
+    Parameters
+    ----------
+    setup, now : Setup, Inputs
+    z : (k,) state, kept
+    work : (k,) or more, room to work
     """
     if not setup.active:
         return law_force(setup.law, setup.p, now, z)  # type: ignore[no-any-return]
@@ -133,11 +140,16 @@ def force_at(setup: Setup, now: Inputs, z: Row, work: Row) -> tuple[float, float
 
 
 def jump(setup: Setup, now: Inputs, z: Row, work: Row) -> float:
-    """Bring the state, in place, to a voltage that has jumped to now.V [V]; return the force [N].
+    """Bring the state to a voltage that has jumped to now.V [V]; return the force [N].
 
     No time goes by: states that depend on the voltage alone follow it, and a series mass, too small
-    to be felt between samples, comes to rest in its new balance. now.dt [s] is what `Q.dt` tells
-    the forces.
+    to be felt between samples, comes to rest in its new balance.
+
+    Parameters
+    ----------
+    setup, now : Setup, Inputs; now.dt [s] is what `Q.dt` tells the forces
+    z : (k,) state, changed in place
+    work : (2k,) or more, room to work
     """
     size = len(z)
     rates, after = work[0:size], work[size : 2 * size]
@@ -189,6 +201,8 @@ def setup_of(
 
     Parameters
     ----------
+    law : str
+        A damper's law, such as "bingham".
     values : dict
         Name ("f_c", "gas_spring.k") to value in SI; what is missing takes its default.
     effects : sequence of str
@@ -259,7 +273,15 @@ class DamperModel:
         self, x: float, v: float, a: float, V: float, dt: float, energy: float,
         stick_force: float, sticks: bool,
     ) -> float:  # fmt: skip
-        """Return the force [N] at the present state, without advancing it."""
+        """Return the force [N] at the present state, without advancing it.
+
+        Parameters
+        ----------
+        x, v, a, V : displacement [m], velocity [m/s], acceleration [m/s2], voltage [V]
+        dt : length of the step [s]
+        energy : dissipated so far [J]
+        stick_force, sticks : force [N] that would stop the motion within dt; whether it is known
+        """
         now = record(Inputs, (x, v, a, V, dt, energy, stick_force, sticks))
         if not self.active:
             return law_force(self.law, self.p, now, self.z)[0]  # type: ignore[no-any-return]
@@ -269,7 +291,13 @@ class DamperModel:
         self, x: float, v: float, a: float, V: float, dt: float, energy: float,
         stick_force: float, sticks: bool,
     ) -> float:  # fmt: skip
-        """Advance over dt [s] with the given inputs held; return the force [N] at the end."""
+        """Advance over a step, the inputs held; return the force [N] at the end.
+
+        Parameters
+        ----------
+        x, v, a, V, dt, energy, stick_force, sticks
+            As in `force`.
+        """
         now = record(Inputs, (x, v, a, V, dt, energy, stick_force, sticks))
         if self.active:
             force = step(self.setup, now, now, self.z, self._end, self._work)[0]

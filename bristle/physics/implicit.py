@@ -18,7 +18,14 @@ hold(globals(), "evaluate")
 
 
 def between(begin: Inputs, end: Inputs, share: float, dt: float) -> Inputs:
-    """Return the inputs at a share of the way from begin to end, for a step of dt [s]."""
+    """Return the inputs at a share of the way from begin to end.
+
+    Parameters
+    ----------
+    begin, end : Inputs
+    share : 0 at begin, 1 at end; motion and voltage are linear between, the rest is that of the end
+    dt : length of the step that the result is for [s]
+    """
     return Inputs(
         begin.x + share * (end.x - begin.x),
         begin.v + share * (end.v - begin.v),
@@ -32,11 +39,18 @@ def between(begin: Inputs, end: Inputs, share: float, dt: float) -> Inputs:
 
 
 def advance_implicit(setup: Setup, begin: Inputs, end: Inputs, z: Row, work: Row) -> None:
-    """Advance the states that move by `rate` over a step, in place, with inputs linear in time.
+    """Advance the states that move by `rate` over a step, with inputs linear in time.
 
     Rosenbrock's method of order two and L-stable (ROS2: Verwer, Spee, Blom & Hundsdorfer 1999,
     SIAM J. Sci. Comput. 20(4)), Jacobian by differences. As many equal substeps as keep each below
-    `IMPLICIT_STEP`. `work` holds `damper.work_size()` floats or more.
+    `IMPLICIT_STEP`.
+
+    Parameters
+    ----------
+    setup : Setup
+    begin, end : Inputs at begin and end of the step of end.dt [s]
+    z : (k,) state, advanced in place
+    work : room for `damper.work_size()` floats or more
     """
     moving, n, size = setup.moving, setup.n_moving, len(z)
     f = work[0:size]

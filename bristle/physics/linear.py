@@ -23,13 +23,26 @@ def identity(n: int) -> Flat:
 
 
 def copy(source: Row, first: int, target: Row, at: int, count: int) -> None:
-    """Copy so many values from `first` on to the target from `at` on."""
+    """Copy some values from one sequence into another.
+
+    Parameters
+    ----------
+    source, first : where from, and the index of the first value there
+    target, at : where to, and the index of the first value there
+    count : number of values
+    """
     for i in range(count):
         target[at + i] = source[first + i]
 
 
 def multiply(a: Sequence[float], b: Sequence[float], n: int, m: int, columns: int) -> Flat:
-    """Return the product of a (n, m) and b (m, columns)."""
+    """Return the product of two matrices, (n, columns) flat.
+
+    Parameters
+    ----------
+    a, b : (n, m) and (m, columns) flat
+    n, m, columns : sizes
+    """
     rows = [b[k * columns : (k + 1) * columns] for k in range(m)]
     product: Flat = []
     for i in range(n):

@@ -195,6 +195,12 @@ def rows(text: str) -> Iterator[tuple[int, str]]:
 def number(field: str, name: str, line: int, factor: float = 1.0) -> float:
     """Return factor times one number of a file, finite.
 
+    Parameters
+    ----------
+    field : text of the number
+    name, line : the file and the line from 1, for the message
+    factor : into the unit wanted
+
     Raises
     ------
     PhysicsError

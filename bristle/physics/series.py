@@ -57,12 +57,18 @@ class Balance(NamedTuple):
 def advance_series(
     setup: Setup, begin: Inputs, end: Inputs, z: Row, deflection: int, speed: int
 ) -> None:
-    """Advance a series element and the law's states over a step, in place, rod and voltage linear.
+    """Advance a series element and the law's states over a step, rod and voltage linear.
 
     Implicit Euler for the series mass, the trapezoidal rule for the deflection between rod and
     fluid, the law's states exactly. Secants, begun with the gain and the slope of the substep
-    before, need two or three trials; what they do not find is bracketed. `deflection`, `speed` are
-    the slots of the series element in `z`.
+    before, need two or three trials; what they do not find is bracketed.
+
+    Parameters
+    ----------
+    setup : Setup
+    begin, end : Inputs at begin and end of the step of end.dt [s]
+    z : (k,) state, advanced in place
+    deflection, speed : slots of the series element's states in `z` [m, m/s]
     """
     count = max(1, int(end.dt / IMPLICIT_STEP + 0.999999))
     h = end.dt / count
@@ -88,9 +94,14 @@ def advance_series(
 def balanced_speed(
     setup: Setup, balance: Balance, guess: float, slope: float, z: Row
 ) -> tuple[float, float]:
-    """Return the series mass's speed [m/s] and the slope of its excess there, 0 if not known.
+    """Return the series mass's speed [m/s] and the slope of its excess there [1], 0 if not known.
 
-    `guess` is a first speed, `slope` one from before or 0.
+    Parameters
+    ----------
+    setup, balance : Setup, Balance
+    guess : a first speed [m/s]
+    slope : of the excess over speed, from a trial before [1]; 0: there is none
+    z : (k,) state, kept
     """
     speed, slope = by_secants(setup, balance, guess, slope, z)
     if slope <= 0.0:
@@ -101,10 +112,16 @@ def balanced_speed(
 def by_secants(
     setup: Setup, balance: Balance, speed: float, slope: float, z: Row
 ) -> tuple[float, float]:
-    """Return the series mass's speed [m/s] and the slope of its excess there, 0 if not found.
+    """Return the series mass's speed [m/s] and the slope of its excess there [1], 0 if not found.
 
-    `speed` is a first guess and `slope` that of a guess before, 0 if there is none. Not found is
-    what may stand still: friction that is a jump leaves nothing to a secant there.
+    Not found is what may stand still: friction that is a jump leaves nothing to a secant there.
+
+    Parameters
+    ----------
+    setup, balance : Setup, Balance
+    speed : a first guess [m/s]
+    slope : of the excess over speed, from a guess before [1]; 0: there is none
+    z : (k,) state, kept
     """
     way = 1.0 if speed > 0.0 else -1.0
     if setup.signed and balance.speed * speed <= 0.0:
@@ -162,9 +179,14 @@ def by_brackets(setup: Setup, balance: Balance, z: Row) -> float:
 
 
 def speed_excess(setup: Setup, balance: Balance, speed: float, way: float, z: Row) -> float:
-    """Return by how much `speed` [m/s] exceeds what the forces give the series mass.
+    """Return by how much a speed exceeds what the forces give the series mass [m/s].
 
-    `way` is the direction of the friction.
+    Parameters
+    ----------
+    setup, balance : Setup, Balance
+    speed : of the series mass at the end of the substep [m/s]
+    way : direction of the friction, 1 or -1
+    z : (k,) state, kept
     """
     now, begin, push, apart, was = balance
     deflection = apart + 0.5 * now.dt * (begin - was + now.v - speed)

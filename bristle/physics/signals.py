@@ -44,10 +44,17 @@ PARAMETERS: dict[str, Parameter] = {
 def value(
     kind: int, t: float, p: Sequence[float], times: Sequence[float], values: Sequence[float]
 ) -> float:
-    """Return the signal at time t [s].
+    """Return the signal at a time, in its own unit.
 
-    `times`, `values` (n,): samples, held from each to the next for "steps", linear between for
-    "csv". A half sine lasts for `duration`, a chirp sweeps linearly and ends with it.
+    A half sine lasts for `duration`, a chirp sweeps linearly and ends with it.
+
+    Parameters
+    ----------
+    kind : one of the codes of `KINDS`
+    t : s
+    p : (8,) values in the order of `PARAMETERS`
+    times, values : (n,) samples [s, the signal's unit], held from each to the next for "steps",
+        linear between for "csv"; else not used
     """
     if kind == CONSTANT:
         return p[0]
@@ -75,7 +82,13 @@ def value(
 def rate(
     kind: int, t: float, p: Sequence[float], times: Sequence[float], values: Sequence[float]
 ) -> float:
-    """Return the rate of the signal at time t [1/s]; between the samples of "csv", their slope."""
+    """Return the rate of the signal at a time [1/s]; between the samples of "csv", their slope.
+
+    Parameters
+    ----------
+    kind, t, p, times, values
+        As in `value`.
+    """
     if kind in (CONSTANT, STEPS):
         return 0.0
     if kind == CSV:

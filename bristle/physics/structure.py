@@ -5,6 +5,8 @@ forces of effects enter as linear in time and are iterated. One source for both 
 inside FMUs, arrays under numba.
 """
 
+# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
+
 from __future__ import annotations
 
 from math import inf
@@ -88,7 +90,15 @@ def step_matrices(m: Matrices, h: float) -> StepMatrices:
 def free_step(
     n: int, phi: Row, held: Row, ramp: Row, x0: Row, a0: float, a1: float, x1: Row
 ) -> None:
-    """Fill x1 with the state after a step under ground motion alone, a_g from a0 to a1 [m/s2]."""
+    """Fill x1 with the state after a step under ground motion alone.
+
+    Parameters
+    ----------
+    n : number of levels
+    phi, held, ramp : flat matrices of the step, see `StepMatrices`
+    x0, x1 : (2n,) state [m, m/s] at begin (kept) and end (filled)
+    a0, a1 : ground acceleration at begin and end [m/s2], linear between
+    """
     size = 2 * n
     for i in range(size):
         total = held[i * (n + 1) + n] * a0 + ramp[i * (n + 1) + n] * (a1 - a0)
@@ -98,13 +108,31 @@ def free_step(
 
 
 def add_force(n: int, held: Row, ramp: Row, level: int, f0: float, f1: float, x1: Row) -> None:
-    """Add to x1 what a force on a level does that goes linearly from f0 to f1 [N]."""
+    """Add what a force on one level does over a step to the state at its end.
+
+    Parameters
+    ----------
+    n : number of levels
+    held, ramp : flat matrices of the step, see `StepMatrices`
+    level : which level, 0 the first
+    f0, f1 : the force at begin and end [N], linear between
+    x1 : (2n,) state at the end [m, m/s], changed in place
+    """
     for i in range(2 * n):
         x1[i] += held[i * (n + 1) + level] * f0 + ramp[i * (n + 1) + level] * (f1 - f0)
 
 
 def accelerations(n: int, M_inverse: Row, C: Row, K: Row, x: Row, forces: Row, out: Row) -> None:
-    """Fill `out` (n,) with the absolute accelerations q'' + a_g [m/s2] under `forces` (n,) [N]."""
+    """Fill `out` with the absolute accelerations q'' + a_g.
+
+    Parameters
+    ----------
+    n : number of levels
+    M_inverse, C, K : (n, n) flat [1/kg, N s/m, N/m]
+    x : (2n,) state [m, m/s]
+    forces : (n,) force on each level [N], positive against +x
+    out : (n,) filled [m/s2]
+    """
     for i in range(n):
         out[i] = 0.0
     for j in range(n):
@@ -118,8 +146,17 @@ def accelerations(n: int, M_inverse: Row, C: Row, K: Row, x: Row, forces: Row, o
 def holding_force(n: int, C: Row, K: Row, mass: float, x: Row, a_g: float, others: float) -> float:
     """Return the force [N] at which the first level does not accelerate relative to the ground.
 
-    `others` is the sum of all other forces on that level [N]. With a full mass matrix the coupling
-    to the other levels' accelerations is left out (a chain has none).
+    With a full mass matrix the coupling to the other levels' accelerations is left out (a chain has
+    none).
+
+    Parameters
+    ----------
+    n : number of levels
+    C, K : (n, n) flat [N s/m, N/m]
+    mass : of the first level [kg]
+    x : (2n,) state [m, m/s]
+    a_g : ground acceleration [m/s2]
+    others : sum of all other forces on that level [N]
     """
     total = -mass * a_g - others
     for j in range(n):
@@ -148,15 +185,21 @@ def step(
     a0: float, a1: float, f0: float, f1: float, energy: float, z0: Row, p: Row, on: Row,
     active: bool, x1: Row, z1: Row, work: Row,
 ) -> None:  # fmt: skip
-    """Advance a structure over one step h [s] with its effects.
+    """Advance a structure over one step with its effects.
 
     Parameters
     ----------
+    n, isolated : number of levels; whether the first lies on an isolation layer
+    stiffnesses : (n,) of the layer and the storeys, from below [N/m]
+    phi, held, ramp : flat matrices of the step, see `StepMatrices`
+    h : length of the step [s]
     x0, x1 : (2n,) state [m, m/s] at begin (kept) and end (filled)
-    a0, a1 : float, ground acceleration [m/s2]
-    f0, f1 : float, force of the devices on the first level [N], linear between
-    active : bool, whether any effect is on
-    z0, z1 : states of the effects, `state_size(n)` each; p, on : their parameters and switches
+    a0, a1 : ground acceleration at begin and end [m/s2], linear between
+    f0, f1 : force of the devices on the first level at begin and end [N], linear between
+    energy : dissipated so far, for effects that know it [J]
+    z0, z1 : (`state_size(n)`,) states of the effects at begin (kept) and end (filled)
+    p, on : parameters and switches of the effects, by slot
+    active : whether any effect is on
     work : room for `work_size(n)` floats
     """
     free_step(n, phi, held, ramp, x0, a0, a1, x1)
@@ -198,6 +241,15 @@ def balance_contact(
     would create energy); where one sticks, what brings the level to rest (Moreau's time stepping).
     The more force, the less motion into the contact: so the balance has one solution, found by
     regula falsi (Illinois) at any stiffness.
+
+    Parameters
+    ----------
+    n, isolated, stiffnesses, held, ramp, h, x0, energy, z0, p, on
+        As in `step`.
+    guess : force that is tried first [N]
+    x1 : (2n,) state at the end without the contacts [m, m/s], changed in place
+    z1 : (`state_size(n)`,) states of the effects at the end, filled
+    middle : (2n,) room to work
     """
     closed = contact_force(n, isolated, stiffnesses, x0, h, energy, 0.0, z0, p, on) != 0.0
     part = 0.5 if closed else 1.0
@@ -230,14 +282,30 @@ def balance_contact(
 def resting_forces(
     n: int, isolated: bool, stiffnesses: Row, x: Row, z: Row, p: Row, on: Row, forces: Row
 ) -> None:
-    """Fill `forces` (n,) with what the effects but contacts exert at a state [N]."""
+    """Fill `forces` with what the effects but contacts exert at a state.
+
+    Parameters
+    ----------
+    n, isolated, stiffnesses, p, on
+        As in `step`.
+    x, z : (2n,) state [m, m/s] and (`state_size(n)`,) states of the effects, kept
+    forces : (n,) filled [N]
+    """
     effect_forces(n, isolated, stiffnesses, x, inf, 0.0, 0.0, z, p, on, forces)
 
 
 def resting_contact(
     n: int, isolated: bool, stiffnesses: Row, x: Row, stick: float, z: Row, p: Row, on: Row
 ) -> float:
-    """Return the contacts' force on the first level at a state; `stick` [N] would hold it."""
+    """Return the contacts' force on the first level at a state [N].
+
+    Parameters
+    ----------
+    n, isolated, stiffnesses, p, on
+        As in `step`.
+    x, z : (2n,) state [m, m/s] and (`state_size(n)`,) states of the effects, kept
+    stick : force that would bring the level to rest [N]
+    """
     return contact_force(n, isolated, stiffnesses, x, inf, 0.0, stick, z, p, on)  # type: ignore[no-any-return]
 
 

@@ -103,7 +103,7 @@ def _histogram(axes: Axes, output: Output, values: Any) -> None:
     axes.axvspan(q25, q75, color=BLUE, alpha=0.16, linewidth=0)
     axes.hist(values, bins=bins, color=BLUE, alpha=0.75, edgecolor="white", linewidth=0.4)
     axes.axvline(q50, color=VERMILION, linewidth=1.6)
-    axes.set_title(f"{_words(output)} [{unit}]" if unit else _words(output))
+    axes.set_title(f"{_title(output)} [{unit}]" if unit else _title(output))
     axes.grid(axis="y", visible=False)
     axes.spines["left"].set_visible(False)
     axes.set_yticks([])
@@ -131,7 +131,7 @@ def _influence(axes: Axes, pairs: list[tuple[str, float]], runs: int) -> None:
     axes.grid(axis="y", visible=False)
 
 
-def _words(output: Output) -> str:
+def _title(output: Output) -> str:
     """Return an output as words: "peak of floor2 acceleration absolute"."""
     component, _, port = output.column.rpartition(".")
     statistic = {"rms": "RMS"}.get(output.statistic, output.statistic)

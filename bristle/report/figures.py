@@ -212,7 +212,7 @@ class _Run:
         return self.frame[name].to_numpy() * factor, shown
 
 
-def _mark_peak(axes: Axes, across: Array, values: Array, words: str) -> None:
+def _mark_peak(axes: Axes, across: Array, values: Array, label_text: str) -> None:
     """Mark the largest absolute value and write it beside, on the side where there is room."""
     size = np.abs(values)
     if not np.isfinite(size).any() or not np.nanmax(size) > 0.0:
@@ -221,7 +221,7 @@ def _mark_peak(axes: Axes, across: Array, values: Array, words: str) -> None:
     low, high = axes.get_xlim()
     on_the_left = across[at] > low + 0.55 * (high - low)
     axes.plot(across[at], values[at], "o", color=VERMILION, markersize=4.5, zorder=4)
-    text = f"{size[at]:.4g}{words.format(time=across[at])}"
+    text = f"{size[at]:.4g}{label_text.format(time=across[at])}"
     # Above a maximum and below a minimum there is no line.
     aside, side = (-5, "right") if on_the_left else (5, "left")
     away, edge = (3, "bottom") if values[at] > 0.0 else (-3, "top")

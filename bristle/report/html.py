@@ -67,7 +67,15 @@ def table(
     numbers: Iterable[int] = (),
     strong: Iterable[int] = (),
 ) -> str:
-    """Return a table; columns in `numbers` are set right, rows in `strong` bold."""
+    """Return a table.
+
+    Parameters
+    ----------
+    header : titles of the columns
+    rows : texts of each row, one per column; they are escaped
+    numbers : indices of the columns that are set right
+    strong : indices of the rows that are bold
+    """
     right, bold = set(numbers), set(strong)
 
     def cell(kind: str, i: int, text: str) -> str:

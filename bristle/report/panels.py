@@ -67,7 +67,15 @@ def draw_error(axes: Axes, prediction: RunPrediction, window: slice) -> None:
 def draw_loop(
     axes: Axes, prediction: RunPrediction, over: str, *, window: slice | None = None
 ) -> None:
-    """Draw measured and predicted output over a coordinate."""
+    """Draw measured and predicted output over a coordinate.
+
+    Parameters
+    ----------
+    axes : where to draw
+    prediction : the run
+    over : name of the coordinate, such as "displacement"
+    window : samples to draw; None for all that count
+    """
     factor, unit = SHOWN.get(over, (1.0, ""))
     part = window or slice(prediction.skip, None)
     x = factor * prediction.coordinates[over][part]
@@ -89,7 +97,12 @@ def draw_pattern(
 ) -> None:
     """Draw the error over a coordinate: samples, and the mean in bins with its interval.
 
-    `after` is a pattern whose means are taken off first.
+    Parameters
+    ----------
+    axes : where to draw
+    comparison : whose error it is
+    pattern : the coordinate with its bins
+    after : a pattern whose means are taken off first; None for none
     """
     factor, unit = SHOWN.get(pattern.coordinate, (1.0, ""))
     x = np.concatenate([one.along()[pattern.coordinate] for one in comparison.predictions])
@@ -246,9 +259,9 @@ def _ordered(names: Any) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _short(words: str) -> str:
+def _short(text: str) -> str:
     """Return "low speed\n(below 12 mm/s)" of "at low speed (below 12 mm/s)"."""
-    return words.removeprefix("at ").replace(" (", "\n(")
+    return text.removeprefix("at ").replace(" (", "\n(")
 
 
 __all__ = [

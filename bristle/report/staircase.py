@@ -21,7 +21,7 @@ CLOSE = 1.1
 
 
 @dataclass(frozen=True)
-class Tread:
+class HistoryStep:
     """One step of the staircase: what was done, and z and error [N] of the model after it."""
 
     number: int
@@ -33,12 +33,12 @@ class Tread:
 
 @dataclass(frozen=True)
 class Staircase:
-    """The treads of a history; `str` gives plain text, rich prints it in colour.
+    """The steps of a history; `str` gives plain text, rich prints it in colour.
 
     `floor` is the z that noise alone explains.
     """
 
-    treads: tuple[Tread, ...]
+    history_steps: tuple[HistoryStep, ...]
     floor: float = 1.0
     unit: str = "N"
 
@@ -53,20 +53,20 @@ class Staircase:
 
     def _lines(self, mark: str) -> list[list[tuple[str, str]]]:
         """Return the lines as pairs of text and style."""
-        if not self.treads:
+        if not self.history_steps:
             return [[("The history is empty.", "")]]
-        names = [f"{one.number} {one.what}" for one in self.treads]
+        names = [f"{one.number} {one.what}" for one in self.history_steps]
         wide = min(max(len(name) for name in [*names, "  noise floor"]), 32)
-        known = [one.z for one in self.treads if one.z is not None]
+        known = [one.z for one in self.history_steps if one.z is not None]
         top = max([*known, 2.0 * self.floor])
         title = "error on held-out runs over what noise explains (z)"
         lines = [[(f"{'':{wide}}  {title}", "dim")]]
-        for name, one in zip(names, self.treads, strict=True):
-            lines.append([(f"{name[:wide]:{wide}}  ", "bold"), *self._tread(one, top, mark)])
+        for name, one in zip(names, self.history_steps, strict=True):
+            lines.append([(f"{name[:wide]:{wide}}  ", "bold"), *self._line(one, top, mark)])
         lines.append([(f"{'  noise floor':{wide}}  ", "dim"), (f"| {self.floor:.3g}", "green")])
         return lines
 
-    def _tread(self, one: Tread, top: float, mark: str) -> list[tuple[str, str]]:
+    def _line(self, one: HistoryStep, top: float, mark: str) -> list[tuple[str, str]]:
         if one.z is None:
             return [("not judged", "dim")]
         done = one.z <= CLOSE * self.floor
@@ -98,18 +98,18 @@ def staircase(steps: Sequence[Step], noise_floor: float = 1.0) -> Staircase:
     0 identify     ######################################## 4.00
       noise floor  | 1
     """
-    return Staircase(tuple(treads(steps)), noise_floor)
+    return Staircase(tuple(history_steps(steps)), noise_floor)
 
 
-def treads(steps: Sequence[Step]) -> list[Tread]:
-    """Return the treads of a history: what each step's `after` says, or the next one's `before`."""
+def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
+    """Return the steps of a history: what each step's `after` says, or the next one's `before`."""
     out = []
     for k, step in enumerate(steps):
         errors: dict[str, Any] = {**step.after}
         if not errors and k + 1 < len(steps):
             errors = {**steps[k + 1].before}
         numbers = [_number(errors.get(key)) for key in ("z_holdout", "z_train", "rms_holdout")]
-        out.append(Tread(step.number, step.what, *numbers))
+        out.append(HistoryStep(step.number, step.what, *numbers))
     return out
 
 

@@ -13,7 +13,7 @@ from ..draw.style import percent, short_z
 from ..errors import BristleError
 from . import html
 from .residuals import headline
-from .staircase import Tread, treads
+from .staircase import HistoryStep, history_steps
 from .study_tables import data_table, data_words, parameter_table, ranking_table, run_errors
 from .study_verdict import badge, noise_floor, rivals, separating, untestable, words
 
@@ -37,7 +37,7 @@ class Content:
     model: StudyModel
     verdict: dict[str, Any] | None
     steps: tuple[Step, ...]
-    treads: tuple[Tread, ...]
+    history_steps: tuple[HistoryStep, ...]
     now: Comparison | None
     before: Comparison | None
     added: str
@@ -68,7 +68,7 @@ def gather(study: Study) -> Content:
     runs = study.runs()
     now = before = None
     trouble, added = "", ""
-    found = treads(steps)
+    found = history_steps(steps)
     try:
         against = comparer(study)
         now = against.compare(as_model(model))
@@ -81,7 +81,7 @@ def gather(study: Study) -> Content:
             if new:
                 before, added = against.compare(as_model(earlier)), " and ".join(new)
                 break
-        found = [_judged(one, against, study) for one in found]
+        found = [_with_error(one, against, study) for one in found]
     except BristleError as error:
         trouble = str(error)
     return Content(
@@ -89,8 +89,8 @@ def gather(study: Study) -> Content:
     )
 
 
-def _judged(tread: Tread, against: RigComparer, study: Study) -> Tread:
-    """Return a tread with its z where the history does not tell it: an edit by hand."""
+def _with_error(step: HistoryStep, against: RigComparer, study: Study) -> HistoryStep:
+    """Return a step with its z where the history does not tell it: an edit by hand."""
     from dataclasses import replace
 
     import numpy as np
@@ -99,11 +99,11 @@ def _judged(tread: Tread, against: RigComparer, study: Study) -> Tread:
     from ..identify.search import z_scale
     from ..study.identification import as_model
 
-    if tread.z is not None or tread.number == 0:
-        return tread  # the model that a study begins with is nobody's guess of this damper
-    then = read_model(study.history.model_file(tread.number), study.folder)
+    if step.z is not None or step.number == 0:
+        return step  # the model that a study begins with is nobody's guess of this damper
+    then = read_model(study.history.model_file(step.number), study.folder)
     runs = against.predictions(as_model(then))
-    return replace(tread, z=z_scale(np.concatenate([one.normalised for one in runs])))
+    return replace(step, z=z_scale(np.concatenate([one.normalised for one in runs])))
 
 
 def render(content: Content) -> str:
@@ -136,12 +136,12 @@ def render(content: Content) -> str:
 
 def _verdict(content: Content) -> str:
     kind, tone = badge(content.verdict)
-    said = words(content.verdict, content.study.name)
+    texts = words(content.verdict, content.study.name)
     inner = [
         f'<div class="verdict" style="--tone: var(--{tone})">',
         f'<div class="kind">{html.escape(kind)}</div>',
-        html.paragraphs(said[0], kind="say"),
-        html.paragraphs(*said[1:]),
+        html.paragraphs(texts[0], kind="say"),
+        html.paragraphs(*texts[1:]),
         "</div>",
     ]
     rows = ranking_table(content.verdict)
@@ -174,15 +174,15 @@ def _tiles(content: Content) -> str:
             f"RMS error at all frequencies, {percent(now.total.share)} of the {now.quantity}'s RMS",
         ),
     ]
-    first = next((one.z for one in content.treads if one.z is not None), None)
+    first = next((one.z for one in content.history_steps if one.z is not None), None)
     if first is not None and first > 1.02 * now.z:
         pairs.append(
             (f"{short_z(first)} → {short_z(now.z)}", "z of the first model, and of this one")
         )
     runs = content.study.settings.runs
-    held = sum(run.role == "holdout" for run in runs)
-    judged = f"{held} of them held out" if held else "its last part held out"
-    pairs.append((f"{len(runs)} run{'s' * (len(runs) > 1)}", judged))
+    count = sum(run.role == "holdout" for run in runs)
+    held_out = f"{count} of them held out" if count else "its last part held out"
+    pairs.append((f"{len(runs)} run{'s' * (len(runs) > 1)}", held_out))
     return html.tiles(pairs)
 
 
@@ -246,25 +246,25 @@ def _sites(content: Content) -> list[str]:
 
 
 def _history(content: Content) -> str:
-    judged = [one for one in content.treads if one.z is not None]
+    with_z = [one for one in content.history_steps if one.z is not None]
     header = ["step", "what", "z held-out", "z training", "error [N]", "why"]
     rows = [
         [
             str(step.number), step.what, _or_dash(one.z), _or_dash(one.z_train),
             "-" if one.rms is None else f"{one.rms:.3g}", step.why,
         ]
-        for step, one in zip(content.steps, content.treads, strict=True)
+        for step, one in zip(content.steps, content.history_steps, strict=True)
     ]  # fmt: skip
     picture = ""
-    if judged:
+    if with_z:
         from ..draw.style import png
         from .study_pictures import staircase_page
 
-        fall = " → ".join(_or_dash(one.z) for one in judged)
+        fall = " → ".join(_or_dash(one.z) for one in with_z)
         cut = content.study.settings.cut_off
         low = f", below {cut:g} Hz" if cut else ""
         picture = html.figure(
-            png(staircase_page(judged)),
+            png(staircase_page(with_z)),
             f"The staircase of the history: z on held-out runs {fall}",
             "The error of each model of the history, on runs that no fit has seen (blue) and on "
             "those that it was fitted to (grey), over what noise explains; forces are RMS "
@@ -331,11 +331,11 @@ def _untold(content: Content) -> str:
         ),
         html.table(["effect", "what it does", "what it would look like"], hidden),
     ] if hidden else []  # fmt: skip
-    told = rivals(content.verdict)
+    texts = rivals(content.verdict)
     experiment = separating(content.verdict)
     if experiment:
         parts.append("<h3>The experiment that would tell</h3>")
-        parts.append(html.paragraphs(*told, experiment))
+        parts.append(html.paragraphs(*texts, experiment))
     if not parts:
         none = (
             "No diagnosis has been made of this model, so nothing is known of what it could miss."

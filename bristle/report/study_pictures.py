@@ -37,44 +37,44 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from ..compare.comparison import Comparison
-    from .staircase import Tread
+    from .staircase import HistoryStep
 
 _WIDTH = 9.2
 SMALL = 0.1
 """Change of z below which a riser of the staircase carries no label."""
 
 
-def staircase_page(treads: Sequence[Tread], unit: str = "N") -> Page:
+def staircase_page(history_steps: Sequence[HistoryStep], unit: str = "N") -> Page:
     """Return the staircase: z of each model on training and held-out runs over the noise floor."""
-    judged = [one for one in treads if one.z is not None]
+    steps = [one for one in history_steps if one.z is not None]
     with look():
         page = Page(_WIDTH, 3.5, "")
         grid = page.grid(1, 1, top=0.25, bottom=0.5, left=0.6, right=1.0)
         axes = page.figure.add_subplot(grid[0, 0])
-        top = max([one.z or 1.0 for one in judged] + [one.z_train or 1.0 for one in judged] + [2.0])
+        top = max([one.z or 1.0 for one in steps] + [one.z_train or 1.0 for one in steps] + [2.0])
         axes.set_yscale("log")
         axes.axhspan(0.9, 1.1, color=FLOOR, lw=0.0)
-        _stairs(axes, [one.z_train for one in judged], PALE, 1.6)
-        _stairs(axes, [one.z for one in judged], BLUE, 2.6)
-        for i, one in enumerate(judged):
+        _stairs(axes, [one.z_train for one in steps], PALE, 1.6)
+        _stairs(axes, [one.z for one in steps], BLUE, 2.6)
+        for i, one in enumerate(steps):
             assert one.z is not None
-            _tread(axes, i, one, judged[i - 1].z if i else None, unit)
-        axes.set_xlim(-0.5, len(judged) - 0.5)
+            _step_marks(axes, i, one, steps[i - 1].z if i else None, unit)
+        axes.set_xlim(-0.5, len(steps) - 0.5)
         axes.set_ylim(0.75, 2.2 * top)
-        names = [textwrap.fill(f"{one.number}  {one.what}", 20) for one in judged]
-        axes.set_xticks(range(len(judged)), names, fontsize=9, color=INK)
+        names = [textwrap.fill(f"{one.number}  {one.what}", 20) for one in steps]
+        axes.set_xticks(range(len(steps)), names, fontsize=9, color=INK)
         axes.tick_params(axis="x", length=0)
         axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
         axes.yaxis.set_minor_formatter(lambda value, _: "")
         axes.grid(visible=False, axis="x")
         axes.set_title("z: error over what noise explains")
-        last = judged[-1]
+        last = steps[-1]
         ends = [
             ("noise floor", 1.0, GREEN),
             ("held-out", last.z, BLUE),
             ("training", last.z_train, GREY),
         ]
-        _name_ends(axes, [(name, y, c) for name, y, c in ends if y is not None], len(judged) - 0.5)
+        _name_ends(axes, [(name, y, c) for name, y, c in ends if y is not None], len(steps) - 0.5)
     return page
 
 
@@ -91,7 +91,7 @@ def _name_ends(axes: Axes, ends: list[tuple[str, float, str]], x: float) -> None
 
 
 def _stairs(axes: Axes, heights: Sequence[float | None], colour: str, width: float) -> None:
-    """Draw treads with risers between them."""
+    """Draw steps with risers between them."""
     x, y = [], []
     for i, height in enumerate(heights):
         if height is not None:
@@ -100,8 +100,8 @@ def _stairs(axes: Axes, heights: Sequence[float | None], colour: str, width: flo
     axes.plot(x, y, color=colour, lw=width, solid_joinstyle="miter")
 
 
-def _tread(axes: Axes, i: int, one: Tread, before: float | None, unit: str) -> None:
-    """Write z and error over a tread, and at its riser by how much the error fell."""
+def _step_marks(axes: Axes, i: int, one: HistoryStep, before: float | None, unit: str) -> None:
+    """Write z and error over a step, and at its riser by how much the error fell."""
     assert one.z is not None
     z = short_z(one.z)
     rms = "" if one.rms is None else f"  {one.rms:.2g} {unit}"

@@ -68,8 +68,8 @@ def with_interval(value: float, std: float | None) -> tuple[str, str]:
     places = max(digits, 0)
     tail = f" {TIMES} 10{str(power).translate(_RAISED)}" if power else ""
     texts = (f"{round(one, digits):.{places}f}".replace("-", MINUS) for one in (scaled, width))
-    told, wide = texts
-    return f"{told}{tail}", f"± {wide}{tail}"
+    number_text, wide = texts
+    return f"{number_text}{tail}", f"± {wide}{tail}"
 
 
 def _at_bound(value: Value) -> bool:
@@ -136,8 +136,8 @@ def ranking_table(
         if effect in named:
             strong.append(len(rows))
         z = entry.get("z_holdout")
-        told = f"{z:.3f}" if isinstance(z, int | float) and z < 10.0 else number(z)
-        rows.append([effect, told, share(entry.get("gain"))])
+        text = f"{z:.3f}" if isinstance(z, int | float) and z < 10.0 else number(z)
+        rows.append([effect, text, share(entry.get("gain"))])
     return (["with this effect", "z held-out", "lower by"], rows, strong) if rows else None
 
 

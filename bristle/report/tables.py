@@ -40,11 +40,11 @@ def _site(one: SiteError) -> list[str]:
     if not one.identifiable:
         return [name, "-", "too few samples", "-", "-", "-", "-"]
     (low, high), total, pattern = one.z_interval, one.total, one.pattern
-    told = pattern is not None and pattern.share >= FAINT
+    worth = pattern is not None and pattern.share >= FAINT
     return [
         name, short_z(one.z), f"{short_z(low)} - {short_z(high)}", f"{total.rms:.3g}",
         percent(total.share), f"{total.noise:.3g}",
-        name_of(pattern.coordinate, one.site) if pattern is not None and told else "-",
+        name_of(pattern.coordinate, one.site) if pattern is not None and worth else "-",
     ]  # fmt: skip
 
 

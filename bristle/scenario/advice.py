@@ -34,6 +34,7 @@ class Network:
         self.feeding = {(wire.target, wire.input): wire for wire in self.wires}
 
     def with_ports(self, ports: frozenset[str]) -> list[Part]:
+        """Return the components that have all of these ports, in the order of the file."""
         return [part for part in self.parts.values() if ports <= part.variables.keys()]
 
     def source(self, part: Part, name: str) -> tuple[Part, str] | None:
@@ -65,7 +66,21 @@ class Network:
 def advise(
     run: Run, parts: Mapping[str, Part], wires: Sequence[Wire], library: Library, findings: Findings
 ) -> None:
-    """Add warnings, notes, and the errors of ports that must be used together."""
+    """Add warnings, notes, and the errors of ports that must be used together.
+
+    Parameters
+    ----------
+    run : Run
+        As far as it could be read.
+    parts : mapping
+        Name to component, in the order of the file.
+    wires : sequence of Wire
+        The connections that could be read.
+    library : Library
+        Knows masses and designs of what is installed.
+    findings : Findings
+        Takes what is found.
+    """
     network = Network(parts, wires)
     _instances(network, findings)
     _order(run, network, findings)

@@ -41,7 +41,15 @@ def table(findings: Findings, data: Mapping[str, Any], path: KeyPath) -> dict[st
 def known_keys(
     findings: Findings, where: str, data: Iterable[str], known: Iterable[str], path: KeyPath
 ) -> None:
-    """Report every key that is none of the known."""
+    """Report every key that is none of the known.
+
+    Parameters
+    ----------
+    findings : Findings, takes what is found
+    where : words that begin the message, such as "[run]"
+    data, known : the keys that are there; the keys that may be
+    path : keys from the top of the document to the table
+    """
     known = tuple(known)
     for key in data:
         if key not in known:

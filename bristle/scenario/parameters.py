@@ -22,6 +22,21 @@ _CHOICES = re.compile(r"\bone of:? ((?:[\w-]+, )*[\w-]+)")
 def check_parameter(
     part: Part, name: str, value: object, folder: Path, library: Library, findings: Findings
 ) -> None:
+    """Check one parameter, and keep its value in `part.parameters` if it is right.
+
+    Parameters
+    ----------
+    part : Part
+        The component; `part.places` knows where the parameter stands.
+    name, value : str, object
+        Its name, and its value as the file has it.
+    folder : Path
+        The scenario's; relative names of files begin there.
+    library : Library
+        Reads ground motions.
+    findings : Findings
+        Takes what is found.
+    """
     where, place = f"{part.name}.{name}", part.places[name]
     variable = part.variables.get(name)
     if variable is None:

@@ -39,6 +39,7 @@ class Part:
 
     @property
     def variables(self) -> dict[str, Variable]:
+        """Variables of the FMU by name; none where it could not be read."""
         return self.description.variables if self.description else {}
 
     def value(self, name: str) -> Value | None:
@@ -55,7 +56,21 @@ class Part:
 def existing_file(
     value: str, folder: Path, path: KeyPath, where: str, findings: Findings
 ) -> Path | None:
-    """Return the absolute path of a file that is there, relative names taken from `folder`."""
+    """Return the absolute path of a file; None, and an error, where there is none.
+
+    Parameters
+    ----------
+    value : str
+        Its name as the scenario has it.
+    folder : Path
+        Where relative names begin.
+    path : tuple
+        Keys from the top of the document to the value.
+    where : str
+        Words that begin the message.
+    findings : Findings
+        Takes what is found.
+    """
     if "\0" in value:
         findings.error(path, f"{where}: no file can have a null character in its name.")
         return None

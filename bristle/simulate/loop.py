@@ -108,11 +108,23 @@ def compile_loop(
     rows: list[bytes],
     fail: Callable[[Operation | None, int], None],
 ) -> Callable[[Sequence[float]], None]:
-    """Return a function that makes one macro step from each of the times it is given.
+    """Return a function that makes one macro step from each of the times [s] it is given.
 
-    It appends a row per step to `rows`, and calls `fail` with the operation and its status when
-    a call answers anything but OK, and with (None, 0) when a `fault` is not 0; `fail` raises
-    unless the run may go on.
+    Parameters
+    ----------
+    schedule : Schedule
+        The operations of a macro step, in order.
+    memory : Memory
+        Where outputs lie and inputs are gathered.
+    instances : sequence of Instance
+        One per component, by the index that operations give it.
+    step : float
+        Length of the macro step [s].
+    rows : list of bytes
+        A row of outputs is appended per step.
+    fail : callable
+        Called with the operation and its status when a call answers anything but OK, and with
+        (None, 0) when a `fault` is not 0; it raises unless the run may go on.
     """
     names: dict[str, Any] = {"fail": fail, "keep": rows.append, "take": memory.row.tobytes}
     names["real"] = ctypes.c_double.from_param

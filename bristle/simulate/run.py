@@ -109,7 +109,14 @@ def execute(
 ) -> pd.DataFrame:
     """Run a scenario as `run` does, into an output that is closed afterwards.
 
-    With `end_process`, a component that hangs after Ctrl-C costs the process, not the results.
+    Parameters
+    ----------
+    scenario, overrides, engine, progress
+        As in `run`, and what is returned and raised too.
+    output : Output
+        What takes results and log.
+    end_process : bool
+        Whether a component that hangs after Ctrl-C costs the process, not the results.
     """
     try:
         if engine not in ENGINES:

@@ -11,6 +11,8 @@ signals of the scenario stand in one vector `s`; each component is a record (see
 holds its numbers, the slots of its inputs in `s`, and the first of its outputs.
 """
 
+# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
+
 from __future__ import annotations
 
 from math import floor, inf, isfinite
@@ -141,7 +143,14 @@ def play(sources, t, s):
 
 
 def start(dampers, structures, h, s):
-    """Settle the signals at the begin: accelerations and forces may follow each other."""
+    """Settle the signals at the begin: accelerations and forces may follow each other.
+
+    Parameters
+    ----------
+    dampers, structures : arrays of records, see `records`
+    h : length of a substep [s]
+    s : (n,) signals, each in its own unit, changed in place
+    """
     for _ in range(3):
         for i in range(len(structures)):
             b = structures[i]
@@ -225,14 +234,27 @@ def accept(dampers, structures, s):
 
 
 def idle(sampled, coupled, at, h, s):
-    """Do nothing, in place of `sample` where nothing has a clock: the loop compiles sooner."""
+    """Do nothing, in place of `sample` where nothing has a clock: the loop compiles sooner.
+
+    Parameters
+    ----------
+    sampled, coupled, at, h, s
+        As in `sample`.
+    """
 
 
 def sample(sampled, coupled, at, h, s):
-    """Let the components act whose instant substep `at` reaches; the forces follow.
+    """Let the components act whose instant a substep reaches; the forces follow.
 
     Components measure the motion and the dampers' forces with the voltages before, in the order of
     the scenario.
+
+    Parameters
+    ----------
+    sampled, coupled : tuples of arrays, as in `integrate`
+    at : number of the substep that has ended, 0 at the begin
+    h : length of a substep [s]
+    s : (n,) signals, each in its own unit, changed in place
     """
     (records, constants, memory), (dampers, structures) = sampled, coupled
     some = False
@@ -257,7 +279,16 @@ def sample(sampled, coupled, at, h, s):
 
 
 def take_command(c, at, h, constants, memory, s):
-    """Let a controller act at the end of substep `at` (0: the begin)."""
+    """Let a controller act at the end of a substep.
+
+    Parameters
+    ----------
+    c : record of the controller, see `records.sampled_record`
+    at : number of the substep that has ended, 0 at the begin
+    h : length of a substep [s]
+    constants, memory : flat matrices of all controllers; states and room to work of all clocks
+    s : (n,) signals, each in its own unit, changed in place
+    """
     n, size = c.n, c.rows * c.n
     law = ControllerConstants(
         c.kind, c.period, c.v_max, c.velocity_corner, n, c.rows, c.v_top,
@@ -274,7 +305,16 @@ def take_command(c, at, h, constants, memory, s):
 
 
 def take_readings(c, at, h, memory, s):
-    """Let sensors act at the end of substep `at` (0: the begin)."""
+    """Let sensors act at the end of a substep.
+
+    Parameters
+    ----------
+    c : record of the sensors, see `records.sampled_record`
+    at : number of the substep that has ended, 0 at the begin
+    h : length of a substep [s]
+    memory : states and room to work of all components with clocks
+    s : (n,) signals, each in its own unit, changed in place
+    """
     law = SensorConstants(
         c.period, c.seed, c.size, c.gains[:], c.biases[:], c.deviation[:], c.quantisation[:],
         c.corner[:], c.share[:], c.length[:], c.ring[:],

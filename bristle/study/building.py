@@ -104,9 +104,9 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
         return found
     names = study.history.numbers()
     path = study.folder / f"building_{names[-1] + 1 if names else 0}.toml"
-    held = f"{len(runs.train)} training run(s), judged on {len(runs.holdout)} held out"
+    counted = f"{len(runs.train)} training run(s), judged on {len(runs.holdout)} held out"
     origin = (
-        f"Identified from the response: {held}.",
+        f"Identified from the response: {counted}.",
         f"Masses and start values: {model.building or 'the built-in building'}.",
         "Frequencies [Hz]: " + ", ".join(f"{f:.4g}" for f in frequencies(fit.building)),
         "Comments give half of the 95 % interval.",
@@ -115,7 +115,7 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
         write_whole(path, building_text(fit, origin))
     lost = f"; the data cannot tell {', '.join(fit.unidentified)}" if fit.unidentified else ""
     step = study.add_step(
-        "identify the building", f"its response in {held}{lost}",
+        "identify the building", f"its response in {counted}{lost}",
         replace(model, building=path.name), before, after,
     )  # fmt: skip
     return replace(found, file=path, step=step)

@@ -83,10 +83,10 @@ def _table(runs: tuple[Measurement, ...]) -> list[str]:
         rms = float(np.median([np.std(run[channel]) for run in there]))
         share = f"{100.0 * noise / rms:8.2g}" if rms > 0.0 else f"{'':>8}"
         colours = [facts.colour for run in there if (facts := run.noise_facts.get(channel))]
-        told = max(set(colours), key=colours.count) if colours else "given"
+        colour = max(set(colours), key=colours.count) if colours else "given"
         lines.append(
             f"{channel:28} {there[0].units[channel]:6} {low:11.4g} {high:11.4g} {noise:9.2g} "
-            f"{share} % {told}"
+            f"{share} % {colour}"
         )
     return lines
 

@@ -135,11 +135,11 @@ class History:
         """Complete what a process began and did not end; nothing where nothing is pending."""
         if not self.pending.is_file():
             return
-        begun = read_json(self.pending)
-        if "add" in begun and self.path(int(begun["add"])).is_dir():
-            self._make_present(int(begun["add"]))
-        if "undo" in begun:
-            number = int(begun["undo"])
+        unfinished = read_json(self.pending)
+        if "add" in unfinished and self.path(int(unfinished["add"])).is_dir():
+            self._make_present(int(unfinished["add"]))
+        if "undo" in unfinished:
+            number = int(unfinished["undo"])
             self._make_present(max((n for n in self.numbers() if n < number), default=0))
             if self.path(number).is_dir():
                 kept = self.folder / "undone" / self.path(number).name

@@ -52,6 +52,7 @@ def identify_study(
 
     Parameters
     ----------
+    study : the folder, opened
     law : another law to take than the model's; its effects stay where they can join it
     model : a model to take in place of the present one
     cutoff : Hz, of the low-pass for the table of errors; None takes the study's
@@ -153,12 +154,12 @@ def _table(at: SiteModel, task: FitTask) -> list[LawError]:
 
 def _by_site(models: SiteModels) -> list[str]:
     """Return the sentence that tells z by site, none where the one site goes without saying."""
-    held = {at.site.shown: at.site.holdout for at in models.values()}
-    if "" in held:
+    problems = {at.site.shown: at.site.holdout for at in models.values()}
+    if "" in problems:
         return []
-    z = {n: robust_z(p, models[n].model) for n, p in held.items() if p is not None}
-    told = ", ".join(f"{site} {z[site]:.3g}" for site in sorted(z, key=lambda site: -z[site]))
-    return [f"z on held-out runs by site: {told}; the errors' z is the worst site's."]
+    z = {n: robust_z(p, models[n].model) for n, p in problems.items() if p is not None}
+    text = ", ".join(f"{site} {z[site]:.3g}" for site in sorted(z, key=lambda site: -z[site]))
+    return [f"z on held-out runs by site: {text}; the errors' z is the worst site's."]
 
 
 def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
@@ -183,8 +184,10 @@ def identify_frames(
     ----------
     frames : one frame per run, with columns named by channel: `time`, `displacement`, `velocity`,
         `voltage` or `current`, `force`, in SI, or in the unit that a title gives: `force [kN]`
+    law, effects : names of the damper's law and of the effects that are on
     holdout : runs to judge on; None splits a single run in time, and else judges on the training
         runs alone
+    cutoff, starts, table : as `identify_study` takes them
 
     Raises
     ------
@@ -192,13 +195,13 @@ def identify_frames(
         As `identify_study`.
     """
     train = measurements_of_frames(frames, "frame")
-    held = measurements_of_frames(holdout, "held out") if holdout else []
+    held_out = measurements_of_frames(holdout, "held out") if holdout else []
     if not train:
         raise StudyError("no frame is given; one run or more is right.")
     model = _of_law(new_model(law, effects) if law in law_names() else new_model(), law)
-    notes = () if held else ("No run is held out: errors are those of the fit itself.",)
-    runs = Runs(train, held, notes)
-    return _identify(bench_rig(train, held), runs, model, FitTask(cutoff, starts, table))
+    notes = () if held_out else ("No run is held out: errors are those of the fit itself.",)
+    runs = Runs(train, held_out, notes)
+    return _identify(bench_rig(train, held_out), runs, model, FitTask(cutoff, starts, table))
 
 
 def measurements_of_frames(
@@ -265,23 +268,23 @@ def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float
 
 
 def as_model(model: StudyModel) -> Model:
-    """Return a study's model as the fit takes it: values, held parameters and bounds in SI."""
-    held, limits = [], {}
+    """Return a study's model as the fit takes it: values, fixed parameters and bounds in SI."""
+    fixed, limits = [], {}
     for name, value in model.flat().items():
         unit = model.declared(name).unit
         if not value.free:
-            held.append(name)
+            fixed.append(name)
         limits[name] = (convert(value.low, value.unit, unit), convert(value.high, value.unit, unit))
-    return Model(model.base_law, tuple(model.effects), model.values(), tuple(held), limits)
+    return Model(model.base_law, tuple(model.effects), model.values(), tuple(fixed), limits)
 
 
 def _with_fit(model: StudyModel, fit: Fit) -> StudyModel:
     """Return the study's model with the values found; what the data cannot tell has no interval."""
     flat = model.flat()
-    told = [name for name in fit.std if name not in fit.unidentified]
+    identifiable = [name for name in fit.std if name not in fit.unidentified]
     found = model.with_values(
-        {name: _inside(model, name, fit.model.values[name]) for name in told},
-        {name: fit.std[name] for name in told},
+        {name: _inside(model, name, fit.model.values[name]) for name in identifiable},
+        {name: fit.std[name] for name in identifiable},
     )
     silent = [name for name in fit.unidentified if flat[name].free]
     return found.with_values(
@@ -324,10 +327,10 @@ def _doubts(runs: list[Measurement]) -> list[str]:
 
 
 def _why(found: Identified) -> str:
-    runs, held = len(found.train.runs), len(found.holdout.runs) if found.holdout else 0
+    runs, held_out = len(found.train.runs), len(found.holdout.runs) if found.holdout else 0
     lost = ", ".join(found.unidentified)
     return (
-        f"fit to {runs} training run{'s' * (runs != 1)}, judged on {held} held out; "
+        f"fit to {runs} training run{'s' * (runs != 1)}, judged on {held_out} held out; "
         f"{found.fit.agreed} of {found.fit.starts} starts agree"
         + (f"; the data cannot tell {lost}" if lost else "")
     )

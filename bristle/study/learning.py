@@ -97,6 +97,8 @@ def add_effects(
 
     Parameters
     ----------
+    study : the folder, opened
+    names : of the effects
     why : the reason for the history; else the verdict at hand, or "by hand"
     found : the diagnosis that named them: the fit then begins from its values
 
@@ -207,6 +209,7 @@ def diagnose_frames(
     ----------
     frames, holdout : as `identify_frames` takes them; without `holdout` a single run is split in
         time, and of several the last third is held out
+    law, effects : names of the damper's law and of the effects that the model has already
 
     Raises
     ------
@@ -216,13 +219,13 @@ def diagnose_frames(
     from .identification import measurements_of_frames
 
     train = measurements_of_frames(frames, "frame")
-    held = measurements_of_frames(holdout, "held out") if holdout else []
+    held_out = measurements_of_frames(holdout, "held out") if holdout else []
     if not train:
         raise StudyError("no frame is given; one run or more is right.")
-    if not held and len(train) == 1:
+    if not held_out and len(train) == 1:
         runs = split_in_time(train)
-        train, held = runs.train, runs.holdout
-    elif not held:
+        train, held_out = runs.train, runs.holdout
+    elif not held_out:
         count = max(1, len(train) // 3)
-        train, held = train[:-count], train[-count:]
-    return diagnose(train, held, law=law, effects=effects)
+        train, held_out = train[:-count], train[-count:]
+    return diagnose(train, held_out, law=law, effects=effects)

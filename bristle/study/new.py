@@ -49,7 +49,17 @@ def make_folder(
     title: str = "",
     law: str = DEFAULT,
 ) -> Made:
-    """Make a study's folder from files; see `bristle.study.create.create_study`."""
+    """Make a study's folder from files.
+
+    Parameters
+    ----------
+    folder, files, rig, building, channels, title, law : see `bristle.study.create.create_study`
+
+    Raises
+    ------
+    StudyError, RecordError
+        As `create_study`.
+    """
     if folder.exists():
         raise StudyError(f"{folder}: is there already. Take another name, or remove it.")
     if not files:
@@ -200,13 +210,17 @@ def _names(files: list[Path]) -> list[str]:
 def _roles(names: list[str]) -> tuple[list[RunFile], list[str]]:
     """Return the runs with their roles, and why: by their names, else every third is held out."""
     words = [set(re.split(r"[^a-z]+", name.lower())) for name in names]
-    told = ["holdout" if w & _HOLDOUT else "train" if w & _TRAIN else "" for w in words]
+    found = ["holdout" if w & _HOLDOUT else "train" if w & _TRAIN else "" for w in words]
     if len(names) == 1:
         return [RunFile(f"data/{names[0]}", "train")], [
             "there is one run: its last 30 % are held out, which is weaker than a run of its own"
         ]
-    if "holdout" in told and len(set(told) | {"train"}) == 2 and told.count("holdout") < len(told):
-        roles = [role or "train" for role in told]
+    if (
+        "holdout" in found
+        and len(set(found) | {"train"}) == 2
+        and found.count("holdout") < len(found)
+    ):
+        roles = [role or "train" for role in found]
         note = "roles follow the names of the files"
     else:
         roles = ["holdout" if k % 3 == 1 else "train" for k in range(len(names))]
@@ -214,8 +228,8 @@ def _roles(names: list[str]) -> tuple[list[RunFile], list[str]]:
             "every third run is held out; change role in study.toml where another choice is better"
         )
     runs = [RunFile(f"data/{name}", role) for name, role in zip(names, roles, strict=True)]
-    held = ", ".join(name for name, role in zip(names, roles, strict=True) if role == "holdout")
-    return runs, [f"{note}. Held out: {held}"]
+    held_out = ", ".join(name for name, role in zip(names, roles, strict=True) if role == "holdout")
+    return runs, [f"{note}. Held out: {held_out}"]
 
 
 def _twins(files: list[str], digests: Mapping[str, list[str]]) -> list[str]:

@@ -71,7 +71,7 @@ class Study:
             )
         self.history = History(self.folder)
         self._lock = FileLock(self.folder / ".lock")
-        self._complete_what_was_begun()
+        self._complete_unfinished()
         self.own_effects = load_effects(self.effects_folder)
         self.settings: Settings = read_settings(self.folder / "study.toml")
         self._seen = self._state()
@@ -181,6 +181,8 @@ class Study:
         ----------
         what, why : str
             As in "add gas_spring", "verdict of the diagnosis: ...".
+        model : StudyModel
+            The model that is written to model.toml.
         before, after : mapping
             Errors of the two models by name, on training and held-out runs.
 
@@ -250,7 +252,7 @@ class Study:
                 f"{error.filename or self.folder}: cannot be written ({error.strerror or error})."
             ) from None
 
-    def _complete_what_was_begun(self) -> None:
+    def _complete_unfinished(self) -> None:
         if not self.history.pending.is_file():
             return
         try:

@@ -144,7 +144,7 @@ def test_host_tells_a_sound_fmu_from_one_that_loses_its_state(
     library = tmp_path / "toy.so"
     headers = Path(fmpy.__file__).parent / "c-code"
     flags = ["-shared", "-fPIC", f"-DTRAIT={trait}", f"-I{headers}"]
-    source = SOURCE.with_name("toy.c")
+    source = SOURCE.parents[1] / "conformance" / "toy.c"
     subprocess.run([str(COMPILER), *flags, str(source), "-o", str(library)], check=True)
     copy = shutil.copy(library, tmp_path / "copy.so")
     command = [str(host), "-", "strict", str(library), "x", str(copy), "x", "0:0:1", "1"]

@@ -12,12 +12,10 @@ import numpy as np
 from bristle.physics import damper
 from bristle.physics.damper import DamperModel
 from bristle.physics.inputs import Inputs
+from bristle.physics.laws import laws_of
 
-LAWS = ("bingham", "lugre")
-NO_LAW = {
-    "bingham": {"f_c": 0.0, "f_v": 0.0, "c_0": 0.0, "c_v": 0.0},
-    "lugre": {"sigma_a": 0.0, "sigma_0": 0.0, "sigma_1": 0.0, "sigma_2": 0.0, "sigma_b": 0.0},
-}
+LAWS = tuple(law.name for law in laws_of("damper"))
+NO_LAW = {law.name: dict.fromkeys(law.linear(), 0.0) for law in laws_of("damper")}
 """Parameters that leave nothing of a law: what remains is the effects."""
 
 

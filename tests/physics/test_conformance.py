@@ -83,9 +83,9 @@ def names_read(effect: type[Effect]) -> tuple[set[str], set[str], set[str]]:
 # -- class data
 
 
-def test_the_library_has_its_effects() -> None:
+def test_the_library_has_not_lost_an_effect() -> None:
     for site, names in LIBRARY.items():
-        assert [effect.name for effect in effects_of(site)] == sorted(names)
+        assert set(names) <= {effect.name for effect in effects_of(site)}
 
 
 @each_effect

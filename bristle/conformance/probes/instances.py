@@ -47,6 +47,7 @@ def _disturb_parameters(bench: Bench, instance: Instance) -> int:
 
 
 def judged(bench: Bench, difference: str) -> Finding:
+    """Judge a difference between two runs: a failure, or a note where the FMU repeats no run."""
     if bench.plan.repeatable:
         return failed(difference)
     return noted(f"cannot be judged, since no two runs are equal: {difference}")

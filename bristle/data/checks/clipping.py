@@ -40,7 +40,8 @@ def stands_at_top(values: Array, near: float, longest: int, crowded: float) -> b
 
     Parameters
     ----------
-    near : distance from the largest value that counts as equal
+    values : (n,) in the channel's unit
+    near : distance from the largest value that counts as equal, in the same unit
     longest : samples of a stretch at a turn at the most
     crowded : how many times as many samples as one step below a cut holds at the least
     """

@@ -80,23 +80,23 @@ def look_at_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
     if np.ptp(force) == 0.0 or np.ptp(velocity) == 0.0:
         return
     share, agree = power_factor(force, velocity)
-    words = f"share of the power that it could dissipate: {share:+.2f}"
-    told = tells_sign(share, agree, len(force))
-    if told and share < 0.0:
+    text = f"share of the power that it could dissipate: {share:+.2f}"
+    known = tells_sign(share, agree, len(force))
+    if known and share < 0.0:
         yield Finding(
             "sign",
             "error",
-            f"force drives the motion, for it is positive along it ({words}).",
+            f"force drives the motion, for it is positive along it ({text}).",
             "Turn sign in [channels.force]: a force is positive when it resists motion along +x.",
             run.name,
             "force",
             -share,
         )
-    elif not told:
+    elif not known:
         yield Finding(
             "sign",
             "warning",
-            f"force neither resists nor drives the motion ({words}): its sign cannot be told.",
+            f"force neither resists nor drives the motion ({text}): its sign cannot be told.",
             "Check that force and motion were recorded together.",
             run.name,
             "force",
@@ -155,12 +155,12 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
             **where,
         )
     else:
-        told = off > max(_GAIN, 4.0 * found.gain_std)
+        certain = off > max(_GAIN, 4.0 * found.gain_std)
         yield Finding(
             "gain",
-            "warning" if told else "note",
+            "warning" if certain else "note",
             f"{gain}{after}.",
-            "One of the two instruments is out of calibration." if told else "",
+            "One of the two instruments is out of calibration." if certain else "",
             value=off,
             **where,
         )

@@ -32,6 +32,7 @@ class Layout:
     numeric: list[bool]
 
     def split(self, line: str) -> list[str]:
+        """Return the fields of a line."""
         if not self.delimiter:
             return line.split()
         if '"' in line:
@@ -101,7 +102,21 @@ def read_fast(lines: list[str], first: int, layout: Layout) -> Body | None:
 
 
 def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
-    """Read rows one by one, so that what is wrong has a line."""
+    """Read rows one by one, so that what is wrong has a line.
+
+    Parameters
+    ----------
+    lines : the whole text, line by line
+    first : index of the first line of data; lines before it are not read
+    layout : how fields are separated, and which columns hold numbers
+    name : the file, for messages
+
+    Raises
+    ------
+    RecordError
+        If a row has more or fewer fields than `layout` has columns; a last row that is cut short is
+        left out instead.
+    """
     wide = len(layout.numeric)
     rows: list[list[float]] = []
     places: list[int] = []

@@ -93,8 +93,8 @@ def _find_time(table: Table) -> tuple[Guess | None, float]:
         rising = float(np.mean(spacing > 0.0)) > 0.98
         unit = column.unit.name if column.unit else ""
         timed = quantity_of_unit(unit) == "time" if unit else False
-        told = meaning(column.name, unit or None)
-        named = told is not None and told.quantity == "time"
+        meant = meaning(column.name, unit or None)
+        named = meant is not None and meant.quantity == "time"
         if not (named or (timed and rising) or (rising and column.index == 0 and not unit)):
             continue
         if unit and not timed:

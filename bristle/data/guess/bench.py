@@ -61,11 +61,11 @@ def _best_force(search: Search, forces: list[Candidate], chosen: dict[str, Candi
         for one in forces
         if one is not best
     )
-    told = f"{best.reason}; its share of dissipated power is {abs(share[best.column.text]):.2f}"
+    reason = f"{best.reason}; its share of dissipated power is {abs(share[best.column.text]):.2f}"
     doubt = ""
     if by_power is not best and abs(share[by_power.column.text]) > 0.1:
         doubt = f'"{by_power.column.text}" dissipates more'
-    return replace(best, reason=f"{told} ({others})", doubt=doubt)
+    return replace(best, reason=f"{reason} ({others})", doubt=doubt)
 
 
 def _from_data(search: Search, chosen: dict[str, Candidate]) -> None:
@@ -95,13 +95,13 @@ def _from_data(search: Search, chosen: dict[str, Candidate]) -> None:
         ]
         best = max(pairs, key=lambda pair: pair[0], default=None)
         if best is not None and best[0] > 0.98:
-            words = f"correlation {best[0]:.4f}"
+            reason = f"correlation {best[0]:.4f}"
             x, v = best[1], best[2]
             chosen["displacement"] = Candidate(
-                x, "displacement", "", 1, f'"{v.text}" is its derivative ({words})'
+                x, "displacement", "", 1, f'"{v.text}" is its derivative ({reason})'
             )
             chosen["velocity"] = Candidate(
-                v, "velocity", "", 1, f'it is the derivative of "{x.text}" ({words})'
+                v, "velocity", "", 1, f'it is the derivative of "{x.text}" ({reason})'
             )
             free = [c for c in free if c.text not in (x.text, v.text)]
     _rest_from_data(search, chosen, free)
@@ -112,18 +112,18 @@ def _rest_from_data(search: Search, chosen: dict[str, Candidate], free: list[Col
         switched = [c for c in free if is_switched(search.column(c.text))]
         positive = [c for c in switched if search.column(c.text).min() >= 0.0]
         if len(positive) == 1:
-            words = "the only free column that is switched and never negative"
-            chosen["voltage"] = Candidate(positive[0], "voltage", "", 1, words)
+            reason = "the only free column that is switched and never negative"
+            chosen["voltage"] = Candidate(positive[0], "voltage", "", 1, reason)
             free = [c for c in free if c is not positive[0]]
     velocity = velocity_of(search, chosen)
     if "force" not in chosen and velocity is not None:
         shares = {c.text: abs(power_factor(search.column(c.text), velocity)[0]) for c in free}
         best = max(free, key=lambda c: shares[c.text], default=None)
         if best is not None and shares[best.text] > 0.3:
-            words = (
+            reason = (
                 f"of the free columns it dissipates most, {shares[best.text]:.2f} of what it could"
             )
-            chosen["force"] = Candidate(best, "force", "", 1, words)
+            chosen["force"] = Candidate(best, "force", "", 1, reason)
 
 
 def _rises(values: Array) -> bool:

@@ -60,17 +60,17 @@ def candidate_of(search: Search, column: Column, time: str) -> Candidate | None:
         fits = unit and quantity_of_unit(unit) == quantity_of_unit(channel_unit(exact))
         if fits or not unit:
             return Candidate(column, exact, unit, 5, "its name")
-    told = meaning(column.name, unit or None)
+    meant = meaning(column.name, unit or None)
     by_unit = quantity_of_unit(unit) if unit else None
-    if told is None:
+    if meant is None:
         if by_unit in (None, "time"):
             return None
         return Candidate(column, str(by_unit), unit, 1, f"its unit, {unit}")
-    return _by_name(column, told, unit, by_unit)
+    return _by_name(column, meant, unit, by_unit)
 
 
-def _by_name(column: Column, told: Meaning, unit: str, by_unit: str | None) -> Candidate | None:
-    quantity, doubt = told.quantity, ""
+def _by_name(column: Column, meant: Meaning, unit: str, by_unit: str | None) -> Candidate | None:
+    quantity, doubt = meant.quantity, ""
     wanted = "displacement" if quantity == "drift" else quantity
     if unit and by_unit not in (wanted, None, "time") and len(column.name) == 1:
         return Candidate(column, str(by_unit), unit, 1, f"its unit, {unit}")  # a letter says little
@@ -80,7 +80,9 @@ def _by_name(column: Column, told: Meaning, unit: str, by_unit: str | None) -> C
         # The ending of a name need not be a unit: "voltage_in" is in no inches.
         doubt, unit = f'"{unit}" at the end of the name is not taken as a unit', ""
     reason = f"its name and its unit, {unit}" if unit else "its name"
-    return Candidate(column, quantity, unit, told.rank, reason, told.place, told.number, 1, doubt)
+    return Candidate(
+        column, quantity, unit, meant.rank, reason, meant.place, meant.number, 1, doubt
+    )
 
 
 def usable(values: Array) -> NDArray[np.bool_]:
@@ -98,6 +100,6 @@ def velocity_of(search: Search, chosen: dict[str, Candidate]) -> Array | None:
     return None
 
 
-def joined(*words: str) -> str:
-    """Return words that are not empty, parted by semicolons."""
-    return "; ".join(word for word in words if word)
+def joined(*texts: str) -> str:
+    """Return texts that are not empty, parted by semicolons."""
+    return "; ".join(word for word in texts if word)

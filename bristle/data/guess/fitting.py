@@ -35,8 +35,8 @@ def fit_units(search: Search, chosen: dict[str, Candidate]) -> dict[str, Candida
         )
         if found is None or abs(found.correlation) < 0.9:
             doubt = "nothing moves" if found is None else f"correlation {found.correlation:.2f}"
-            words = f'it is not the derivative of "{x.column.text}" ({doubt})'
-            out[upper] = replace(v, doubt=joined(v.doubt, words))
+            text = f'it is not the derivative of "{x.column.text}" ({doubt})'
+            out[upper] = replace(v, doubt=joined(v.doubt, text))
             continue
         out[lower], out[upper] = _units_from(x, v, found, lower, upper)
     return out
@@ -50,21 +50,21 @@ def _units_from(
     if x.unit and v.unit:
         ratio = gain * parse_unit(v.unit).factor / parse_unit(x.unit).factor
         if not 0.8 < ratio < 1.25:
-            words = (
+            text = (
                 f'it is {ratio:.4g} times the derivative of "{x.column.text}": is '
                 f"{v.unit} or {x.unit} wrong?"
             )
-            return x, replace(v, doubt=joined(v.doubt, words))
-        told = f'{found.gain * ratio / gain:.3g} times the derivative of "{x.column.text}"'
-        return x, replace(v, reason=f"{v.reason}; it is {told}")
+            return x, replace(v, doubt=joined(v.doubt, text))
+        gain_text = f'{found.gain * ratio / gain:.3g} times the derivative of "{x.column.text}"'
+        return x, replace(v, reason=f"{v.reason}; it is {gain_text}")
     if x.unit:
         unit = _nearest(parse_unit(x.unit).factor / gain, upper)
-        words = f'unit from the derivative of "{x.column.text}" (gain {found.gain:.4g})'
-        return x, replace(v, unit=unit, reason=f"{v.reason}; {words}") if unit else v
+        text = f'unit from the derivative of "{x.column.text}" (gain {found.gain:.4g})'
+        return x, replace(v, unit=unit, reason=f"{v.reason}; {text}") if unit else v
     if v.unit:
         unit = _nearest(parse_unit(v.unit).factor * gain, lower)
-        words = f'unit from "{v.column.text}", its derivative (gain {found.gain:.4g})'
-        return (replace(x, unit=unit, reason=f"{x.reason}; {words}") if unit else x), v
+        text = f'unit from "{v.column.text}", its derivative (gain {found.gain:.4g})'
+        return (replace(x, unit=unit, reason=f"{x.reason}; {text}") if unit else x), v
     return x, v
 
 
@@ -82,14 +82,14 @@ def fit_signs(search: Search, chosen: dict[str, Candidate], rig: str) -> dict[st
     x, v, f = before + "displacement", before + "velocity", "force"
     out = dict(chosen)
     if x in out and v in out:
-        sign, words = velocity_sign(search, out[x].column.text, out[v].column.text)
-        out[v] = replace(out[v], sign=sign, reason=joined(out[v].reason, words))
+        sign, text = velocity_sign(search, out[x].column.text, out[v].column.text)
+        out[v] = replace(out[v], sign=sign, reason=joined(out[v].reason, text))
     moving = {name.removeprefix("base_"): out[name] for name in (x, v) if name in out}
     velocity = velocity_of(search, moving)
     if f in out and velocity is not None:
         along = velocity * (out[v].sign if v in out else 1)
-        sign, words, doubt = force_sign(search.column(out[f].column.text), along)
-        reason, doubt = joined(out[f].reason, words), joined(out[f].doubt, doubt)
+        sign, text, doubt = force_sign(search.column(out[f].column.text), along)
+        reason, doubt = joined(out[f].reason, text), joined(out[f].doubt, doubt)
         out[f] = replace(out[f], sign=sign, reason=reason, doubt=doubt)
     for drive in DRIVE:
         if drive in out:

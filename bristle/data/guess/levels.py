@@ -23,10 +23,10 @@ def structure_guesses(candidates: list[Candidate], levels: list[str]) -> dict[st
     chosen: dict[str, Candidate] = {}
     named_base = any(c.place == "base" for c in candidates)
     for candidate in sorted(candidates, key=lambda one: -one.rank):
-        channel, words = _channel(candidate, levels, named_base)
+        channel, text = _channel(candidate, levels, named_base)
         if channel is None or channel in chosen or (candidate.rank == 0):
             continue
-        chosen[channel] = replace(candidate, reason=f"{candidate.reason}{words}")
+        chosen[channel] = replace(candidate, reason=f"{candidate.reason}{text}")
     return chosen
 
 
@@ -42,15 +42,15 @@ def _channel(candidate: Candidate, levels: list[str], named_base: bool) -> tuple
         return None, ""
     if candidate.place == "ground":
         return ("ground_acceleration", "") if quantity == "acceleration" else (None, "")
-    level, words = candidate.place, ""
+    level, text = candidate.place, ""
     if not level and candidate.number is not None:
         offset = candidate.number - (0 if named_base and levels[0] == "base" else 1)
         if not 0 <= offset < len(levels):
             return None, ""
         level = levels[offset]
-        words = f"; number {candidate.number} of the levels, counted from the lowest, is {level}"
+        text = f"; number {candidate.number} of the levels, counted from the lowest, is {level}"
     if not level and quantity != "acceleration":
-        level, words = levels[0], f"; without a number it is taken as that of {levels[0]}"
+        level, text = levels[0], f"; without a number it is taken as that of {levels[0]}"
     if not level:
         return "ground_acceleration", "; without a number it is taken as that of the ground"
-    return f"{level}_{_ENDINGS[quantity]}", words
+    return f"{level}_{_ENDINGS[quantity]}", text

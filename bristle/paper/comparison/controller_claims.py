@@ -39,6 +39,7 @@ from .numbers import (
 
 
 def between(n: Numbers) -> Verdict:
+    """Decide whether only the LPV controller uses voltages between the limits."""
     switch = max(n.value(case, CLIPPED, "between") for case in n.cases())
     scheduled = min(n.value(case, LPV, "between") for case in n.cases())
     return Verdict(
@@ -49,6 +50,8 @@ def between(n: Numbers) -> Verdict:
 
 
 def inverses(n: Numbers) -> Verdict:
+    """Decide whether the LuGre inverse does better than the Bingham inverse."""
+
     def peak(case: Key) -> float:
         return n.lower(case, HINF, BINGHAM, PEAK_Y)
 
@@ -57,17 +60,20 @@ def inverses(n: Numbers) -> Verdict:
 
     peaks, values = [peak(c) for c in n.cases()], [rms(c) for c in n.cases()]
     better = sum(value > 0.0 for value in values)
-    said = (
+    measured = (
         f"with the LuGre inverse the RMS of y is lower in {better} of {len(values)} cases (by "
         f"{min(values):.0f} to {max(values):.0f} %), its peak in {sum(p > 0 for p in peaks)} (by "
         f"{min(peaks):.0f} to {max(peaks):.0f} %)"
     )
     share = (sum(p > 0 for p in peaks) + better) / (2 * len(values))
     verdict = REPRODUCED if share > 0.75 else NOT if share <= 0.5 else UNDECIDABLE
-    return Verdict(verdict, said, "The plant is a LuGre damper, which its inverse knows exactly.")
+    return Verdict(
+        verdict, measured, "The plant is a LuGre damper, which its inverse knows exactly."
+    )
 
 
 def roll_off(n: Numbers) -> Verdict:
+    """Decide whether the weight rolls off below the first mode."""
     first, corner = n.facts["first_mode"], n.facts["weight_corner"]
     return Verdict(
         verdict_word(near(first, 13.0, 0.05) and corner < first),
@@ -80,6 +86,7 @@ def roll_off(n: Numbers) -> Verdict:
 
 
 def anti_windup(n: Numbers) -> Verdict:
+    """Decide whether anti-windup lowers the peak acceleration and the largest command."""
     case = n.strong
     peaks = [n.value(case, law, PEAK_Y) for law in (LPV_0, LPV, LPV_400)]
     commands = [n.value(case, law, "peak command") for law in (LPV_0, LPV, LPV_400)]
@@ -118,14 +125,18 @@ def _percentages(n: Numbers, law: str, weak: float, strong: float) -> Verdict:
 
 
 def lpv_against_clipped(n: Numbers) -> Verdict:
+    """Decide whether LPV has peaks as far below clipped as stated."""
     return _percentages(n, LPV, 30.0, 25.0)
 
 
 def hinf_against_clipped(n: Numbers) -> Verdict:
+    """Decide whether H-infinity has peaks as far below clipped as stated."""
     return _percentages(n, HINF, 7.0, 22.0)
 
 
 def lpv_against_hinf(n: Numbers) -> Verdict:
+    """Decide whether the LPV controller has lower peaks than the H-infinity controller."""
+
     def low(case: Key) -> float:
         return n.lower(case, LPV, HINF, PEAK_Y)
 
@@ -135,6 +146,8 @@ def lpv_against_hinf(n: Numbers) -> Verdict:
 
 
 def drift_passive(n: Numbers) -> Verdict:
+    """Decide whether no controller has a lower peak drift than 4 V."""
+
     def excess(case: Key) -> float:
         best = min(n.value(case, law, PEAK_X) for law in CONTROLLERS)
         return 100.0 * (n.value(case, FOUR, PEAK_X) / best - 1.0)
@@ -147,6 +160,8 @@ def drift_passive(n: Numbers) -> Verdict:
 
 
 def drift_controllers(n: Numbers) -> Verdict:
+    """Decide whether LPV and H-infinity have like peak drifts, and LPV the lower RMS."""
+
     def peak(case: Key) -> float:
         return n.lower(case, LPV, HINF, PEAK_X)
 
@@ -167,6 +182,8 @@ def drift_controllers(n: Numbers) -> Verdict:
 
 
 def force(n: Numbers) -> Verdict:
+    """Decide whether 4 V has a lower peak force and a larger RMS force than every controller."""
+
     def below(case: Key) -> list[float]:
         return [n.lower(case, FOUR, law, PEAK_F) for law in CONTROLLERS]
 
@@ -185,6 +202,8 @@ def force(n: Numbers) -> Verdict:
 
 
 def voltage(n: Numbers) -> Verdict:
+    """Decide whether clipped has the lowest RMS voltage and the other two have like ones."""
+
     def ratio(case: Key) -> float:
         others = [n.value(case, law, RMS_V) for law in (HINF, LPV)]
         return n.value(case, CLIPPED, RMS_V) / min(others)
@@ -204,6 +223,7 @@ def voltage(n: Numbers) -> Verdict:
 
 
 def windows(n: Numbers) -> Verdict:
+    """Decide whether motions, intensities and lengths of the runs are the stated ones."""
     wanted = {(EL_CENTRO, 0.2), (EL_CENTRO, 0.6)}
     north = [case for case in n.cases() if case[0] != EL_CENTRO]
     seconds = n.facts["paper_windows"]
@@ -223,6 +243,7 @@ def windows(n: Numbers) -> Verdict:
 
 
 def without_damper(n: Numbers) -> Verdict:
+    """Decide whether the building alone is linear and damped as stated."""
     per_g = [n.value(case, NONE, PEAK_Y) / case[1] for case in n.cases() if case[0] == EL_CENTRO]
     linear = max(per_g) / min(per_g) - 1.0
     ratio = n.facts["damping_ratio"]

@@ -159,7 +159,15 @@ def compare(
 def scenario(
     motion: Motion, intensity: float, law: str, controllers: dict[str, Path]
 ) -> tuple[str, dict[str, object]]:
-    """Return the stock scenario and the overrides of a case."""
+    """Return the stock scenario and the overrides of a case.
+
+    Parameters
+    ----------
+    motion : the ground motion
+    intensity : nominal peak [g]
+    law : one of `LAWS`, `OTHERS` or `LPV_400`
+    controllers : files of the controllers "hinf" and "lpv", of those that the law needs
+    """
     name, settings = _PLANTS[law]
     overrides: dict[str, object] = {
         "run.stop": max(motion.window, motion.paper_window),
@@ -177,9 +185,18 @@ def scenario(
 def measured(frame: pd.DataFrame, motion: Motion, intensity: float, law: str) -> dict[str, Any]:
     """Return the row of a run.
 
-    Keys are "motion", "intensity [g]", "law"; of each quantity "peak ...", "rms ..." over the
-    record and "paper window rms ..." over the paper's window; "peak command" before limits, in
-    the command's unit; "between", the share of samples at which the voltage lies between 0 and 8 V.
+    Parameters
+    ----------
+    frame : the run's results, indexed by time [s], in SI
+    motion, intensity, law : the case; intensity in g
+
+    Returns
+    -------
+    dict
+        Keys are "motion", "intensity [g]", "law"; of each quantity "peak ...", "rms ..." over the
+        record and "paper window rms ..." over the paper's window; "peak command" before limits, in
+        the command's unit; "between", the share of samples at which the voltage lies between 0 and
+        8 V.
     """
     row: dict[str, Any] = {"motion": motion.name, "intensity [g]": intensity, "law": law}
     time = frame.index.to_numpy()

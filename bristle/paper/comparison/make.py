@@ -98,11 +98,11 @@ def make(folder: Path, newhall: Path | None = None, progress: bool = False) -> R
     tables = {"table4": published_table(comparison, northridge=False)}
     if len(found) > 1:
         tables["table5"] = published_table(comparison, northridge=True)
-    judged = ledger(numbers)
+    claims = ledger(numbers)
     files = [folder / f"{name}.png" for name in figures] + [folder / f"{k}.json" for k in KINDS]
-    files += _write_tables(folder, comparison, tables, judged)
+    files += _write_tables(folder, comparison, tables, claims)
     report = Report(
-        comparison, numbers, judged, tables, figures, folder, [folder / REPORT, *files],
+        comparison, numbers, claims, tables, figures, folder, [folder / REPORT, *files],
         time.perf_counter() - began,
     )  # fmt: skip
     _write(folder / REPORT, page_of.page(report))
@@ -116,18 +116,18 @@ def designing(folder: Path) -> Iterator[Callable[[], dict[str, Path]]]:
     Yields a function that waits for them and returns their files.
     """
     search = os.pathsep.join([str(_PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
-    with tempfile.TemporaryFile("w+") as said:
+    with tempfile.TemporaryFile("w+") as errors:
         child = subprocess.Popen(
             [sys.executable, "-m", "bristle.paper.reference", "--out", str(folder.absolute()),
              "--only", *KINDS],
-            env={**os.environ, "PYTHONPATH": search}, stdout=subprocess.DEVNULL, stderr=said,
+            env={**os.environ, "PYTHONPATH": search}, stdout=subprocess.DEVNULL, stderr=errors,
         )  # fmt: skip
 
         @cache
         def wait() -> dict[str, Path]:
             if child.wait() != 0:
-                said.seek(0)
-                raise DesignError(f"a design failed: {said.read().strip()[-500:]}")
+                errors.seek(0)
+                raise DesignError(f"a design failed: {errors.read().strip()[-500:]}")
             return {kind: folder / f"{kind}.json" for kind in KINDS}
 
         try:
@@ -157,11 +157,11 @@ def _write_tables(
     folder: Path,
     comparison: Comparison,
     tables: dict[str, pd.DataFrame],
-    judged: list[tuple[Statement, Verdict]],
+    claims: list[tuple[Statement, Verdict]],
 ) -> list[Path]:
     import pandas as pd
 
-    rows = [(s.number, s.section, s.text, v.verdict, v.measured, s.rule, v.why) for s, v in judged]
+    rows = [(s.number, s.section, s.text, v.verdict, v.measured, s.rule, v.why) for s, v in claims]
     names = ["number", "section", "statement", "verdict", "measured", "decided by", "why"]
     written = []
     frames = {**tables, "comparison": comparison.table, "ledger": pd.DataFrame(rows, columns=names)}

@@ -23,6 +23,7 @@ from .numbers import (
 
 
 def rig(n: Numbers) -> Verdict:
+    """Decide whether sample rate, force, stroke, stiffness and frequencies are the stated ones."""
     f = n.facts
     frequencies = f["frequencies"]
     holds = (
@@ -42,27 +43,30 @@ def rig(n: Numbers) -> Verdict:
 
 
 def flattening(n: Numbers) -> Verdict:
+    """Decide whether the steady force falls again at high speed."""
     steady = n.facts["steady"]
     holds = all(c[-1] < 0.98 * max(c) and c[-1] <= c[-2] for c in steady.values())
-    said = "; ".join(f"{V:g} V: {max(c):.2f} to {c[-1]:.2f} N" for V, c in steady.items())
+    measured = "; ".join(f"{V:g} V: {max(c):.2f} to {c[-1]:.2f} N" for V, c in steady.items())
     return Verdict(
         verdict_word(holds),
-        f"largest force to that at {n.facts['speeds'][-1]:g} m/s: {said}",
+        f"largest force to that at {n.facts['speeds'][-1]:g} m/s: {measured}",
         "Built into the law.",
     )
 
 
 def jump(n: Numbers) -> Verdict:
+    """Decide whether the force rises over that at high speed, the less the higher the voltage."""
     rises = {V: max(curve) / curve[-1] - 1.0 for V, curve in n.facts["steady"].items()}
     values = list(rises.values())
     holds = min(values) > 0.05 and all(a > b for a, b in pairwise(values))
-    said = ", ".join(f"{100 * rise:.0f} % at {V:g} V" for V, rise in rises.items())
+    measured = ", ".join(f"{100 * rise:.0f} % at {V:g} V" for V, rise in rises.items())
     return Verdict(
-        verdict_word(holds), f"rise over the force at high speed: {said}", "Built into the law."
+        verdict_word(holds), f"rise over the force at high speed: {measured}", "Built into the law."
     )
 
 
 def stiction(n: Numbers) -> Verdict:
+    """Decide whether stiction shows in the peaks at the low voltage and not at the high one."""
     lugre: Any = n.peaks[n.peaks["law"] == "LuGre"].groupby("voltage [V]")
     over = {
         float(V): (float(part["height [m/s2]"].median()), float(part["crest [m/s2]"].iloc[0]))
@@ -79,28 +83,30 @@ def stiction(n: Numbers) -> Verdict:
 
 
 def better_law(n: Numbers) -> Verdict:
+    """Decide whether the LuGre law fits better than the Bingham law."""
     parts = {s: n.fits[n.fits["specimen"] == s].set_index("law")["share"] for s in STIFFNESS}
     ratios = {s: (float(p["LuGre"]), float(p["Bingham"])) for s, p in parts.items()}
-    said = "; ".join(
+    measured = "; ".join(
         f"{s}: LuGre {100 * a:.1f} %, Bingham {100 * b:.1f} % of the force" for s, (a, b) in
         ratios.items()
     )  # fmt: skip
     return Verdict(
-        verdict_word(all(a < b for a, b in ratios.values())), said,
+        verdict_word(all(a < b for a, b in ratios.values())), measured,
         "The specimen here is itself a LuGre damper; the paper's data are lost. So this says that "
         "bristles show in such a test, not that a real damper has them.",
     )  # fmt: skip
 
 
 def modified_law(n: Numbers) -> Verdict:
+    """Decide whether the exponential lowers the error of both laws as far as stated."""
     gains = {s: (100 * gain(n.fits, s, "Bingham"), 100 * gain(n.fits, s, "LuGre"))
              for s in STIFFNESS}  # fmt: skip
     close = [abs(b - 5.0) <= POINTS and abs(u - 15.0) <= POINTS for b, u in gains.values()]
-    said = "; ".join(f"{s}: Bingham {b:.0f} %, LuGre {u:.0f} % lower" for s, (b, u) in
+    measured = "; ".join(f"{s}: Bingham {b:.0f} %, LuGre {u:.0f} % lower" for s, (b, u) in
                      gains.items())  # fmt: skip
     verdict = REPRODUCED if all(close) else UNDECIDABLE if any(close) else NOT
     return Verdict(
-        verdict, said,
+        verdict, measured,
         "A known conflict: with these parameters the exponential matters far more to the LuGre "
         "law. Tables II and III, which would decide, are lost.",
     )  # fmt: skip
@@ -118,21 +124,23 @@ def _curves(n: Numbers) -> dict[str, dict[float, float]]:
 
 
 def optimum(n: Numbers) -> Verdict:
+    """Decide whether the stated voltages are as good as the best, intensity by intensity."""
     curves = _curves(n)
     excess = {g: curves[g][V] / min(curves[g].values()) - 1.0 for g, V in OPTIMA.items()}
-    said = ", ".join(
+    measured = ", ".join(
         f"{g}: least at {min(curve, key=lambda V, c=curve: c[V]):g} V"  # type: ignore[misc]
         for g, curve in curves.items()
     )
     return Verdict(
         verdict_word(max(excess.values()) <= AS_GOOD),
-        f"{said}; the text's voltages lie at most {100 * max(excess.values()):.1f} % above",
+        f"{measured}; the text's voltages lie at most {100 * max(excess.values()):.1f} % above",
         "With the motion at 0.45 of its nominal peak, a reconstruction: at full size no set of "
         "damper parameters that was tried gives this.",
     )
 
 
 def four_volts(n: Numbers) -> Verdict:
+    """Decide whether 4 V is near the best at more intensities than any other voltage."""
     curves = _curves(n)
     good: dict[float, int] = {}
     for curve in curves.values():

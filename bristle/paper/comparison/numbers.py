@@ -65,7 +65,14 @@ class Numbers:
         return float(index.loc[(*case, law), quantity])
 
     def lower(self, case: Key, law: str, other: str, quantity: str) -> float:
-        """Return by how many percent a law's number lies below another's."""
+        """Return by how many percent a law's number lies below another's.
+
+        Parameters
+        ----------
+        case : motion and intensity [g]
+        law, other : names of the two laws
+        quantity : column of the table, such as `PEAK_Y`
+        """
         return 100.0 * (1.0 - self.value(case, law, quantity) / self.value(case, other, quantity))
 
     def weak(self) -> list[Key]:
@@ -87,14 +94,17 @@ class Verdict:
 
 
 def verdict_word(holds: bool) -> str:
+    """Return the verdict's word for a statement that holds, or does not."""
     return REPRODUCED if holds else NOT
 
 
 def near(value: float, wanted: float, share: float) -> bool:
+    """Return whether a value lies within a share [1] of the one that is wanted."""
     return abs(value - wanted) <= share * abs(wanted)
 
 
 def named(case: Key) -> str:
+    """Return a case in words: its motion and its intensity [g]."""
     return f"{case[0]} {case[1]:g} g"
 
 
@@ -115,6 +125,7 @@ def grouped(cases: list[Key]) -> dict[str, list[Key]]:
 
 
 def cases_text(cases: list[Key]) -> str:
+    """Return cases in words, by motion, the weakest first."""
     return "; ".join(
         f"{motion} {', '.join(f'{intensity:g}' for _, intensity in sorted(group))} g"
         for motion, group in grouped(cases).items()
@@ -126,14 +137,21 @@ def by_record(n: Numbers, holds: Callable[[Key], bool], measured: str, why: str 
 
     It is not reproduced where it fails on El Centro, and undecidable where it holds on that and
     fails on a Northridge record, for another station may have been meant.
+
+    Parameters
+    ----------
+    n : the numbers of all cases
+    holds : whether the order holds in a case, a motion and its intensity [g]
+    measured : the numbers behind it, in a sentence
+    why : what to know of it, in sentences
     """
     failed = [case for case in n.cases() if not holds(case)]
     count = f"holds in {len(n.cases()) - len(failed)} of {len(n.cases())} cases"
-    said = f"{count}. {measured}"
+    text = f"{count}. {measured}"
     if not failed:
-        return Verdict(REPRODUCED, said, why)
+        return Verdict(REPRODUCED, text, why)
     where = f"Fails at {cases_text(failed)}."
     if any(case[0] == EL_CENTRO for case in failed):
-        return Verdict(NOT, said, f"{where} {why}".strip())
+        return Verdict(NOT, text, f"{where} {why}".strip())
     open_ = "The text does not name the Northridge station, and the order depends on the record."
-    return Verdict(UNDECIDABLE, said, f"{where} {open_} {why}".strip())
+    return Verdict(UNDECIDABLE, text, f"{where} {open_} {why}".strip())

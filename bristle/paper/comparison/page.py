@@ -98,7 +98,7 @@ def page(report: Report) -> str:
     parts = [
         _head(report, count),
         _setting(report),
-        _ledger(report.ledger),
+        _claims_table(report.ledger),
         *(_table(_TITLES[name], name, table) for name, table in report.tables.items()),
         _figures(report),
         _designs(report),
@@ -161,14 +161,14 @@ be compared; values cannot.</p>
 """
 
 
-def _ledger(judged: list[tuple[Statement, Verdict]]) -> str:
+def _claims_table(claims: list[tuple[Statement, Verdict]]) -> str:
     rows = "".join(
         f"<tr><td>{s.number}</td>"
-        f'<td class="what">{_said(s.text)}<small>Section {escape(s.section)}</small></td>'
+        f'<td class="what">{_text(s.text)}<small>Section {escape(s.section)}</small></td>'
         f'<td><span class="badge {_CLASSES[v.verdict]}">{v.verdict}</span></td>'
-        f"<td>{_said(v.measured)}{_small(v.why)}<small><b>Decided by:</b> {_said(s.rule, False)}."
+        f"<td>{_text(v.measured)}{_small(v.why)}<small><b>Decided by:</b> {_text(s.rule, False)}."
         "</small></td></tr>\n"
-        for s, v in judged
+        for s, v in claims
     )
     return f"""<section>
 <h2 id="ledger">The ledger</h2>
@@ -183,10 +183,10 @@ weakest to the strongest intensity.</p>
 
 
 def _small(text: str) -> str:
-    return f"<small>{_said(text)}</small>" if text else ""
+    return f"<small>{_text(text)}</small>" if text else ""
 
 
-def _said(text: str, sentence: bool = True) -> str:
+def _text(text: str, sentence: bool = True) -> str:
     """Return a text as HTML: numbers stay with their units, a sentence begins with a capital."""
     if sentence:
         text = text[:1].upper() + text[1:]

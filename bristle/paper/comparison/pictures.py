@@ -99,7 +99,17 @@ def anti_windup(c: Comparison) -> Page:
 
 def histories(c: Comparison, motion: str, column: str, what: str, unit: str, factor: float,
               laws: tuple[str, ...], figure: str) -> Page:  # fmt: skip
-    """Draw one response over time at a weak and a strong intensity, a panel per law."""
+    """Draw one response over time at a weak and a strong intensity, a panel per law.
+
+    Parameters
+    ----------
+    c : the runs
+    motion : name of the ground motion
+    column, factor : of the results, and what brings its SI values to `unit`
+    what, unit : name and unit of the response, for title and axes
+    laws : a panel for each
+    figure : number of the paper's figure
+    """
     listed = next(m for m in c.motions if m.name == motion).intensities
     weak, strong = listed[0], 0.6 if 0.6 in listed else listed[-1]
     peaks = {
@@ -248,10 +258,10 @@ def voltages(c: Comparison) -> Page:
         loop.plot(1e3 * own["structure.base_velocity"], own["damper.force"], color=COLOUR[law],
                   linewidth=0.5)  # fmt: skip
         loop.set_title("force [N]")
-        for panel, words in ((axes, "time [s]"), (loop, "velocity [mm/s]")):
+        for panel, axis_name in ((axes, "time [s]"), (loop, "velocity [mm/s]")):
             panel.tick_params(labelbottom=row == 2)
             if row == 2:
-                panel.set_xlabel(words, loc="right", labelpad=0)
+                panel.set_xlabel(axis_name, loc="right", labelpad=0)
     return page
 
 
