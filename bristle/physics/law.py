@@ -14,32 +14,10 @@ from typing import Any, ClassVar, NamedTuple
 from ..errors import PhysicsError
 from .command import Constant, Form, Monotone
 from .inputs import Inputs
-from .parameter import CHOICES, Parameter, Table, all_parameters, check_numbers, fields_of, named
+from .law_check import ALL_HOOKS, HOOKS, check_law
+from .law_check import PARTS as PARTS
+from .parameter import CHOICES, Parameter, Table, all_parameters, fields_of, named
 from .tuples import FACTORS, values_of_law
-
-SITES = ("damper", "structure")
-
-PARTS = ("yield", "sign", "bristle", "viscous", "spring", "command")
-"""What a law may have, and effects may act on.
-
-    yield     a force to be overcome before it slides
-    sign      this force jumps with the direction of motion, and at rest it is what holds the motion
-    bristle   this force is carried by what bends before it slips
-    viscous   a force that grows with speed
-    spring    a force that grows with displacement
-    command   something depends on the command; found from `command`
-"""
-
-HOOKS = {
-    "limit": "sign",
-    "yielding": "yield",
-    "damping": "bristle",
-    "viscous": "viscous",
-    "elastic": "spring",
-}
-"""The hooks that give a force [N], each with the part of which it is the force."""
-
-ALL_HOOKS = (*HOOKS, "rate", "advance", "force")
 
 FOREVER = 1e15
 """Time [s] after which sliding is steady at any speed."""
@@ -153,7 +131,8 @@ class Law:
         cls.parameters = all_parameters(cls.parameters, cls.tables)
         if any(not isinstance(form, Constant) for form in cls.command.values()):
             cls.parts = tuple(dict.fromkeys((*cls.parts, "command")))
-        _check(cls)
+        _refuse_twin(cls)
+        check_law(cls)
         cls.State = named("State", tuple(cls.states))
         cls.Values = named("Values", cls.seen())
         LAWS[cls.name] = cls
@@ -281,6 +260,16 @@ class Law:
         return values_of_law(cls, values, V)
 
 
+def _refuse_twin(law: type[Law]) -> None:
+    """Refuse a second law of a name, unless its own file defines it anew."""
+    known = LAWS.get(law.name)
+    if known is not None and known.__module__ != law.__module__:
+        raise PhysicsError(
+            f"law {law.name!r} ({law.__module__}.{law.__qualname__}): the name is taken by "
+            f"{known.__module__}.{known.__qualname__}. Another name is right."
+        )
+
+
 def _motion(v: float, V: float, dt: float = 0.0) -> Inputs:
     return Inputs(0.0, v, 0.0, V, dt, 0.0, 0.0, False)
 
@@ -292,68 +281,6 @@ def _moves(law: type[Law], name: str, hooks: tuple[str, ...]) -> bool:
     none = dict.fromkeys(law.linear(), 0.0)
     p = law.at({**none, name: 1.0}, MOST)  # beyond all knots of a table over the voltage
     return any(function(q, z, p) for hook in hooks if (function := law.hook(hook)))
-
-
-def _check(law: type[Law]) -> None:
-    """Refuse a law whose class data could not work, when it is defined."""
-    where = f"law {law.name!r} ({law.__module__}.{law.__qualname__})"
-    if law.site not in SITES:
-        raise PhysicsError(f"{where}: site {law.site!r} is none of {SITES}.")
-    if not law.name.isidentifier():
-        raise PhysicsError(f"{where}: a name is one word of letters, digits and _.")
-    known = LAWS.get(law.name)
-    if known is not None and known.__module__ != law.__module__:
-        raise PhysicsError(
-            f"{where}: the name is taken by {known.__module__}.{known.__qualname__}."
-        )
-    wrong = [part for part in law.parts if part not in PARTS]
-    if wrong:
-        raise PhysicsError(f"{where}: parts {wrong}; there are {PARTS}.")
-    if not law.first_line():
-        raise PhysicsError(f"{where}: a first docstring line tells users what it is.")
-    check_numbers(where, law.parameters, law.tables)
-    _check_names(law, where)
-    _check_hooks(law, where)
-
-
-def _check_names(law: type[Law], where: str) -> None:
-    """Refuse forms, shapes and variants that name what the law has not."""
-    places = {**dict.fromkeys(law.parameters), **dict.fromkeys(law.tables)}
-    for quantity, form in law.command.items():
-        lacking = [name for name in form.names() if name not in places]
-        if lacking:
-            raise PhysicsError(f"{where}: command of {quantity} names {lacking}, no parameters.")
-        if isinstance(form, Monotone) and form.table not in law.tables:
-            raise PhysicsError(f"{where}: command of {quantity}: {form.table} is no table.")
-        if quantity in places and quantity not in form.names():
-            raise PhysicsError(f"{where}: {quantity} is a quantity and a parameter.")
-    for name, shape in law.shapes.items():
-        lacking = [n for n in (name, *shape.shapes) if n not in law.parameters]
-        if lacking:
-            raise PhysicsError(f"{where}: shapes names {lacking}, no parameters of it.")
-    for suffix, variant in law.variants.items():
-        lacking = [n for n in (*variant.values, *variant.idle) if n not in law.parameters]
-        if lacking:
-            raise PhysicsError(f"{where}: variant {suffix} names {lacking}, no parameters of it.")
-
-
-def _check_hooks(law: type[Law], where: str) -> None:
-    if law.site == "structure":
-        if law.hook("force") is None:
-            raise PhysicsError(f"{where}: the law of a building's part has the hook `force`.")
-        return
-    given = [hook for hook in HOOKS if law.hook(hook) is not None]
-    if not given:
-        raise PhysicsError(f"{where}: defines none of the hooks {list(HOOKS)}.")
-    lacking = [HOOKS[hook] for hook in given if not law.has(HOOKS[hook])]
-    if lacking:
-        raise PhysicsError(f"{where}: has the hooks {given}; its parts must name {lacking}.")
-    if law.has("sign") and law.hook("limit") is None:
-        raise PhysicsError(f"{where}: the part sign needs the hook `limit`.")
-    if law.states and law.hook("rate") is None:
-        raise PhysicsError(f"{where}: has states and no `rate`.")
-    if not law.states and (law.hook("rate") or law.hook("advance")):
-        raise PhysicsError(f"{where}: has `rate` or `advance` and no states.")
 
 
 def laws_of(site: str = "damper") -> tuple[type[Law], ...]:
