@@ -17,7 +17,7 @@ from ..physics.sensor import instrument
 Array = NDArray[np.float64]
 
 
-def channel_history(signal, dt, z, p, out):  # type: ignore[no-untyped-def]
+def channel_history(signal: Any, dt: float, z: Any, p: Any, out: Any) -> None:
     """Fill `out` (n,) with what the instrument shows of a signal (n,) sampled every dt [s].
 
     Parameters

@@ -11,7 +11,9 @@ from ..physics.effect import effects_of
 from ..physics.linear import Row, copy
 from ..physics.structure import (
     EFFECT_STEP,
+    Loads,
     Matrices,
+    Setup,
     accelerations,
     add_force,
     free_step,
@@ -188,15 +190,15 @@ def effect_steps(
     z1 = work[8 * n + states : 8 * n + 2 * states]
     copy(state, 0, new_state, 0, size)
     copy(state, size, z1, 0, states)
+    setup = Setup(n, c.isolated, c.stiffnesses, c.phi, c.held, c.ramp, c.h, c.p, c.on, True)
     for k in range(c.substeps):
         s, e = k / c.substeps, (k + 1.0) / c.substeps
         copy(new_state, 0, x0, 0, size)
         copy(z1, 0, z0, 0, states)
-        effects_step(
-            n, c.isolated, c.stiffnesses, c.phi, c.held, c.ramp, c.h, x0, a0 + s * (a1 - a0),
-            a0 + e * (a1 - a0), f0 + s * (f1 - f0), f0 + e * (f1 - f0), 0.0, z0, c.p, c.on, True,
-            new_state, z1, room,
-        )  # fmt: skip
+        loads = Loads(
+            a0 + s * (a1 - a0), a0 + e * (a1 - a0), f0 + s * (f1 - f0), f0 + e * (f1 - f0), 0.0
+        )
+        effects_step(setup, loads, x0, z0, new_state, z1, room)
     copy(z1, 0, new_state, size, states)
 
 

@@ -21,7 +21,7 @@ from .plan import Plan
 from .probes import PROBES
 from .registry import Finding, Probe, failed, noted
 from .report import Report, Row
-from .subprocesses import Nursery
+from .subprocesses import Subprocesses
 
 _BUNDLE = re.compile(r"bristle_[0-9a-f]{12}")  # the code inside our FMUs, named by its digest
 _LIBRARY, _LEGAL, _REFERENCE, _REPEATABLE = "library", "legal run", "driven run", "repeatable"
@@ -74,8 +74,8 @@ def judge(
             plan.beside = make_plan(beside, read_root(beside), Path(folder) / "beside", timeout)
         elif only is None or any(name.startswith("another FMU") for name in only):
             plan.beside = _companion(plan, Path(folder))
-        with Nursery(Path(plan.work)) as nursery:
-            return Report(str(path), _Session(plan, nursery, only, progress).rows())
+        with Subprocesses(Path(plan.work)) as subprocesses:
+            return Report(str(path), _Session(plan, subprocesses, only, progress).rows())
 
 
 def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: float) -> Plan:
@@ -147,12 +147,12 @@ class _Session:
     def __init__(
         self,
         plan: Plan,
-        nursery: Nursery,
+        subprocesses: Subprocesses,
         only: Collection[str] | None,
         progress: Callable[[str], None] | None,
     ) -> None:
         self.plan = plan
-        self.nursery = nursery
+        self.subprocesses = subprocesses
         self.only = only
         self.progress = progress or (lambda name: None)
         self.reached: set[str] = set()
@@ -237,7 +237,7 @@ class _Session:
             (work / name).unlink(missing_ok=True)
         # Forks share a hash seed and a memory layout; what depends on these is found anew.
         anew = probe.name == _REPEATABLE
-        code = self.nursery.run(probe.name, self.plan.timeout, anew=anew, bare=probe.bare)
+        code = self.subprocesses.run(probe.name, self.plan.timeout, anew=anew, bare=probe.bare)
         return _finding(work, code, self.plan.timeout)
 
 

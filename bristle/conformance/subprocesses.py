@@ -30,7 +30,7 @@ _BOOT = (
 _PACKAGES = str(Path(__file__).parents[2])
 
 
-class Nursery:
+class Subprocesses:
     """Starts a process per probe; used as a context, it leaves none behind."""
 
     def __init__(self, work: Path) -> None:
@@ -39,7 +39,7 @@ class Nursery:
         self._living: list[int] = []
         self._mother: subprocess.Popen[bytes] | None = None
 
-    def __enter__(self) -> Nursery:
+    def __enter__(self) -> Subprocesses:
         return self
 
     def __exit__(

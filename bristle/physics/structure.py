@@ -180,31 +180,57 @@ advance_effects: Any
 regenerate()
 
 
-def step(
-    n: int, isolated: bool, stiffnesses: Row, phi: Row, held: Row, ramp: Row, h: float, x0: Row,
-    a0: float, a1: float, f0: float, f1: float, energy: float, z0: Row, p: Row, on: Row,
-    active: bool, x1: Row, z1: Row, work: Row,
-) -> None:  # fmt: skip
+class Setup(NamedTuple):
+    """A structure with effects as a step needs it: numbers that stay over a run.
+
+    `n` levels, the first of them `isolated` or a storey; `stiffnesses` (n,) N/m of the layer and
+    the storeys, from below; `phi`, `held`, `ramp` the flat matrices of a step of `h` [s] (see
+    `StepMatrices`); `p`, `on` parameters and switches of the effects by slot, any of which is
+    `active`.
+    """
+
+    n: int
+    isolated: bool
+    stiffnesses: Row
+    phi: Row
+    held: Row
+    ramp: Row
+    h: float
+    p: Row
+    on: Row
+    active: bool
+
+
+class Loads(NamedTuple):
+    """What acts over a step, linear from begin to end.
+
+    `a0`, `a1` ground acceleration [m/s2]; `f0`, `f1` force of the devices on the first level [N];
+    `energy` dissipated so far [J], for effects that know it.
+    """
+
+    a0: float
+    a1: float
+    f0: float
+    f1: float
+    energy: float
+
+
+def step(setup: Setup, loads: Loads, x0: Row, z0: Row, x1: Row, z1: Row, work: Row) -> None:
     """Advance a structure over one step with its effects.
 
     Parameters
     ----------
-    n, isolated : number of levels; whether the first lies on an isolation layer
-    stiffnesses : (n,) of the layer and the storeys, from below [N/m]
-    phi, held, ramp : flat matrices of the step, see `StepMatrices`
-    h : length of the step [s]
+    setup, loads : the structure and its effects; what acts over the step
     x0, x1 : (2n,) state [m, m/s] at begin (kept) and end (filled)
-    a0, a1 : ground acceleration at begin and end [m/s2], linear between
-    f0, f1 : force of the devices on the first level at begin and end [N], linear between
-    energy : dissipated so far, for effects that know it [J]
     z0, z1 : (`state_size(n)`,) states of the effects at begin (kept) and end (filled)
-    p, on : parameters and switches of the effects, by slot
-    active : whether any effect is on
     work : room for `work_size(n)` floats
     """
-    free_step(n, phi, held, ramp, x0, a0, a1, x1)
-    add_force(n, held, ramp, 0, f0, f1, x1)
-    if not active:
+    n, held, ramp = setup.n, setup.held, setup.ramp
+    isolated, stiffnesses, p, on = setup.isolated, setup.stiffnesses, setup.p, setup.on
+    h, energy = setup.h, loads.energy
+    free_step(n, setup.phi, held, ramp, x0, loads.a0, loads.a1, x1)
+    add_force(n, held, ramp, 0, loads.f0, loads.f1, x1)
+    if not setup.active:
         return
     size = 2 * n
     g0, g1 = work[0:n], work[n : 2 * n]
@@ -221,9 +247,7 @@ def step(
             x1[i] = free[i]
         for i in range(n):
             add_force(n, held, ramp, i, g0[i], g1[i], x1)
-        contact = balance_contact(
-            n, isolated, stiffnesses, held, ramp, h, x0, energy, z0, p, on, contact, x1, z1, middle
-        )
+        contact = balance_contact(setup, energy, x0, z0, contact, x1, z1, middle)
         effect_forces(n, isolated, stiffnesses, x1, h, energy, contact, z1, p, on, g1)
     for i in range(size):
         middle[i] = 0.5 * (x0[i] + x1[i])
@@ -232,9 +256,8 @@ def step(
 
 
 def balance_contact(
-    n: int, isolated: bool, stiffnesses: Row, held: Row, ramp: Row, h: float, x0: Row,
-    energy: float, z0: Row, p: Row, on: Row, guess: float, x1: Row, z1: Row, middle: Row,
-) -> float:  # fmt: skip
+    setup: Setup, energy: float, x0: Row, z0: Row, guess: float, x1: Row, z1: Row, middle: Row
+) -> float:
     """Add to x1 the contacts' force on the first level that goes with it; return that force [N].
 
     It is that of the middle of the step; where a contact closes, that of its end (the middle's
@@ -244,13 +267,15 @@ def balance_contact(
 
     Parameters
     ----------
-    n, isolated, stiffnesses, held, ramp, h, x0, energy, z0, p, on
-        As in `step`.
+    setup, energy, x0, z0
+        As in `step`; the energy [J] is that of `Loads`.
     guess : force that is tried first [N]
     x1 : (2n,) state at the end without the contacts [m, m/s], changed in place
     z1 : (`state_size(n)`,) states of the effects at the end, filled
     middle : (2n,) room to work
     """
+    n, held, ramp, h = setup.n, setup.held, setup.ramp, setup.h
+    isolated, stiffnesses, p, on = setup.isolated, setup.stiffnesses, setup.p, setup.on
     closed = contact_force(n, isolated, stiffnesses, x0, h, energy, 0.0, z0, p, on) != 0.0
     part = 0.5 if closed else 1.0
     gain = held[n * (n + 1)]
@@ -259,9 +284,9 @@ def balance_contact(
     for _ in range(MOST_TRIALS):
         for i in range(2 * n):
             middle[i] = x0[i] + part * (x1[i] - x0[i])
-        halt = tried - x1[n] / gain
-        advance_effects(n, isolated, stiffnesses, middle, h, energy, halt, tried, z0, p, on, z1)
-        found = contact_force(n, isolated, stiffnesses, middle, h, energy, halt, z1, p, on)
+        stick = tried - x1[n] / gain
+        advance_effects(n, isolated, stiffnesses, middle, h, energy, stick, tried, z0, p, on, z1)
+        found = contact_force(n, isolated, stiffnesses, middle, h, energy, stick, z1, p, on)
         excess = found - tried
         if abs(excess) <= 1e-10 * (1.0 + abs(found)):
             break

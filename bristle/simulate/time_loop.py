@@ -16,6 +16,7 @@ holds its numbers, the slots of its inputs in `s`, and the first of its outputs.
 from __future__ import annotations
 
 from math import floor, inf, isfinite
+from typing import Any
 
 from ..component import clock, controller, damper, sensors, source, structure
 from ..component.damper import (
@@ -66,7 +67,9 @@ INLINE = (
 """What becomes part of its caller: it is short or has one caller. Saves time, twice."""
 
 
-def integrate(span, sources, coupled, sampled, s, outputs, table):
+def integrate(
+    span: Any, sources: Any, coupled: Any, sampled: Any, s: Any, outputs: Any, table: Any
+) -> tuple[int, int, int]:
     """Fill `table` (rows + 1, m) with the signals `outputs` (m,), a row for some substeps each.
 
     Parameters
@@ -129,7 +132,7 @@ def integrate(span, sources, coupled, sampled, s, outputs, table):
     return rows + 1, -1, sweeps
 
 
-def play(sources, t, s):
+def play(sources: Any, t: float, s: Any) -> None:
     """Write what the sources give at time t [s] into the signals."""
     records, times, samples = sources
     for i in range(len(records)):
@@ -142,7 +145,7 @@ def play(sources, t, s):
         source_output(t, shown, c, shown, shown, shown)
 
 
-def start(dampers, structures, h, s):
+def start(dampers: Any, structures: Any, h: float, s: Any) -> None:
     """Settle the signals at the begin: accelerations and forces may follow each other.
 
     Parameters
@@ -168,7 +171,7 @@ def start(dampers, structures, h, s):
             s[d.first + FRICTION] = 0.0
 
 
-def begin(dampers, structures, s):
+def begin(dampers: Any, structures: Any, s: Any) -> None:
     """Keep what a substep begins from, and extrapolate the forces to its end."""
     for i in range(len(structures)):
         b = structures[i]
@@ -183,7 +186,7 @@ def begin(dampers, structures, s):
         d.smooth_2, d.smooth_1 = d.smooth_1, d.smooth
 
 
-def move(b, clock, s):
+def move(b: Any, clock: Any, s: Any) -> None:
     """Take a structure to the end of the substep under the forces of the present sweep."""
     gather(b.inputs, s, b.now)
     b.before[DAMPER_FORCE] = b.smooth0 + s[b.friction] + s[b.extra_friction]
@@ -196,7 +199,7 @@ def move(b, clock, s):
         show(b, b.new_state, s)
 
 
-def correct(d, clock, s):
+def correct(d: Any, clock: Any, s: Any) -> float:
     """Take a damper to the end of the substep and correct its force; return its disagreement [N].
 
     The correction is the secant's, from the second sweep on and while friction stays: a plain
@@ -216,10 +219,10 @@ def correct(d, clock, s):
         slope = min((excess - d.excess) / (tried - d.tried), -0.5)
     d.tried, d.excess = tried, excess
     shown[FORCE] = tried - excess / slope
-    return abs(excess)
+    return abs(excess)  # type: ignore[no-any-return]
 
 
-def accept(dampers, structures, s):
+def accept(dampers: Any, structures: Any, s: Any) -> None:
     """Accept a substep."""
     for i in range(len(structures)):
         b = structures[i]
@@ -233,7 +236,7 @@ def accept(dampers, structures, s):
         d.smooth = d.found - s[d.first + FRICTION]
 
 
-def idle(sampled, coupled, at, h, s):
+def idle(sampled: Any, coupled: Any, at: int, h: float, s: Any) -> None:
     """Do nothing, in place of `sample` where nothing has a clock: the loop compiles sooner.
 
     Parameters
@@ -243,7 +246,7 @@ def idle(sampled, coupled, at, h, s):
     """
 
 
-def sample(sampled, coupled, at, h, s):
+def sample(sampled: Any, coupled: Any, at: int, h: float, s: Any) -> None:
     """Let the components act whose instant a substep reaches; the forces follow.
 
     Components measure the motion and the dampers' forces with the voltages before, in the order of
@@ -278,7 +281,7 @@ def sample(sampled, coupled, at, h, s):
     respond(dampers, structures, s)
 
 
-def take_command(c, at, h, constants, memory, s):
+def take_command(c: Any, at: int, h: float, constants: Any, memory: Any, s: Any) -> None:
     """Let a controller act at the end of a substep.
 
     Parameters
@@ -304,7 +307,7 @@ def take_command(c, at, h, constants, memory, s):
         controller_step(span, c.before[:], c.now[:], law, state, state, s[c.first :], work)
 
 
-def take_readings(c, at, h, memory, s):
+def take_readings(c: Any, at: int, h: float, memory: Any, s: Any) -> None:
     """Let sensors act at the end of a substep.
 
     Parameters
@@ -327,7 +330,7 @@ def take_readings(c, at, h, memory, s):
         sensors_step(span, c.before[:], c.now[:], law, state, state, s[c.first :], work)
 
 
-def respond(dampers, structures, s):
+def respond(dampers: Any, structures: Any, s: Any) -> None:
     """Let the forces of dampers follow voltages that have jumped, the motion held.
 
     Where a damper is given the acceleration, force and acceleration follow each other as in
@@ -358,7 +361,7 @@ def respond(dampers, structures, s):
             show(structures[i], structures[i].state, s)
 
 
-def show(b, state, s):
+def show(b: Any, state: Any, s: Any) -> None:
     """Write accelerations and holding force of a structure in a state into the signals."""
     gather(b.inputs, s, b.now)
     c, now = structure_constants(b), state[0 : b.n_states]
@@ -366,13 +369,13 @@ def show(b, state, s):
     structure_output(0.0, b.now[:], c, now, s[b.first :], b.work[:])
 
 
-def gather(slots, s, values):
+def gather(slots: Any, s: Any, values: Any) -> None:
     """Read a component's inputs from the signals."""
     for j in range(len(slots)):
         values[j] = s[slots[j]]
 
 
-def damper_constants(d):
+def damper_constants(d: Any) -> damper.Constants:
     """Return what a damper's functions compute with."""
     setup = Setup(
         d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.n_own, d.signed, d.active
@@ -380,7 +383,7 @@ def damper_constants(d):
     return DamperConstants(setup, d.v_max, d.stroke, d.moving_mass, d.measured, True)
 
 
-def structure_constants(b):
+def structure_constants(b: Any) -> structure.Constants:
     """Return what a structure's functions compute with."""
     return StructureConstants(
         b.n, b.isolated, b.mass, b.m_inverse[:], b.damping[:], b.stiffness[:], b.stiffnesses[:],

@@ -111,14 +111,14 @@ def structure_run(step: Any, effects: list[str], to: Any) -> np.ndarray:
     stiffnesses, matrices = to(m.stiffnesses), [to(row) for row in (s.phi, s.held, s.ramp)]
     x, z, p, on = to(model.x), to(model.z or [0.0]), to(model.p), to(model.on)
     work = to([0.0] * structure.work_size(m.n))
+    setup = structure.Setup(
+        m.n, m.isolated, stiffnesses, *matrices, s.h, p, on, active=bool(effects)
+    )
     found = []
     for k in range(400):
         x1, z1 = to([0.0] * len(model.x)), to([0.0] * max(1, len(model.z)))
         a0, a1 = (float(4.0 * np.sin(0.01 * i)) for i in (k, k + 1))
-        step(
-            m.n, m.isolated, stiffnesses, *matrices, s.h, x, a0, a1, 1.0, 1.5, 0.0, z, p, on,
-            bool(effects), x1, z1, work,
-        )  # fmt: skip
+        step(setup, structure.Loads(a0, a1, 1.0, 1.5, 0.0), x, z, x1, z1, work)
         x, z = x1, z1
         found.append(list(x))
     return np.array(found)

@@ -444,10 +444,11 @@ def test_step_keeps_the_state_at_its_begin() -> None:
     s = step_matrices(m, 2e-3)
     x0, x1 = [0.01, 0.0, -0.01, 0.1, 0.2, 0.3], [0.0] * 6
     before = list(x0)
-    structure.step(
-        m.n, m.isolated, m.stiffnesses, s.phi, s.held, s.ramp, s.h, x0, 1.0, 2.0, 3.0, 3.0, 0.0,
-        [], [], [], False, x1, [], [0.0] * structure.work_size(m.n),
-    )  # fmt: skip
+    setup = structure.Setup(
+        m.n, m.isolated, m.stiffnesses, s.phi, s.held, s.ramp, s.h, [], [], active=False
+    )
+    loads = structure.Loads(1.0, 2.0, 3.0, 3.0, 0.0)
+    structure.step(setup, loads, x0, [], x1, [], [0.0] * structure.work_size(m.n))
     assert x0 == before
     assert x1 != before
 
