@@ -343,7 +343,7 @@ def _rank(name: str) -> int:
 
 
 def dependence(
-    residual: Array, coordinate: Array, bins: int = BINS, flips: int = 299, seed: int = 0
+    residual: Array, coordinate: Array, flips: int = 299, seed: int = 0
 ) -> tuple[float, float]:
     """Return how much of a residual a coordinate organises, and the most by chance.
 
@@ -354,7 +354,6 @@ def dependence(
     ----------
     residual : (n,) over the noise expected of a true model, or in any unit
     coordinate : (n,) in any unit
-    bins : not needed; those of `Finder` are taken
     flips, seed : how many random patterns of signs are drawn, and their seed
     """
     finder = Finder([residual], [residual], [{"it": coordinate}], flips, seed)

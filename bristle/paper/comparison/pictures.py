@@ -98,7 +98,7 @@ def anti_windup(c: Comparison) -> Page:
 
 
 def histories(c: Comparison, motion: str, column: str, what: str, unit: str, factor: float,
-              laws: tuple[str, ...], figure: str) -> Page:  # fmt: skip
+              laws: tuple[str, ...]) -> Page:  # fmt: skip
     """Draw one response over time at a weak and a strong intensity, a panel per law.
 
     Parameters
@@ -108,7 +108,6 @@ def histories(c: Comparison, motion: str, column: str, what: str, unit: str, fac
     column, factor : of the results, and what brings its SI values to `unit`
     what, unit : name and unit of the response, for title and axes
     laws : a panel for each
-    figure : number of the paper's figure
     """
     listed = next(m for m in c.motions if m.name == motion).intensities
     weak, strong = listed[0], 0.6 if 0.6 in listed else listed[-1]
@@ -155,13 +154,13 @@ def responses(c: Comparison) -> Page:
     """Fig. 14: acceleration of floor 2 under El Centro."""
     laws = (FOUR, *CONTROLLERS)
     what = "Under El Centro the peak acceleration of floor 2"
-    return histories(c, EL_CENTRO, _Y, what, "m/s²", 1.0, laws, "14")
+    return histories(c, EL_CENTRO, _Y, what, "m/s²", 1.0, laws)
 
 
 def drifts(c: Comparison) -> Page:
     """Fig. 15: base drift under El Centro."""
     laws = (FOUR, *CONTROLLERS)
-    return histories(c, EL_CENTRO, _X, "The base drift under El Centro", "mm", 1e3, laws, "15")
+    return histories(c, EL_CENTRO, _X, "The base drift under El Centro", "mm", 1e3, laws)
 
 
 def northridge(c: Comparison) -> Page | None:
@@ -171,7 +170,7 @@ def northridge(c: Comparison) -> Page | None:
         return None
     laws = (FOUR, *CONTROLLERS)
     what = f"Under {motion} the peak acceleration of floor 2"
-    return histories(c, motion, _Y, what, "m/s²", 1.0, laws, "16")
+    return histories(c, motion, _Y, what, "m/s²", 1.0, laws)
 
 
 def summary(c: Comparison) -> Page:
