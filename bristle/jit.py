@@ -56,31 +56,27 @@ def compiled(
     inline: tuple[str, ...] = (),
     *,
     keep: bool = True,
-    allocates: bool = False,
 ) -> Any:
     """Return the function compiled by numba, together with all that it calls, cached on disk.
 
     Parameters
     ----------
     function : callable
-        It and its callees take arrays and make none, unless it `allocates`.
+        It and its callees take arrays and make none.
     inline : tuple of str
         Callees that become part of their callers, each as MODULE.NAME with the module's last name:
         best for short ones and for those with one caller, which would otherwise be translated by
         themselves and with it again.
     keep : bool
         Whether to keep the machine code on disk.
-    allocates : bool
-        Whether the function makes arrays of its own; its callees make none.
     """
     folder = _folder(function) if keep else None
-    options = {**_OPTIONS, "_nrt": allocates}
     with _FOLDER:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder or "")
         try:
             root = _closed(function, {}, inline)
-            return numba.njit(cache=folder is not None, nogil=True, **options)(root)
+            return numba.njit(cache=folder is not None, nogil=True, **_OPTIONS)(root)
         finally:
             numba.config.CACHE_DIR = before
 

@@ -1,4 +1,4 @@
-"""The numeric kernels of the motion smoother, compiled.
+"""The Kalman smoother of a motion under white jerk: of a damper's and of a building's levels.
 
 The covariances of the filter settle after some samples and then stay: from there on gains are kept,
 which is what makes smoothing cheap enough to draw errors by it.
@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,26 +18,61 @@ Array = NDArray[np.float64]
 _SETTLED = 1e-12
 """Relative change of a covariance in a sample below which it stays."""
 
+# What the filter keeps of a sample, and where: the predicted covariance (6), the gains of three
+# channels (3 each), the prediction (3), the shares of the innovations (3), their variances (3).
+_GAIN, _MEAN, _SHARE, _SIZE, _COLUMNS = 6, 15, 18, 21, 24
 
-def kalman_smooth(
-    y: Array, r: Array, have: NDArray[np.bool_], dt: float, jerk: float, backward: bool,
-    state: Array, cov: Array, loss: Array,
-) -> float:  # fmt: skip
-    """Kalman filter and smoother for [x, v, a] with white jerk; return -log L.
+
+class Samples(NamedTuple):
+    """A measured motion, as the smoother takes it.
+
+    `y` (n, 3) displacement, velocity, acceleration [m, m/s, m/s2]: what is not finite was not
+    measured; `r` (3,) their variances; `have` (3,) whether a channel is there at all; `dt` the
+    step [s]; `mean` (3,) and `cov` (6,) the state before the first sample and its covariance, by
+    rows of the upper triangle.
+    """
+
+    y: Array
+    r: Array
+    have: NDArray[np.bool_]
+    dt: float
+    mean: Array
+    cov: Array
+
+
+class Smoothed(NamedTuple):
+    """What smoothing fills.
+
+    `state` (n, 3) the motion [m, m/s, m/s2]; `cov` (3,) its variances in the middle; `loss` (3,)
+    mean squares of the normalised innovations.
+    """
+
+    state: Array
+    cov: Array
+    loss: Array
+
+
+def room(n: int) -> Smoothed:
+    """Return room for n smoothed samples."""
+    return Smoothed(np.zeros((n, 3)), np.zeros(3), np.zeros(3))
+
+
+def kalman_smooth(samples: Samples, jerk: Array, out: Smoothed | None = None) -> float:
+    """Kalman filter for [x, v, a] with white jerk, and the smoother; return -log L.
+
+    Smoothing is by the recursion of Bryson & Frazier (1963).
 
     Parameters
     ----------
-    y : (n, 2) displacement and velocity [m, m/s]; what is not finite was not measured
-    r, have : (2,) variances [m2, m2/s2]; (2,) whether a channel is there at all
-    dt, jerk : step [s], intensity of the jerk [m2/s5]
-    backward : whether to smooth, by the recursion of Bryson & Frazier (1963), and to fill
-    state, cov : (n, 3) the motion [m, m/s, m/s2]; (3,) its variances in the middle
-    loss : (2,) mean squares of the normalised innovations, filled either way
+    samples : what was measured
+    jerk : (n,) intensity of the jerk on the way to each sample [m2/s5]
+    out : filled with the smoothed motion; None: the likelihood alone is wanted
     """
-    n = len(y) if backward else 1
-    total: float = _compiled()(
-        y, r, have, dt, jerk, backward, state, cov, loss, np.zeros((n, 17)), np.zeros((6, 6))
-    )
+    backward = out is not None
+    n = len(samples.y) if backward else 1
+    filled = out if out is not None else room(1)
+    work = np.zeros((6, 9))
+    total: float = _compiled()(samples, jerk, backward, filled, np.zeros((n, _COLUMNS)), work)
     return total
 
 
@@ -49,71 +84,46 @@ def _compiled() -> Callable[..., float]:
     return function
 
 
-def _filter(
-    y: Any, r: Any, have: Any, dt: float, jerk: float, backward: bool, state: Any, cov: Any,
-    loss: Any, kept: Any, work: Any,
-) -> float:  # fmt: skip
+def _filter(samples: Any, jerk: Any, backward: bool, out: Any, kept: Any, work: Any) -> float:
     """Do the work of `kalman_smooth`; elements one by one, for slices take seconds to compile.
 
-    `kept` has a row per sample: the predicted covariance (6), two gains (3 each), the prediction
-    (3), the shares of the innovations (2). `work` has six rows of room.
+    `kept` has a row per sample, `work` six rows of room.
     """
+    y, r, have, loss = samples.y, samples.r, samples.have, out.loss
     n = len(y)
-    h, h2 = dt, 0.5 * dt * dt
-    q00, q01, q02 = jerk * dt**5 / 20.0, jerk * dt**4 / 8.0, jerk * dt**3 / 6.0
-    q11, q12, q22 = jerk * dt**3 / 3.0, jerk * dt**2 / 2.0, jerk * dt
+    h = samples.dt
+    h2 = 0.5 * h * h
     p, g, s, logs = work[0], work[1], work[2], work[3]
-    x, v = _start(y, r, have, dt, p)
-    a = 0.0
-    s[0] = s[1] = 1.0
-    total = loss[0] = loss[1] = 0.0
+    for i in range(6):
+        p[i] = samples.cov[i]
+    x, v, a = samples.mean[0], samples.mean[1], samples.mean[2]
+    for c in range(3):
+        s[c], loss[c] = 1.0, 0.0
+    total = growth = 0.0
+    bounded = have[0] or have[1]  # of an acceleration alone, no covariance settles
     settled = False
     for k in range(n):
+        whole = True
+        for c in range(3):
+            whole = whole and (not have[c] or np.isfinite(y[k, c]))
         if k > 0:
+            settled = settled and whole and jerk[k] == jerk[k - 1]
             x, v, a = x + h * v + h2 * a, v + h * a, a
+            growth = growth if settled else -p[0]
             if not settled:
-                a00, a01, a02, a11, a12, a22 = p[0], p[1], p[2], p[3], p[4], p[5]
-                b01, b02, b12 = a01 + h * a11 + h2 * a12, a02 + h * a12 + h2 * a22, a12 + h * a22
-                b00 = a00 + h * a01 + h2 * a02
-                b11 = a11 + h * a12
-                p[0] = b00 + h * b01 + h2 * b02 + q00
-                p[1] = b01 + h * b02 + q01
-                p[2] = b02 + q02
-                p[3] = b11 + h * b12 + q11
-                p[4] = b12 + q12
-                p[5] = a22 + q22
+                _predict(p, h, jerk[k])
         if backward:
-            kept[k, 12], kept[k, 13], kept[k, 14] = x, v, a
+            kept[k, _MEAN], kept[k, _MEAN + 1], kept[k, _MEAN + 2] = x, v, a
             if not settled:
                 for i in range(6):
                     kept[k, i] = p[i]
         change = 0.0
-        both = True
-        for c in range(2):
-            if not have[c]:
-                continue
-            if not np.isfinite(y[k, c]):
-                both = False
-                settled = False
-                if backward:
-                    for i in range(3):
-                        kept[k, 6 + 3 * c + i] = 0.0
+        for c in range(3):
+            if not have[c] or not np.isfinite(y[k, c]):
                 continue
             if not settled:
-                i0, i1, i2 = (p[0], p[1], p[2]) if c == 0 else (p[1], p[3], p[4])
-                size = (i0 if c == 0 else i1) + r[c]
-                g0, g1, g2 = i0 / size, i1 / size, i2 / size
-                change = max(change, abs(size - s[c]) / size)
-                change = max(change, abs(g2 - g[3 * c + 2]) / (abs(g2) + 1e-300))
-                s[c], logs[c] = size, 0.5 * np.log(size)
-                g[3 * c], g[3 * c + 1], g[3 * c + 2] = g0, g1, g2
-                p[0] -= g0 * i0
-                p[1] -= g0 * i1
-                p[2] -= g0 * i2
-                p[3] -= g1 * i1
-                p[4] -= g1 * i2
-                p[5] -= g2 * i2
-            e = y[k, c] - (x if c == 0 else v)
+                change = max(change, _measure(p, c, r[c], g, s, logs))
+            e = y[k, c] - (x if c == 0 else v if c == 1 else a)
             share = e / s[c]
             total += logs[c] + 0.5 * e * share
             loss[c] += e * share / n
@@ -121,53 +131,63 @@ def _filter(
             v += g[3 * c + 1] * e
             a += g[3 * c + 2] * e
             if backward:
-                kept[k, 15 + c] = share
+                kept[k, _SHARE + c], kept[k, _SIZE + c] = share, s[c]
                 for i in range(3 * c, 3 * c + 3):
-                    kept[k, 6 + i] = g[i]
-        if backward and k > 0 and settled:
-            for i in range(6):
-                kept[k, i] = kept[k - 1, i]
-        settled = settled or (both and k > 10 and change < _SETTLED)
+                    kept[k, _GAIN + i] = g[i]
+        if settled:
+            # What no channel tells drifts: the displacement's variance grows on, and it alone.
+            drift = 0.0 if have[0] else growth
+            p[0] += drift
+            if backward:
+                for i in range(6):
+                    kept[k, i] = kept[k - 1, i]
+                kept[k, 0] += drift
+        else:
+            growth += p[0]
+        settled = settled or (bounded and whole and k > 10 and change < _SETTLED)
     if backward:
-        _smooth_back(kept, have, y, r, h, h2, state, cov, work)
+        _smooth_back(samples, kept, out, work)
     return total
 
 
-def _start(
-    y: Any, r: Any, have: Any, dt: float, p: Any,
-) -> tuple[float, float]:  # fmt: skip
-    """Return x, v before the first sample; fill their covariance (6,), wide if nothing tells."""
-    n = len(y)
-    c = 0 if have[0] else 1
-    first, before, fastest = 0.0, 0.0, 0.0
-    seen = 0
-    for k in range(n):
-        if np.isfinite(y[k, c]):
-            if seen == 0:
-                first = y[k, c]
-            elif k > 0 and np.isfinite(y[k - 1, c]):
-                fastest = max(fastest, abs(y[k, c] - before) / dt)
-            before = y[k, c]
-            seen += 1
-    x, v = 0.0, 0.0
-    if have[0]:
-        x = first
-        p[0] = 4.0 * r[0] + 1e-30
-        speed = fastest
-    if have[1]:
-        speed = 0.0
-        for k in range(n):
-            if np.isfinite(y[k, 1]):
-                v = y[k, 1]
-                speed = 2.0 * np.sqrt(r[1])
-                break
-    if not have[0]:
-        p[0] = 1e-30  # where the motion begins is not known: it is called zero
-    p[3] = speed * speed + 1e-30
-    p[5] = (2.0 * fastest / dt if have[0] else 2.0 * fastest) ** 2 + 1e-30
-    if have[0] and have[1]:
-        p[5] = 1e4 * r[1] / (dt * dt) / n + 1e-30
-    return x, v
+def _predict(p: Any, h: float, jerk: float) -> None:
+    """Move a covariance (6,) on by a step h [s] under white jerk."""
+    h2 = 0.5 * h * h
+    a00, a01, a02, a11, a12, a22 = p[0], p[1], p[2], p[3], p[4], p[5]
+    b01, b02, b12 = a01 + h * a11 + h2 * a12, a02 + h * a12 + h2 * a22, a12 + h * a22
+    b00 = a00 + h * a01 + h2 * a02
+    b11 = a11 + h * a12
+    p[0] = b00 + h * b01 + h2 * b02 + jerk * h**5 / 20.0
+    p[1] = b01 + h * b02 + jerk * h**4 / 8.0
+    p[2] = b02 + jerk * h**3 / 6.0
+    p[3] = b11 + h * b12 + jerk * h**3 / 3.0
+    p[4] = b12 + jerk * h**2 / 2.0
+    p[5] = a22 + jerk * h
+
+
+def _measure(p: Any, c: int, r: float, g: Any, s: Any, logs: Any) -> float:
+    """Take up channel c of variance r; return by how much gain and innovation's variance changed.
+
+    `p` (6,) is updated; `g` (9,) gains, `s` (3,) variances of innovations and `logs` (3,) half
+    their logarithms are filled for the channel.
+    """
+    i0, i1, i2 = p[2], p[4], p[5]
+    if c == 0:
+        i0, i1, i2 = p[0], p[1], p[2]
+    elif c == 1:
+        i0, i1, i2 = p[1], p[3], p[4]
+    size = (i0 if c == 0 else i1 if c == 1 else i2) + r
+    g0, g1, g2 = i0 / size, i1 / size, i2 / size
+    change: float = max(abs(size - s[c]) / size, abs(g2 - g[3 * c + 2]) / (abs(g2) + 1e-300))
+    s[c], logs[c] = size, 0.5 * np.log(size)
+    g[3 * c], g[3 * c + 1], g[3 * c + 2] = g0, g1, g2
+    p[0] -= g0 * i0
+    p[1] -= g0 * i1
+    p[2] -= g0 * i2
+    p[3] -= g1 * i1
+    p[4] -= g1 * i2
+    p[5] -= g2 * i2
+    return change
 
 
 def _square(
@@ -181,26 +201,25 @@ def _square(
     )
 
 
-def _smooth_back(
-    kept: Any, have: Any, y: Any, r: Any, h: float, h2: float, state: Any, cov: Any, work: Any,
-) -> None:  # fmt: skip
-    """Fill `state` and `cov` from what the filter kept."""
+def _smooth_back(samples: Any, kept: Any, out: Any, work: Any) -> None:
+    """Fill the state and its variances from what the filter kept."""
+    y, have, state, cov = samples.y, samples.have, out.state, out.cov
     n = len(y)
+    h = samples.dt
+    h2 = 0.5 * h * h
     m, across, L = work[0], work[1], work[2:5]
     for i in range(5):
-        for j in range(6):
+        for j in range(9):
             work[i, j] = 0.0
     for k in range(n - 1, -1, -1):
         wanted = k >= n // 2
-        for c in (1, 0):
+        for c in (2, 1, 0):
             if not have[c] or not np.isfinite(y[k, c]):
                 continue
-            g0, g1, g2 = kept[k, 6 + 3 * c], kept[k, 7 + 3 * c], kept[k, 8 + 3 * c]
-            own = g0 if c == 0 else g1
-            m[c] -= g0 * m[0] + g1 * m[1] + g2 * m[2] + kept[k, 15 + c]
+            at = _GAIN + 3 * c
+            g0, g1, g2 = kept[k, at], kept[k, at + 1], kept[k, at + 2]
+            m[c] -= g0 * m[0] + g1 * m[1] + g2 * m[2] + kept[k, _SHARE + c]
             if wanted:  # L = (I - g H)' L (I - g H) + H' H / s
-                # The variance of this channel's innovation, behind the other's update for c = 1.
-                size = r[c] / (1.0 - own) if own < 1.0 else kept[k, 0] + r[c]
                 for i in range(3):
                     across[i] = g0 * L[0, i] + g1 * L[1, i] + g2 * L[2, i]
                 for i in range(3):
@@ -209,13 +228,13 @@ def _smooth_back(
                     across[i] = L[i, 0] * g0 + L[i, 1] * g1 + L[i, 2] * g2
                 for i in range(3):
                     L[i, c] -= across[i]
-                L[c, c] += 1.0 / size
+                L[c, c] += 1.0 / kept[k, _SIZE + c]
         p00, p01, p02, p11, p12, p22 = (
             kept[k, 0], kept[k, 1], kept[k, 2], kept[k, 3], kept[k, 4], kept[k, 5],
         )  # fmt: skip
-        state[k, 0] = kept[k, 12] - (p00 * m[0] + p01 * m[1] + p02 * m[2])
-        state[k, 1] = kept[k, 13] - (p01 * m[0] + p11 * m[1] + p12 * m[2])
-        state[k, 2] = kept[k, 14] - (p02 * m[0] + p12 * m[1] + p22 * m[2])
+        state[k, 0] = kept[k, _MEAN] - (p00 * m[0] + p01 * m[1] + p02 * m[2])
+        state[k, 1] = kept[k, _MEAN + 1] - (p01 * m[0] + p11 * m[1] + p12 * m[2])
+        state[k, 2] = kept[k, _MEAN + 2] - (p02 * m[0] + p12 * m[1] + p22 * m[2])
         if k == n // 2:
             # The diagonal of P - P L P.
             cov[0] = p00 - _square(p00, p01, p02, L)

@@ -21,8 +21,8 @@ from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
 from .drive import smooth_steps
+from .kalman import Samples, kalman_smooth, room
 from .prepare import SHORTEST
-from .response_kernels import compiled_smooth_level
 from .smooth import random_motion
 
 Array = NDArray[np.float64]
@@ -186,11 +186,21 @@ def _level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
     # A channel without any noise still is no better than its last digits.
     r = np.maximum(r, (1e-7 * np.std(y, axis=0)) ** 2 + 1e-30)
     added = jumps(y[:, 2], dt) if have[2] else np.zeros(n)
-    state, cov = np.zeros((n, 3)), np.zeros(3)
     jerk = looser * _likeliest(y, r, have, dt, added)
-    compiled_smooth_level()(y, r, have, dt, jerk + added, True, state, cov)
-    std = np.sqrt(np.maximum(cov, 0.0))
-    return {"state": state, "std": std, "jerk": jerk, "r": r, "have": have}
+    out = room(n)
+    kalman_smooth(_samples(y, r, have, dt), jerk + added, out)
+    std = np.sqrt(np.maximum(out.cov, 0.0))
+    return {"state": out.state, "std": std, "jerk": jerk, "r": r, "have": have}
+
+
+def _samples(y: Array, r: Array, have: NDArray[np.bool_], dt: float) -> Samples:
+    """Return a level's channels (n, 3) of variances r (3,), with a wide guess of the beginning."""
+    n, largest = len(y), np.max(np.abs(y), axis=0)
+    wide = max(largest[0], largest[1] * dt, largest[2] * dt * dt) + 1e-12
+    cov = np.zeros(6)
+    for c, (at, size) in enumerate(((0, wide), (3, wide / dt), (5, wide / dt**2))):
+        cov[at] = 4.0 * r[c] if have[c] else size**2 / (n if c else 1)
+    return Samples(y, r, have, dt, np.where(have, y[0], 0.0), cov)
 
 
 def jumps(a: Array, dt: float) -> Array:
@@ -209,14 +219,13 @@ def _likeliest(
         power = np.convolve(np.abs(y[:, int(np.argmax(have))]), np.ones(most), mode="valid")
         begin = int(np.argmax(power))
         y, added = y[begin : begin + most], added[begin : begin + most]
-    spare, cov = np.zeros((1, 3)), np.zeros(3)
+    samples = _samples(y, r, have, dt)
     highest = int(np.flatnonzero(have)[-1])
     third = np.diff(y[:, highest], n=3 - highest) / dt ** (3 - highest)
     top = np.log10(np.var(third) * dt + 1e-30)
 
     def cost(exponent: float) -> float:
-        jerk = 10.0**exponent + added
-        return float(compiled_smooth_level()(y, r, have, dt, jerk, False, spare, cov))
+        return kalman_smooth(samples, 10.0**exponent + added)
 
     grid = np.arange(top - 12.0, top + 2.1, 1.5)
     best = grid[int(np.argmin([cost(exponent) for exponent in grid]))]
@@ -235,12 +244,12 @@ def _draws(n: int, runs: list[dict[str, Any]], dt: float, draws: int, seed: int)
     lead = min(200, n)
     total = n + 2 * lead
     out = np.zeros((draws, n, 3))
-    state, cov = np.zeros((total, 3)), np.zeros(3)
+    smoothed = room(total)
     for d in range(draws):
         path = random_motion(generator, total, dt, jerk)
         y = path + generator.standard_normal((total, 3)) * np.sqrt(r)
-        compiled_smooth_level()(y, r, have, dt, np.full(total, jerk), True, state, cov)
-        out[d] = (path - state)[lead : lead + n]
+        kalman_smooth(_samples(y, r, have, dt), np.full(total, jerk), smoothed)
+        out[d] = (path - smoothed.state)[lead : lead + n]
     return out
 
 

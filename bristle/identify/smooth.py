@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter, uniform_filter1d
 from scipy.optimize import minimize_scalar
 from scipy.signal import istft, stft
 
-from .kalman import kalman_smooth
+from .kalman import Samples, Smoothed, kalman_smooth, room
 
 Array = NDArray[np.float64]
 
@@ -75,32 +75,62 @@ def smooth(
     """
     given = x if x is not None else v
     assert given is not None
-    y = np.zeros((len(given), 2))
-    have = np.array([x is not None, v is not None])
+    y = np.zeros((len(given), 3))
     if x is not None:
         y[:, 0] = x
     if v is not None:
         y[:, 1] = v
-    r = np.array([max(noise[0], 1e-15) ** 2, max(noise[1], 1e-15) ** 2])
-    state, cov, loss = np.zeros((len(y), 3)), np.zeros(3), np.zeros(2)
+    samples = _samples(y, noise, (x is not None, v is not None), dt)
     if jerk <= 0.0:
-        jerk = _likeliest(y, r, have, dt)
-    kalman_smooth(y, r, have, dt, jerk, True, state, cov, loss)
+        jerk = _likeliest(samples)
+    out = _smoothed(samples, jerk)
     return Motion(
-        state[:, 0].copy(), state[:, 1].copy(), state[:, 2].copy(), np.sqrt(np.maximum(cov, 0.0)),
-        jerk, np.sqrt(loss),
+        out.state[:, 0].copy(), out.state[:, 1].copy(), out.state[:, 2].copy(),
+        np.sqrt(np.maximum(out.cov, 0.0)), jerk, np.sqrt(out.loss[:2]),
     )  # fmt: skip
 
 
-def _likeliest(y: Array, r: Array, have: NDArray[np.bool_], dt: float) -> float:
+def _samples(y: Array, noise: tuple[float, float], have: tuple[bool, bool], dt: float) -> Samples:
+    """Return displacement and velocity in y (n, 3), with what they tell before the first sample."""
+    r = np.array([max(one, 1e-15) ** 2 for one in noise] + [0.0])
+    there = np.array([*have, False])
+    seen = y[:, 0 if have[0] else 1]
+    finite = np.isfinite(seen)
+    pairs = finite[1:] & finite[:-1]
+    fastest = float(np.max(np.abs(np.diff(seen)[pairs]) / dt, initial=0.0))
+    mean, cov = np.zeros(3), np.zeros(6)
+    if have[0]:
+        mean[0] = seen[finite][0] if finite.any() else 0.0
+        cov[0] = 4.0 * r[0] + 1e-30
+        speed = fastest
+    else:
+        cov[0] = 1e-30  # where the motion begins is not known: it is called zero
+    if have[1]:
+        velocity = y[:, 1][np.isfinite(y[:, 1])]
+        mean[1] = velocity[0] if len(velocity) else 0.0
+        speed = 2.0 * float(np.sqrt(r[1])) if len(velocity) else 0.0
+    cov[3] = speed * speed + 1e-30
+    cov[5] = (2.0 * fastest / dt if have[0] else 2.0 * fastest) ** 2 + 1e-30
+    if all(have):
+        cov[5] = 1e4 * r[1] / (dt * dt) / len(y) + 1e-30
+    return Samples(y, r, there, dt, mean, cov)
+
+
+def _smoothed(samples: Samples, jerk: float) -> Smoothed:
+    out = room(len(samples.y))
+    kalman_smooth(samples, np.full(len(samples.y), jerk), out)
+    return out
+
+
+def _likeliest(samples: Samples) -> float:
     """Return the intensity of the white jerk that makes the measurement likeliest."""
-    spare, cov, loss = np.zeros((1, 3)), np.zeros(3), np.zeros(2)
-    path = y[:, 0] if have[0] else np.cumsum(np.nan_to_num(y[:, 1])) * dt
+    y, dt = samples.y, samples.dt
+    path = y[:, 0] if samples.have[0] else np.cumsum(np.nan_to_num(y[:, 1])) * dt
     third = np.diff(path[np.isfinite(path)], n=3) / dt**3
     top = np.log10(np.var(third) * dt + 1e-30)
 
     def cost(exponent: float) -> float:
-        return float(kalman_smooth(y, r, have, dt, 10.0**exponent, False, spare, cov, loss))
+        return kalman_smooth(samples, np.full(len(y), 10.0**exponent))
 
     grid = np.arange(top - 14.0, top + 1.0, 1.0)
     best = grid[int(np.argmin([cost(exponent) for exponent in grid]))]
@@ -131,22 +161,21 @@ def posterior_draws(
     motion : the motion that was found, (n,); None where there is none
     """
     generator = np.random.default_rng(seed)
-    r = np.array([max(noise[0], 1e-15) ** 2, max(noise[1], 1e-15) ** 2])
+    std = np.array([max(one, 1e-15) for one in noise])
     out = np.zeros((draws, n, 3))
-    cov, loss = np.zeros(3), np.zeros(2)
     lead = min(200, n) if motion is None else 0
     total = n + 2 * lead
-    state = np.zeros((total, 3))
     for d in range(draws):
         truth = np.zeros((total, 3))
         if motion is None:
             truth = random_motion(generator, total, dt, jerk)
-        y = truth[:, :2] + generator.standard_normal((total, 2)) * np.sqrt(r)
-        kalman_smooth(y, r, np.array(have), dt, jerk, True, state, cov, loss)
+        y = truth.copy()
+        y[:, :2] += generator.standard_normal((total, 2)) * std
+        state = _smoothed(_samples(y, noise, have, dt), jerk).state
         out[d] = (truth - state)[lead : lead + n]
     _centre(out)
     if motion is not None and draws:
-        left = _left_out(motion, out[0], r, np.array(have), dt)
+        left = _left_out(motion, out[0], noise, have, dt)
         out[:, :, 2] = _by_spectrum(motion.a, out[:, :, 2], dt)
         out += left
     return out
@@ -188,7 +217,9 @@ def _centre(draws: Array) -> None:
             group *= np.sqrt(len(group) / (len(group) - 1.0))
 
 
-def _left_out(motion: Motion, draw: Array, r: Array, have: NDArray[np.bool_], dt: float) -> Array:
+def _left_out(
+    motion: Motion, draw: Array, noise: tuple[float, float], have: tuple[bool, bool], dt: float
+) -> Array:
     """Return what the smoother takes off the motion (n, 3): what it would take off its own result.
 
     That result holds noise, of which some is taken off as well; were it counted, an error would be
@@ -197,10 +228,9 @@ def _left_out(motion: Motion, draw: Array, r: Array, have: NDArray[np.bool_], dt
     (Wiener).
     """
     path = np.column_stack([motion.x, motion.v, motion.a])
-    twice, noisy = np.zeros_like(path), np.zeros_like(path)
-    cov, loss = np.zeros(3), np.zeros(2)
-    for y, state in ((path, twice), (draw, noisy)):
-        kalman_smooth(y[:, :2].copy(), r, have, dt, motion.jerk, True, state, cov, loss)
+    twice, noisy = (
+        _smoothed(_samples(y, noise, have, dt), motion.jerk).state for y in (path, draw)
+    )
     left = path - twice
     edge = min(EDGE, len(draw) // 4)
     chance = np.mean((draw - noisy)[edge : len(draw) - edge] ** 2, axis=0)
