@@ -22,7 +22,7 @@ from ..physics.inputs import Inputs
 from ..physics.laws import DEFAULT, base_and_variant
 from .model import Model, Problem, Run
 from .response import Response, base_equilibrium, responses, shear
-from .response_kernels import Along
+from .along import Along
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,27 +19,39 @@ contact_force = structure.contact_force
 advance_effects = structure.advance_effects
 
 
-def forces_along(
-    n: int, stiffnesses: Any, isolated: bool, x: Any, v: Any, dt: float, z: Any, p: Any, on: Any,
-    level: Any, forces: Any, z1: Any, out: Any,
-) -> None:  # fmt: skip
-    """Fill `out` (m,) with what effects add to the force of the highest of n levels.
+class Chain(NamedTuple):
+    """The levels up to the one that moves, as effects of a building see them.
+
+    `n` their number; `stiffnesses` (n,) below each [N/m]; `isolated` whether the first is the base
+    on its isolation layer; `dt` the sampling step [s]; `level` (2 n,), `forces` (n,) and `states`
+    room to work.
+    """
+
+    n: int
+    stiffnesses: Array
+    isolated: bool
+    dt: float
+    level: Array
+    forces: Array
+    states: Array
+
+
+def forces_along(chain: Any, x: Any, v: Any, z: Any, p: Any, on: Any, out: Any) -> None:
+    """Fill `out` (m,) with what effects add to the force of the highest level [N].
 
     The levels below rest. A contact slides wherever the motion is not zero: whoever asks leaves out
     the samples at rest.
 
     Parameters
     ----------
-    n : levels up to the one that moves
-    stiffnesses : (n,) N/m below each level
-    isolated : whether the first level is the base on its isolation layer
+    chain : the levels up to the one that moves
     x, v : (m,) motion relative to the level below [m, m/s]
-    dt : sampling step [s]
     z : states of all effects, moved on in place
     p, on : flat parameters of all effects [SI], and (effects,) whether each is on
-    level, forces, z1 : room for (2 n,), (n,) floats and for as many states
     out : (m,) N, filled
     """
+    n, stiffnesses, isolated, dt = chain.n, chain.stiffnesses, chain.isolated, chain.dt
+    level, forces, z1 = chain.level, chain.forces, chain.states
     for k in range(len(x)):
         if k > 0:
             level[n - 1] = 0.5 * (x[k - 1] + x[k])
@@ -116,9 +128,10 @@ class Along:
             p[slot] = values.get(name, EFFECTS[effect].parameters[own].value)
         n = max(1, self._storey)
         z = np.array(structure.start_states(n, values) or [0.0])
-        self._forces(
-            n, np.full(n, stiffness), self._storey == 0, np.ascontiguousarray(x),
-            np.ascontiguousarray(v), dt, z, p, self.on, np.zeros(2 * n), np.zeros(n),
-            np.zeros_like(z), out,
+        chain = Chain(
+            n, np.full(n, stiffness), self._storey == 0, dt, np.zeros(2 * n), np.zeros(n),
+            np.zeros_like(z),
         )  # fmt: skip
+        path = np.ascontiguousarray(x), np.ascontiguousarray(v)
+        self._forces(chain, *path, z, p, self.on, out)
         return out
