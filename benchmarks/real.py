@@ -92,7 +92,7 @@ def bench_row(
     row.verdict, row.words = verdict_of(found), found.words
     if found.before is None:
         return
-    named = found.kind in ("effect", "class") and found.after is not None
+    named = found.kind in ("effect", "ambiguous") and found.after is not None
     after = found.after if named else (found.trials[0] if found.trials else found.before)
     assert after is not None
     noise = [run.noise["force"] for run in [*train, *held]]

@@ -59,7 +59,7 @@ def ask(case: Recorded) -> dict[str, Any]:
 def follow_up(case: Recorded, answer: dict[str, Any], found: Diagnosis) -> dict[str, Any]:
     """Return how well noise-free runs part the rivals of a class from the hidden effect."""
     hidden = [one["effect"] for one in case.truth["effects"]]
-    if answer["kind"] != "class" or len(hidden) != 1 or hidden[0] not in answer["effects"]:
+    if answer["kind"] != "ambiguous" or len(hidden) != 1 or hidden[0] not in answer["effects"]:
         return {}
     rivals = [name for name in answer["effects"] if name != hidden[0]]
     site = _site(hidden[0], rivals, found)

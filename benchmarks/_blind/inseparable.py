@@ -57,7 +57,11 @@ def follow_up(case: Recorded, answer: dict[str, Any], experiment: Any) -> dict[s
     `resolved` rival -> standard deviations; `separated` the verdict after the proposed experiment.
     """
     found = case.truth["effects"]
-    if answer["kind"] != "class" or len(found) != 1 or found[0]["effect"] not in answer["effects"]:
+    if (
+        answer["kind"] != "ambiguous"
+        or len(found) != 1
+        or found[0]["effect"] not in answer["effects"]
+    ):
         return {}
     made = cases.make(case.task)
     more: dict[str, Any] = {"resolved": resolve(case, made, answer["effects"])}

@@ -113,7 +113,9 @@ def unreachable(line: Line) -> bool:
 def answer(line: Line) -> dict[str, Any]:
     """Return the answer; an error counts as the verdict "error", which is never right."""
     empty = {"kind": "error", "effects": [], "sensors": [], "coordinate": "", "ranking": []}
-    return line.get("answer") or empty
+    said = line.get("answer") or empty
+    # Answers that were stored when an ambiguous verdict was called a class.
+    return {**said, "kind": "ambiguous"} if said["kind"] == "class" else said
 
 
 # --- what is right ------------------------------------------------------------------------------
@@ -140,7 +142,7 @@ def in_class(line: Line) -> bool:
     """Return whether the verdict is a class of at most three with the hidden effect."""
     said, (true,) = answer(line), hidden(line)
     return (
-        said["kind"] == "class"
+        said["kind"] == "ambiguous"
         and len(said["effects"]) <= LARGEST_CLASS
         and true in said["effects"]
     )
@@ -185,7 +187,9 @@ def tells_twin(line: Line) -> bool:
 def names_it_alone(line: Line) -> bool:
     """Single effect: named and nothing else beside it, one family counting as one."""
     said = answer(line)
-    return said["kind"] in ("effect", "class") and _family(said["effects"]) == _family(hidden(line))
+    return said["kind"] in ("effect", "ambiguous") and _family(said["effects"]) == _family(
+        hidden(line)
+    )
 
 
 def false_alarm(line: Line) -> bool:
@@ -224,7 +228,7 @@ def reports_fault(line: Line) -> bool:
     if kind in ("gain", "sign"):
         channels.add(SWAPPED.get(fault["channel"], fault["channel"]))
     told = any(s["channel"] in channels and s["fault"] == kind for s in said["sensors"])
-    return told and not (said["kind"] in ("effect", "class") and said["effects"])
+    return told and not (said["kind"] in ("effect", "ambiguous") and said["effects"])
 
 
 def names_both(line: Line) -> bool:
@@ -242,7 +246,7 @@ def names_one_at_least(line: Line) -> bool:
     if said["kind"] == "effect":
         return bool(said["effects"]) and set(said["effects"]) <= pair
     return (
-        said["kind"] == "class"
+        said["kind"] == "ambiguous"
         and len(said["effects"]) <= LARGEST_CLASS
         and bool(set(said["effects"]) & pair)
     )

@@ -341,7 +341,7 @@ def part_rows(lines: list[Line]) -> list[Figure]:
             group="parts",
         )
     )
-    classes = [line for line in counted if score.answer(line)["kind"] == "class"]
+    classes = [line for line in counted if score.answer(line)["kind"] == "ambiguous"]
     rows.append(
         share(
             "verdict is a class, single effects", Count(len(classes), len(counted)), group="parts"

@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from bristle.diagnose.damper import kind_of
 from bristle.diagnose.decision import decide
+from bristle.diagnose.inconsistent_runs import kind_of
 from bristle.diagnose.rule import BENCH, SITE, DecisionRule
 from bristle.diagnose.sites import decide_site
 from bristle.physics.effect import EFFECTS
@@ -67,9 +67,10 @@ def answer(case: Stored, rule: DecisionRule) -> tuple[str, tuple[str, ...]]:
     if case.opened or case.before is None:
         return case.opened or "none", ()
     if case.site:
-        return decide_site(case.before, case.single, rule)
+        decision = decide_site(case.before, case.single, rule)
+        return kind_of(decision.kind, case.before, decision.best, rule), decision.effects
     decision = decide(case.before, case.single, case.grow, organised(case, rule), case.reduce, rule)
-    kind = kind_of(decision, case.before, rule)
+    kind = kind_of(decision.kind, case.before, decision.best, rule)
     if case.instruments and kind in ("none", "effect"):
         return "effect", (*case.instruments, *decision.effects)
     return kind, decision.effects
@@ -87,7 +88,7 @@ def hidden(case: Stored) -> tuple[str, ...]:
 def marks(case: Stored, kind: str, effects: tuple[str, ...]) -> list[str]:
     """Return what a verdict counts as."""
     true, what = hidden(case), case.task.kind
-    named = kind in ("effect", "class")
+    named = kind in ("effect", "ambiguous")
     if what == "fault":
         return ["none"] + ["alarm"] * named
     if what == "outside":

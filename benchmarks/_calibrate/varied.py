@@ -23,7 +23,7 @@ BENCH_VALUES: dict[str, tuple[float, ...]] = {
     "least_excess": (0.003, 0.006, 0.01, 0.02, 0.04),
     "close": (0.001, 0.002, 0.004, 0.008, 0.02),
     "rival": (1.05, 1.1, 1.25, 1.5, 2.0),
-    "largest_class": (1, 2, 3, 4, 5),
+    "most_alternatives": (1, 2, 3, 4, 5),
     "first": (0.05, 0.1, 0.2, 0.3, 0.5),
     "pair_left": (0.2, 0.35, 0.5, 0.7, 0.9),
     "pair_part": (0.01, 0.02, 0.05, 0.1, 0.2),
@@ -42,7 +42,7 @@ SITE_VALUES: dict[str, tuple[float, ...]] = {
     "least_excess": (0.003, 0.006, 0.01, 0.02, 0.04),
     "close": (0.001, 0.002, 0.005, 0.01, 0.03),
     "rival": (1.1, 1.5, 2.0, 3.0, 5.0),
-    "largest_class": (1, 2, 3, 4),
+    "most_alternatives": (1, 2, 3, 4),
     "likelihood": (5.0, 20.0, 40.0, 80.0, 320.0),
 }
 """The same at a building's layer and storeys."""

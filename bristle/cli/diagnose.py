@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..diagnose import Diagnosis
+    from ..diagnose.verdict_text import Verdict
 
 HELP = "what a study's model is missing, how sure, what else it could be"
 
@@ -30,10 +30,11 @@ def main(arguments: argparse.Namespace) -> int:
 
     study = Study(arguments.folder)
     found = diagnose_study(study, write=not arguments.dry_run, say=speaker(arguments.json))
+    verdict = verdict_of(study, found)
     if arguments.json:
-        print(json.dumps(verdict_of(study, found), indent=2, ensure_ascii=False))
+        print(json.dumps(verdict, indent=2, ensure_ascii=False))
     else:
-        print(text(found, arguments.folder))
+        print(text(verdict, arguments.folder))
     return 0
 
 
@@ -46,54 +47,59 @@ def speaker(quiet: bool):  # type: ignore[no-untyped-def]
 
 SHORT = "  (short search: it gains too little, as the others do)"
 
-TITLES = {
-    "none": "Nothing is missing.",
-    "effect": "Missing: {names}.",
-    "class": "Missing is one of: {names}.",
-    "unknown": "Something is missing that no effect of the library explains.",
-    "insufficient": "These data carry no verdict.",
-}
 
+def text(verdict: Verdict, folder: Path) -> str:
+    """Return the content of verdict.json as text, with the next command for a study's folder."""
+    from ..diagnose.verdict_text import about, sentences, separating, untestable
 
-def text(found: Diagnosis, folder: Path) -> str:
-    """Return the verdict as text."""
-    from ..physics.effect import EFFECTS
-
-    joined = (" and " if found.kind == "effect" else ", ").join(found.effects)
-    lines = [TITLES[found.kind].format(names=joined), "", found.words]
-    for name in found.effects:
-        lines += ["", f"  {EFFECTS[name].first_line()}"]
-    if found.sensors:
+    first, *others = sentences(verdict)
+    lines = [first, *(["", " ".join(others)] if others else [])]
+    for name in verdict["effects"]:
+        lines += ["", f"  {about(name)}"]
+    if verdict["sensors"]:
         lines += ["", "Sensors:"]
-        lines += [f"  {one.channel:14} {one.fault:10} {one.value:.5g}" for one in found.sensors]
-    if found.trials and found.before is not None:
-        lines += ["", f"  {'model':34} {'z, training':>12} {'z, held out':>12}"]
-        lines.append(f"  {'as it is':34} {found.before.train:>12.3f} {found.before.z:>12.3f}")
-        refined = [trial for trial in found.trials[:5] if trial.refined]
-        others = [trial for trial in found.trials if not trial.refined]
-        # The order of equals is that of a rounding: one stands for all of them.
-        others.sort(key=lambda trial: (round(trial.z, 2), trial.effects))
-        for trial in [*refined, *others[:1]]:
-            note = "" if trial.refined else SHORT
-            lines.append(
-                f"  {'with ' + trial.effects[-1]:34} {trial.train:>12.3f} {trial.z:>12.3f}{note}"
-            )
-        lines.append("  z: error over the noise that a true model would show; a true model has 1.")
-    if found.untestable:
-        lines += ["", f"Not testable with these runs: {', '.join(found.untestable)}."]
-    if found.experiment is not None:
-        lines += ["", f"To tell them apart: {found.experiment.words()}"]
-    return "\n".join([*lines, *_next(found, folder)])
-
-
-def _next(found: Diagnosis, folder: Path) -> list[str]:
-    if found.kind in ("effect", "class"):
-        names = " ".join(found.effects) if found.kind == "effect" else found.effects[0]
-        return ["", f"Next:  bristle add {folder} {names}"]
-    if found.kind == "unknown":
-        return [
-            "",
-            f"Next:  bristle compare {folder} , which shows where the residual is;  bristle "
-            "effects new NAME  begins an effect of your own.",
+        lines += [
+            f"  {one['channel']:14} {one['fault']:10} {one['value']:.5g}"
+            for one in verdict["sensors"]
         ]
-    return ["", f"Next:  bristle report {folder}"]
+    lines += _trials(verdict)
+    if hidden := untestable(verdict):
+        lines += ["", f"Not testable with these runs: {', '.join(hidden)}."]
+    if separating(verdict):
+        lines += ["", f"To distinguish them: {separating(verdict)}"]
+    return "\n".join([*lines, "", f"Next:  {_next(verdict, folder)}"])
+
+
+def _trials(verdict: Verdict) -> list[str]:
+    """Return the table of the effects tried at the site whose model errs the most."""
+    at = max(verdict["findings"], key=lambda found: found["z_holdout_before"], default=None)
+    rows = [row for row in verdict["ranking"] if at is not None and row["site"] == at["site"]]
+    if at is None or not rows or "z_train_before" not in at:
+        return []
+    lines = ["", f"  {'error / noise (z) of the model':34} {'training':>12} {'held out':>12}"]
+    before = at["z_train_before"], at["z_holdout_before"]
+    lines.append(f"  {'as it is':34} {before[0]:>12.3f} {before[1]:>12.3f}")
+    refined = [row for row in rows[:5] if row["refined"]]
+    # The order of equals is that of a rounding: one stands for all of them.
+    others = sorted(
+        (row for row in rows if not row["refined"]),
+        key=lambda row: (round(row["z_holdout"], 2), row["effect"]),
+    )
+    for row in [*refined, *others[:1]]:
+        note = "" if row["refined"] else SHORT
+        z = row["z_train"], row["z_holdout"]
+        lines.append(f"  {'with ' + row['effect']:34} {z[0]:>12.3f} {z[1]:>12.3f}{note}")
+    return [*lines, "  A true model has z = 1: it errs by the noise alone."]
+
+
+def _next(verdict: Verdict, folder: Path) -> str:
+    """Return the command that follows from a verdict."""
+    if verdict["kind"] in ("effect", "ambiguous"):
+        count = len(verdict["effects"]) if verdict["kind"] == "effect" else 1
+        return f"bristle add {folder} {' '.join(verdict['effects'][:count])}"
+    if verdict["kind"] == "unknown":
+        return (
+            f"bristle compare {folder} , which shows where the residual is;  bristle effects new "
+            "NAME  begins an effect of your own."
+        )
+    return f"bristle report {folder}"

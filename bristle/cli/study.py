@@ -210,5 +210,5 @@ def _auto(arguments: argparse.Namespace) -> int:
         return 0
     if not shown:
         print(f"{staircase(study.steps())}\n")
-    print(text(learned.verdict, arguments.folder))
+    print(text(learned.verdict.as_dict(), arguments.folder))
     return 0

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from ..data.channels import DRIVE
 from ..data.measurement import Measurement
 from ..identify.model import Model
-from ..identify.rig import DAMPER
 from ..identify.structure import StructureProblem
-from .faults import instruments_of
+from .conclusion import About
 from .finding import Finding
 from .opening import Insufficient, Opening, Progress, opening
-from .verdict import Diagnosis
-from .verdict_text import of_damper
 
 
 class BenchRuns:
@@ -62,30 +58,8 @@ class BenchRuns:
         """Return the damper's finding as it is."""
         return finding
 
-    def verdict(self, findings: Mapping[str, Finding]) -> Diagnosis:
-        """Return the verdict, which is the damper's finding with the instruments that show."""
-        opened, found = self._opened, findings[DAMPER]
-        assert opened is not None
-        made = Diagnosis(
-            found.kind, found.effects, of_damper(found, opened.faults), findings,
-            sensors=opened.faults, untestable=found.untestable, coordinate=found.coordinate,
-            noise=opened.noise,
-        )  # fmt: skip
-        return without_drive(with_instrument(made), [*self._train, *self._holdout])
-
-
-def without_drive(found: Diagnosis, runs: Sequence[Measurement]) -> Diagnosis:
-    """Return the diagnosis with the doubt that a drive which nobody recorded leaves."""
-    driven = any(run.has(channel) for run in runs for channel in DRIVE)
-    if driven or found.kind != "unknown":
-        return found
-    doubt = "Neither voltage nor current was recorded: a drive that changed would look like this."
-    return replace(found, words=f"{found.words} {doubt}")
-
-
-def with_instrument(found: Diagnosis) -> Diagnosis:
-    """Return the diagnosis with the instrument named whose effect the channels show."""
-    named = instruments_of(found.sensors)
-    if not named or found.kind not in ("none", "effect"):
-        return found
-    return replace(found, kind="effect", effects=(*named, *found.effects))
+    def about(self) -> About:
+        """Return what the verdict tells beside the damper's finding."""
+        assert self._opened is not None
+        driven = any(m.has(name) for m in (*self._train, *self._holdout) for name in DRIVE)
+        return About(sensors=self._opened.faults, noise=self._opened.noise, driven=driven)

@@ -1,4 +1,4 @@
-"""From trials to a verdict: none, an effect, a pair, a class of rivals, or something unknown.
+"""From trials to a verdict: none, an effect, a pair, alternatives, or something unknown.
 
 Only numbers on held-out runs decide. z is RMS(residual)/noise expected; z^2 - 1 is the excess, the
 part of the residual's power that noise does not account for. An effect explains the share of the
@@ -15,13 +15,18 @@ from .candidates import Trial
 from .evidence import paired
 from .rule import BENCH, DecisionRule
 
+Z = "error / noise (z)"
+"""How z is introduced in a sentence."""
+
+OTHER_FORM = "A residual remains: the effect in the rig has a different functional form."
+
 
 @dataclass(frozen=True)
 class Decision:
     """What follows from the trials.
 
     `kind` as in verdict.json; `effects` the new ones, all missing ("effect") or one of them
-    ("class"); `best` the trial that goes with it, the model before for "none" and "unknown";
+    ("ambiguous"); `best` the trial that goes with it, the model before for "none" and "unknown";
     `explained` the share of the excess; `reasons` sentences.
     """
 
@@ -73,13 +78,9 @@ def decide(
             return pair
     if not _suffices(before, best, rule):
         return Decision(
-            "unknown", (), before, explained,
-            (
-                f"The best effect of the library, {_new(best, before)[0]}, explains "
-                f"{explained:.0%} of what is missing and leaves z = {best.z:.2f}.",
-            ),
-        )  # fmt: skip
-    return _effect_or_class(before, best, ranked[1:], rule)
+            "unknown", (), before, explained, (in_part(_new(best, before)[0], best, explained),)
+        )
+    return _effect_or_ambiguous(before, best, ranked[1:], rule)
 
 
 def _suffices(before: Trial, best: Trial, rule: DecisionRule) -> bool:
@@ -102,23 +103,47 @@ def _without_effect(
     before: Trial, ranked: Sequence[Trial], organised: bool, rule: DecisionRule
 ) -> Decision:
     if before.z <= rule.clean and not organised:
-        reason = f"On runs it has not seen the model errs by {before.z:.2f} times the noise"
-        if ranked:
-            gain = max(0.0, 1.0 - ranked[0].z / before.z)
-            reason += f", and no effect lowers that by more than {gain:.1%}"
-        return Decision("none", (), before, 0.0, (reason + ".",))
-    return Decision(
-        "unknown", (), before, 0.0,
-        (f"z = {before.z:.2f}, and no effect of the library lowers it by {rule.gain:.0%}.",),
-    )  # fmt: skip
+        return as_noise(before, ranked)
+    return Decision("unknown", (), before, 0.0, (unexplained(before, rule),))
+
+
+def as_noise(before: Trial, ranked: Sequence[Trial]) -> Decision:
+    """Return the decision that nothing is missing, `ranked` being the trials, best first."""
+    reason = f"On held-out runs {Z} = {before.z:.2f}"
+    if ranked:
+        gain = 100.0 * max(0.0, 1.0 - ranked[0].z / before.z)
+        reason += f", and no effect lowers it by more than {gain:.1f} %"
+    return Decision("none", (), before, 0.0, (reason + ".",))
+
+
+def unexplained(before: Trial, rule: DecisionRule) -> str:
+    """Return the sentence that no effect gains enough."""
+    least = f"{100.0 * rule.gain:.0f} %"
+    return f"On held-out runs {Z} = {before.z:.2f}; no effect of the library lowers it by {least}."
+
+
+def in_part(name: str, best: Trial, explained: float) -> str:
+    """Return the sentence that the best effect explains too little."""
+    return (
+        f"The best effect of the library, {name}, explains {100.0 * explained:.0f} % of what is "
+        f"missing and leaves {Z} = {best.z:.2f}."
+    )
+
+
+def gained(name: str, before: Trial, best: Trial, explained: float) -> str:
+    """Return the sentence that an effect lowers the error, `explained` its share of the excess."""
+    return (
+        f"With {name} the {Z} on held-out runs falls from {before.z:.2f} to {best.z:.2f}; that is "
+        f"{100.0 * explained:.0f} % of what exceeds the noise."
+    )
 
 
 def _too_loud(before: Trial, best: Trial) -> Decision:
     return Decision(
         "insufficient", (), before, 0.0,
         (
-            f"The model errs by {before.z:.2f} times the noise: that was estimated too high, as "
-            "happens where a force turns within a few samples. "
+            f"On held-out runs {Z} = {before.z:.2f}: the noise was estimated too high, as happens "
+            "where a force turns within a few samples. "
             f"{_new(best, before)[0].capitalize()} lowers the error further, which this noise "
             "cannot judge. State the noise of the channels in study.toml, or sample faster.",
         ),
@@ -161,8 +186,9 @@ def _pair(
     return Decision(
         "effect", names, pair, explained,
         (
-            f"No single effect explains it: the best, {_new(best, before)[0]}, leaves "
-            f"z = {best.z:.2f}; {names[0]} and {names[1]} together leave {pair.z:.2f}.",
+            f"No single effect explains the {Z} of {before.z:.2f} on held-out runs: the best, "
+            f"{_new(best, before)[0]}, leaves {best.z:.2f}; {names[0]} and {names[1]} together "
+            f"leave {pair.z:.2f}.",
         ),
     )  # fmt: skip
 
@@ -173,7 +199,7 @@ def _needed(single: Trial, pair: Trial, rule: DecisionRule) -> bool:
     return rule.excess(pair.z) <= left and missing(single, pair, rule)
 
 
-def _effect_or_class(
+def _effect_or_ambiguous(
     before: Trial, best: Trial, others: Sequence[Trial], rule: DecisionRule
 ) -> Decision:
     name = _new(best, before)[0]
@@ -185,17 +211,12 @@ def _effect_or_class(
         and _rivals(best, other, rule)
         and not _same(name, other, before)
     ]
-    names = (name, *(_new(other, before)[0] for other in rivals))[: rule.largest_class]
-    reasons = [
-        f"With {name} the error on runs not seen falls from {before.z:.2f} to {best.z:.2f} times "
-        f"the noise: {explained:.0%} of what noise does not account for."
-    ]
+    names = (name, *(_new(other, before)[0] for other in rivals))[: rule.most_alternatives]
+    reasons = [gained(name, before, best, explained)]
     if best.z > rule.adequate:
-        reasons.append("A residual remains: the rig's effect has another form than ours.")
-    if len(names) > 1:
-        reasons.append("These data cannot tell: " + ", ".join(names) + ".")
-        return Decision("class", names, best, explained, tuple(reasons))
-    return Decision("effect", names, best, explained, tuple(reasons))
+        reasons.append(OTHER_FORM)
+    kind = "ambiguous" if len(names) > 1 else "effect"
+    return Decision(kind, names, best, explained, tuple(reasons))
 
 
 def _rivals(best: Trial, other: Trial, rule: DecisionRule) -> bool:

@@ -10,10 +10,14 @@ from ..identify.rig import DAMPER
 from ..physics.building import Building
 from ..physics.laws import DEFAULT
 from .bench import BenchRuns
+from .conclusion import verdict_of
 from .damper import look_at_damper
+from .detail import detailed
 from .equilibrium import BuildingRuns
 from .finding import Finding
-from .opening import Insufficient, Progress, silent
+from .inconsistent_runs import contradicted
+from .opening import IN_BUILDING, Insufficient, Opening, Progress, silent
+from .rule import SITE
 from .sites import look_at
 from .verdict import Diagnosis
 
@@ -86,12 +90,21 @@ def diagnose_rig(
     findings: dict[str, Finding] = {}
     for name, (own, other) in runs.lines().items():
         say(f"{name}: effects of the structure")
-        findings[name] = look_at(name, own, other, runs.part(name))
+        found = look_at(name, own, other, runs.part(name))
+        assert found.before is not None
+        site = Opening(found.before, own, other, rule=SITE, scope=IN_BUILDING)
+        findings[name] = detailed(contradicted(found, site), site)
     runs.correct(findings)
     opened = runs.open_damper()
     if isinstance(opened, Insufficient):
-        text = " ".join(opened.reasons)
-        return Diagnosis("insufficient", (), text, sensors=opened.faults, noise=opened.noise)
+        return Diagnosis(
+            "insufficient", (), opened.reasons, sensors=opened.faults, noise=opened.noise
+        )
     if opened is not None:
-        findings[DAMPER] = runs.excused(look_at_damper(opened, say), findings)
-    return runs.verdict(findings)
+        found = look_at_damper(opened, say)
+        excused = runs.excused(found, findings)
+        if excused is found:  # what an instrument explains contradicts nothing
+            excused = contradicted(found, opened)
+        say("intervals")
+        findings[DAMPER] = detailed(excused, opened)
+    return verdict_of(findings, runs.about())

@@ -22,15 +22,16 @@ from ..identify.structure import StructureProblem, problems_of
 from ..physics.building import Building
 from .building_prior import moved_numbers, within_prior
 from .candidates import SHOWN, judge
+from .conclusion import About
 from .corrected import corrected
 from .damper import excused_by_sensor, left_by_filter
 from .finding import Finding
 from .load_cell import load_cell
-from .opening import Opening, Progress
-from .rule import BENCH, SITE, DecisionRule
+from .opening import IN_BUILDING, Opening, Progress, median_noise
+from .rule import BENCH, INSIDE, SITE, DecisionRule
 from .sensors import SensorFault, sensor_faults
-from .sites import coordinate_of, shortened
-from .verdict import Diagnosis, late_values, of_sites
+from .sites import shortened
+from .verdict import late_values
 
 Pair = tuple[StructureProblem, StructureProblem]
 
@@ -65,6 +66,7 @@ class BuildingRuns:
         say("looking for sensor faults")
         self._sensors = tuple(sensor_faults([_as_bench(m, building) for m in (*train, *holdout)]))
         right = [_corrected(list(runs), self._sensors, building) for runs in (train, holdout)]
+        self._noise = median_noise([*right[0], *right[1]])
         say("smoothing the motion of each level")
         found = responses([*right[0], *right[1]], building)
         found, self._present = corrected_for_delay(found, present)
@@ -134,8 +136,8 @@ class BuildingRuns:
         # A force that no load cell shows cannot be late.
         shown = () if train.reconstructed else SHOWN
         return Opening(
-            judge(model, train, held_out), train, held_out, self._sensors, {}, shown,
-            shortened(train, SEARCHED),
+            judge(model, train, held_out), train, held_out, self._sensors, self._noise, shown,
+            shortened(train, SEARCHED), INSIDE, IN_BUILDING,
         )  # fmt: skip
 
     def excused(self, finding: Finding, findings: Mapping[str, Finding]) -> Finding:
@@ -148,16 +150,13 @@ class BuildingRuns:
             most = left_by_filter(self._present.law, *self._problems[DAMPER])
             why = "The load cell's filter has another form than ours."
             finding = excused_by_sensor(finding, most, why)
-        if finding.kind == "unknown" and finding.before is not None:
-            along = coordinate_of(finding.before.residual, self._problems[DAMPER][1])
-            finding = replace(finding, coordinate=along)
         return finding
 
-    def verdict(self, findings: Mapping[str, Finding]) -> Diagnosis:
-        """Return the verdict that the findings of all sites amount to."""
+    def about(self) -> About:
+        """Return what the verdict tells beside the findings of the sites."""
         reconstructed = DAMPER in self._problems and self._problems[DAMPER][0].reconstructed
-        found = of_sites(findings, "reconstructed" if reconstructed else "measured", self._sensors)
-        return replace(found, words=" ".join([found.words, *self._notes]))
+        force = "reconstructed" if reconstructed else "measured"
+        return About(force, self._sensors, self._noise, tuple(self._notes))
 
 
 def _suits(suited: Pair, given: Pair, present: Model, rule: DecisionRule = BENCH) -> bool:

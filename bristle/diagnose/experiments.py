@@ -39,12 +39,12 @@ class Experiment:
     contrast: float = 0.0
     deviations: float = 0.0
 
-    def words(self, rule: DecisionRule = BENCH) -> str:
+    def sentence(self, rule: DecisionRule = BENCH) -> str:
         """Return the run as a sentence of an experiment's plan."""
         if self.deviations < rule.tells:
             return (
-                "No run within the strokes, speeds and voltages of these would tell: at best the "
-                f"rivals' forces differ by {self.deviations:.1f} standard deviations over "
+                "No run within the strokes, speeds and voltages of these would distinguish them: "
+                f"at best the forces differ by {self.deviations:.1f} standard deviations over "
                 f"{LENGTH:g} s. Go beyond them."
             )
         motion = (
@@ -61,8 +61,8 @@ class Experiment:
             f"{self.switch:.3g} s"
         )
         return (
-            f"Run {motion} {drive} for {LENGTH:g} s: there the rivals' forces differ by "
-            f"{self.contrast:.2g} times the noise, however they are refitted."
+            f"Run {motion} {drive} for {LENGTH:g} s: there the forces of the alternatives differ "
+            f"by {self.contrast:.2g} times the noise, however they are refitted."
         )
 
     def signals(self, dt: float) -> tuple[Array, Array, Array, Array]:

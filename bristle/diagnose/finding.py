@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
 
 from ..compare.patterns import ResidualPattern
 from ..identify.model import Model
@@ -23,9 +26,9 @@ class Finding:
     is what the finding names; `before` the trial of the site's model as it was, `after` that of
     `model`, `trials` those of single effects, best first; `reasons` sentences.
 
-    Of a bench's damper there is more: `std` by parameter [SI] of what the data identify,
-    `patterns` of the residual that is left, `untestable` effects, the `experiment` that would tell
-    the members of a class apart.
+    `std` is by parameter [SI], of what the data identify; `patterns` those of the residual;
+    `untestable` the effects that the site's runs do not show; `experiment` the run that would
+    distinguish alternatives, where the rig's motion can be chosen.
     """
 
     site: str
@@ -46,11 +49,40 @@ class Finding:
     untestable: tuple[str, ...] = ()
     experiment: Experiment | None = None
 
+    def as_dict(self) -> dict[str, Any]:
+        """Return what verdict.json holds of the site."""
+        model = self.model.values if self.model is not None else {}
+        out: dict[str, Any] = {
+            "site": self.site, "kind": self.kind, "effects": list(self.effects),
+            "z_holdout_before": round(self.z_before, 4), "z_holdout_after": round(self.z_after, 4),
+            "explained": round(self.share, 4), "untestable": list(self.untestable),
+            "values": {n: {"value": model[n], "std": self.std[n]} for n in self.std if n in model},
+            "reasons": list(self.reasons),
+        }  # fmt: skip
+        if self.before is not None and self.after is not None:
+            for when, trial in (("before", self.before), ("after", self.after)):
+                out[f"z_train_{when}"] = round(trial.train, 4)
+                out[f"rms_holdout_{when}"] = trial.rms
+        if np.isfinite(self.detectable):
+            out["detectable"] = round(self.detectable, 5)
+        if self.kind == "unknown" and self.coordinate:
+            out["coordinate"] = self.coordinate
+        if self.patterns:
+            out["organised"] = [
+                {"coordinate": one.coordinate, "share": round(one.share, 4), "p": one.p}
+                for one in self.patterns[:5]
+            ]
+        if self.experiment is not None:
+            out["separate_by"] = self.experiment.sentence()
+        return out
 
-def of_decision(decision: Decision, before: Trial, trials: tuple[Trial, ...] = ()) -> Finding:
-    """Return the finding at the damper that a decision is."""
+
+def of_decision(
+    decision: Decision, before: Trial, trials: tuple[Trial, ...] = (), site: str = DAMPER
+) -> Finding:
+    """Return the finding at a site that a decision is, with the trials of single effects."""
     best = decision.best
     return Finding(
-        DAMPER, decision.kind, decision.effects, before.z, best.z, decision.explained,
+        site, decision.kind, decision.effects, before.z, best.z, decision.explained,
         float("nan"), "", best.model, trials, before, best, decision.reasons,
     )  # fmt: skip

@@ -3,13 +3,63 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.model import Run
 from ..identify.search import z_scale
 from ..identify.search_context import residuals
+from .candidates import Trial
+from .decision import Z
+from .finding import Finding
+from .opening import Opening
 from .rule import BENCH, DecisionRule
+
+HELD_OUT_DIFFER = (
+    "The model fits the runs that it was fitted to: the others differ from them in something that "
+    "no channel shows."
+)
+
+
+def contradicted(found: Finding, opened: Opening) -> Finding:
+    """Return a finding, insufficient where the runs contradict each other, with the reason.
+
+    Parameters
+    ----------
+    found : what a site's trials lead to
+    opened : the site's runs and its model
+    """
+    assert found.after is not None
+    before, rule = opened.before, opened.rule
+    kind = kind_of(found.kind, before, found.after, rule)
+    if kind == found.kind == "unknown":
+        restart = opened.scope.restart
+        mixed = groups(before.model, opened.searched, opened.held_out, rule, restart)
+        return replace(found, kind="insufficient", reasons=(mixed,)) if mixed else found
+    if kind == found.kind:
+        return found
+    if found.kind == "unknown":
+        reasons = (*found.reasons, HELD_OUT_DIFFER)
+    else:
+        reasons = (inconsistent_runs(found.after.model, opened.problem, opened.held_out, rule),)
+    return replace(found, kind=kind, reasons=reasons)
+
+
+def kind_of(kind: str, before: Trial, best: Trial, rule: DecisionRule = BENCH) -> str:
+    """Return the kind of a verdict: a decision's, unless the runs contradict each other.
+
+    Parameters
+    ----------
+    kind : the decision's
+    before, best : the trial of the present model, and the one that goes with the decision
+    rule : the numbers that decide
+    """
+    if kind == "unknown" and before.train <= rule.trained:
+        return "insufficient"
+    if kind == "none" and best.train > rule.misfit:
+        return "insufficient"
+    return kind
 
 
 def inconsistent_runs(
@@ -42,12 +92,18 @@ def inconsistent_runs(
         return ""
     worst = ", ".join(f"{name} ({z[name]:.3g})" for name in bad)
     return (
-        f"One model does not explain all runs: its error in times the noise is largest in {worst}, "
-        f"while {_list(good)} it explains. Were they taken on one rig, with one setting?"
+        f"One model does not explain all runs: its {Z} is largest in {worst}, while it explains "
+        f"{_list(good)}. Were they taken on one rig, with one setting?"
     )
 
 
-def groups(model: Model, train: Problem, held_out: Problem, rule: DecisionRule = BENCH) -> str:
+def groups(
+    model: Model,
+    train: Problem,
+    held_out: Problem,
+    rule: DecisionRule = BENCH,
+    restart: bool = True,
+) -> str:
     """Return, in words, the groups of runs that each have values of their own, "" where not so.
 
     For a model that leaves the runs unexplained together: where it explains each of two or three
@@ -58,15 +114,17 @@ def groups(model: Model, train: Problem, held_out: Problem, rule: DecisionRule =
     model : law and effects; it is refitted to each group
     train, held_out : the runs to group, in this order
     rule : the numbers that decide
+    restart : whether a group's fit begins from several starts too, not from the values at hand
+        alone: rigs may differ in size
     """
     found: list[list[Run]] = []
     for run in chain(train.runs, held_out.runs):
         for group in found:
-            if _explains(model, train, [*group, run], rule):
+            if _explains(model, train, [*group, run], rule, restart):
                 group.append(run)
                 break
         else:
-            if len(found) == rule.most_groups or not _explains(model, train, [run], rule):
+            if len(found) == rule.most_groups or not _explains(model, train, [run], rule, restart):
                 return ""
             found.append([run])
     if len(found) < 2 or min(len(group) for group in found) < 2:
@@ -78,14 +136,15 @@ def groups(model: Model, train: Problem, held_out: Problem, rule: DecisionRule =
     )
 
 
-def _explains(model: Model, problem: Problem, runs: list[Run], rule: DecisionRule) -> bool:
-    """Return whether a model that is fitted to these runs alone leaves noise.
-
-    From the values of all runs, and from the runs' own: rigs may differ in size.
-    """
+def _explains(
+    model: Model, problem: Problem, runs: list[Run], rule: DecisionRule, restart: bool
+) -> bool:
+    """Return whether a model that is fitted to these runs alone leaves noise."""
     part = problem.of(runs)
     if _z(fit(part, model, with_std=False).model, part) <= rule.misfit:
         return True
+    if not restart:
+        return False
     own = identify(
         part, model.law, model.effects, 2, held=model.held,
         values={name: model.value(name) for name in model.held}, limits=model.limits,

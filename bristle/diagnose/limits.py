@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,6 +36,7 @@ def untestable(
     expected: Expected,
     visible: float,
     rule: DecisionRule = BENCH,
+    able: Sequence[str] | None = None,
 ) -> list[str]:
     """Return the effects that these runs do not excite, or that refitting the model absorbs.
 
@@ -47,6 +50,7 @@ def untestable(
     expected : what a true model would show on each run; see `Problem.expectation`
     visible : the detectable share of the force RMS; see `detectable`
     rule : the numbers that decide
+    able : names of the effects that can join; None for those of a damper on a bench
     """
     free = model.free()
     search = Search(problem, model, expected, free)
@@ -59,7 +63,7 @@ def untestable(
     force = np.concatenate([run.force[run.skip :] for run in problem.runs])
     size = float(np.linalg.norm(force / sigma))
     out = []
-    for name in joinable(model):
+    for name in joinable(model) if able is None else able:
         change = _change(name, model, problem, expected, base)
         raw = float(np.linalg.norm(change)) / size
         left = float(np.linalg.norm(change - basis @ (basis.T @ change))) / size

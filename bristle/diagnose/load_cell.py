@@ -16,8 +16,8 @@ from ..physics.effect import instrument_of
 from ..physics.laws import law_of_part
 from .candidates import judge
 from .finding import Finding
+from .limits import detectable
 from .rule import SITE, DecisionRule
-from .sites import detectable
 
 FORCE_GAIN = "force_gain"
 """What a finding names for a load cell of a wrong scale, which is no effect."""
@@ -95,6 +95,7 @@ def _search_cell(
     own, other = problem(value, train), problem(value, holdout)
     base = fit_line(own, law_of_part("layer").name)
     after = judge(base.model, own, other)
-    finding = Finding("force", "none", (), 0.0, after.z, 0.0, detectable(other), "", base.model)
+    seen = detectable(other, other.expectation(base.model), SITE)
+    finding = Finding("force", "none", (), 0.0, after.z, 0.0, seen, "", base.model)
     delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
     return after.z, delay, gain, finding

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -50,21 +50,48 @@ class Insufficient:
 
 
 @dataclass(frozen=True)
+class Scope:
+    """What a rig allows at each of its sites: a bench has one site, a building many and long runs.
+
+    `rank_all`: effects are tried, and ranked, even where noise is all that the model leaves.
+    `restart`: fits begin anew from several starts before runs are called contradictory, and
+    intervals are those of a refit of so many sweeps, `sweeps`; 0 takes the fit as it is.
+    `choose_motion`: the motion can be chosen, so that a run can be proposed.
+    """
+
+    rank_all: bool
+    restart: bool
+    sweeps: int
+    choose_motion: bool
+
+
+ON_BENCH = Scope(rank_all=True, restart=True, sweeps=4, choose_motion=True)
+IN_BUILDING = Scope(rank_all=False, restart=False, sweeps=0, choose_motion=False)
+
+
+@dataclass(frozen=True)
 class Opening:
-    """What a diagnosis of a damper begins with: runs freed of sensors' faults, and its model.
+    """What the look at a site begins with: runs freed of sensors' faults, and its model.
 
     `before` is the present model, fitted to `problem` and judged on `held_out`; `shown` the
-    channels whose instruments may still have an effect. Inside a building `brief` is the part of
-    the training runs that effects are searched on, None on a bench.
+    channels whose instruments may still have an effect; `part` the part of the training runs that
+    effects are searched on, None for all; `rule` the numbers that decide there.
     """
 
     before: Trial
     problem: Problem
     held_out: Problem
-    faults: tuple[SensorFault, ...]
-    noise: Mapping[str, float]
-    shown: tuple[str, ...]
-    brief: StructureProblem | None = None
+    faults: tuple[SensorFault, ...] = ()
+    noise: Mapping[str, float] = field(default_factory=dict)
+    shown: tuple[str, ...] = ()
+    part: Problem | None = None
+    rule: DecisionRule = BENCH
+    scope: Scope = ON_BENCH
+
+    @property
+    def searched(self) -> Problem:
+        """The training runs, or the part of them, that effects are searched on."""
+        return self.part or self.problem
 
 
 def opening(
@@ -87,7 +114,7 @@ def opening(
     say("looking for sensor faults")
     faults = sensor_faults([*train, *holdout])
     lacking = _lacking([*train, *holdout], faults)
-    noise = _noise([*train, *holdout])
+    noise = median_noise([*train, *holdout])
     if lacking:
         return Insufficient(tuple(lacking), tuple(faults), noise)
     say("smoothing the motion")
@@ -143,12 +170,10 @@ class Trials:
 
     def _all(self, first: Trial, most: int | None) -> list[Trial]:
         opened = self.opened
-        on, held_out = opened.brief or opened.problem, opened.held_out
-        trials = try_all(first.model, on, held_out, shown=opened.shown, most=most)
-        if opened.brief is None:
-            return trials
+        held_out = opened.held_out
+        trials = try_all(first.model, opened.searched, held_out, shown=opened.shown, most=most)
         trials = sorted([*trials, *self._of_layer(first)], key=lambda trial: trial.z)
-        if opened.brief is not opened.problem:
+        if opened.searched is not opened.problem:
             best = trials[0].z
             for k, one in enumerate(trials[:CONTENDERS]):
                 if one.refined and one.z <= NEAR * best:
@@ -158,15 +183,18 @@ class Trials:
     def _of_layer(self, first: Trial) -> list[Trial]:
         """Return the trials of the layer's effects, of which a reconstructed force has a share."""
         problem, held_out = self.opened.problem, self.opened.held_out
-        assert isinstance(problem, StructureProblem)
-        assert isinstance(held_out, StructureProblem)
-        if not problem.reconstructed:
+        if not (isinstance(problem, StructureProblem) and isinstance(held_out, StructureProblem)):
             return []
-        return [
-            try_effect(effect.name, first.model, problem, held_out)
-            for effect in effects_of("structure")
-            if "force" in effect.hooks() and effect.name not in first.model.effects
-        ]
+        names = of_layer(first.model, problem)
+        return [try_effect(name, first.model, problem, held_out) for name in names]
+
+
+def of_layer(model: Model, problem: Problem) -> list[str]:
+    """Return the layer's effects that can join a damper's model: a reconstructed force has them."""
+    if not (isinstance(problem, StructureProblem) and problem.reconstructed):
+        return []
+    able = [effect.name for effect in effects_of("structure") if "force" in effect.hooks()]
+    return [name for name in able if name not in model.effects]
 
 
 def _left(runs: Sequence[Measurement]) -> list[Measurement]:
@@ -178,7 +206,7 @@ def _left(runs: Sequence[Measurement]) -> list[Measurement]:
     ]
 
 
-def _noise(runs: Sequence[Measurement]) -> dict[str, float]:
+def median_noise(runs: Sequence[Measurement]) -> dict[str, float]:
     """Return the median noise of each channel over the runs, in SI."""
     names = dict.fromkeys(name for run in runs for name in run.noise)
     return {

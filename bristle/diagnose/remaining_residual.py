@@ -5,15 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import welch
 
-from ..compare.coordinates import coordinates_of, late_speed
-from ..compare.names import name_of
+from ..compare.coordinates import late_speed
 from ..compare.patterns import ResidualPattern, residual_patterns
-from ..identify.fit import Problem
+from ..compare.prediction import coordinates_of_run
+from ..identify.fit import Problem, Run
+from ..identify.structure import StructureRun
 from .candidates import Trial
 from .decision import missing
 from .rule import BENCH, DecisionRule
+
+Array = NDArray[np.float64]
 
 FLIPS = 499
 """Random patterns of signs that say what chance would organise."""
@@ -26,11 +30,18 @@ def patterns_of(trial: Trial, held_out: Problem) -> list[ResidualPattern]:
         size = len(run.force) - run.skip
         normalised.append(trial.residual[begin : begin + size])
         raw.append(normalised[-1] * run.noise)
-        along = coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force)
-        along["rest"] = late_speed(run.v, run.dt)
+        along = coordinates_of_run(run)
+        along["rest"] = late_speed_of(run)
         coordinates.append({name: values[run.skip :] for name, values in along.items()})
         begin += size
     return residual_patterns(normalised, raw, coordinates, flips=FLIPS)
+
+
+def late_speed_of(run: Run) -> Array:
+    """Return the mean speed (n,) of late [m/s]; it goes on where samples are left out."""
+    if isinstance(run, StructureRun) and run.whole is not None:
+        return late_speed(run.whole.v, run.dt)[run.keep]
+    return late_speed(run.v, run.dt)
 
 
 def remaining_residual(
@@ -63,19 +74,6 @@ def remaining_residual(
         return most_telling(rest, before, held_out, rule), rest
     rest = patterns_of(nearest, held_out)
     return most_telling(rest, nearest, held_out, rule), rest
-
-
-def sentences(
-    coordinate: str, rest: Sequence[ResidualPattern], rule: DecisionRule = BENCH
-) -> list[str]:
-    """Return the sentence about the coordinate of what is unexplained, in a list; none without."""
-    if not coordinate:
-        return []
-    sure = coordinate == "frequency" or any(
-        pattern.p <= rule.chance for pattern in rest if pattern.coordinate == coordinate
-    )
-    how = "is organised by" if sure else "follows no coordinate beyond chance; nearest is"
-    return [f"What is unexplained {how} {name_of(coordinate)}."]
 
 
 def _clear(patterns: Sequence[ResidualPattern], rule: DecisionRule) -> bool:
@@ -116,8 +114,11 @@ def most_telling(
 def ringing(trial: Trial, held_out: Problem) -> float:
     """Return the largest share of a residual's power within a third of an octave, above the motion.
 
-    The motion ends where nine tenths of the velocity's power lie below.
+    The motion ends where nine tenths of the velocity's power lie below. Runs of which samples are
+    left out have no spectrum: 0.
     """
+    if any(isinstance(run, StructureRun) and _has_gaps(run) for run in held_out.runs):
+        return 0.0
     largest, begin = 0.0, 0
     powers, motions = [], []
     size = min(1024, *(len(run.force) - run.skip for run in held_out.runs))
@@ -136,3 +137,7 @@ def ringing(trial: Trial, held_out: Problem) -> float:
         inside = (f >= centre / 2 ** (1 / 6)) & (f <= centre * 2 ** (1 / 6))
         largest = max(largest, float(power[inside].sum()) / total)
     return largest
+
+
+def _has_gaps(run: StructureRun) -> bool:
+    return bool(np.any(np.diff(run.keep) != 1))

@@ -19,9 +19,9 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class DecisionRule:
-    """What decides between none, an effect, a class, unknown and insufficient.
+    """What decides between none, an effect, ambiguous, unknown and insufficient.
 
-    One instance per use: `BENCH`, `SITE`, `SENSOR`. A rule of your own is
+    One instance per use: `BENCH`, `INSIDE`, `SITE`, `SENSOR`. A rule of your own is
     `dataclasses.replace(BENCH, gain=0.03)`.
     """
 
@@ -104,19 +104,19 @@ class DecisionRule:
     close: float = 0.004
     """Share of z within which two adequate models are equal, whatever the statistics say.
 
-    Trades: above, classes where one name was right; below, one name where the data cannot tell.
-    Found: blind seeds.
+    Trades: above, ambiguous where one name was right; below, one name where the data cannot
+    distinguish. Found: blind seeds.
     """
 
     rival: float = 1.25
     """Times the best excess up to which another one rivals it, where the best is not adequate.
 
-    A misfit of form cannot decide between what is nearly as wrong. Trades: above, classes where
+    A misfit of form cannot decide between what is nearly as wrong. Trades: above, ambiguous where
     one name was right; below, wrong names. Found: blind seeds.
     """
 
-    largest_class: int = 3
-    """Most members of a class.
+    most_alternatives: int = 3
+    """Most effects that an ambiguous verdict names.
 
     Trades: above, the name is among many; below, it may be left out. Found: stated.
     """
@@ -363,7 +363,11 @@ class DecisionRule:
 
 
 BENCH = DecisionRule()
-"""A damper's law, on a bench or in a building."""
+"""A damper's law on a bench."""
+
+INSIDE = replace(BENCH, organised=1.0)
+"""A damper's law in a building: errors of equilibrium are correlated, so that a pattern alone, by
+which the residual depends on a coordinate, accuses nothing."""
 
 SITE = replace(BENCH, gain=0.03, share=0.7, close=0.005, rival=2.0)
 """A building's site, whose model is a line and whose noise is white and known: few effects, and

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..identify.fit import fit
 from ..identify.line import fit_line
-from ..identify.model import Model, Problem, Run
+from ..identify.model import Model, Run
 from ..identify.site_fit import joined
 from ..identify.structure import (
     StructureProblem,
@@ -23,8 +23,9 @@ from ..identify.structure import (
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.laws import law_of_part
 from .candidates import Trial, judge
+from .decision import OTHER_FORM, Decision, as_noise, gained, in_part, unexplained
 from .evidence import paired
-from .finding import Finding
+from .finding import Finding, of_decision
 from .rule import SITE, DecisionRule
 
 Array = NDArray[np.float64]
@@ -47,21 +48,24 @@ def look_at(
     rule : the numbers that decide
     """
     linear = law_of_part(site)
-    hook = "force" if site == "layer" else "spring"
     base = fit_line(train, linear.name)
-    taken: set[str] = set()
     if present is not None and present.effects:
         values = {**base.model.values, **present.values}
         base = fit(train, replace(present, law=linear.name, values=values), with_std=False)
-        taken = set(present.effects).union(*(EFFECTS[name].excludes for name in present.effects))
     before = judge(base.model, train, held_out)
-    able = [e for e in effects_of("structure") if hook in e.hooks() and e.name not in taken]
-    names = [e.name for e in able]
+    names = joinable_at(site, base.model)
     if before.z <= rule.quiet and before.train <= rule.clean:
         names = []  # a line leaves nothing that a further effect could explain
     trials = [try_effect(name, base.model, train, held_out) for name in names]
     trials.sort(key=lambda trial: trial.z)
-    return judge_site(site, before, trials, held_out, rule)
+    return of_decision(decide_site(before, trials, rule), before, tuple(trials), site)
+
+
+def joinable_at(site: str, base: Model) -> list[str]:
+    """Return the effects of the structure that can join a layer's or storey's model."""
+    hook = "force" if site == "layer" else "spring"
+    taken = set(base.effects).union(*(EFFECTS[name].excludes for name in base.effects))
+    return [e.name for e in effects_of("structure") if hook in e.hooks() and e.name not in taken]
 
 
 def try_effect(
@@ -107,46 +111,23 @@ def _first_samples(run: Run, samples: int) -> StructureRun:
     )  # fmt: skip
 
 
-def judge_site(
-    site: str,
-    before: Trial,
-    trials: list[Trial],
-    held_out: StructureProblem,
-    rule: DecisionRule = SITE,
-) -> Finding:
-    """Return the finding that a site's trials lead to; held-out runs decide.
-
-    Parameters
-    ----------
-    site : "layer", "storey1", "storey2" ...
-    before : the trial of the model without a further effect
-    trials : those of single effects, best first
-    held_out : the site's runs that decide
-    rule : the numbers that decide
-    """
-    kind, effects = decide_site(before, trials, rule)
-    named = trials[0] if trials and lowers(before, trials[0], rule) else before
-    share = 1.0 - rule.excess(named.z) / rule.excess(before.z)
-    where = coordinate_of(named.residual, held_out) if kind == "unknown" else ""
-    return Finding(
-        site, kind, effects, before.z, named.z, share, detectable(held_out, rule), where,
-        named.model, tuple(trials), before, named,
-    )  # fmt: skip
-
-
-def decide_site(
-    before: Trial, trials: Sequence[Trial], rule: DecisionRule = SITE
-) -> tuple[str, tuple[str, ...]]:
-    """Return kind and effects that the trials of a site, best first, lead to."""
+def decide_site(before: Trial, trials: Sequence[Trial], rule: DecisionRule = SITE) -> Decision:
+    """Return the decision that the trials of a site, best first, lead to; held-out runs decide."""
     if not trials or not lowers(before, trials[0], rule):
-        return ("none" if before.z <= rule.clean else "unknown"), ()
+        if before.z <= rule.clean:
+            return as_noise(before, trials)
+        return Decision("unknown", (), before, 0.0, (unexplained(before, rule),))
     best = trials[0]
+    name = best.effects[-1]
     share = 1.0 - rule.excess(best.z) / rule.excess(before.z)
-    if best.z > rule.clean and share < rule.share:
-        return "unknown", ()
-    rivals = [best.effects[-1], *(t.effects[-1] for t in trials[1:] if _rivals(best, t, rule))]
-    kind = "effect" if len(rivals) == 1 else "class"
-    return kind, tuple(rivals[: rule.largest_class])
+    reasons = [gained(name, before, best, share)]
+    if best.z > rule.clean:
+        if share < rule.share:
+            return Decision("unknown", (), before, share, (in_part(name, best, share),))
+        reasons.append(OTHER_FORM)
+    rivals = [name, *(t.effects[-1] for t in trials[1:] if _rivals(best, t, rule))]
+    kind = "effect" if len(rivals) == 1 else "ambiguous"
+    return Decision(kind, tuple(rivals[: rule.most_alternatives]), best, share, tuple(reasons))
 
 
 def lowers(before: Trial, after: Trial, rule: DecisionRule = SITE) -> bool:
@@ -161,7 +142,7 @@ def _rivals(best: Trial, other: Trial, rule: DecisionRule) -> bool:
 
 
 def equals(best: Trial, other: Trial, rule: DecisionRule = SITE) -> bool:
-    """Return whether the data cannot tell another trial from the best one."""
+    """Return whether the data cannot distinguish another trial from the best one."""
     return other.z / best.z - 1.0 < rule.close or not better(other, best, rule)
 
 
@@ -174,36 +155,3 @@ def better(first: Trial, second: Trial, rule: DecisionRule = SITE) -> bool:
         return True
     gain = float(np.sum(first.losses - second.losses))
     return second.z <= rule.clean and gain > rule.likelihood
-
-
-def detectable(held_out: StructureProblem, rule: DecisionRule = SITE) -> float:
-    """Return the smallest share of a site's force that lowers z by `rule.gain` when explained."""
-    noise = float(np.mean([run.noise for run in held_out.runs]))
-    excess = np.sqrt(1.0 / (1.0 - rule.gain) ** 2 - 1.0)
-    return float(excess * noise / max(held_out.size("N"), 1e-300))
-
-
-def coordinate_of(residual: Array, problem: Problem) -> str:
-    """Return the coordinate along which a residual is organised the most, "time" if along none."""
-    runs = problem.runs
-    shown: dict[str, list[Array]] = {
-        "displacement": [run.x for run in runs],
-        "velocity": [run.v for run in runs],
-        "acceleration": [run.a for run in runs],
-        "time": [run.dt * np.arange(len(run.x), dtype=np.float64) for run in runs],
-    }
-    shares = {}
-    for name, parts in shown.items():
-        values = np.concatenate([p[r.skip :] for p, r in zip(parts, runs, strict=True)])
-        shares[name] = _organised(residual, values)
-    return max(shares, key=lambda name: shares[name])
-
-
-def _organised(residual: Array, coordinate: Array, bins: int = 24) -> float:
-    """Return the share of a residual's power that its means in bins of equal count hold."""
-    label = np.empty(len(residual), dtype=np.int64)
-    label[np.argsort(coordinate, kind="stable")] = np.arange(len(residual)) * bins // len(residual)
-    cut = np.clip(residual, -8.0, 8.0)
-    sums = np.bincount(label, weights=cut, minlength=bins)
-    counts = np.maximum(np.bincount(label, minlength=bins), 1)
-    return float(np.sum(sums**2 / counts) / max(float(np.sum(cut**2)), 1e-300))

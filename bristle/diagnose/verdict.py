@@ -1,9 +1,9 @@
-"""The verdict on a rig: what its sites show, put together."""
+"""The verdict on a rig: what its sites show, and verdict.json."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,35 +11,47 @@ import numpy as np
 from ..compare.patterns import ResidualPattern
 from ..identify.assigned import late_effects
 from ..identify.rig import DAMPER
-from ..physics.effect import EFFECTS, effects_of
+from ..physics.effect import EFFECTS
 from . import verdict_text
 from .candidates import Trial
 from .experiments import Experiment
-from .faults import SensorFault, instruments_of
+from .faults import SensorFault
 from .finding import Finding
-from .load_cell import FORCE_GAIN
+from .verdict_file import SCHEMA
+
+OF_WORST = (
+    "z_holdout_before", "z_holdout_after", "z_train_before", "z_train_after", "rms_holdout_before",
+    "rms_holdout_after", "explained", "organised",
+)  # fmt: skip
+"""What verdict.json tells of the worst site beside the list of all."""
 
 
 @dataclass(frozen=True)
 class Diagnosis:
     """The verdict on a rig's model, and what it rests on.
 
-    `kind`, `effects`, ... as in verdict.json; `findings` what each site shows, the damper's last;
-    `sites` the site of each effect, empty on a bench, which has one; `force` "measured" or
-    "reconstructed" in a building, "" on a bench; `noise` that of each channel, as far as it was
-    asked for, in SI.
+    `kind`, `effects`, ... as in verdict.json; `reasons` sentences; `findings` what each site shows,
+    the damper's last; `sites` the site of each effect; `alternatives` what is no effect and would
+    look like one of them; `force` "measured" or "reconstructed"; `noise` that of each channel, in
+    SI.
     """
 
     kind: str
     effects: tuple[str, ...]
-    words: str
+    reasons: tuple[str, ...]
     findings: Mapping[str, Finding] = field(default_factory=dict)
     sensors: tuple[SensorFault, ...] = ()
     untestable: tuple[str, ...] = ()
     coordinate: str = ""
     sites: Mapping[str, str] = field(default_factory=dict)
-    force: str = ""
+    alternatives: tuple[str, ...] = ()
+    force: str = "measured"
     noise: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def words(self) -> str:
+        """The verdict in sentences."""
+        return str(self.as_dict()["words"])
 
     @property
     def worst(self) -> Finding | None:
@@ -84,18 +96,23 @@ class Diagnosis:
 
     @property
     def patterns(self) -> tuple[ResidualPattern, ...]:
-        """Along which coordinates the damper's residual is organised; empty in a building."""
-        return self._damper.patterns if self._damper else ()
+        """On which coordinates the residual of the worst site depends."""
+        return self.worst.patterns if self.worst is not None else ()
 
     @property
     def experiment(self) -> Experiment | None:
-        """The run that would tell the members of a class apart, where one was sought."""
-        return self._damper.experiment if self._damper else None
+        """The run that would distinguish alternatives, where one was sought."""
+        found = (one.experiment for one in self.findings.values() if one.experiment is not None)
+        return next(found, None)
 
     @property
     def std(self) -> Mapping[str, float]:
-        """Standard deviations by parameter [SI] of what the data identify, as far as asked for."""
-        return self._damper.std if self._damper else {}
+        """Standard deviations by parameter [SI] of what the data identify, of `values`."""
+        out: dict[str, float] = {}
+        for site, found in self.findings.items():
+            own = {n: s for n, s in found.std.items() if n.partition(".")[0] in found.effects}
+            out.update(found.std if site == DAMPER else own)
+        return out
 
     @property
     def values(self) -> dict[str, float]:
@@ -123,119 +140,39 @@ class Diagnosis:
     def as_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""
         out: dict[str, Any] = {
-            "schema": 1, "kind": self.kind, "effects": list(self.effects),
-            "ranking": self._ranking(), "untestable": list(self.untestable),
-            "sensors": [fault.as_dict() for fault in self.sensors], "words": self.words,
+            "schema": SCHEMA, "kind": self.kind, "effects": list(self.effects),
+            "sites": dict(self.sites), "force": self.force, "ranking": self._ranking(),
+            "untestable": list(self.untestable),
+            "sensors": [fault.as_dict() for fault in self.sensors],
+            "noise_floor": {name: float(noise) for name, noise in self.noise.items()},
+            "findings": [found.as_dict() for found in self.findings.values()],
+            "reasons": list(self.reasons),
         }  # fmt: skip
-        out |= self._of_building() if self.force else self._of_bench()
+        if self.worst is not None:
+            shown = self.worst.as_dict()
+            out |= {key: shown[key] for key in OF_WORST if key in shown}
+        if self.experiment is not None:
+            out["separate_by"] = self.experiment.sentence()
+        if self.alternatives:
+            out["alternatives"] = list(self.alternatives)
         if np.isfinite(self.detectable):
             out["detectable"] = round(self.detectable, 5)
         if self.coordinate:
             out["coordinate"] = self.coordinate
-        return out
+        return out | {"words": " ".join(verdict_text.sentences(out))}
 
     def _ranking(self) -> list[dict[str, Any]]:
         """Return one row per trial of all sites, the largest gain first."""
-        rows = []
-        for found in self.findings.values():
-            for trial in found.trials:
-                row = {
-                    "effect": trial.effects[-1],
-                    "z_holdout": round(trial.z, 4),
-                    "gain": round(1.0 - trial.z / found.z_before, 4),
-                }
-                more = {"site": found.site} if self.force else {"refined": trial.refined}
-                rows.append(row | more)
+        rows = [
+            {
+                "effect": trial.effects[-1], "site": found.site, "z_holdout": round(trial.z, 4),
+                "z_train": round(trial.train, 4), "gain": round(1.0 - trial.z / found.z_before, 4),
+                "refined": trial.refined,
+            }
+            for found in self.findings.values()
+            for trial in found.trials
+        ]  # fmt: skip
         return sorted(rows, key=lambda row: -row["gain"])
-
-    def _of_building(self) -> dict[str, Any]:
-        return {
-            "z_holdout_before": round(self.z_before, 4), "z_holdout_after": round(self.z_after, 4),
-            "sites": dict(self.sites), "force": self.force,
-        }  # fmt: skip
-
-    def _of_bench(self) -> dict[str, Any]:
-        out: dict[str, Any] = {"noise_floor": {n: float(v) for n, v in self.noise.items()}}
-        found = self._damper
-        if found is None or found.before is None or found.after is None:
-            return out
-        for when, trial in (("before", found.before), ("after", found.after)):
-            out[f"z_holdout_{when}"] = round(trial.z, 4)
-            out[f"z_train_{when}"] = round(trial.train, 4)
-            out[f"rms_holdout_{when}"] = trial.rms
-        out["explained"] = round(found.share, 4)
-        if found.patterns:
-            out["organised"] = [
-                {"coordinate": one.coordinate, "share": round(one.share, 4), "p": one.p}
-                for one in found.patterns[:5]
-            ]
-        if found.experiment is not None:
-            out["separate_by"] = found.experiment.words()
-        return out
-
-
-def of_sites(
-    findings: Mapping[str, Finding],
-    force: str = "measured",
-    sensors: tuple[SensorFault, ...] = (),
-) -> Diagnosis:
-    """Return one verdict from what the sites of a building show.
-
-    Parameters
-    ----------
-    findings : by site, the damper's last
-    force : whether the damper's force was "measured" or "reconstructed"
-    sensors : the faults that channels show of each other
-    """
-    reconstructed = force == "reconstructed"
-    sensors = (*sensors, *_of_load_cell(findings))
-    parts = [replace(f, kind="none", effects=()) if _is_gain(f) else f for f in findings.values()]
-    named: list[str] = []
-    rivals: list[str] = []
-    alike: dict[str, str] = {}
-    sites: dict[str, str] = {}
-    for part in parts:
-        twins = lookalikes(part.effects) if reconstructed and part.site == DAMPER else {}
-        alike |= twins
-        sure = part.kind == "effect" and not twins
-        # What is no effect, such as a mass of the base, is a rival that words alone can name.
-        known = [one for one in (*part.effects, *twins) if one in EFFECTS]
-        (named if sure else rivals).extend(known if part.kind != "unknown" else [])
-        sites.update({e: sites.get(e, _site_of(e, part.site)) for e in part.effects})
-    for name in instruments_of(sensors):
-        named.append(name)
-        sites[name] = "sensor"
-    effects = tuple(dict.fromkeys([*named, *rivals]))
-    unknown = next((part for part in parts if part.kind == "unknown"), None)
-    kind = "unknown" if unknown else "class" if rivals else "effect" if named else "none"
-    coordinate = unknown.coordinate if unknown else ""
-    return Diagnosis(
-        kind, effects[:3] if kind == "class" else effects,
-        verdict_text.of_sites(kind, effects, sites, alike, coordinate), findings, sensors,
-        _absorbed(effects) if reconstructed else (), coordinate, sites, force,
-    )  # fmt: skip
-
-
-def _site_of(effect: str, site: str) -> str:
-    """Return where an effect is that was found at a site: in the layer if it is the structure's."""
-    known = EFFECTS.get(effect)
-    return "layer" if site == "damper" and known and known.site == "structure" else site
-
-
-def lookalikes(effects: tuple[str, ...]) -> dict[str, str]:
-    """Return what else would do the same to a reconstructed force as these effects, and why."""
-    twins: dict[str, str] = {}
-    for name in effects:
-        for twin, why in (EFFECTS[name].lookalikes if name in EFFECTS else {}).items():
-            if twin not in effects:
-                twins.setdefault(twin, why)
-    return twins
-
-
-def _absorbed(effects: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the effects that the damper's law takes up whole, without a load cell."""
-    able = [effect.name for effect in effects_of("structure") if effect.absorbed_by]
-    return tuple(name for name in able if name not in effects)
 
 
 def _in_a_storey(name: str) -> bool:
@@ -248,21 +185,3 @@ def late_values(finding: Finding) -> dict[str, float]:
         return {}
     (name,) = finding.effects
     return {f"{name}.{EFFECTS[name].late[0]}": float(finding.coordinate.split()[0])}
-
-
-def _is_gain(finding: Finding) -> bool:
-    return FORCE_GAIN in finding.effects
-
-
-def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
-    """Return the faults of the load cell that equilibrium shows and that are no effects."""
-    out = []
-    for finding in findings.values():
-        if _is_gain(finding):
-            gain = float(finding.coordinate)
-            text = (
-                f"The load cell shows {gain:.4g} times the force that equilibrium asks for "
-                f"(z {finding.z_before:.3g} before, {finding.z_after:.3g} with that set right)."
-            )
-            out.append(SensorFault("force", "gain", gain, float("nan"), text))
-    return out

@@ -1,56 +1,134 @@
-"""A verdict in words: what a damper lacks, or what is missing at the sites of a building."""
+"""A verdict in words, from the content of verdict.json: what commands, reports and programs show.
+
+`sentences` is the verdict as it is read: what is missing first, then why, then what else was seen.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
+from ..compare.names import joined, name_of, site_name
+from ..identify.rig import DAMPER
 from ..physics.effect import EFFECTS
-from .faults import SensorFault, words_of
-from .finding import Finding
-from .remaining_residual import sentences
+from .rule import BENCH, DecisionRule
+
+Verdict = Mapping[str, Any]
+
+HEADINGS = {
+    "none": "Nothing found missing",
+    "effect": "Missing physics found",
+    "ambiguous": "One of a few is missing",
+    "unknown": "Something unknown is missing",
+    "insufficient": "The data carry no verdict",
+}
+"""The kinds of a verdict, and how each is headed."""
 
 
-def of_damper(found: Finding, faults: Sequence[SensorFault]) -> str:
-    """Return the verdict on a bench: the damper's reasons, and what the channels show."""
-    texts = [*found.reasons, *words_of(faults)]
-    if found.kind == "none":
-        texts.append(
-            f"An effect that leaves {found.detectable:.2%} of the force would have been seen."
-        )
-    if found.kind == "unknown":
-        texts += sentences(found.coordinate, found.patterns)
-    return " ".join(texts)
-
-
-def of_sites(
-    kind: str,
-    effects: tuple[str, ...],
-    sites: Mapping[str, str],
-    alike: Mapping[str, str],
-    coordinate: str,
-) -> str:
-    """Return the verdict on a building.
-
-    Parameters
-    ----------
-    kind, effects : of the verdict, as in verdict.json
-    sites : the site of each effect
-    alike : what acts like an effect where no load cell tells, and why
-    coordinate : along which an unknown residual is organised
-    """
-    texts = []
-    if kind == "none":
-        texts.append("No effect is missing at any site that these runs test.")
-    elif kind == "effect":
-        texts.append(f"Missing: {', '.join(f'{e} ({sites[e]})' for e in effects)}.")
-    elif kind == "class":
-        others = [twin for twin in alike if twin not in EFFECTS]
-        texts.append(
-            f"Missing is one of {', '.join([*effects, *others])}; these runs cannot say which."
-        )
+def sentences(verdict: Verdict) -> list[str]:
+    """Return what a verdict says, one sentence or a few in each text, the most important first."""
+    reasons = verdict.get("reasons")
+    out = [headline(verdict)]
+    if reasons is None and verdict.get("words"):  # schema 1 has the reasons in one text
+        out.append(str(verdict["words"]))
     else:
-        texts.append(f"Something is missing that no effect explains, along {coordinate}.")
-        texts += [f"Besides, {e} is missing ({sites[e]})." for e in effects if e in sites]
-    for reason in alike.values():
-        texts.append(f"Without a measured force {reason}: a load cell at the damper would tell.")
-    return " ".join(texts)
+        out += [*(reasons or []), *_besides(verdict), *_limits(verdict), *_remaining(verdict)]
+    told = " ".join(out)
+    out += [text for text in map(fault_text, verdict.get("sensors") or []) if text not in told]
+    return list(dict.fromkeys(text for text in out if text))
+
+
+def headline(verdict: Verdict) -> str:
+    """Return the verdict in one sentence."""
+    kind, effects = verdict.get("kind"), effects_at(verdict)
+    if kind == "effect":
+        return f"The model misses {joined(effects)}."
+    if kind == "ambiguous":
+        which = f"either {' or '.join(effects)}" if len(effects) == 2 else _one_of(effects)
+        return f"The model misses {which}. The data cannot distinguish them."
+    if kind == "unknown":
+        return "The model misses something that no known effect explains."
+    if kind == "none":
+        return "These data show nothing that the model misses."
+    return "These data carry no verdict."
+
+
+def effects_at(verdict: Verdict) -> list[str]:
+    """Return the effects, each with its site where the rig has several: "duffing (layer)"."""
+    sites = verdict.get("sites") or {}
+    several = bool(set(sites.values()) - {DAMPER}) or len(verdict.get("findings") or []) > 1
+    names = [str(name) for name in verdict.get("effects") or []]
+    names += [str(one) for one in verdict.get("alternatives") or []]
+    return [f"{one} ({sites[one]})" if several and one in sites else one for one in names]
+
+
+def _one_of(effects: Sequence[str]) -> str:
+    return f"one of {joined(effects)}" if len(effects) > 1 else joined(effects) or "an effect"
+
+
+def _besides(verdict: Verdict) -> list[str]:
+    """Return that other sites miss an effect, where something unknown is missing at one."""
+    effects = effects_at(verdict) if verdict.get("kind") == "unknown" else []
+    return [f"Besides, the model misses {joined(effects)}."] if effects else []
+
+
+def _limits(verdict: Verdict) -> list[str]:
+    share = verdict.get("detectable")
+    if verdict.get("kind") != "none" or not isinstance(share, int | float):
+        return []
+    return [f"An effect that leaves {100.0 * share:.2g} % of the force would have been seen."]
+
+
+def _remaining(verdict: Verdict, rule: DecisionRule = BENCH) -> list[str]:
+    """Return the sentence about the coordinate of what no effect explains."""
+    coordinate = str(verdict.get("coordinate") or "")
+    if verdict.get("kind") != "unknown" or not coordinate:
+        return []
+    findings = verdict.get("findings") or []
+    at = next((found for found in findings if found["kind"] == "unknown"), verdict)
+    organised, name = at.get("organised"), name_of(coordinate, at.get("site", ""))
+    sure = organised is None or coordinate == "frequency"
+    sure = sure or any(
+        one["p"] <= rule.chance for one in organised or [] if one["coordinate"] == coordinate
+    )
+    if sure:
+        return [f"The remaining error depends mainly on {name}."]
+    return [f"The remaining error depends on no coordinate beyond chance; the nearest is {name}."]
+
+
+def fault_text(fault: Mapping[str, Any]) -> str:
+    """Return the sentence of a sensor's fault."""
+    return str(fault.get("words") or "") or (
+        f"Sensor: {fault.get('fault')} of {fault.get('channel')}, {fault.get('value'):.3g}."
+    )
+
+
+def about(effect: str) -> str:
+    """Return what an effect is, as a sentence: the first line of its text."""
+    if effect not in EFFECTS:
+        return f"{effect} is an effect of the user's own."
+    return f"{EFFECTS[effect].first_line().rstrip('.')}."
+
+
+def untestable(verdict: Verdict) -> list[str]:
+    """Return the effects that the data could not show, with their sites where there are several."""
+    names = [str(name) for name in verdict.get("untestable") or []]
+    findings = verdict.get("findings") or []
+    if len(findings) < 2:
+        return names
+    sites = {n: [f["site"] for f in findings if n in f.get("untestable", [])] for n in names}
+    return [f"{n} ({', '.join(sites[n])})" if sites[n] else n for n in names]
+
+
+def separating(verdict: Verdict) -> str:
+    """Return the experiment that would distinguish alternatives, "" where none is named."""
+    found = verdict.get("separate_by")
+    if isinstance(found, Mapping):
+        told = found.get("words") or found.get("text")
+        return str(told or ", ".join(f"{key}: {value}" for key, value in found.items()))
+    return str(found or "")
+
+
+def sited(site: str, reason: str) -> str:
+    """Return a reason with the site that it is about: "At storey 2: with duffing ..."."""
+    return f"At {site_name(site)}: {reason[:1].lower()}{reason[1:]}"

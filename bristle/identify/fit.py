@@ -38,6 +38,7 @@ __all__ = [
     "Scaled",
     "fit",
     "identify",
+    "intervals_of",
     "law_parameters",
     "multistart_refit",
     "parameter",
@@ -184,6 +185,22 @@ def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) 
         for name, own in best.std.items()
     }
     return replace(best, std=std)
+
+
+def intervals_of(problem: Problem, model: Model) -> Fit:
+    """Return a model as it is as a fit: its standard deviations without a further search.
+
+    Parameters
+    ----------
+    problem : the runs that the model was fitted to
+    model : with its values
+    """
+    scaled = Scaled(problem, model, problem.expectation(model))
+    cost = float(np.mean(loss(scaled.residuals(scaled.start))))
+    if not scaled.names:
+        return Fit(model, {}, cost)
+    std, lost = _intervals(scaled, scaled.start)
+    return Fit(model, std, cost, lost)
 
 
 def _spread(values: list[float], about: float) -> float:

@@ -9,13 +9,21 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..compare.names import site_name
+from ..diagnose.verdict_text import HEADINGS, about, sentences, separating
 from ..draw.style import percent, short_z
 from ..errors import BristleError
 from . import html
 from .residuals import headline
 from .staircase import HistoryStep, history_steps
-from .study_tables import data_table, data_words, parameter_table, ranking_table, run_errors
-from .study_verdict import badge, noise_floor, rivals, separating, untestable, words
+from .study_tables import (
+    data_table,
+    data_words,
+    noise_floor,
+    parameter_table,
+    ranking_table,
+    run_errors,
+    untestable_rows,
+)
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
@@ -23,6 +31,10 @@ if TYPE_CHECKING:
     from ..data.model import StudyModel
     from ..study.history import Step
     from ..study.study import Study
+
+
+_TONES = {"none": "green", "effect": "blue", "ambiguous": "purple", "unknown": "red"}
+"""Colours of the kinds of a verdict."""
 
 
 @dataclass(frozen=True)
@@ -135,16 +147,22 @@ def render(content: Content) -> str:
 
 
 def _verdict(content: Content) -> str:
-    kind, tone = badge(content.verdict)
-    texts = words(content.verdict, content.study.name)
+    verdict = content.verdict
+    if verdict is None:
+        kind, heading, texts = "", "Not diagnosed", _undiagnosed(content.study.name)
+    else:
+        kind, texts = str(verdict["kind"]), sentences(verdict)
+        heading = HEADINGS[kind]
+        if kind in ("effect", "ambiguous"):
+            texts[1:1] = [about(str(name)) for name in verdict["effects"]]
     inner = [
-        f'<div class="verdict" style="--tone: var(--{tone})">',
-        f'<div class="kind">{html.escape(kind)}</div>',
+        f'<div class="verdict" style="--tone: var(--{_TONES.get(kind, "soft")})">',
+        f'<div class="kind">{html.escape(heading)}</div>',
         html.paragraphs(texts[0], kind="say"),
         html.paragraphs(*texts[1:]),
         "</div>",
     ]
-    rows = ranking_table(content.verdict)
+    rows = ranking_table(verdict)
     if rows:
         header, cells, strong = rows
         inner.append("<h3>The evidence</h3>")
@@ -155,8 +173,15 @@ def _verdict(content: Content) -> str:
             )
         )  # fmt: skip
         inner.append(html.table(header, cells, numbers=(1, 2), strong=strong))
-    inner.append(html.paragraphs(noise_floor(content.verdict), kind="soft"))
+    inner.append(html.paragraphs(noise_floor(verdict), kind="soft"))
     return "\n".join(part for part in inner if part)
+
+
+def _undiagnosed(name: str) -> list[str]:
+    return [
+        "No diagnosis has been made of the present model.",
+        f"bristle diagnose {name} tells what it misses, and how sure that is.",
+    ]
 
 
 def _tiles(content: Content) -> str:
@@ -167,7 +192,7 @@ def _tiles(content: Content) -> str:
     pairs = [
         (
             f"z = {short_z(now.z)}",
-            f"error over noise on held-out runs; 95 %: {low:.2f} to {high:.2f}",
+            f"error / noise (z) on held-out runs; 95 %: {low:.2f} to {high:.2f}",
         ),
         (
             f"{now.total.rms:.2g} {now.unit}",
@@ -323,7 +348,7 @@ def _data(content: Content) -> str:
 
 
 def _untold(content: Content) -> str:
-    hidden = untestable(content.verdict)
+    hidden = untestable_rows(content.verdict)
     parts = [
         html.paragraphs(
             "These effects could be there all the same: either the data do not excite them, or "
@@ -331,11 +356,10 @@ def _untold(content: Content) -> str:
         ),
         html.table(["effect", "what it does", "what it would look like"], hidden),
     ] if hidden else []  # fmt: skip
-    texts = rivals(content.verdict)
-    experiment = separating(content.verdict)
+    experiment = separating(content.verdict or {})
     if experiment:
         parts.append("<h3>The experiment that would tell</h3>")
-        parts.append(html.paragraphs(*texts, experiment))
+        parts.append(html.paragraphs(experiment))
     if not parts:
         none = (
             "No diagnosis has been made of this model, so nothing is known of what it could miss."

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..data.channels import channel_unit, is_channel
+from ..diagnose.verdict_text import about, untestable
 from ..draw.style import MINUS, TIMES, percent
+from ..physics.effect import EFFECTS
 from .tables import run_table
 
 if TYPE_CHECKING:
@@ -139,6 +142,27 @@ def ranking_table(
         text = f"{z:.3f}" if isinstance(z, int | float) and z < 10.0 else number(z)
         rows.append([effect, text, share(entry.get("gain"))])
     return (["with this effect", "z held-out", "lower by"], rows, strong) if rows else None
+
+
+def noise_floor(verdict: Mapping[str, Any] | None) -> str:
+    """Return the noise that the verdict rests on, in words; "" where it is not told."""
+    floor = (verdict or {}).get("noise_floor") or {}
+    parts = [
+        f"{name} {in_lab_unit(value, channel_unit(name) if is_channel(name) else '')}".strip()
+        for name, value in floor.items()
+        if isinstance(value, int | float)
+    ]
+    return f"Noise that the verdict rests on: {', '.join(parts)}." if parts else ""
+
+
+def untestable_rows(verdict: Mapping[str, Any] | None) -> list[list[str]]:
+    """Return rows of the effects that could not be tested: name, what it does and would show."""
+    rows = []
+    for told in untestable(verdict or {}):
+        name = told.partition(" ")[0]
+        effect = EFFECTS.get(name)
+        rows.append([told, about(name), effect.expect if effect else "-"])
+    return rows
 
 
 _LAB = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}

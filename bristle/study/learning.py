@@ -167,7 +167,7 @@ class Learned:
 def learn(
     study: Study, *, say: Say = _silent, on_step: Callable[[], None] | None = None
 ) -> Learned:
-    """Identify, diagnose and add until the verdict is none, class, unknown or insufficient.
+    """Identify, diagnose and add until the verdict is none, ambiguous, unknown or insufficient.
 
     What was done is in the history already when this is interrupted: calling it again goes on.
 

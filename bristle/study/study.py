@@ -218,9 +218,17 @@ class Study:
         return step
 
     def verdict(self) -> dict[str, Any] | None:
-        """Return the verdict on the present model, None if there is none."""
+        """Return the verdict on the present model in the present schema, None if there is none.
+
+        Raises
+        ------
+        StudyError
+            If the file is damaged, or of a schema that this version does not know.
+        """
+        from ..diagnose.verdict_file import current
+
         path = self.folder / "verdict.json"
-        return read_json(path) if path.is_file() else None
+        return current(read_json(path), str(path)) if path.is_file() else None
 
     def write_verdict(self, verdict: Mapping[str, Any]) -> None:
         """Write the verdict on the model that was read here; see `add_step` for what is raised."""

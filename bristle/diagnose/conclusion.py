@@ -1,0 +1,153 @@
+"""What the sites of a rig show, put together into one verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from ..identify.rig import DAMPER
+from ..physics.effect import EFFECTS, effects_of
+from . import verdict_text
+from .decision import Z
+from .faults import SensorFault, instruments_of
+from .finding import Finding
+from .load_cell import FORCE_GAIN
+from .rule import BENCH
+from .verdict import Diagnosis
+
+NOT_DRIVEN = "Neither voltage nor current was recorded: a drive that changed would look like this."
+
+
+@dataclass(frozen=True)
+class About:
+    """What a verdict tells beside what the sites show.
+
+    `force` of a damper is "measured" or "reconstructed"; `sensors` the faults that channels show;
+    `noise` that of each channel, in SI; `notes` further sentences; `driven` whether voltage or
+    current was recorded, as far as that matters.
+    """
+
+    force: str = "measured"
+    sensors: tuple[SensorFault, ...] = ()
+    noise: Mapping[str, float] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    driven: bool = True
+
+
+def verdict_of(findings: Mapping[str, Finding], about: About) -> Diagnosis:
+    """Return one verdict from what the sites of a rig show.
+
+    Parameters
+    ----------
+    findings : by site, the damper's last
+    about : what else is known of the runs
+    """
+    reconstructed = about.force == "reconstructed"
+    sensors = (*about.sensors, *_of_load_cell(findings))
+    parts = [replace(f, kind="none", effects=()) if _is_gain(f) else f for f in findings.values()]
+    named: list[str] = []
+    rivals: list[str] = []
+    alike: dict[str, str] = {}
+    sites: dict[str, str] = {}
+    for part in parts:
+        twins = lookalikes(part.effects) if reconstructed and part.site == DAMPER else {}
+        alike |= twins
+        sure = part.kind == "effect" and not twins
+        # What is no effect, such as a mass of the base, is an alternative in words alone.
+        known = [one for one in (*part.effects, *twins) if one in EFFECTS]
+        (named if sure else rivals).extend(known if part.kind != "unknown" else [])
+        sites.update({e: sites.get(e, _site_of(e, part.site)) for e in part.effects})
+    kind = _kind_of([part.kind for part in parts], named, rivals)
+    if kind in ("none", "effect") and (shown := instruments_of(sensors)):
+        kind, named = "effect", [*shown, *named]
+        sites |= dict.fromkeys(shown, "sensor")
+    effects = tuple(dict.fromkeys([*named, *rivals]))
+    unknown = next((part for part in parts if part.kind == "unknown"), None)
+    reasons = [
+        *_reasons(parts, kind),
+        *about.notes,
+        *(_without_load_cell(a) for a in alike.values()),
+    ]
+    if kind == "unknown" and not about.driven:
+        reasons.append(NOT_DRIVEN)
+    return Diagnosis(
+        kind, effects[: BENCH.most_alternatives] if kind == "ambiguous" else effects,
+        tuple(reasons), findings, sensors, _untestable(findings, effects, reconstructed),
+        unknown.coordinate if unknown else "", sites,
+        tuple(one for one in alike if one not in EFFECTS), about.force, about.noise,
+    )  # fmt: skip
+
+
+def _kind_of(kinds: Sequence[str], named: Sequence[str], rivals: Sequence[str]) -> str:
+    """Return the kind of the verdict that sites of these kinds amount to."""
+    if "unknown" in kinds:
+        return "unknown"
+    if named or rivals:
+        return "ambiguous" if rivals else "effect"
+    return "insufficient" if "insufficient" in kinds else "none"
+
+
+def _reasons(parts: Sequence[Finding], kind: str) -> list[str]:
+    """Return why the verdict is what it is, each reason with its site where there are several."""
+    if len(parts) == 1:
+        return list(parts[0].reasons)
+    if kind == "none" and parts:
+        low, high = (f(part.z_before for part in parts) for f in (min, max))
+        out = [f"On held-out runs {Z} = {low:.2f} to {high:.2f} at the {len(parts)} sites."]
+        parts = [part for part in parts if part.z_before > BENCH.clean]
+    else:
+        out, parts = [], [part for part in parts if part.kind != "none"]
+    return out + [
+        verdict_text.sited(part.site, " ".join(part.reasons)) for part in parts if part.reasons
+    ]
+
+
+def _without_load_cell(reason: str) -> str:
+    return f"Without a measured force {reason}: a load cell at the damper would tell."
+
+
+def _untestable(
+    findings: Mapping[str, Finding], effects: tuple[str, ...], reconstructed: bool
+) -> tuple[str, ...]:
+    """Return the effects, not those named, that some site's runs do not show.
+
+    Without a load cell the damper's law takes up others whole.
+    """
+    names = {name for found in findings.values() for name in found.untestable}
+    if reconstructed:
+        names |= {effect.name for effect in effects_of("structure") if effect.absorbed_by}
+    return tuple(sorted(names - set(effects)))
+
+
+def _site_of(effect: str, site: str) -> str:
+    """Return where an effect is that was found at a site: in the layer if it is the structure's."""
+    known = EFFECTS.get(effect)
+    return "layer" if site == "damper" and known and known.site == "structure" else site
+
+
+def lookalikes(effects: tuple[str, ...]) -> dict[str, str]:
+    """Return what else would do the same to a reconstructed force as these effects, and why."""
+    twins: dict[str, str] = {}
+    for name in effects:
+        for twin, why in (EFFECTS[name].lookalikes if name in EFFECTS else {}).items():
+            if twin not in effects:
+                twins.setdefault(twin, why)
+    return twins
+
+
+def _is_gain(finding: Finding) -> bool:
+    return FORCE_GAIN in finding.effects
+
+
+def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
+    """Return the faults of the load cell that equilibrium shows and that are no effects."""
+    out = []
+    for finding in findings.values():
+        if _is_gain(finding):
+            gain = float(finding.coordinate)
+            text = (
+                f"The load cell shows {gain:.4g} times the force that equilibrium asks for "
+                f"(z {finding.z_before:.3g} before, {finding.z_after:.3g} with that set right)."
+            )
+            out.append(SensorFault("force", "gain", gain, float("nan"), text))
+    return out

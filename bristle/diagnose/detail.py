@@ -1,0 +1,83 @@
+"""What is told of every site beside what is missing there.
+
+Whether its runs contradict each other, what they could not show, along what the residual is
+organised, how well parameters are known, and which run would distinguish alternatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..identify.fit import intervals_of, multistart_refit
+from ..identify.search_context import is_rough
+from .candidates import SHOWN, joinable, judge
+from .experiments import separating
+from .finding import Finding
+from .limits import detectable, untestable
+from .opening import Opening, of_layer
+from .remaining_residual import patterns_of, remaining_residual
+from .sites import joinable_at
+
+
+def detailed(found: Finding, opened: Opening) -> Finding:
+    """Return a site's finding with limits, patterns, intervals and, where asked for, a next run.
+
+    Parameters
+    ----------
+    found : what the site lacks
+    opened : its runs and its model
+    """
+    return _with_intervals(_with_patterns(_with_limits(found, opened), opened), opened)
+
+
+def _with_limits(found: Finding, opened: Opening) -> Finding:
+    """Return a finding with what the data could not show, and what would tell more."""
+    problem, model, rule = opened.searched, opened.before.model, opened.rule
+    expected = problem.expectation(model)
+    visible = detectable(problem, expected, rule)
+    hidden = untestable(model, problem, expected, visible, rule, _able(found, opened))
+    experiment = None
+    if found.kind == "ambiguous" and opened.scope.choose_motion:
+        members = [t.model for t in found.trials if set(t.effects) & set(found.effects)]
+        experiment = separating(members, opened.problem)
+    return replace(found, detectable=visible, untestable=tuple(hidden), experiment=experiment)
+
+
+def _able(found: Finding, opened: Opening) -> list[str]:
+    """Return the effects that can join the model at a site."""
+    model = opened.before.model
+    if model.law_class.site == "structure":
+        return joinable_at(found.site, model)
+    shown = tuple(channel for channel in SHOWN if channel in opened.shown)
+    return [*joinable(model, shown), *of_layer(model, opened.problem)]
+
+
+def _with_patterns(found: Finding, opened: Opening) -> Finding:
+    """Return a finding with the coordinates that its residual depends on, where it has any."""
+    if found.kind == "none" and not found.patterns:
+        return found
+    patterns = list(found.patterns) or patterns_of(opened.before, opened.held_out)
+    if found.kind != "unknown":
+        return replace(found, patterns=tuple(patterns))
+    coordinate, patterns = remaining_residual(
+        opened.before, found.trials, patterns, opened.held_out, opened.rule
+    )
+    return replace(found, coordinate=coordinate, patterns=tuple(patterns))
+
+
+def _with_intervals(found: Finding, opened: Opening) -> Finding:
+    """Return a finding with standard deviations; its model refitted where `Scope.sweeps` asks so.
+
+    Parameters that the data cannot identify have none.
+    """
+    after = found.after
+    assert after is not None
+    if not opened.scope.sweeps:
+        fitted = intervals_of(opened.searched, after.model)
+    else:
+        fitted = multistart_refit(opened.problem, after.model, opened.scope.sweeps)
+    if opened.scope.sweeps and is_rough(after.model):
+        again = judge(fitted.model, opened.problem, opened.held_out)
+        after = min(after, again, key=lambda one: one.z)
+    identifiable = {n: s for n, s in fitted.std.items() if n not in fitted.unidentified}
+    return replace(found, model=fitted.model, after=after, z_after=after.z, std=identifiable)
