@@ -178,9 +178,7 @@ def sample(k: int, measured: Row, c: Constants, state: Row, outputs: Row, spare:
     outputs[VOLTAGE], outputs[COMMAND_RAW], outputs[SCHEDULING] = voltage, u, v
 
 
-def designed(
-    measured: Row, v: float, c: Constants, state: Row, spare: Row
-) -> tuple[float, float]:
+def designed(measured: Row, v: float, c: Constants, state: Row, spare: Row) -> tuple[float, float]:
     """Return voltage and raw command of a state-space law, and move its state on.
 
     Parameters

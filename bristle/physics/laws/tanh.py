@@ -18,7 +18,7 @@ class Tanh(Law):
     beta = 1/v_s, and sgn(x) is smoothed over x_s, for a jump in mid-stroke could not be followed by
     a fit; with x_s -> 0 it is as published. It stores (f_c + f_v V) tanh(delta) |x| at most and
     dissipates the rest. Published are k, f_0 and delta linear and alpha quadratic in the current;
-    here k, f_0 and delta are constant and alpha is linear. Defaults are chosen for a damper of 10 N.
+    here k, f_0 and delta are constant, alpha is linear. Defaults are chosen for a damper of 10 N.
     """
 
     name = "tanh"
