@@ -225,12 +225,10 @@ def _signal_file(
 def _start_values(model: StudyModel, run: Run) -> dict[str, float]:
     """Return the start values of states that begin with a signal of the run."""
     first = {"x": run.x[0], "v": run.v[0], "a": run.a[0], "V": run.V[0]}
-    return {
-        f"{name}.{state}_0": float(first[signal])
-        for name in _of_site(model, "damper")
-        for state, signal in EFFECTS[name].starts.items()
-        if signal in first
-    }
+    states = dict(LAWS[model.base_law].starts)
+    for name in _of_site(model, "damper"):
+        states |= {f"{name}.{state}": signal for state, signal in EFFECTS[name].starts.items()}
+    return {f"{name}_0": float(first[s]) for name, s in states.items() if s in first}
 
 
 def prediction(model: StudyModel, run: Run) -> Array:

@@ -164,28 +164,27 @@ def sample(k: int, measured: Row, c: Constants, state: Row, outputs: Row, spare:
     spare : (n,) or more, room to work
     """
     y, v = measured[FLOOR_ACCELERATION], measured[BASE_VELOCITY]
+    x = measured[BASE_DISPLACEMENT]
     if c.velocity_corner > 0.0:
-        x = measured[BASE_DISPLACEMENT]
         if k == 0:  # nothing is known of the past: the filter has settled
             state[LOW] = state[X_BEFORE] = x
         low = low_passed(state[LOW], state[X_BEFORE], x, c.velocity_corner, c.period)
         state[LOW], state[X_BEFORE] = low, x
         v = filtered_velocity(low, x, c.velocity_corner)
     if c.kind >= SKYHOOK_SWITCH:
-        voltage, u = skyhook(y, v, c, state)
+        voltage, u = skyhook(y, x, v, c, state)
     else:
-        voltage, u = designed(y, v, measured[DAMPER_FORCE], c, state, spare)
+        voltage, u = designed(measured, v, c, state, spare)
     outputs[VOLTAGE], outputs[COMMAND_RAW], outputs[SCHEDULING] = voltage, u, v
 
 
-def designed(
-    y: float, v: float, f: float, c: Constants, state: Row, spare: Row
-) -> tuple[float, float]:
+def designed(measured: Row, v: float, c: Constants, state: Row, spare: Row) -> tuple[float, float]:
     """Return voltage and raw command of a state-space law, and move its state on.
 
     Parameters
     ----------
-    y, v, f : floor acceleration [m/s2], velocity across the damper [m/s], damper force [N]
+    measured : (4,) inputs, as in `start`
+    v : velocity across the damper that the law works with [m/s]
     c : Constants
     state : as in `start`, moved on in place
     spare : (n,) or more, room to work
@@ -197,10 +196,11 @@ def designed(
     u : float
         Command before limits and inverse: N; V where the kind is `SIGNED`.
     """
+    y, f = measured[FLOOR_ACCELERATION], measured[DAMPER_FORCE]
     row = table_row(v, c.v_top, c.rows) if c.rows > 1 else 0
     u = command(c.n, c.C, row, state)
     if c.kind == INVERSE:
-        voltage, applied = inverted(u, v, c, state)
+        voltage, applied = inverted(u, measured[BASE_DISPLACEMENT], v, c, state)
         second = c.anti_windup * (applied - u)
     elif c.kind == SIGNED:
         voltage = signed_voltage(u, v, c.v_max)
@@ -212,14 +212,15 @@ def designed(
     return voltage, u
 
 
-def inverted(u: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
+def inverted(u: float, x: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
     """Return the voltage of a commanded force, and the force that it gives by the law.
 
     Moves the estimated states of the law on.
 
     Parameters
     ----------
-    u, v : commanded force [N], velocity across the damper [m/s]
+    u : commanded force [N]
+    x, v : displacement [m] and velocity [m/s] across the damper
     c : Constants
     state : as in `start`
 
@@ -229,20 +230,21 @@ def inverted(u: float, v: float, c: Constants, state: Row) -> tuple[float, float
         V; N.
     """
     z = state[c.n : len(state) - REMEMBERED]
-    voltage = voltage_of_law(c.law, c.p, u, v, z, c.still, c.least_slope, c.v_max)
-    applied = force_of_law(c.law, c.p, v, voltage, z)
+    voltage = voltage_of_law(c.law, c.p, u, v, z, (c.still, c.least_slope, c.v_max), x)
+    applied = force_of_law(c.law, c.p, v, voltage, z, x)
     estimate_states(c.law, c.p, v, voltage, c.period, z)
     for i in range(len(z)):
         state[c.n + i] = z[i]
     return voltage, applied
 
 
-def skyhook(y: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
+def skyhook(y: float, x: float, v: float, c: Constants, state: Row) -> tuple[float, float]:
     """Return voltage and command of the skyhook law, and move its integral on.
 
     Parameters
     ----------
-    y, v : floor acceleration [m/s2], velocity across the damper [m/s]
+    y : floor acceleration [m/s2]
+    x, v : displacement [m] and velocity [m/s] across the damper
     c : Constants
     state : as in `start`, moved on in place
 
@@ -257,4 +259,4 @@ def skyhook(y: float, v: float, c: Constants, state: Row) -> tuple[float, float]
     u = skyhook_command(absolute, c.gain)
     if c.kind == SKYHOOK_SWITCH:
         return skyhook_switch(absolute, v, c.v_max), u
-    return inverted(u, v, c, state)[0], u
+    return inverted(u, x, v, c, state)[0], u

@@ -31,7 +31,7 @@ law_force: Any = None
 hold(globals(), "advance_law", "law_force")
 
 
-def force_of_law(law: int, p: Row, v: float, V: float, z: Row) -> float:
+def force_of_law(law: int, p: Row, v: float, V: float, z: Row, x: float = 0.0) -> float:
     """Return a law's force [N]; sgn(0) = 1.
 
     Parameters
@@ -39,14 +39,16 @@ def force_of_law(law: int, p: Row, v: float, V: float, z: Row) -> float:
     law, p : code of the law; (m,) its parameters
     v, V : velocity [m/s], voltage [V]
     z : (k,) states of the law
+    x : displacement [m], which only laws with a spring or a hysteresis over it ask for
     """
-    now = record(Inputs, (0.0, v, 0.0, V, 0.0, 0.0, inf, v == 0.0))
+    now = record(Inputs, (x, v, 0.0, V, 0.0, 0.0, inf, v == 0.0))
     return law_force(law, p, now, z)[0]  # type: ignore[no-any-return]
 
 
 def voltage_of_law(
-    law: int, p: Row, command: float, v: float, z: Row, still: float, least: float, v_max: float
-) -> float:
+    law: int, p: Row, command: float, v: float, z: Row, limits: tuple[float, float, float],
+    x: float = 0.0,
+) -> float:  # fmt: skip
     """Return the voltage [V] at which a damper of some law gives the commanded force.
 
     Parameters
@@ -54,10 +56,13 @@ def voltage_of_law(
     law, p : code of the law; (m,) its parameters
     command : force [N], positive against +x
     v, z : velocity [m/s]; (k,) states of the law
-    still, least, v_max : see `affine_voltage`; `STILL`, `LEAST_SLOPE` and 8 V are usual
+    limits : still [m/s], least [N/V] and v_max [V] of `affine_voltage`; `STILL`, `LEAST_SLOPE` and
+        8 V are usual
+    x : displacement [m]
     """
-    f_0 = force_of_law(law, p, v, 0.0, z)
-    slope = force_of_law(law, p, v, 1.0, z) - f_0
+    f_0 = force_of_law(law, p, v, 0.0, z, x)
+    slope = force_of_law(law, p, v, 1.0, z, x) - f_0
+    still, least, v_max = limits
     return affine_voltage(command, v, f_0, slope, still, least, v_max)
 
 

@@ -269,9 +269,11 @@ def _tables(law: str, effect: str = "") -> dict[str, tuple[str, ...]]:
 
 def _defaults(law: str, effect: str = "") -> dict[str, Value]:
     """Return the parameters of an effect, or of a law, at their defaults."""
-    fixed: tuple[str, ...] = (*CHOICES, *(EFFECTS[effect].assumed if effect else ()))
-    if not effect:
-        fixed = (*fixed, *base_and_variant(law)[1].idle)
+    if effect:
+        fixed: tuple[str, ...] = (*CHOICES, *EFFECTS[effect].assumed)
+    else:
+        base, variant = base_and_variant(law)
+        fixed = (*base.fixed(), *variant.idle)
     return {
         name: Value(p.value, p.unit, *p.bounds, free=name not in fixed)
         for name, p in _declared(law, effect).items()

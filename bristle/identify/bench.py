@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..physics import damper
 from ..physics.inputs import Inputs, Setup
+from ..physics.laws import LAWS
 
 Array = NDArray[np.float64]
 
@@ -171,6 +172,8 @@ class Bench:
             for state, signal in effect.starts.items()
             if signal in first
         }
+        for state, signal in LAWS[self.law].starts.items():
+            initial[f"{state}_0"] = first[signal]
         z = np.array(damper.start_states(self.law, {**initial, **values}))
         out = np.empty(len(x))
         motion = Inputs(x, v, a, V, dt, 0.0, 0.0, False)

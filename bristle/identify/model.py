@@ -67,7 +67,8 @@ class Model:
 
     def free(self) -> list[str]:
         """Return the names of the parameters that a fit moves."""
-        names = [name for name in law_parameters(self.law) if name not in CHOICES]
+        fixed_of_law = self.law_class.fixed()
+        names = [name for name in law_parameters(self.law) if name not in fixed_of_law]
         for effect in self.effects:
             joined = EFFECTS[effect]
             idle = () if self.law_class.has("bristle") else joined.bristles

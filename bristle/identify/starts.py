@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from ..physics.law import Shape
-from ..physics.parameter import CHOICES
 from .model import Array, Model, Problem, Run
 
 _NEAR_REST = 3.0  # errors of the velocity within which a sign law tells nothing
@@ -100,12 +99,10 @@ class _Net:
     def _column(self, name: str, node: Node) -> Array:
         """Return the force over all runs of one linear parameter at 1, the others at zero."""
         values = {**dict.fromkeys(self.linear, 0.0), name: 1.0}
-        for choice in self.law.parameters:
-            if choice in CHOICES:
-                values[choice] = self.model_0.value(choice)
-        for (shape, grid), own, k in zip(self.grids.items(), self.bends[name], node, strict=True):
-            if own:
-                values[shape] = float(grid[k])
+        for fixed in self.law.fixed():
+            values[fixed] = self.model_0.value(fixed)
+        for (shape, grid), k in zip(self.grids.items(), node, strict=True):
+            values[shape] = float(grid[k])
         alone = Model(self.model_0.law, (), values)
         return np.concatenate([self.problem.predict(alone, run) for run in self.problem.runs])
 

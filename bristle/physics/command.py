@@ -35,8 +35,8 @@ class Form:
         """Return the parameters that act through the voltage alone."""
         return self.names()[1:]
 
-    def source(self, at: Place, knots: str) -> str:
-        """Return the source of the quantity at V; `knots` is that of the table's knots."""
+    def source(self, at: Place, knots: str, V: str = "V") -> str:
+        """Return the source of the quantity at `V`; `knots` is that of the table's knots."""
         raise NotImplementedError
 
 
@@ -46,7 +46,7 @@ class Constant(Form):
 
     level: str
 
-    def source(self, at: Place, knots: str) -> str:
+    def source(self, at: Place, knots: str, V: str = "V") -> str:
         """Return the source of level."""
         return at(self.level)
 
@@ -58,9 +58,9 @@ class Linear(Form):
     level: str
     slope: str
 
-    def source(self, at: Place, knots: str) -> str:
+    def source(self, at: Place, knots: str, V: str = "V") -> str:
         """Return the source of level + slope V."""
-        return f"{at(self.level)} + {at(self.slope)} * V"
+        return f"{at(self.level)} + {at(self.slope)} * {V}"
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,9 @@ class Quadratic(Form):
     bend: str
     affine: ClassVar[bool] = False
 
-    def source(self, at: Place, knots: str) -> str:
+    def source(self, at: Place, knots: str, V: str = "V") -> str:
         """Return the source of level + slope V + bend V^2."""
-        return f"{at(self.level)} + V * ({at(self.slope)} + V * {at(self.bend)})"
+        return f"{at(self.level)} + {V} * ({at(self.slope)} + {V} * {at(self.bend)})"
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,6 @@ class Monotone(Form):
     table: str
     affine: ClassVar[bool] = False
 
-    def source(self, at: Place, knots: str) -> str:
+    def source(self, at: Place, knots: str, V: str = "V") -> str:
         """Return the source of the climbing line at V."""
-        return f"climb(V, {knots}, {at(self.table)})"
+        return f"climb({V}, {knots}, {at(self.table)})"

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from .codegen import Slots, switched, switched_laws
 from .law import Law
-from .tuples import law_state, law_values
+from .tuples import FACTORS, law_state, law_values
 
 _FACTORS = {"limit": " * yield_factor * slip_length", "viscous": " * viscous_factor"}
+_ALL_FACTORS = {name: name for name in FACTORS}  # variables of the generated source
 _NOW = "    x, v, a, V, dt, energy, halt, halts = now"
 _SETUP = "    law, p, on = setup.law, setup.p, setup.on"
 _ROD = ["    rod_x = x", "    rod_v = v"]
@@ -77,7 +78,7 @@ def advance_law_source(slots: Slots) -> str:
         if law.hook("advance") is None:
             return []
         return [
-            f"k = {law_values(law, 'slip_length')}",
+            f"k = {law_values(law, {'slip_length': 'slip_length'})}",
             f"{_targets(law, 'z_next')} = {law.name}_advance(now, {law_state(law)}, k)",
         ]
 
@@ -155,6 +156,8 @@ def _law_steps(slots: Slots, head: str, middle: list[str]) -> str:
         if law.hook("advance") is not None:
             advanced = f"{law.name}_advance(m, {law_state(law)}, k)"
             lines += [*middle, f"{_targets(law, 'z1')} = {advanced}"]
+            if law.felt:
+                lines.append(f"k = {law_values(law, felt='z1')}")
         lines += [f"s = {law_state(law).replace('z[', 'z1[')}", f"rest = {_forces(law, False)}"]
         return [*lines, *(_friction(f"{law.name}_limit(q, s, k)") if law.has("sign") else [])]
 
@@ -177,7 +180,7 @@ def evaluate_source(slots: Slots) -> str:
     def own(law: type[Law]) -> list[str]:
         lines = [
             f"s = {law_state(law)}",
-            f"k = {law_values(law, 'slip_length')}",
+            f"k = {law_values(law, _ALL_FACTORS)}",
             f"rest = ({_forces(law)}) * factor + added",
         ]
         if law.has("sign"):
@@ -252,11 +255,11 @@ def net_force_source(slots: Slots) -> str:
         lines = [f"s = {law_state(law)}"]
         if law.hook("advance") is not None:
             lines += [
-                f"k = {law_values(law, 'half_slip_length')}",
+                f"k = {law_values(law, {**_ALL_FACTORS, 'slip_length': 'half_slip_length'})}",
                 "m = record(Inputs, (x, middle, a, V, dt, energy, 0.0, False))",
                 f"s = record({law.name}_Z, {law.name}_advance(m, s, k))",
             ]
-        lines.append(f"k = {law_values(law, 'slip_length')}")
+        lines.append(f"k = {law_values(law, _ALL_FACTORS)}")
         forces = _forces(law)
         if law.has("sign"):
             friction = f"{law.name}_limit(q, s, k){_FACTORS['limit']} * direction"

@@ -6,6 +6,8 @@ states and `p` its parameters, as those of effects are. Whatever needs to know s
 asks its class; nothing knows a law by name.
 """
 
+# Longer than 300 lines: what a law may declare, and what follows from it, stand in one class.
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
@@ -71,15 +73,21 @@ class Law:
         `{name: Parameter}`, `{name: Table}`, `{name: unit}`. Start values of states are zero or the
         parameter `STATE_0`. Once the class is defined `parameters` also lists the values of its
         tables, as `curve[1]`.
+    starts
+        States that begin with the value of a signal where a measurement begins: {state: signal}.
     command
         `{quantity: form}`, how quantities depend on the voltage (see `command`). In a hook the
         quantity is p.NAME, and the parameters that make it are not there.
+    felt
+        The state [V] that stands for the voltage in `command`, of a law with a lag of its own.
     parts, contains
         `PARTS` that the law has: an effect joins laws with the parts that it acts on. `contains`
         names the kinds of effects that the law has in it already; they are not offered beside it.
     shapes
         `{parameter: Shape}`: the parameters in which the force is not linear. All others are
-        linear, but `parameter.CHOICES`.
+        linear, but `parameter.CHOICES` and what is `assumed`.
+    assumed
+        Parameters that measurements hardly tell: no fit moves them.
     variants
         `{suffix: Variant}`.
     place, stiffness
@@ -117,6 +125,9 @@ class Law:
     parts: ClassVar[tuple[str, ...]] = ()
     contains: ClassVar[tuple[str, ...]] = ()
     shapes: ClassVar[dict[str, Shape]] = {}
+    starts: ClassVar[dict[str, str]] = {}
+    felt: ClassVar[str] = ""
+    assumed: ClassVar[tuple[str, ...]] = ()
     variants: ClassVar[dict[str, Variant]] = {}
     place: ClassVar[str] = ""
     stiffness: ClassVar[str] = ""
@@ -162,7 +173,12 @@ class Law:
     @classmethod
     def linear(cls) -> tuple[str, ...]:
         """Return the names of the parameters in which the force is linear."""
-        return tuple(n for n in cls.parameters if n not in CHOICES and n not in cls.shapes)
+        return tuple(n for n in cls.parameters if n not in cls.shapes and n not in cls.fixed())
+
+    @classmethod
+    def fixed(cls) -> tuple[str, ...]:
+        """Return the names of the parameters that no fit moves."""
+        return tuple(n for n in cls.parameters if n in CHOICES or n in cls.assumed)
 
     @classmethod
     def driven(cls) -> tuple[str, ...]:
@@ -205,14 +221,18 @@ class Law:
     def slopes_at_rest(cls, values: Mapping[str, float], V: float) -> tuple[float, float]:
         """Return the slopes of the force as v -> 0 at V [V]: per speed [N.s/m], per travel [N/m].
 
-        A jump with direction is left out. Travel is that of the rod and of all states in metres.
+        A jump with direction is left out, and so is a force at rest. Travel is that of the rod and
+        of all states in metres.
         """
         p, rest = cls.at(values, V), dict.fromkeys(cls.states, 0.0)
         bent = {name: LEAST if unit == "m" else 0.0 for name, unit in cls.states.items()}
         hooks = [own for name in HOOKS if name != "limit" and (own := cls.hook(name))]
-        moving, still = _motion(LEAST, V), _motion(0.0, V)._replace(x=LEAST)
-        speed = sum(own(moving, cls.State(**rest), p) for own in hooks)
-        travel = sum(own(still, cls.State(**bent), p) for own in hooks)
+        still, moving = _motion(0.0, V), _motion(LEAST, V)
+        apart, speed, travel = still._replace(x=LEAST), 0.0, 0.0
+        for own in hooks:
+            zero = own(still, cls.State(**rest), p)
+            speed += own(moving, cls.State(**rest), p) - zero
+            travel += own(apart, cls.State(**bent), p) - zero
         return speed / LEAST, travel / LEAST
 
     @classmethod

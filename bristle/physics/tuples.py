@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 record = tuple.__new__
 """Makes a named tuple from a tuple, in half the time of calling its class; `jit` knows it too."""
 
-FACTORS = ("slip_length",)
-"""What the `p` of a law with bristles holds beside its own numbers: the factor by which effects
-stretch the travel before sliding."""
+FACTORS = ("slip_length", "yield_factor", "viscous_factor")
+"""What the `p` of a law with bristles holds beside its own numbers: the factors by which effects
+stretch the travel before sliding, and change the yield force and the viscous part. The last two act
+on the forces that the law gives; only what balances forces inside of a law needs them."""
 
 
 def made(kind: str, sources: Sequence[str]) -> str:
@@ -37,18 +38,20 @@ def law_state(law: type[Law]) -> str:
     return made(f"{law.name}_Z", [f"z[{k}]" for k in range(len(law.states))])
 
 
-def law_values(law: type[Law], slip_length: str = "1.0") -> str:
+def law_values(law: type[Law], factors: Mapping[str, str] | None = None, felt: str = "z") -> str:
     """Return the source that makes a law's parameter tuple from `p` at the voltage V.
 
-    `slip_length` is the source of the factor on the travel before sliding.
+    `factors` are the sources of `FACTORS`, 1 where one is missing; `felt` is the sequence of states
+    that holds the voltage of a law with a lag of its own, "" where V stands for it.
     """
+    V = f"{felt}[{list(law.states).index(law.felt)}]" if law.felt and felt else "V"
     at = {name: f"p[{k}]" for k, name in enumerate(law.parameters)}
     fields = fields_of(law.parameters, law.tables)
     given = dict(zip(fields, listed(fields, law.tables, at)))
     for quantity, form in law.command.items():
         table = law.tables.get(form.names()[0])
-        given[quantity] = form.source(given.__getitem__, repr(table.knots) if table else "")
-    given.update(dict.fromkeys(FACTORS, slip_length))
+        given[quantity] = form.source(given.__getitem__, repr(table.knots) if table else "", V)
+    given.update({name: (factors or {}).get(name, "1.0") for name in FACTORS})
     return made(f"{law.name}_P", [given[name] for name in law.seen()])
 
 
@@ -62,4 +65,4 @@ def values_of_law(law: type[Law], values: Mapping[str, float], V: float) -> Any:
 def _maker(law: type[Law]) -> Any:
     """Return what makes the `p` of a law's hooks from its flat parameters and the voltage."""
     names = {"record": record, "climb": climb, f"{law.name}_P": law.Values}
-    return eval(f"lambda p, V: {law_values(law)}", names)
+    return eval(f"lambda p, V: {law_values(law, felt='')}", names)

@@ -148,8 +148,18 @@ def _table(at: SiteModel, task: FitTask) -> list[LawError]:
     if site.is_line or not site.any_law or samples > _LONGEST_TABLE:
         return []
     return error_table(
-        site.train, site.holdout, task.cutoff, starts=min(task.starts, _TABLE_STARTS)
-    )
+        site.train, site.holdout, task.cutoff, laws=_tabled(at.model.law),
+        starts=min(task.starts, _TABLE_STARTS),
+    )  # fmt: skip
+
+
+def _tabled(own: str) -> tuple[str, ...]:
+    """Return the laws of the table: the model's, and those that a step moves on exactly.
+
+    What is integrated by its rates takes minutes to fit; whoever wants it asks for it by name.
+    """
+    named = {name: base_and_variant(name)[0] for name in law_names()}
+    return tuple(n for n, law in named.items() if law.exact() or law.name == own)
 
 
 def _by_site(models: SiteModels) -> list[str]:

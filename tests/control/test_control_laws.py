@@ -42,7 +42,7 @@ INVERSE_TABLE = [
 
 @pytest.mark.parametrize(("u", "v", "z", "voltage", "force"), INVERSE_TABLE)
 def test_lugre_inverse_table(u: float, v: float, z: float, voltage: float, force: float) -> None:
-    V = inverse.voltage_of_law(LUGRE, P, u, v, [z], *LIMITS)
+    V = inverse.voltage_of_law(LUGRE, P, u, v, [z], LIMITS)
     assert pytest.approx(voltage, abs=5e-9) == V
     assert inverse.force_of_law(LUGRE, P, v, V, [z]) == pytest.approx(force, abs=5e-9)
 
@@ -56,7 +56,7 @@ def test_lugre_inverse_gives_back_the_voltage(
         LUGRE, P, v, 0.0, [z]
     )
     found = inverse.voltage_of_law(
-        LUGRE, P, inverse.force_of_law(LUGRE, P, v, V, [z]), v, [z], *LIMITS
+        LUGRE, P, inverse.force_of_law(LUGRE, P, v, V, [z]), v, [z], LIMITS
     )
     if abs(slope) >= inverse.LEAST_SLOPE:
         assert found == pytest.approx(V, abs=1e-12 * 10.0 / inverse.LEAST_SLOPE)
@@ -67,15 +67,15 @@ def test_lugre_inverse_gives_back_the_voltage(
 @given(v=speeds, sign=signs, V=st.floats(0.0, 8.0))
 def test_bingham_inverse_gives_back_the_voltage(v: float, sign: float, V: float) -> None:
     force = inverse.force_of_law(BINGHAM, BINGHAM_P, sign * v, V, [0.0])
-    found = inverse.voltage_of_law(BINGHAM, BINGHAM_P, force, sign * v, [0.0], *LIMITS)
+    found = inverse.voltage_of_law(BINGHAM, BINGHAM_P, force, sign * v, [0.0], LIMITS)
     assert found == pytest.approx(V, abs=1e-10)
 
 
 @given(u=st.floats(0.0, 1e3), v=speeds, sign=signs)
 def test_no_inverse_asks_a_damper_to_push(u: float, v: float, sign: float) -> None:
     z = sign / 500.0
-    assert inverse.voltage_of_law(LUGRE, P, -sign * u, sign * v, [z], *LIMITS) == 0.0
-    assert inverse.voltage_of_law(BINGHAM, BINGHAM_P, -sign * u, sign * v, [0.0], *LIMITS) == 0.0
+    assert inverse.voltage_of_law(LUGRE, P, -sign * u, sign * v, [z], LIMITS) == 0.0
+    assert inverse.voltage_of_law(BINGHAM, BINGHAM_P, -sign * u, sign * v, [0.0], LIMITS) == 0.0
 
 
 def test_estimated_deflection_is_exact_and_bounded() -> None:
@@ -200,8 +200,8 @@ skyhook_switch = sensing.skyhook_switch
 def every_law(u, v, z, p, bingham_p, A, B, W, C, x, spare, bent, out):  # type: ignore[no-untyped-def]
     """Call every law once; one function, so that numba compiles them together."""
     bent[0] = z
-    out[0] = voltage_of_law(LUGRE, p, u, v, bent, 1e-3, 0.5, 8.0)
-    out[1] = voltage_of_law(BINGHAM, bingham_p, u, v, bent, 1e-3, 0.5, 8.0)
+    out[0] = voltage_of_law(LUGRE, p, u, v, bent, (1e-3, 0.5, 8.0))
+    out[1] = voltage_of_law(BINGHAM, bingham_p, u, v, bent, (1e-3, 0.5, 8.0))
     out[2] = force_of_law(LUGRE, p, v, out[0], bent)
     out[3] = force_of_law(BINGHAM, bingham_p, v, out[1], bent)
     estimate_states(LUGRE, p, v, out[0], 0.002, bent)

@@ -84,11 +84,11 @@ def simulate(  # type: ignore[no-untyped-def]
             if law == 1 or law == 5:
                 V = clipped_voltage(u, measured, 0.5, 8.0)
             elif law == 2:
-                V = voltage_of_law(LUGRE_CODE, p, u, v, bent, STILL, LEAST_SLOPE, 8.0)
+                V = voltage_of_law(LUGRE_CODE, p, u, v, bent, (STILL, LEAST_SLOPE, 8.0))
                 applied = force_of_law(LUGRE_CODE, p, v, V, bent)
                 estimate_states(LUGRE_CODE, p, v, V, 0.002, bent)
             elif law == 3:
-                V = voltage_of_law(BINGHAM_CODE, bingham_p, u, v, bent, STILL, LEAST_SLOPE, 8.0)
+                V = voltage_of_law(BINGHAM_CODE, bingham_p, u, v, bent, (STILL, LEAST_SLOPE, 8.0))
                 applied = force_of_law(BINGHAM_CODE, bingham_p, v, V, bent)
             else:
                 V = signed_voltage(u, v, 8.0)

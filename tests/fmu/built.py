@@ -11,11 +11,12 @@ from typing import Any
 
 from bristle.fmu import build, catalogue
 from bristle.physics.effect import effects_of
+from bristle.physics.laws import laws_of
 
 COMPONENTS = catalogue.component_names()
-SITES = {"Structure": ("structure", ""), "LuGreDamper": ("damper", "lugre")} | {
-    "BinghamDamper": ("damper", "bingham")
-}
+DAMPERS = {catalogue.component_of_law(law.name): law.name for law in laws_of("damper")}
+"""Component to its law."""
+SITES = {"Structure": ("structure", ""), **{name: ("damper", law) for name, law in DAMPERS.items()}}
 LIVELY: dict[str, dict[str, Any]] = {
     "GroundMotion": {"peak": 3.0, "factor": 1.5},
     "ConstantVoltage": {"level": 3.0},

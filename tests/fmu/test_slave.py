@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from built import COMPONENTS, SITES, built, lively
+from built import COMPONENTS, DAMPERS, SITES, built, lively
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from fresh import fresh
@@ -18,7 +18,6 @@ from bristle.fmu import build, catalogue
 from bristle.physics.effect import effects_of
 from bristle.physics.laws import LAWS
 
-DAMPERS = ["BinghamDamper", "LuGreDamper"]
 CONTROLLERS = ["ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped", "Skyhook"]
 each_component = pytest.mark.parametrize("component", COMPONENTS)
 each_damper = pytest.mark.parametrize("component", DAMPERS)
@@ -51,8 +50,7 @@ FAULTLESS = {"gain": 1.0, "bias": 0.0, "noise_density": 0.0, "quantisation": 0.0
 LEVELS = ("base", "floor1", "floor2")
 INPUTS: dict[str, dict[str, str]] = {
     "Structure": {"ground_acceleration": "m/s2", "damper_force": "N", "extra_force": "N"},
-    "BinghamDamper": DAMPER_INPUTS,
-    "LuGreDamper": DAMPER_INPUTS,
+    **dict.fromkeys(DAMPERS, DAMPER_INPUTS),
     "GroundMotion": {},
     "ConstantVoltage": {},
     "SignalSource": {},
@@ -69,8 +67,7 @@ OUTPUTS: dict[str, dict[str, str | None]] = {
         "drift2": "m",
         "holding_force": "N",
     },
-    "BinghamDamper": {**DAMPER_OUTPUTS},
-    "LuGreDamper": {**DAMPER_OUTPUTS},
+    **dict.fromkeys(DAMPERS, DAMPER_OUTPUTS),
     "GroundMotion": {"ground_acceleration": "m/s2"},
     "ConstantVoltage": {"voltage": "V"},
     "SignalSource": {"value": None},
@@ -81,8 +78,11 @@ OUTPUTS: dict[str, dict[str, str | None]] = {
 }
 PARAMETERS: dict[str, dict[str, Any]] = {
     "Structure": {"attached_mass": 0.0},
-    "BinghamDamper": {"stroke": 0.02, "v_max": 8.0, "moving_mass": 0.0},
-    "LuGreDamper": {"stroke": 0.02, "v_max": 8.0, "moving_mass": 0.0, "bristle_deflection_0": 0.0},
+    **{
+        component: {"stroke": 0.02, "v_max": 8.0, "moving_mass": 0.0}
+        | {f"{state}_0": 0.0 for state in LAWS[law].states}
+        for component, law in DAMPERS.items()
+    },
     "GroundMotion": {"record": "el_centro_1940_ns", "peak": 0.0, "factor": 1.0, "start": 0.0},
     "ConstantVoltage": {"level": 4.0},
     "SignalSource": {"kind": "constant", "level": 0.0},
@@ -256,7 +256,9 @@ def test_dependencies_are_what_is_seen(component: str) -> None:
     assert seen <= said
     # No effect needs the acceleration yet, and bristles need no holding.
     reserved = {("force", "acceleration")} | (
-        {("force", "holding_force")} if component == "LuGreDamper" else set()
+        {("force", "holding_force")}
+        if component in DAMPERS and not LAWS[DAMPERS[component]].has("sign")
+        else set()
     )
     assert said - seen <= reserved
 

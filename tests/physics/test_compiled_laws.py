@@ -13,11 +13,12 @@ from bristle.physics import damper, structure
 from bristle.physics.building import paper_building
 from bristle.physics.effect import EFFECTS, effects_of
 from bristle.physics.inputs import Inputs
+from bristle.physics.laws import laws_of
 from bristle.physics.signals import KINDS, PARAMETERS, rate, value
 
 DAMPER_CASES = [
     (law, effects)
-    for law in ("bingham", "lugre")
+    for law in (law.name for law in laws_of("damper"))
     for effects in [
         [],
         *([e.name] for e in effects_of("damper", law)),

@@ -18,6 +18,7 @@ from rigs import LAWS, NO_LAW, Bench, force_at, loop_energy, sine
 from bristle import units
 from bristle.component.structure import StructureModel
 from bristle.errors import ScenarioError
+from bristle.fmu.catalogue import component_of_law
 from bristle.physics.building import paper_building
 from bristle.physics.effect import EFFECTS, HOOKS, SITES, Effect, Q, effects_of, laws_joined
 from bristle.scenario.scenario import load_scenario
@@ -342,9 +343,7 @@ def spelled(effects: list[type[Effect]]) -> str:
     return ", ".join(f'"{name}" = {value}' for name, value in given.items())
 
 
-@pytest.mark.parametrize(
-    ("damper", "law"), [("LuGreDamper", "lugre"), ("BinghamDamper", "bingham")]
-)
+@pytest.mark.parametrize(("damper", "law"), [(component_of_law(law), law) for law in LAWS])
 def test_a_scenario_can_switch_every_effect_on(
     damper: str, law: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

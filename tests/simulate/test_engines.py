@@ -9,6 +9,8 @@ import pandas as pd
 import pytest
 
 from bristle import run
+from bristle.fmu.catalogue import component_of_law
+from bristle.physics.laws import laws_of
 from bristle.scenario.scenario import load_scenario
 from bristle.simulate.coupled import simulate
 from bristle.simulate.results import read_results
@@ -62,11 +64,11 @@ WIRES = """
 """
 # Every coefficient that the force is proportional to, by law.
 COEFFICIENTS = {
-    "LuGreDamper": {
-        "sigma_a": 650.0, "sigma_0": 415.0, "sigma_1": 5.0, "sigma_2": 100.0, "sigma_b": 20.0,
-    },
-    "BinghamDamper": {"f_c": 1.3, "f_v": 0.83, "c_0": 100.0, "c_v": 20.0},
-}  # fmt: skip
+    component_of_law(law.name): {
+        name: parameter.value for name, parameter in law.parameters.items() if "N" in parameter.unit
+    }
+    for law in laws_of("damper")
+}
 
 
 def scenario(
