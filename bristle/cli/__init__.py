@@ -15,7 +15,7 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from ..errors import BristleError
+from ..errors import BristleError, TrustError
 
 _NAMES = {"list_": "list"}
 
@@ -42,10 +42,16 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit code (0, 1, 2 or 130) and never a traceback."""
+    """Run one command; return its exit code (0, 1, 2 or 130) and never a traceback.
+
+    The traceback of an error that nobody foresaw is kept in a file, which the one line names.
+    """
     arguments = build_parser().parse_args(argv)
+    from ..interrupt import Hurry
+
     try:
-        return int(arguments.main(arguments))
+        with Hurry():
+            return _with_consent(arguments)
     except BristleError as error:
         if arguments.debug:
             raise
@@ -59,6 +65,30 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print("interrupted", file=sys.stderr)
         return 130
+    except Exception as error:
+        if arguments.debug:
+            raise
+        from . import _failure
+
+        print(_failure.line(error, arguments.command), file=sys.stderr)
+        return 1
+
+
+def _with_consent(arguments: argparse.Namespace) -> int:
+    """Run a command; ask, on a terminal, about code that has not run here, and run it again."""
+    if getattr(arguments, "trust", False):
+        from ..trust import granted
+
+        with granted():
+            return int(arguments.main(arguments))
+    while True:
+        try:
+            return int(arguments.main(arguments))
+        except TrustError as error:
+            from . import _consent
+
+            if not _consent.given(error):
+                raise
 
 
 def run_and_exit() -> NoReturn:

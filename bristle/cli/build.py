@@ -7,6 +7,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..fmu.build import Plan
     from ..fmu.description import Description
@@ -51,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="where NAME.fmu goes, in place of an older one; else the current folder",
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 

@@ -8,6 +8,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..diagnose import Diagnosis
 
@@ -20,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dry-run", action="store_true", help="show the verdict; leave verdict.json as it is"
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print verdict.json")
 
 

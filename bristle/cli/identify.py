@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..study.identified import Identified
 
@@ -41,6 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of a building's study: the building alone, its stiffnesses, frequencies and damping "
         "ratios from its response, as a building file",
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 

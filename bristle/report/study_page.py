@@ -64,12 +64,13 @@ def gather(study: Study) -> Content:
     from ..study.comparison import comparer
     from ..study.identification import as_model
 
-    model, steps = study.model(), tuple(study.steps())
+    model, steps = study.model(to_show=True), tuple(study.steps())
     runs = study.runs()
     now = before = None
     trouble, added = "", ""
     found = history_steps(steps)
     try:
+        study.model()  # raises where the code of an effect waits for consent
         against = comparer(study)
         now = against.compare(as_model(model))
         for step in reversed(steps):
@@ -352,7 +353,7 @@ def _reproduce(content: Content) -> str:
 
     study = content.study
     name = study.name
-    commands = [f"bristle study first-look {name}", f"bristle identify {name}"]
+    commands = [f"bristle study check {name}", f"bristle identify {name}"]
     for step in content.steps:
         if step.what.startswith("add "):
             commands.append(f"bristle {step.what.replace('add ', f'add {name} ', 1)}")

@@ -107,6 +107,7 @@ def add_effects(
     StudyError
         If an effect is not known, is there already, or cannot join the model.
     """
+    study.usable_effects()  # raises where one of the study's own waits for consent
     model = present = study.model()
     for name in names:
         _refuse(model, name)

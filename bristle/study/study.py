@@ -17,7 +17,8 @@ from ..data.measurement import Measurement, read_measurements
 from ..data.model import StudyModel, model_text, read_model
 from ..errors import StudyError
 from ..identify.prepare import SHORTEST
-from ..physics.user import Loaded, load_effects
+from ..physics.user import Loaded, waiting
+from ..trust import load_effects
 from .history import History, Step
 from .new import make_folder
 from .settings import ROLES, Settings, read_settings
@@ -55,6 +56,10 @@ class Study:
     ----------
     folder : path
         The folder that holds study.toml.
+    trust : bool
+        Whether to consent to the code in its effects/, which is remembered. Without it, what has
+        not run here before does not run: data, history, verdict and report can be read all the
+        same.
 
     Raises
     ------
@@ -62,7 +67,7 @@ class Study:
         If there is no study, or its study.toml is wrong: with every mistake and its line.
     """
 
-    def __init__(self, folder: Path | str) -> None:
+    def __init__(self, folder: Path | str, *, trust: bool = False) -> None:
         self.folder = Path(folder)
         if not (self.folder / "study.toml").is_file():
             raise StudyError(
@@ -72,7 +77,7 @@ class Study:
         self.history = History(self.folder)
         self._lock = FileLock(self.folder / ".lock")
         self._complete_unfinished()
-        self.own_effects = load_effects(self.effects_folder)
+        self.own_effects = load_effects(self.effects_folder, trust=trust)
         self.settings: Settings = read_settings(self.folder / "study.toml")
         self._seen = self._state()
 
@@ -80,9 +85,9 @@ class Study:
     """The files of effects/, each with its effect or why it is left out."""
 
     @classmethod
-    def open(cls, folder: Path | str) -> Study:
+    def open(cls, folder: Path | str, *, trust: bool = False) -> Study:
         """Return the study in a folder; the same as `Study(folder)`."""
-        return cls(folder)
+        return cls(folder, trust=trust)
 
     @classmethod
     def create(cls, folder: Path | str, files: Sequence[Path | str], **choices: Any) -> Study:
@@ -105,10 +110,19 @@ class Study:
 
         Call it before a fit or a diagnosis: an effect that cannot be compiled would take all others
         along.
+
+        Raises
+        ------
+        TrustError
+            If the code of one must not run yet.
         """
         from ..check.user_effects import usable
 
-        self.own_effects = usable(load_effects(self.effects_folder))
+        found = load_effects(self.effects_folder)
+        for one in found:
+            if untrusted := waiting(one.path):
+                raise untrusted
+        self.own_effects = usable(found)
         return [one.error for one in self.own_effects if one.error]
 
     @property
@@ -157,9 +171,23 @@ class Study:
         twins = _twins_within(train) + _twins_within(holdout)
         return Runs(train, holdout, (*idle, *twins))
 
-    def model(self) -> StudyModel:
-        """Return the present model; StudyError with every mistake of model.toml."""
-        model = read_model(self.folder / "model.toml")
+    def model(self, *, to_show: bool = False) -> StudyModel:
+        """Return the present model.
+
+        Parameters
+        ----------
+        to_show : bool
+            Whether the model is only to be shown: then an effect whose code must not run yet is
+            there with the values of the file.
+
+        Raises
+        ------
+        StudyError
+            With every mistake of model.toml.
+        TrustError
+            If the model has an effect whose code must not run yet.
+        """
+        model = read_model(self.folder / "model.toml", to_show=to_show)
         self._seen = self._state()
         return model
 
