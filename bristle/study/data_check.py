@@ -1,4 +1,4 @@
-"""A first look at a study's measurements, before any model: what to mend, what cannot be told."""
+"""The data check: what to mend in a study's measurements before any model, what cannot be told."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..data.checks.channels import look_at_channels
+from ..data.checks.channels import check_channels
 from ..data.checks.finding import Finding, grouped, sentence
-from ..data.checks.motion import look_at_force, look_at_motion, velocity_of_run
-from ..data.checks.runs import Excitation, look_at_runs
+from ..data.checks.motion import check_force, check_motion, velocity_of_run
+from ..data.checks.runs import Excitation, check_runs
 from ..data.measurement import Measurement
 from ..data.relation import band
 from .study import Study
@@ -20,7 +20,7 @@ _HEADINGS = {"error": "To mend", "warning": "To know", "note": "Noted"}
 
 
 @dataclass(frozen=True)
-class FirstLook:
+class DataCheck:
     """What is found, worst first, and what each run excites."""
 
     findings: tuple[Finding, ...]
@@ -91,8 +91,8 @@ def _table(runs: tuple[Measurement, ...]) -> list[str]:
     return lines
 
 
-def first_look(study: Study, show: Callable[[int], None] | None = None) -> FirstLook:
-    """Look at all measurements of a study.
+def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataCheck:
+    """Check all measurements of a study.
 
     Parameters
     ----------
@@ -111,16 +111,16 @@ def first_look(study: Study, show: Callable[[int], None] | None = None) -> First
         level = damper_level(runs.all)
     findings = [Finding("split", "warning", note) for note in runs.notes]
     for done, run in enumerate(runs.all, 1):
-        findings += _look_at_run(run, level)
+        findings += _check_run(run, level)
         if show:
             show(done)
-    together, excitations = look_at_runs(runs.train, runs.holdout, level)
+    together, excitations = check_runs(runs.train, runs.holdout, level)
     findings += together
     if study.settings.has_building:
         findings += _unmeasured(runs.all)
     findings = [_milder(finding, runs.all) for finding in findings]
     ordered = [finding for level in _HEADINGS for finding in findings if finding.level == level]
-    return FirstLook(tuple(ordered), tuple(excitations), tuple(runs.all))
+    return DataCheck(tuple(ordered), tuple(excitations), tuple(runs.all))
 
 
 def damper_level(runs: list[Measurement]) -> str:
@@ -129,13 +129,13 @@ def damper_level(runs: list[Measurement]) -> str:
     return "base" if based else "floor1"
 
 
-def _look_at_run(run: Measurement, level: str) -> list[Finding]:
+def _check_run(run: Measurement, level: str) -> list[Finding]:
     velocity = velocity_of_run(run, level)
-    findings = [*look_at_channels(run, velocity), *look_at_motion(run, level)]
+    findings = [*check_channels(run, velocity), *check_motion(run, level)]
     for other in _other_levels(run, level):
-        findings += look_at_motion(run, other)
+        findings += check_motion(run, other)
     if "force" in run.channels and velocity is not None:
-        findings += look_at_force(run, velocity)
+        findings += check_force(run, velocity)
     filled = float(np.mean(~run.measured))
     if filled > 0.05:
         text = f"{100 * filled:.2g} % of the samples were missing and are filled."
