@@ -118,6 +118,7 @@ def _watch(on_hang: Callable[[], None], patience: float) -> Callable[[], None]:
     def restore() -> None:
         signal.set_wakeup_fd(before)
         left.set()
+        theirs.shutdown(socket.SHUT_WR)  # forked processes may hold its end open
         theirs.close()
         watcher.join()
         ours.close()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made import Columns, bench_run, write
+from made import Columns, bench_run, write, write_runs
 
 from bristle.cli import main
 from bristle.data.checks.clipping import clipped_share
