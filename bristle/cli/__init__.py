@@ -12,7 +12,8 @@ import importlib
 import os
 import pkgutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import NoReturn
 
 from ..errors import BristleError, TrustError
@@ -35,6 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
         module = importlib.import_module(f"{__name__}.{found.name}")
         name = _NAMES.get(found.name, found.name)
         sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
+        sub.add_argument("--quiet", action="store_true", help="do not tell what is being done")
         sub.add_argument("--debug", action="store_true", help="show the traceback of an error")
         module.add_arguments(sub)
         sub.set_defaults(main=module.main)
@@ -50,7 +52,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     from ..interrupt import Hurry
 
     try:
-        with Hurry():
+        with Hurry(), _progress(arguments):
             return _with_consent(arguments)
     except BristleError as error:
         if arguments.debug:
@@ -72,6 +74,18 @@ def main(argv: Sequence[str] | None = None) -> int:
 
         print(_failure.line(error, arguments.command), file=sys.stderr)
         return 1
+
+
+@contextmanager
+def _progress(arguments: argparse.Namespace) -> Iterator[None]:
+    """Tell on stderr what is being done, unless nobody wants to know."""
+    from ..progress import Line, telling
+
+    if arguments.quiet or getattr(arguments, "json", False):
+        yield
+        return
+    with Line() as line, telling(line.say):
+        yield
 
 
 def _with_consent(arguments: argparse.Namespace) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -32,19 +31,12 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    found = diagnose_study(study, write=not arguments.dry_run, say=speaker(arguments.json))
+    found = diagnose_study(study, write=not arguments.dry_run)
     if arguments.json:
         print(json.dumps(verdict_of(study, found), indent=2, ensure_ascii=False))
     else:
         print(text(found, arguments.folder))
     return 0
-
-
-def speaker(quiet: bool):  # type: ignore[no-untyped-def]
-    """Return what tells the stages on a terminal, and nothing in a pipe."""
-    if quiet or not sys.stderr.isatty():
-        return lambda _text: None
-    return lambda text: print(f"\033[2K{text} ...", end="\r", file=sys.stderr, flush=True)
 
 
 SHORT = "  (short search: it gains too little, as the others do)"

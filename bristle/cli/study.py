@@ -204,7 +204,7 @@ def _auto(arguments: argparse.Namespace) -> int:
     from ..report.staircase import staircase
     from ..study.learning import learn
     from ..study.study import Study
-    from .diagnose import speaker, text
+    from .diagnose import text
 
     study = Study(arguments.folder)
     quiet = arguments.json or not sys.stdout.isatty()
@@ -217,7 +217,7 @@ def _auto(arguments: argparse.Namespace) -> int:
         print(f"\n{staircase(steps)}\n", flush=True)
         shown.append(len(steps))
 
-    learned = learn(study, say=speaker(arguments.json), on_step=show)
+    learned = learn(study, on_step=show)
     if arguments.json:
         import json
 
