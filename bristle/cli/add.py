@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..findings import command
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -59,5 +60,5 @@ def text(added: Added, folder: Path) -> str:
             interval = f"+- {half:.2g}" if half is not None else row["how"]
             lines.append(f"  {row['name']:28} {row['value']:>12.5g} {row['unit']:10} {interval}")
     if "z_holdout" in after and after["z_holdout"] >= before["z_holdout"]:
-        lines += ["", "The error on runs not seen did not fall:  bristle undo " + str(folder)]
-    return "\n".join([*lines, "", f"Next:  bristle diagnose {folder}"])
+        lines += ["", "The error on runs not seen did not fall:  " + command("undo", folder)]
+    return "\n".join([*lines, "", f"Next:  {command('diagnose', folder)}"])

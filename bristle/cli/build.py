@@ -7,6 +7,7 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..findings import command
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -117,5 +118,5 @@ def _print(target: Path, description: Description, fresh: bool) -> None:
         ports = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in description.of(causality)]
         if ports:
             print(f"  {causality}s: {', '.join(ports)}")
-    print(f"  {len(description.of('parameter'))} parameters: bristle list ports {target}")
+    print(f"  {len(description.of('parameter'))} parameters:  {command('list', 'ports', target)}")
     print(f'In a scenario: fmu = "{target.name}", a path relative to the scenario\'s file.')

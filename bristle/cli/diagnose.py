@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..findings import command
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -83,12 +84,12 @@ def text(found: Diagnosis, folder: Path) -> str:
 
 def _next(found: Diagnosis, folder: Path) -> list[str]:
     if found.kind in ("effect", "class"):
-        names = " ".join(found.effects) if found.kind == "effect" else found.effects[0]
-        return ["", f"Next:  bristle add {folder} {names}"]
+        names = found.effects if found.kind == "effect" else found.effects[:1]
+        return ["", f"Next:  {command('add', folder, *names)}"]
     if found.kind == "unknown":
         return [
             "",
-            f"Next:  bristle compare {folder} , which shows where the residual is;  bristle "
+            f"Next:  {command('compare', folder)} , which shows where the residual is;  bristle "
             "effects new NAME  begins an effect of your own.",
         ]
-    return ["", f"Next:  bristle report {folder}"]
+    return ["", f"Next:  {command('report', folder)}"]

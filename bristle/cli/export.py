@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..findings import command
 from ._consent import add_trust
 
 HELP = "write a study's model as an FMU and a scenario that uses it"
@@ -39,7 +40,7 @@ def main(arguments: argparse.Namespace) -> int:
         print(json.dumps(answer, indent=2))
         return 0
     print(f"{found.fmu}: the model's damper, its values baked in.")
-    print(f"{found.scenario}: plays {found.run} on it. Run it:  bristle run {found.scenario}")
+    print(f"{found.scenario}: plays {found.run} on it. Run it:  {command('run', found.scenario)}")
     for note in found.notes:
         print(f"{note[:1].upper()}{note[1:]}")
     return 0

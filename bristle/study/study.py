@@ -16,6 +16,7 @@ from ..data.files import read_json, write_json, write_whole
 from ..data.measurement import Measurement, read_measurements
 from ..data.model import StudyModel, model_text, read_model
 from ..errors import StudyError
+from ..findings import command
 from ..identify.prepare import SHORTEST
 from ..physics.user import Loaded, waiting
 from ..trust import load_effects
@@ -23,6 +24,8 @@ from .history import History, Step
 from .new import make_folder
 from .settings import ROLES, Settings, read_settings
 
+OF_MODEL = ("identify.png", "compare.png", "report.html")
+"""Reports that show a model: they are set aside when another becomes the present one."""
 PATIENCE = 10.0
 """Seconds to wait for another process that writes in the same study."""
 SPLIT = 0.7
@@ -71,8 +74,8 @@ class Study:
         self.folder = Path(folder)
         if not (self.folder / "study.toml").is_file():
             raise StudyError(
-                f"{self.folder}: no study: there is no study.toml. Make one with  bristle study "
-                f"new {self.folder.name or 'NAME'} --data 'lab/*.csv'"
+                f"{self.folder}: no study: there is no study.toml. Make one with  "
+                f"{command('study', 'new', self.folder.name or 'NAME', '--data', 'lab/*.csv')}"
             )
         self.history = History(self.folder)
         self._lock = FileLock(self.folder / ".lock")
@@ -228,6 +231,7 @@ class Study:
                 numbers[-1] + 1 if numbers else 0, what, why, {**(before or {})}, {**(after or {})}
             )
             self.history.add(step, model_text(model, self.folder / "model.toml"))
+            self._set_aside(step.number - 1)
             self._seen = self._state()
         return step
 
@@ -242,6 +246,7 @@ class Study:
         with self.writing():
             self.history.keep_edit()
             step = self.history.undo()
+            self._set_aside(step.number)
             self._seen = self._state()
         return step
 
@@ -262,6 +267,15 @@ class Study:
         with self.writing():
             write_whole(path, content)
         return path
+
+    def _set_aside(self, number: int) -> None:
+        """Put the reports of a step's model into a folder of that step."""
+        for name in OF_MODEL:
+            old = self.reports_folder / name
+            if old.is_file():
+                kept = self.reports_folder / f"step_{max(number, 0):03d}"
+                kept.mkdir(exist_ok=True)
+                old.replace(kept / name)
 
     @contextmanager
     def writing(self, patience: float = PATIENCE) -> Iterator[None]:
