@@ -22,6 +22,7 @@ import numpy as np
 from numba.core import types
 from numba.extending import intrinsic
 
+from .progress import tell
 from .resources import cache_folder
 
 # Python's arrays outlive every call, so compiled code need not count references to them.
@@ -71,6 +72,8 @@ def compiled(
         Whether to keep the machine code on disk.
     """
     folder = _folder(function) if keep else None
+    if folder is None or not any(folder.iterdir()):
+        tell("compiling the laws, once")
     with _FOLDER:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder or "")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from ..findings import command
+from ._consent import add_trust
 
 if TYPE_CHECKING:
     from ..diagnose.verdict_text import Verdict
@@ -20,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dry-run", action="store_true", help="show the verdict; leave verdict.json as it is"
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print verdict.json")
 
 
@@ -29,20 +32,13 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    found = diagnose_study(study, write=not arguments.dry_run, say=speaker(arguments.json))
+    found = diagnose_study(study, write=not arguments.dry_run)
     verdict = verdict_of(study, found)
     if arguments.json:
         print(json.dumps(verdict, indent=2, ensure_ascii=False))
     else:
         print(text(verdict, arguments.folder))
     return 0
-
-
-def speaker(quiet: bool):  # type: ignore[no-untyped-def]
-    """Return what tells the stages on a terminal, and nothing in a pipe."""
-    if quiet or not sys.stderr.isatty():
-        return lambda _text: None
-    return lambda text: print(f"\033[2K{text} ...", end="\r", file=sys.stderr, flush=True)
 
 
 SHORT = "  (short search: it gains too little, as the others do)"
@@ -96,10 +92,10 @@ def _next(verdict: Verdict, folder: Path) -> str:
     """Return the command that follows from a verdict."""
     if verdict["kind"] in ("effect", "ambiguous"):
         count = len(verdict["effects"]) if verdict["kind"] == "effect" else 1
-        return f"bristle add {folder} {' '.join(verdict['effects'][:count])}"
+        return command("add", folder, *verdict["effects"][:count])
     if verdict["kind"] == "unknown":
         return (
-            f"bristle compare {folder} , which shows where the residual is;  bristle effects new "
-            "NAME  begins an effect of your own."
+            f"{command('compare', folder)} , which shows where the residual is;  bristle effects "
+            "new NAME  begins an effect of your own."
         )
-    return f"bristle report {folder}"
+    return command("report", folder)

@@ -20,9 +20,9 @@ from ..physics.building import Building
 from ..physics.effect import EFFECTS
 from ..physics.inputs import Inputs
 from ..physics.laws import DEFAULT, base_and_variant
+from .along import Along
 from .model import Model, Problem, Run
 from .response import Response, base_equilibrium, responses, shear
-from .along import Along
 
 Array = NDArray[np.float64]
 
