@@ -112,8 +112,8 @@ def _weights(task: Task, reach: _Reach) -> list[str]:
         low, high = (limit / reach.ground for limit in OPEN_LOOP)
         found.append(
             f"weights: the weight on the acceleration is {acceleration:.3g} s2/m at the first "
-            f"mode; the ground moves the top level up to {reach.ground:.3g} times its own acceleration, "
-            f"so that {low:.1g} to {high:.1g} s2/m is plausible."
+            f"mode; the ground moves the top level up to {reach.ground:.3g} times its own "
+            f"acceleration, so that {low:.1g} to {high:.1g} s2/m is plausible."
         )
     worth = acceleration * reach.command
     if not EFFORT[0] <= command / worth <= EFFORT[1]:
