@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import textwrap
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,13 +15,8 @@ if TYPE_CHECKING:
 
 HELP = "run the paper's comparison of controllers and judge its statements"
 
-_COLUMNS = (
-    ("base drift [mm]", "{:.1f}/{:.2f}"),
-    ("floor 1 acceleration [m/s2]", "{:.2f}/{:.3f}"),
-    ("floor 2 acceleration [m/s2]", "{:.2f}/{:.3f}"),
-    ("damper force [N]", "{:.2f}/{:.2f}"),
-    ("voltage [V]", "{:.1f}/{:.2f}"),
-)
+_WIDTH = 14
+"""Of a column of numbers."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -59,6 +56,7 @@ def _answer(report: Report) -> dict[str, Any]:
     return {
         "seconds": round(report.seconds, 1),
         "left_out": report.comparison.left_out,
+        "beyond_stroke": _beyond_stroke(report),
         "tables": {
             name: table.to_dict(orient="records") for name, table in report.tables.items()
         },
@@ -73,11 +71,25 @@ def _answer(report: Report) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _beyond_stroke(report: Report) -> list[dict[str, Any]]:
+    """Return the runs in which the base leaves the damper's stroke, with the drift [mm]."""
+    from ..paper.comparison.experiment import BEYOND
+    from ..paper.comparison.tables import beyond_stroke
+
+    names = ["motion", "intensity [g]", "law", "peak base drift [mm]", BEYOND]
+    rows: list[dict[str, Any]] = beyond_stroke(report.comparison)[names].to_dict(orient="records")
+    return rows
+
+
 def _print(report: Report) -> None:
-    for title, table in zip(
-        ("Table IV: El Centro", "Table V: Northridge"), report.tables.values(), strict=False
-    ):
-        _print_table(title, table)
+    from ..paper.comparison.tables import stroke_lines, stroke_text
+
+    for name, table in report.tables.items():
+        _print_table(name, table)
+    beyond = stroke_text(report.comparison)
+    if beyond:
+        print(beyond)
+        print("".join(f"  {line}\n" for line in stroke_lines(report.comparison)))
     if report.comparison.left_out:
         print(f"Left out. {report.comparison.left_out}\n")
     print("The paper's statements")
@@ -88,17 +100,26 @@ def _print(report: Report) -> None:
     print(f"  {report.files[0]}")
 
 
-def _print_table(title: str, table: pd.DataFrame) -> None:
-    """Print a table, peak/RMS of each quantity."""
-    print(f"{title}; peak/RMS, over the record as published")
-    head = "".join(f"{name:>29}" for name, _ in _COLUMNS)
+def _print_table(name: str, table: pd.DataFrame) -> None:
+    """Print Table IV or V; drifts beyond the damper's stroke are marked."""
+    from ..paper.comparison.experiment import BEYOND
+    from ..paper.comparison.tables import MARK, TABLES, columns, shown
+
+    kind, title = TABLES[name]
+    window = ", over the record as published" if kind == "rms" else ""
+    marked = f"; {MARK} beyond the damper's stroke" if kind == "peak" else ""
+    print(f"{title}{window}{marked}")
+    listed = columns(kind)
+    wrapped = [textwrap.wrap(heading, _WIDTH - 2) for heading, _ in listed]
+    for line in zip_longest(*wrapped, fillvalue=""):
+        print(f"{'':25}" + "".join(f"{text:>{_WIDTH}}" for text in line))
     groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
     for (motion, g), group in groups:
-        print(f"{f'{motion} {g:g} g':23}{head}")
+        print(f"{motion} {g:g} g")
         for _, row in group.iterrows():
-            cells = "".join(
-                f"{form.format(row[f'peak {name}'], row[f'rms {name}']):>29}"
-                for name, form in _COLUMNS
-            )
-            print(f"  {row['law']:21}{cells}")
+            texts = [shown(row[column], column) for _, column in listed]
+            # The mark stands beside the column, so that the digits stay below each other.
+            first = texts[0] + (MARK if row.get(BEYOND, 0.0) > 0.0 else " ")
+            print(f"  {row['law']:23}{first:>{_WIDTH + 1}}{texts[1]:>{_WIDTH - 1}}"
+                  + "".join(f"{text:>{_WIDTH}}" for text in texts[2:]))  # fmt: skip
     print()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -32,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Design, verify, write controller file and picture; print what was found."""
-    from ..design import design, read_task
+    from ..design import design, implausible, read_task
     from ..errors import DesignError
 
     out: Path = arguments.out or Path(arguments.file.stem + ".json")
@@ -43,8 +44,11 @@ def main(arguments: argparse.Namespace) -> int:
         raise DesignError(
             f"{arguments.file}: kind = {task.kind!r}; `bristle design {task.kind}` is right for it."
         )
+    warnings = implausible(task)
+    for text in warnings:
+        print(f"warning: {arguments.file}: {text}", file=sys.stderr, flush=True)
     result = design(task)
-    answer = _answer(result)
+    answer = {**_answer(result), "warnings": warnings}
     answer["files"] = [str(path.absolute()) for path in _write(result, out)]
     if arguments.json:
         import json

@@ -21,7 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="FOLDER",
-        help="where results, figure and log go, in place of older ones; else results/NAME/",
+        help="where results, figure and log go, in place of older ones; else results/NAME/, "
+        "or results/NAME_a.b=value/ with --set a.b=value",
     )
     parser.add_argument(
         "--set",
@@ -48,13 +49,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Run, draw, print; return 0, 1 if the run failed on its way, 130 if it was interrupted."""
     from ..errors import RunError
+    from ..scenario.naming import run_name
     from ..scenario.scenario import parse_overrides, resolve_scenario
     from ..simulate.output import Output
     from ..simulate.run import IncompleteRunError, RunInterrupted, execute
 
     overrides = parse_overrides(arguments.overrides)
     file = resolve_scenario(arguments.file)
-    folder = Path(arguments.out) if arguments.out else Path("results", file.stem)
+    folder = Path(arguments.out or Path("results", run_name(file, overrides)))
     output = Output(folder, arguments.format)
     code, trouble = 0, ""
     try:

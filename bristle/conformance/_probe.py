@@ -23,7 +23,10 @@ PLAN, FINDING, BOX = "plan.json", "finding.json", "box"
 def main(work: Path, name: str) -> None:
     """Try one probe; the process then ends as the FMU lets it."""
     finding = _try(Bench(Plan.load(work / PLAN), BlackBox(work / BOX)), name)
-    text = {"verdict": finding.verdict, "seen": finding.seen, "data": dict(finding.data)}
+    text = {
+        "verdict": finding.verdict, "seen": finding.seen, "data": dict(finding.data),
+        "rule": finding.rule,
+    }  # fmt: skip
     part = work / (FINDING + ".part")
     part.write_text(json.dumps(text))
     part.replace(work / FINDING)

@@ -12,18 +12,21 @@ if TYPE_CHECKING:
 
 Verdict = Literal["pass", "fail", "note"]
 Level = Literal["file", "library", "run"]
+Rule = Literal["standard", "robustness", "bristle"]
 
 
 @dataclass(frozen=True)
 class Finding:
     """What one probe saw, in words, and how that is to be judged.
 
-    `data` is for the probes that follow (step count, whether inputs may be driven).
+    `data` is for the probes that follow (step count, whether inputs may be driven). `rule` is which
+    rule was broken where that is not the probe's own.
     """
 
     verdict: Verdict
     seen: str
     data: Mapping[str, float | bool] = field(default_factory=dict)
+    rule: Rule | None = None
 
 
 class UnexpectedError(Exception):
@@ -36,8 +39,9 @@ class Probe:
 
     `needs` is what must have worked before: "file" nothing, "library" that the library loads,
     "run" that a legal run gave a reference. `unless` returns why a probe does not apply, or None.
-    `bare` runs it in an interpreter without site-packages. `house` marks a rule of bristle's own,
-    which does not concern strangers.
+    `bare` runs it in an interpreter without site-packages. `rule` says what a failure is: a
+    violation of the "standard"; a lack of "robustness" against what the standard forbids the
+    importer or says nothing of; or a violation of a rule of "bristle" for its own FMUs.
     """
 
     name: str
@@ -47,7 +51,7 @@ class Probe:
     needs: Level
     unless: Callable[[Plan], str | None]
     bare: bool
-    house: bool
+    rule: Rule
 
 
 PROBES: dict[str, Probe] = {}
@@ -61,7 +65,7 @@ def probe(
     needs: Level = "run",
     unless: Callable[[Plan], str | None] = lambda plan: None,
     bare: bool = False,
-    house: bool = False,
+    rule: Rule = "standard",
 ) -> Callable[[Callable[[Bench], Finding]], Callable[[Bench], Finding]]:
     """Return a decorator that enters a function into the list of probes.
 
@@ -75,12 +79,14 @@ def probe(
         What must have worked before; see `Probe`.
     unless : callable
         Returns why the probe does not apply to a plan, or None.
-    bare, house : bool
-        Whether it runs without site-packages; whether the rule is bristle's own.
+    bare : bool
+        Whether it runs without site-packages.
+    rule : "standard", "robustness" or "bristle"
+        What a failure is; see `Probe`.
     """
 
     def enter(function: Callable[[Bench], Finding]) -> Callable[[Bench], Finding]:
-        PROBES[name] = Probe(name, tried, standard, function, needs, unless, bare, house)
+        PROBES[name] = Probe(name, tried, standard, function, needs, unless, bare, rule)
         return function
 
     return enter
@@ -91,9 +97,9 @@ def passed(seen: str, **data: float | bool) -> Finding:
     return Finding("pass", seen, data)
 
 
-def failed(seen: str, **data: float | bool) -> Finding:
-    """Return a finding that breaks a rule of the standard, or takes its host down."""
-    return Finding("fail", seen, data)
+def failed(seen: str, rule: Rule | None = None, **data: float | bool) -> Finding:
+    """Return a finding that breaks a rule, the probe's own or another, or takes its host down."""
+    return Finding("fail", seen, data, rule)
 
 
 def noted(seen: str, **data: float | bool) -> Finding:

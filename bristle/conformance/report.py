@@ -8,17 +8,27 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
 VERDICTS = ("pass", "fail", "note")
+RULES = {
+    "standard": "Violations of the standard",
+    "bristle": "Violations of bristle's rules for its own FMUs",
+    "robustness": "Lack of robustness, where the standard forbids the call or says nothing",
+}
+"""What a failure breaks, and the heading under which it is repeated at the end."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """One probe: what was tried, what was seen, what the standard says, and the verdict."""
+    """One probe: what was tried, what was seen, what the standard says, and the verdict.
+
+    `rule` is what a failure would break: the "standard", "robustness" or a rule of "bristle".
+    """
 
     probe: str
     tried: str
     seen: str
     standard: str
     verdict: str
+    rule: str
 
 
 @dataclass(frozen=True)
@@ -33,6 +43,15 @@ class Report:
         """Whether nothing falls short; notes are allowed."""
         return all(row.verdict != "fail" for row in self.rows)
 
+    @property
+    def conforms(self) -> bool:
+        """Whether no rule of the standard is broken, nor one of bristle's for its own FMUs."""
+        return not self.failures("standard", "bristle")
+
+    def failures(self, *rules: str) -> list[Row]:
+        """Return the rows that fail, of certain rules or of all."""
+        return [r for r in self.rows if r.verdict == "fail" and (not rules or r.rule in rules)]
+
     def row(self, probe: str) -> Row:
         """Return the row of one probe; KeyError if it was not tried."""
         for row in self.rows:
@@ -46,25 +65,37 @@ class Report:
         return {verdict: found[verdict] for verdict in VERDICTS}
 
     def to_json(self) -> str:
-        """Return the report as JSON text: schema, fmu, ok, counts, rows."""
+        """Return the report as JSON text: schema, fmu, conforms, ok, counts, failures, rows."""
         return json.dumps(
             {
                 "schema": 1,
                 "fmu": self.fmu,
+                "conforms": self.conforms,
                 "ok": self.ok,
                 "counts": self.counts(),
+                "failures": {rule: [row.probe for row in self.failures(rule)] for rule in RULES},
                 "rows": [asdict(row) for row in self.rows],
             },
             indent=2,
         )
 
     def summary(self) -> str:
-        """Return one line: passed, failed, noted."""
+        """Return what falls short, a line per probe by the rule that it breaks, and the counts."""
+        lines = []
+        for rule, heading in RULES.items():
+            rows = self.failures(rule)
+            if rows:
+                lines += [f"{heading}:", *(f"  {row.probe}: {row.seen}" for row in rows), ""]
         counts = self.counts()
-        words = "falls short" if not self.ok else "conforms"
-        return (
-            f"{self.fmu} {words}: {counts['pass']} passed, {counts['fail']} failed, "
-            f"{counts['note']} noted"
+        verdict = "conforms to the standard" if self.conforms else "does not conform"
+        weak = len(self.failures("robustness"))
+        robust = f", {weak} of them in robustness" if weak else ""
+        return "\n".join(
+            [
+                *lines,
+                f"{self.fmu} {verdict}: {counts['pass']} passed, {counts['fail']} failed{robust}, "
+                f"{counts['note']} noted",
+            ]
         )
 
     def to_text(self) -> str:

@@ -164,7 +164,7 @@ class _Session:
         rows = []
         for probe in PROBES.values():
             if self.only is None:
-                wanted = self.plan.ours or not probe.house
+                wanted = self.plan.ours or probe.rule != "bristle"
             else:
                 wanted = probe.name in self.only
             if wanted or probe.name in self.first:
@@ -172,7 +172,7 @@ class _Session:
                 finding = self.find(probe)
                 if wanted or finding.verdict == "fail":
                     row = (probe.name, probe.tried, finding.seen, probe.standard, finding.verdict)
-                    rows.append(Row(*row))
+                    rows.append(Row(*row, finding.rule or probe.rule))
         return rows
 
     def find(self, probe: Probe) -> Finding:
@@ -185,7 +185,7 @@ class _Session:
             return noted("not tried: no life of this FMU comes to its end (see legal run)")
         if probe.needs == "run" and "run" not in self.reached:
             return noted("not tried: no legal run")
-        if probe.house and not self.plan.ours:
+        if probe.rule == "bristle" and not self.plan.ours:
             return noted("not tried: this is no FMU of bristle")
         reason = probe.unless(self.plan)
         if reason is not None:
@@ -255,4 +255,4 @@ def _finding(work: Path, code: int | None, timeout: float) -> Finding:
         return failed(f"crashed{where}: {name}{after}", ended=True)
     if code != 0 or not told:
         return failed(f"left the process{where} with exit code {code}{after}", ended=True)
-    return Finding(told["verdict"], told["seen"], told["data"])
+    return Finding(told["verdict"], told["seen"], told["data"], told["rule"])

@@ -4,13 +4,15 @@
     result = design(read_task("my_design.toml"))
     result.controller.save("my_controller.json")
 
-`facts` of the result hold gamma, the closed-loop norms computed anew, and the poles.
+`facts` of the result hold gamma, the closed-loop norms computed anew, and the poles;
+`implausible(task)` tells beforehand what looks unmeant, with the plausible range.
 """
 
 from __future__ import annotations
 
 from ..control.controller import Controller, read_controller
 from .file import damper_from_model, read_task, task_from_data
+from .plausible import implausible
 from .result import Result
 from .sliding import Damper
 from .task import Scheduling, Task
@@ -27,6 +29,7 @@ __all__ = [
     "Weights",
     "damper_from_model",
     "design",
+    "implausible",
     "read_controller",
     "read_task",
     "task_from_data",

@@ -22,6 +22,14 @@ from .weights import LqgWeights, Weights
 
 SAMPLES_PER_PERIOD = 10
 """Fewest samples in a period of the first mode, which a controller must damp."""
+MOST_SAMPLES = 1000
+"""Samples in a period of the fastest mode beyond which more bring nothing."""
+SPEEDS = (1.0, 50.0)
+"""Where a grid usefully ends, in typical speeds of the damper's law."""
+ABSURD_SAMPLES = 100_000
+"""Samples in a period of the fastest mode that no controller takes, and that rounding spoils."""
+ABSURD_SPEED = 1000.0
+"""End of a grid, in typical speeds of the damper's law, that no damper reaches."""
 FASTEST_TIMES_PERIOD = 1.0
 """Largest |pole| times sample period of a controller that may be sampled."""
 
@@ -143,6 +151,13 @@ class Task:
                 f"scheduling: the grid goes to {self.scheduling.grid[-1]:g} m/s, beyond the "
                 f"{known:g} m/s of the damper's data."
             )
+        typical = self.damper.speed
+        if self.kind == "lpv" and self.scheduling.grid[-1] > ABSURD_SPEED * typical:
+            raise DesignError(
+                f"scheduling: the grid goes to {self.scheduling.grid[-1]:g} m/s, beyond any "
+                f"damper's speed: the law's typical speed is {typical:g} m/s; up to "
+                f"{SPEEDS[1] * typical:g} m/s is plausible."
+            )
 
     @property
     def states(self) -> int:
@@ -185,14 +200,15 @@ class Task:
 
 
 def check_sample_period(h: float, building: Building) -> None:
-    """Refuse a sample period that is not positive, or too long for the building's first mode.
+    """Refuse a sample period that is not positive, or does not suit the building's modes.
 
     Raises
     ------
     DesignError
-        With the longest period that would do.
+        With the longest or the shortest period that would do.
     """
-    first = frequencies(building)[0]
+    own = frequencies(building)
+    first, fastest = own[0], own[-1]
     longest = 1.0 / (SAMPLES_PER_PERIOD * first)
     if not (isfinite(h) and h > 0.0):
         raise DesignError(f"sample_period = {h!r} s must be positive; 0.002 s is usual.")
@@ -200,4 +216,10 @@ def check_sample_period(h: float, building: Building) -> None:
         raise DesignError(
             f"sample_period = {h:g} s is too long for the first mode of {building.name!r}, "
             f"{first:.4g} Hz: at most {longest:.3g} s, {SAMPLES_PER_PERIOD} samples per period."
+        )
+    shortest = 1.0 / (MOST_SAMPLES * fastest)
+    if h * fastest * ABSURD_SAMPLES < 1.0:
+        raise DesignError(
+            f"sample_period = {h:g} s is too short: the fastest mode of {building.name!r} has "
+            f"{fastest:.4g} Hz, so that {shortest:.2g} to {longest:.2g} s is plausible."
         )

@@ -32,11 +32,12 @@ class SignalSlave(SourceSlave):
     rated = False
 
     def declare_signal(self, unit: str) -> None:
-        """Declare the parameters of a signal in this unit."""
+        """Declare the parameters of a signal in this unit, "" for that of whatever it feeds."""
         self.add_parameter("kind", "constant", None, "one of " + ", ".join(KINDS))
         for name, parameter in PARAMETERS.items():
             own = parameter.unit or unit
-            self.add_parameter(name, parameter.value, own, parameter.text, parameter.bounds)
+            text = parameter.text if own else parameter.text + ", in the unit of the input"
+            self.add_parameter(name, parameter.value, own, text, parameter.bounds)
         self.add_parameter("steps", "0:0", None, "TIME:VALUE pairs of the kind steps")
         text = "two-column CSV of the kind csv, its header `time [s],NAME [UNIT]`"
         self.add_parameter("file", "", None, text)

@@ -37,13 +37,15 @@ _HINTS = (
 class Document:
     """The content of a scenario file, with the place of every key.
 
-    `overridden` gives, for each path that an override has set, the override's own name.
+    `overridden` gives, for each path that an override has set, the override's own name; `changed`
+    holds those paths that had another value before.
     """
 
     file: Path
     data: dict[str, Any]
     lines: dict[KeyPath, int]
     overridden: dict[KeyPath, str] = field(default_factory=dict)
+    changed: set[KeyPath] = field(default_factory=set)
 
     def place(self, path: KeyPath) -> tuple[int, str]:
         """Return the line of a key and the words before a finding about it.
@@ -133,9 +135,12 @@ def apply_overrides(
             if not isinstance(table, dict):
                 break  # the check of the file says that this must be a table
         else:
+            before = {name: old for name, old, _ in flatten(table, ())}
             _drop(table, key)
             table[key] = _plain(value, key)
             document.overridden[target] = str(name)
+            if key not in before or before[key] != table[key]:
+                document.changed.add(target)
 
 
 def _target(data: Mapping[str, Any], name: str) -> tuple[str, ...] | str:

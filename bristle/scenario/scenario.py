@@ -25,6 +25,7 @@ from .document import (
     read_document,
 )
 from .library import Library, installed
+from .naming import changed_title, needs_title
 
 __all__ = [
     "Component",
@@ -76,6 +77,8 @@ class Connection:
 @dataclass(frozen=True)
 class Scenario:
     """A checked scenario; `stop` [s] is a whole number of steps of `step` [s].
+
+    `title` is the file's unless overrides changed what runs (see `naming.changed_title`).
 
     `algorithm` is "gauss-seidel" (components step in their order) or "jacobi".
     """
@@ -191,6 +194,8 @@ def _read(
         for part in parts.values()
         if (description := part.description) is not None
     )
+    if ("title",) not in document.overridden and needs_title(document.changed):
+        title = changed_title(components, document.changed)
     connections = tuple(Connection(w.target, w.input, w.source, w.output) for w in wires)
     scenario = Scenario(path, title, run.stop, run.step, run.algorithm, components, connections)
     return scenario, found

@@ -76,7 +76,9 @@ def full_report(healthy: Path) -> Report:
 
 def test_healthy_toy_conforms_and_every_probe_has_its_row(full_report: Report) -> None:
     assert full_report.ok, full_report.to_text()
-    assert [r.probe for r in full_report.rows] == [n for n, p in PROBES.items() if not p.house]
+    assert [r.probe for r in full_report.rows] == [
+        n for n, p in PROBES.items() if p.rule != "bristle"
+    ]
     assert full_report.counts()["pass"] >= 30
     for row in full_report.rows:
         assert row.tried
@@ -294,7 +296,9 @@ def test_command_prints_json_and_exits_0(healthy: Path, capsys: pytest.CaptureFi
     told = json.loads(capsys.readouterr().out)
     assert told["ok"] is True
     assert told["counts"] == {"pass": 1, "fail": 0, "note": 0}
-    assert set(told["rows"][0]) == {"probe", "tried", "seen", "standard", "verdict"}
+    assert told["conforms"] is True
+    assert told["failures"] == {"standard": [], "bristle": [], "robustness": []}
+    assert set(told["rows"][0]) == {"probe", "tried", "seen", "standard", "verdict", "rule"}
 
 
 def test_command_prints_a_plain_table_in_a_pipe_and_exits_1(
@@ -305,7 +309,35 @@ def test_command_prints_a_plain_table_in_a_pipe_and_exits_1(
     assert out.startswith("fail  legal run\n      tried     the default experiment")
     assert "SIGABRT" in out
     assert "\x1b" not in out
-    assert out.endswith("Spoilt.fmu falls short: 0 passed, 1 failed, 0 noted\n")
+    assert out.endswith("Spoilt.fmu does not conform: 0 passed, 1 failed, 0 noted\n")
+    end = out.partition("\n\n")[2]
+    assert end.startswith(
+        "Violations of the standard:\n  legal run: crashed in fmi2DoStep: SIGABRT"
+    )
+
+
+def test_a_lack_of_robustness_is_told_apart_and_counts_with_strict(
+    trait: Callable[[str], Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ["conform", str(trait("crash on NaN")), "--only", "NaN input"]
+    assert cli.main(arguments) == 0
+    out = capsys.readouterr().out
+    assert "Violations" not in out
+    assert "Lack of robustness" in out
+    assert out.count("NaN input: crashed in fmi2DoStep: SIGSEGV") == 1
+    assert out.endswith("conforms to the standard: 0 passed, 1 failed, 1 of them in robustness, "
+                        "0 noted\n")  # fmt: skip
+    assert cli.main([*arguments, "--strict"]) == 1
+    assert cli.main([*arguments, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out.partition("\n{")[2].join(["{", ""]))
+    assert (told["conforms"], told["ok"]) == (True, False)
+    assert told["failures"]["robustness"] == ["NaN input"]
+
+
+def test_a_reset_that_mends_nothing_violates_the_standard(trait: Callable[[str], Path]) -> None:
+    report = conform(trait("remember NaN"), only=["NaN input"])
+    assert report.row("NaN input").rule == "standard"
+    assert not report.conforms
 
 
 def test_command_prints_a_table_on_a_terminal(healthy: Path) -> None:
@@ -386,6 +418,44 @@ def test_built_in_fmu_conforms(name: str) -> None:
         assert report.row(probe).verdict == "pass"
     for probe in ("another FMU before", "another FMU after", "repeatable", "bare interpreter"):
         assert report.row(probe).verdict == "pass"
+
+
+def test_a_missing_unit_is_a_violation_of_our_own_and_a_note_of_others(
+    spoil: Spoil, tmp_path: Path
+) -> None:
+    bare = tmp_path / "ConstantVoltage.fmu"
+    with (
+        zipfile.ZipFile(build.ensure("ConstantVoltage")) as source,
+        zipfile.ZipFile(bare, "w") as sink,
+    ):
+        for info in source.infolist():
+            data = source.read(info)
+            sink.writestr(info, data.replace(b' unit="V"', b"") if info.filename == XML else data)
+    report = conform(bare, only=["units"])
+    row = report.row("units")
+    assert (row.verdict, row.rule, report.conforms) == ("fail", "bristle", False)
+    assert "voltage" in row.seen
+    assert "Violations of bristle's rules for its own FMUs:\n  units" in report.to_text()
+    foreign = conform(spoil((XML, 'start="0.3" unit="m"', 'start="0.3"')), only=["units"])
+    assert foreign.row("units").verdict == "note"
+
+
+def test_a_unit_that_only_words_can_tell_is_none_missing() -> None:
+    for name in ("SignalSource", "Sensors"):
+        assert conform(build.ensure(name), only=["units"]).row("units").verdict == "note"
+
+
+REFERENCE = Path(__file__).parents[2].parent / "shared" / "fmi" / "reference_fmus" / "2.0"
+
+
+@pytest.mark.skipif(not REFERENCE.exists(), reason="the Reference-FMUs are not at hand")
+@pytest.mark.parametrize("name", [path.stem for path in sorted(REFERENCE.glob("*.fmu"))])
+def test_the_reference_fmus_violate_nothing_but_lack_robustness(name: str) -> None:
+    """Of the Modelica Association; steps of NaN and infinity keep them busy for ever."""
+    report = conform(REFERENCE / f"{name}.fmu", timeout=2.0)
+    assert report.conforms, report.to_text()
+    robustness = {row.probe for row in report.failures("robustness")}
+    assert robustness == (set() if name == "Stair" else {"NaN step", "infinite step"})
 
 
 # The line of the bundled slave base that is replaced, by what, the probe that must fail, its words.

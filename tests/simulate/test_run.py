@@ -94,6 +94,19 @@ def test_older_files_of_the_folder_are_replaced(fine: Path, tmp_path: Path) -> N
     assert read_results(tmp_path / "out").equals(run(fine))
 
 
+def test_a_run_with_another_value_has_a_title_and_a_folder_of_its_own(
+    fine: Path, tmp_path: Path
+) -> None:
+    command(fine, "--no-figure", cwd=tmp_path)
+    done = command(fine, "--no-figure", "--set", "sum.gain=3", cwd=tmp_path)
+    plain, changed = (tmp_path / "results" / name for name in ("toys", "toys_sum.gain=3"))
+    assert read_results(plain).equals(run(fine))
+    frame = read_results(changed)
+    assert frame.equals(run(fine, {"sum.gain": 3}))
+    assert "gain = 3" in frame.attrs["made"]["title"]
+    assert frame.attrs["made"]["title"] in done.stdout.replace("\n", " ")
+
+
 def test_json_gives_peaks_and_rms_with_units(fine: Path, tmp_path: Path) -> None:
     done = command(fine, "--json", "--no-figure", "--set", "sum.gain=3", cwd=tmp_path)
     answer = json.loads(done.stdout)

@@ -75,7 +75,7 @@ def _feed(bench: Bench, v: Variable, value: float) -> Callable[[Instance], int]:
     "fault: input",
     tried="each real input set to NaN and to infinity, a step, another step, reset",
     standard=_RULE.format(INPUT),
-    house=True,
+    rule="bristle",
 )
 def fault_input(bench: Bench) -> Finding:
     """Feed what is not finite."""
@@ -90,7 +90,7 @@ def fault_input(bench: Bench) -> Finding:
     "fault: step",
     tried="steps of 0, -h, NaN and infinity, another step, reset",
     standard=_RULE.format(STEP),
-    house=True,
+    rule="bristle",
 )
 def fault_step(bench: Bench) -> Finding:
     """Step by what is no step."""
@@ -107,7 +107,7 @@ def fault_step(bench: Bench) -> Finding:
     "fault: order",
     tried="fmi2DoStep before initialisation, inside it and after fmi2Terminate",
     standard=_RULE.format(ORDER),
-    house=True,
+    rule="bristle",
 )
 def fault_order(bench: Bench) -> Finding:
     """Step where stepping is not allowed."""
@@ -133,7 +133,7 @@ def fault_order(bench: Bench) -> Finding:
     "fault: parameter",
     tried="each real parameter set to NaN before initialisation, one step, reset",
     standard=_RULE.format(PARAMETER) + "; real outputs are 0 from initialisation on",
-    house=True,
+    rule="bristle",
 )
 def fault_parameter(bench: Bench) -> Finding:
     """Initialise with a parameter that is not finite."""
@@ -158,7 +158,7 @@ def fault_parameter(bench: Bench) -> Finding:
     "fault: earlier state",
     tried="a state copied, a fault, the state set back, on to the end",
     standard=_RULE.format("0 again"),
-    house=True,
+    rule="bristle",
 )
 def fault_earlier_state(bench: Bench) -> Finding:
     """Go back before the fault and run on."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import xml.etree.ElementTree as ElementTree
 import zipfile
 from collections import Counter, defaultdict
@@ -13,6 +14,9 @@ from ...fmu.description import Variable, describe, read_root
 from ..bench import Bench, some
 from ..plan import Plan
 from ..registry import Finding, UnexpectedError, failed, noted, passed, probe
+
+_UNIT_IN_WORDS = re.compile(r"\[.+\]|\bin the unit of\b")
+"""What a description says where FMI has no way to write the unit, or any will do."""
 
 
 def _root(bench: Bench) -> ElementTree.Element:
@@ -132,7 +136,8 @@ def start_values(bench: Bench) -> Finding:
     "units",
     tried="which real inputs, outputs and parameters have a unit, and whether it is defined",
     standard="FMI 2.0 sections 2.2.2 and 2.2.7: a unit in use is defined in UnitDefinitions. "
-    "Having one is optional; without it nobody can check a connection.",
+    "Having one is optional; without it nobody can check a connection, so bristle's own FMUs have "
+    "one, or say in the description which it is.",
     needs="file",
     unless=_unreadable,
 )
@@ -143,9 +148,13 @@ def units(bench: Bench) -> Finding:
     unknown = sorted({v.unit for v in ports if v.unit is not None} - defined)
     if unknown:
         return failed(f"used and not defined: {some(unknown)}")
-    plain = [v.name for v in ports if v.unit is None and v.causality != "local"]
+    plain = [v for v in ports if v.unit is None and v.causality != "local"]
+    untold = [v.name for v in plain if not _UNIT_IN_WORDS.search(v.description)]
+    if bench.plan.ours and untold:
+        return failed(f"{len(untold)} reals have no unit: {some(untold)}", rule="bristle")
     if plain:
-        return noted(f"{len(plain)} of {len(ports)} reals have no unit: {some(plain)}")
+        names = some([v.name for v in plain])
+        return noted(f"{len(plain)} of {len(ports)} reals have no unit: {names}")
     return passed(f"{len(defined)} units defined, none missing")
 
 

@@ -107,6 +107,7 @@ def two_instances(bench: Bench) -> Finding:
 
 @probe(
     "two libraries",
+    rule="robustness",
     tried="the same FMU unpacked and loaded a second time from another folder",
     standard="No clause on copies; each is a legal FMU of its own unless "
     "canBeInstantiatedOnlyOncePerProcess.",
@@ -121,6 +122,7 @@ def two_libraries(bench: Bench) -> Finding:
 
 @probe(
     "another FMU before",
+    rule="robustness",
     tried="another FMU loaded and running in the same process, then this one",
     standard="No clause; a co-simulation has several FMUs in one process, so no FMU may take what "
     "another one needs (module names, symbols, settings of the process).",
@@ -134,6 +136,7 @@ def another_before(bench: Bench) -> Finding:
 
 @probe(
     "another FMU after",
+    rule="robustness",
     tried="this FMU running, then another one loaded and run in the same process",
     standard="No clause; an FMU that comes later must not change one that is already running.",
     unless=lambda plan: None if plan.beside else "there is no other FMU at hand",
@@ -173,6 +176,7 @@ def _beside(bench: Bench, other: Bench, *, companion_first: bool) -> Finding:
 
 @probe(
     "bare interpreter",
+    rule="robustness",
     tried="a run in an interpreter without installed packages",
     standard="No clause. For FMUs that carry Python code: what they import beyond the standard "
     "library is missing elsewhere, although needsExecutionTool is not claimed.",
@@ -196,6 +200,7 @@ def bare_interpreter(bench: Bench) -> Finding:
 
 @probe(
     "memory",
+    rule="robustness",
     tried="resident memory over instantiate, three steps, free",
     standard="FMI 2.0 section 2.1.5: fmi2FreeInstance frees all memory. A few kilobytes may be the "
     "allocator's, so growth is a note.",

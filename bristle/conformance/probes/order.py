@@ -40,6 +40,7 @@ def forbidden(bench: Bench, act: Callable[[], int], instance: Instance) -> Findi
 
 @probe(
     "wrong guid",
+    rule="robustness",
     tried="fmi2Instantiate with a guid that is not the FMU's",
     standard="FMI 2.0 section 2.1.5: the guid is there to check that modelDescription.xml and code "
     "belong together; refusing is not demanded",
@@ -54,7 +55,10 @@ def wrong_guid(bench: Bench) -> Finding:
 
 
 @probe(
-    "step before initialisation", tried="fmi2DoStep right after fmi2Instantiate", standard=_ORDER
+    "step before initialisation",
+    rule="robustness",
+    tried="fmi2DoStep right after fmi2Instantiate",
+    standard=_ORDER,
 )
 def step_first(bench: Bench) -> Finding:
     """Step an instance that was never initialised."""
@@ -64,6 +68,7 @@ def step_first(bench: Bench) -> Finding:
 
 @probe(
     "step in initialisation",
+    rule="robustness",
     tried="fmi2DoStep between entering and leaving initialisation mode",
     standard=_ORDER,
 )
@@ -75,7 +80,12 @@ def step_in_initialisation(bench: Bench) -> Finding:
     return forbidden(bench, lambda: instance.step(bench.plan.start, bench.plan.step), instance)
 
 
-@probe("step after terminate", tried="fmi2DoStep after fmi2Terminate", standard=_ORDER)
+@probe(
+    "step after terminate",
+    rule="robustness",
+    tried="fmi2DoStep after fmi2Terminate",
+    standard=_ORDER,
+)
 def step_last(bench: Bench) -> Finding:
     """Step an instance that was terminated."""
     instance = bench.ready()
@@ -84,7 +94,12 @@ def step_last(bench: Bench) -> Finding:
     return forbidden(bench, lambda: instance.step(bench.time(2), bench.plan.step), instance)
 
 
-@probe("initialise twice", tried="fmi2EnterInitializationMode in mid-run", standard=_ORDER)
+@probe(
+    "initialise twice",
+    rule="robustness",
+    tried="fmi2EnterInitializationMode in mid-run",
+    standard=_ORDER,
+)
 def initialise_twice(bench: Bench) -> Finding:
     """Enter initialisation mode again without a reset."""
     instance = bench.ready()
@@ -94,6 +109,7 @@ def initialise_twice(bench: Bench) -> Finding:
 
 @probe(
     "leave what was not entered",
+    rule="robustness",
     tried="fmi2ExitInitializationMode right after fmi2Instantiate",
     standard=_ORDER,
 )
@@ -110,6 +126,7 @@ def _fixed(bench: Bench) -> Variable | None:
 
 @probe(
     "fixed parameter in mid-run",
+    rule="robustness",
     tried="setting a fixed parameter after a step",
     standard="FMI 2.0 section 2.2.7: a fixed variable does not change after initialisation, so it "
     "must not be set; the answer is left open",
@@ -127,7 +144,12 @@ def fixed_parameter(bench: Bench) -> Finding:
     return forbidden(bench, lambda: instance.set(v.kind, [v.reference], [value]), instance)
 
 
-@probe("setting an output", tried="fmi2SetReal on an output in mid-run", standard=_ORDER)
+@probe(
+    "setting an output",
+    rule="robustness",
+    tried="fmi2SetReal on an output in mid-run",
+    standard=_ORDER,
+)
 def set_output(bench: Bench) -> Finding:
     """Set a real output."""
     outputs = bench.plan.variables("output", "Real")
@@ -141,6 +163,7 @@ def set_output(bench: Bench) -> Finding:
 
 @probe(
     "step past the stop time",
+    rule="robustness",
     tried="fmi2DoStep beyond the stop time of fmi2SetupExperiment",
     standard="FMI 2.0 section 2.1.6: the FMU has to answer Error. Hardly a tool relies on it, and "
     "many cannot answer it, so going on is a note.",
@@ -179,25 +202,30 @@ def _odd_step(bench: Bench, step: float) -> Finding:
     return finding
 
 
-@probe("zero step", tried="fmi2DoStep with a step of 0", standard=_STEP)
+@probe("zero step", rule="robustness", tried="fmi2DoStep with a step of 0", standard=_STEP)
 def zero_step(bench: Bench) -> Finding:
     """Take a step of length zero."""
     return _odd_step(bench, 0.0)
 
 
-@probe("negative step", tried="fmi2DoStep with a negative step", standard=_STEP)
+@probe("negative step", rule="robustness", tried="fmi2DoStep with a negative step", standard=_STEP)
 def negative_step(bench: Bench) -> Finding:
     """Take a step back."""
     return _odd_step(bench, -bench.plan.step)
 
 
-@probe("NaN step", tried="fmi2DoStep with a step that is not a number", standard=_STEP)
+@probe(
+    "NaN step",
+    rule="robustness",
+    tried="fmi2DoStep with a step that is not a number",
+    standard=_STEP,
+)
 def nan_step(bench: Bench) -> Finding:
     """Take a step of no length at all."""
     return _odd_step(bench, math.nan)
 
 
-@probe("infinite step", tried="fmi2DoStep with an infinite step", standard=_STEP)
+@probe("infinite step", rule="robustness", tried="fmi2DoStep with an infinite step", standard=_STEP)
 def infinite_step(bench: Bench) -> Finding:
     """Take an endless step; it must end all the same."""
     return _odd_step(bench, math.inf)

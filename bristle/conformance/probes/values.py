@@ -35,7 +35,7 @@ def _strange_input(bench: Bench, value: float) -> Finding:
     if bench.plan.repeatable:
         difference = bench.differs(bench.whole_run(instance), bench.reference())
         if difference:
-            return failed(f"fmi2Reset does not mend it: {difference}")
+            return failed(f"fmi2Reset does not mend it: {difference}", rule="standard")
     silent = [a for a in answers if a.endswith("OK")]
     if silent:
         return noted(f"taken without a word: {some(silent)}")
@@ -60,20 +60,31 @@ _STRANGE = (
 )
 
 
-@probe("NaN input", tried="each real input set to NaN, a step, a reset", standard=_STRANGE)
+@probe(
+    "NaN input",
+    rule="robustness",
+    tried="each real input set to NaN, a step, a reset",
+    standard=_STRANGE,
+)
 def nan_input(bench: Bench) -> Finding:
     """Feed NaN."""
     return _strange_input(bench, math.nan)
 
 
-@probe("infinite input", tried="each real input set to infinity, a step", standard=_STRANGE)
+@probe(
+    "infinite input",
+    rule="robustness",
+    tried="each real input set to infinity, a step",
+    standard=_STRANGE,
+)
 def infinite_input(bench: Bench) -> Finding:
     """Feed infinity."""
     return _strange_input(bench, math.inf)
 
 
 @probe(
-    "huge input", tried="each real input set to 1e300, a step, a reset", standard=_STRANGE
+    "huge input",
+    rule="robustness", tried="each real input set to 1e300, a step, a reset", standard=_STRANGE
 )  # fmt: skip
 def huge_input(bench: Bench) -> Finding:
     """Feed a number whose square overflows."""
@@ -106,6 +117,7 @@ _REFERENCE = (
 
 @probe(
     "reading what is not there",
+    rule="robustness",
     tried="fmi2GetReal with value references that no variable has",
     standard=_REFERENCE,
 )
@@ -116,6 +128,7 @@ def read_unknown(bench: Bench) -> Finding:
 
 @probe(
     "setting what is not there",
+    rule="robustness",
     tried="fmi2SetReal with value references that no variable has",
     standard=_REFERENCE,
 )
@@ -126,6 +139,7 @@ def set_unknown(bench: Bench) -> Finding:
 
 @probe(
     "empty lists",
+    rule="robustness",
     tried="fmi2GetReal ... fmi2SetString with no variable at all",
     standard="FMI 2.0 section 2.1.7: nvr is the number of references; none is not excluded, and "
     "tools do it",

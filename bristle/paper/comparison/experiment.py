@@ -41,6 +41,8 @@ QUANTITIES = {
     "voltage": ("", "V", 1.0),
 }
 """What is tabled: the column of a run, the unit it is shown in, the factor to that unit."""
+BEYOND = "drift beyond stroke [mm]"
+"""Column of the table: how far the base drifts beyond the damper's stroke; 0 without a damper."""
 
 _PLANTS: dict[str, tuple[str, dict[str, object]]] = {
     NONE: ("no_damper", {}),
@@ -194,9 +196,9 @@ def measured(frame: pd.DataFrame, motion: Motion, intensity: float, law: str) ->
     -------
     dict
         Keys are "motion", "intensity [g]", "law"; of each quantity "peak ...", "rms ..." over the
-        record and "paper window rms ..." over the paper's window; "peak command" before limits, in
-        the command's unit; "between", the share of samples at which the voltage lies between 0 and
-        8 V.
+        record and "paper window rms ..." over the paper's window; `BEYOND`; "peak command" before
+        limits, in the command's unit; "between", the share of samples at which the voltage lies
+        between 0 and 8 V.
     """
     row: dict[str, Any] = {"motion": motion.name, "intensity [g]": intensity, "law": law}
     time = frame.index.to_numpy()
@@ -206,6 +208,7 @@ def measured(frame: pd.DataFrame, motion: Motion, intensity: float, law: str) ->
         row[f"peak {quantity} [{unit}]"] = float(np.abs(values).max())
         row[f"rms {quantity} [{unit}]"] = _rms(values[record])
         row[f"paper window rms {quantity} [{unit}]"] = _rms(values[paper])
+    row[BEYOND] = _beyond_stroke(frame, row["peak base drift [mm]"])
     voltage = _values(frame, "", "voltage")
     row["between"] = float(np.mean((voltage > 1e-9) & (voltage < 8.0 - 1e-9)))
     command = frame.get("controller.command_raw")
@@ -222,22 +225,13 @@ def _values(frame: pd.DataFrame, column: str, quantity: str) -> np.ndarray[Any, 
     return values
 
 
+def _beyond_stroke(frame: pd.DataFrame, drift: float) -> float:
+    """Return by how much a drift exceeds the stroke of the run's damper, in the drift's unit."""
+    if "damper.stroke_ratio" not in frame:
+        return 0.0
+    ratio = float(frame["damper.stroke_ratio"].max())
+    return drift * (1.0 - 1.0 / ratio) if ratio > 1.0 else 0.0
+
+
 def _rms(values: np.ndarray[Any, Any]) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
-
-
-def published_table(comparison: Comparison, northridge: bool) -> pd.DataFrame:
-    """Return Table IV (El Centro) or Table V (Northridge) of the comparison.
-
-    One row per intensity and law; peak and RMS over the record as published.
-    """
-    table = comparison.table
-    wanted = (table["motion"] != EL_CENTRO) == northridge
-    part = table[wanted & table["law"].isin(LAWS)].copy()
-    order = {law: i for i, law in enumerate(LAWS)}
-    places = {motion.name: i for i, motion in enumerate(comparison.motions)}
-    part["_place"], part["_law"] = part["motion"].map(places), part["law"].map(order)
-    part = part.sort_values(["_place", "intensity [g]", "_law"])
-    keep = [name for name in part if str(name).startswith(("peak ", "rms "))]
-    keep.remove("peak command")
-    return part[["motion", "intensity [g]", "law", *keep]].reset_index(drop=True)

@@ -22,19 +22,33 @@ from ...progress import Progress
 from .. import optimum, stiction
 from ..figures import prepare
 from ..runs import Drawing, Runs
-from . import identification
+from . import cases as published
+from . import identification, pictures
 from . import page as page_of
 from .claims import Statement, ledger
-from .experiment import Comparison, cases, compare, motions, published_table
+from .experiment import Comparison, cases, compare, motions
 from .facts import facts
 from .numbers import Numbers, Verdict
-from .pictures import FIGURES
+from .tables import TABLES, published_table
 
 if TYPE_CHECKING:
     import pandas as pd
 
 KINDS = ("hinf", "lpv")
 REPORT = "report.html"
+FIGURES: dict[str, tuple[str, Callable[[Comparison], Page | None]]] = {
+    "fig13-anti-windup": ("Fig. 13", pictures.anti_windup),
+    "fig14-northridge-strong": ("Fig. 14", published.northridge_hinf),
+    "fig15-northridge-strong-lpv": ("Fig. 15", published.northridge_lpv),
+    "fig16-northridge-weak": ("Fig. 16", published.northridge_weak),
+    "fig17-el-centro": ("Fig. 17", published.el_centro),
+    "summary": ("", pictures.summary),
+    "accelerations-el-centro": ("", pictures.responses),
+    "drift-el-centro": ("", pictures.drifts),
+    "accelerations-northridge": ("", pictures.northridge),
+    "voltages": ("", pictures.voltages),
+}
+"""File name to the paper's number, "" for this project's own, and what draws it."""
 _PACKAGE = Path(__file__).resolve().parents[2]
 
 
@@ -95,9 +109,7 @@ def make(folder: Path, newhall: Path | None = None, progress: bool = False) -> R
         comparison.strong,
     )  # fmt: skip
     figures = _draw(comparison, peaks, best, folder)
-    tables = {"table4": published_table(comparison, northridge=False)}
-    if len(found) > 1:
-        tables["table5"] = published_table(comparison, northridge=True)
+    tables = {name: published_table(comparison, kind) for name, (kind, _) in TABLES.items()}
     claims = ledger(numbers)
     files = [folder / f"{name}.png" for name in figures] + [folder / f"{k}.json" for k in KINDS]
     files += _write_tables(folder, comparison, tables, claims)

@@ -7,40 +7,36 @@ import re
 from collections import Counter
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ... import __version__
 from .claims import Statement
-from .experiment import CONTROLLERS, KAPPA, LAWS
+from .experiment import KAPPA, LAWS
 from .numbers import NOT, REPRODUCED, UNDECIDABLE, Verdict
+from .page_tables import stroke_html, table_html
+from .tables import TABLES, stroke_text
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from .make import Report
 
 CAPTIONS = {
     "fig5-stiction": "The structure shaken by a sine, damper at constant voltage.",
     "fig9-passive-optimum": "El Centro at four intensities, damper at constant voltage.",
     "fig13-anti-windup": "The strong Northridge case, LPV with three anti-windup rates.",
-    "fig14-accelerations-el-centro": "Acceleration of floor 2 over time, weak and strong.",
-    "fig15-drift-el-centro": "Displacement of the base relative to the table.",
-    "fig16-accelerations-northridge": "As Fig. 14, for the Northridge record at hand.",
-    "fig17-voltages": "Voltage and hysteresis loops of the three controllers.",
+    "fig14-northridge-strong": "Ground motion, voltages and responses: clipped, H-infinity.",
+    "fig15-northridge-strong-lpv": "The same motion: 0 V, LPV with its voltage and parameter.",
+    "fig16-northridge-weak": "The weak Northridge case: clipped, LPV with its parameter.",
+    "fig17-el-centro": "El Centro at 0.6 g: clipped, LPV with its parameter.",
     "summary": "All cases of Tables IV and V at a glance.",
+    "accelerations-el-centro": "Acceleration of floor 2 over time, weak and strong.",
+    "drift-el-centro": "Displacement of the base relative to the table.",
+    "accelerations-northridge": "Acceleration of floor 2 over time, weak and strong.",
+    "voltages": "Voltage and hysteresis loops of the three controllers.",
 }
-_SHOWN = (
-    ("base drift", "mm", "{:.1f}", "{:.2f}"),
-    ("floor 1 acceleration", "m/s2", "{:.2f}", "{:.3f}"),
-    ("floor 2 acceleration", "m/s2", "{:.2f}", "{:.3f}"),
-    ("damper force", "N", "{:.2f}", "{:.2f}"),
-    ("voltage", "V", "{:.1f}", "{:.2f}"),
-)
 DOTS = 160
 """Dots per inch of the images."""
 
 _CLASSES = {REPRODUCED: "yes", NOT: "no", UNDECIDABLE: "open"}
-_TITLES = {"table4": "Table IV: El Centro", "table5": "Table V: Northridge"}
 
 _STYLE = """
 :root { --ink:#1f2328; --grey:#5c636b; --line:#e3e6ea; --pale:#f6f7f9;
@@ -70,11 +66,8 @@ td { border-bottom:1px solid var(--line); padding:8px; vertical-align:top; }
 .numbers td, .numbers th { text-align:right; padding:4px 8px; white-space:nowrap;
      font-variant-numeric:tabular-nums; }
 .numbers td:first-child, .numbers th:first-child { text-align:left; }
-.numbers thead tr:first-child th { border-bottom:none; padding-bottom:0; text-align:center; }
-.numbers thead tr:first-child th:first-child { text-align:left; }
 .numbers .group td { background:var(--pale); font-weight:600; text-align:left; padding-top:8px; }
-.numbers .rms { color:var(--grey); } .numbers b { color:var(--ink); }
-.numbers td.first { border-left:1px solid var(--line); }
+.numbers b { color:var(--ink); }
 .ledger td:first-child { color:var(--grey); text-align:right; width:2.2em; }
 .ledger .what { width:31%; } .ledger small { color:var(--grey); display:block; margin-top:3px; }
 .badge { display:inline-block; padding:1px 9px; border-radius:10px; color:#fff; font-size:12.5px;
@@ -99,7 +92,8 @@ def page(report: Report) -> str:
         _head(report, count),
         _setting(report),
         _claims_table(report.ledger),
-        *(_table(_TITLES[name], name, table) for name, table in report.tables.items()),
+        *(table_html(name, table) for name, table in report.tables.items()),
+        stroke_html(report.comparison),
         _figures(report),
         _designs(report),
         _foot(report),
@@ -121,15 +115,17 @@ def _head(report: Report, count: Counter[str]) -> str:
         if count[verdict]
     )
     tables = "".join(
-        f'<a href="#{name}">{escape(_TITLES[name].partition(":")[0])}</a>' for name in report.tables
+        f'<a href="#{name}">{escape(TABLES[name][1].partition(":")[0])}</a>'
+        for name in report.tables
     )
+    stroke = '<a href="#stroke">Stroke</a>' if stroke_text(report.comparison) else ""
     return f"""<header>
 <h1>Semi-active control of a base-isolated structure: the paper's comparison, done anew</h1>
 <p class="lead">Of {total} statements in the text of Shirazi, Mohammadpour, Grigoriadis and Song
 (2012), {count[REPRODUCED]} are reproduced, {count[NOT]} are not, and {count[UNDECIDABLE]} cannot be
 decided from what the text tells.</p>
 <div class="bar" role="img" aria-label="verdicts">{bar}</div>
-<nav><a href="#ledger">Ledger</a>{tables}<a href="#figures">Figures</a>
+<nav><a href="#ledger">Ledger</a>{tables}{stroke}<a href="#figures">Figures</a>
 <a href="#designs">Designs</a></nav>
 </header>
 """
@@ -194,62 +190,18 @@ def _text(text: str, sentence: bool = True) -> str:
     return escape(kept.replace("H-infinity", "H\u2011infinity"))
 
 
-def _table(title: str, name: str, table: pd.DataFrame) -> str:
-    """Return a table with peak and RMS side by side, the lowest of the controllers bold."""
-    heads = "".join(
-        f'<th colspan="2">{quantity} [{unit.replace("2", "²")}]</th>'
-        for quantity, unit, _, _ in _SHOWN
-    )
-    unders = "<th>peak</th><th>RMS</th>" * len(_SHOWN)
-    body = []
-    groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
-    for (motion, g), group in groups:
-        body.append(
-            f'<tr class="group"><td colspan="{1 + 2 * len(_SHOWN)}">{escape(motion)}, nominal '
-            f"{g:g} g</td></tr>"
-        )
-        own = group.set_index("law")
-        for law in own.index:
-            cells = "".join(
-                _cell(own, str(law), f"{kind} {quantity} [{unit}]", form, kind)
-                for quantity, unit, *forms in _SHOWN
-                for kind, form in zip(("peak", "rms"), forms, strict=True)
-            )
-            body.append(f"<tr><td>{escape(str(law))}</td>{cells}</tr>")
-    rows = "\n".join(body)
-    return f"""<section>
-<h2 id="{name}">{escape(title)}</h2>
-<p>Bold: the lowest of the three controllers. RMS values are over the record as published.</p>
-<div class="scroll"><table class="numbers"><thead><tr><th></th>{heads}</tr>
-<tr><th>Law</th>{unders}</tr></thead><tbody>
-{rows}
-</tbody></table></div>
-</section>
-"""
-
-
-def _cell(own: Any, law: str, column: str, form: str, kind: str) -> str:
-    value = float(own.loc[law, column])
-    absent = law == "no damper" and ("force" in column or "voltage" in column)
-    text = "-" if absent else form.format(value)
-    others = [form.format(float(own.loc[c, column])) for c in CONTROLLERS if c != law]
-    lowest = law in CONTROLLERS and float(text) < min(map(float, others))
-    name = "first" if kind == "peak" else "rms"
-    return f'<td class="{name}">{f"<b>{text}</b>" if lowest else text}</td>'
-
-
 def _figures(report: Report) -> str:
     figures = "".join(
         f'<figure style="max-width:{_width(report, name)}px">'
-        f'<img alt="{escape(number or "Summary")}" src="{_embedded(report, name)}">'
-        f"<figcaption><b>{escape(number or 'Summary')}.</b> {escape(CAPTIONS[name])}</figcaption>"
-        "</figure>\n"
+        f'<img alt="{escape(number or CAPTIONS[name])}" src="{_embedded(report, name)}">'
+        f"<figcaption>{f'<b>{escape(number)}.</b> ' if number else ''}{escape(CAPTIONS[name])}"
+        "</figcaption></figure>\n"
         for name, number in sorted(report.figures.items(), key=lambda item: item[0] != "summary")
     )
     return f"""<section>
 <h2 id="figures">Figures</h2>
-<p>Numbered as in the paper. Of Figs 14 to 17 the text tells only what they are about; the
-arrangement is this project's.</p>
+<p>Numbers are the paper's; its text tells what each figure shows, and the arrangement is this
+project's. Figures without a number are this project's own.</p>
 {figures}</section>
 """
 

@@ -1,7 +1,6 @@
-"""The paper's Figs 13 to 17 drawn anew from the runs of the comparison.
+"""The paper's Fig. 13 drawn anew from the runs of the comparison, and this project's own pictures.
 
-What Figs 14 to 17 show is known from the text in part only: responses over time at two
-intensities, without damper and with the controllers. The arrangement is this project's.
+Figs 14 to 17 are in `cases`.
 """
 
 from __future__ import annotations
@@ -26,8 +25,6 @@ from .experiment import (
 )
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import pandas as pd
     from matplotlib.axes import Axes
 
@@ -69,7 +66,7 @@ def anti_windup(c: Comparison) -> Page:
         f"{case[0]}, nominal {case[1]:g} g, LPV controller. Orange: the signed voltage that "
         "the controller asks for. Blue: what the damper gets, with the sign of the velocity."
     )
-    begin, end = _strong_part(frames[0.0])
+    begin, end = strong_part(frames[0.0])
     page = Page(10.0, 5.0, title, subtitle, NOTE)
     grid = page.grid(2, len(frames), left=0.5, column_gap=0.25, row_gap=0.5)
     first: list[Any] = [None, None]
@@ -90,7 +87,7 @@ def anti_windup(c: Comparison) -> Page:
                 axes.set_title(f"λ = {rate:g} 1/s: signed voltage [V]")
             else:
                 axes.plot(part.index, part[_Y], color=BLUE, linewidth=1.0)
-                _mark(axes, part[_Y], "m/s²")
+                mark(axes, part[_Y], "m/s²")
                 axes.set_title("acceleration of floor 2 [m/s²]")
                 axes.set_xlabel("time [s]", loc="right", labelpad=0)
                 axes.margins(y=0.16)
@@ -132,7 +129,7 @@ def histories(c: Comparison, motion: str, column: str, what: str, unit: str, fac
     page = Page(10.0, 1.25 * len(laws) + 0.75, title, subtitle, NOTE)
     grid = page.grid(len(laws), 2, left=0.5, column_gap=0.35, row_gap=0.36)
     for place, g in enumerate((weak, strong)):
-        begin, end = _strong_part(c.frames[motion, g, NONE], longest=20.0)
+        begin, end = strong_part(c.frames[motion, g, NONE], longest=20.0)
         size = 1.35 * max(peaks[g, law] for law in laws)
         free = factor * c.frames[motion, g, NONE].loc[begin:end, column]
         for row, law in enumerate(laws):
@@ -142,7 +139,7 @@ def histories(c: Comparison, motion: str, column: str, what: str, unit: str, fac
             axes.plot(part.index, part, color=COLOUR[law], linewidth=0.9)
             axes.set_ylim(-size, size)
             axes.set_xlim(begin, end)
-            _mark(axes, part, unit)
+            mark(axes, part, unit)
             axes.set_title(f"{short(law)} [{unit}]", color=COLOUR[law], fontsize=9)
             axes.tick_params(labelbottom=row == len(laws) - 1)
             if row == len(laws) - 1:
@@ -151,20 +148,20 @@ def histories(c: Comparison, motion: str, column: str, what: str, unit: str, fac
 
 
 def responses(c: Comparison) -> Page:
-    """Fig. 14: acceleration of floor 2 under El Centro."""
+    """Return a picture of floor 2's acceleration under El Centro."""
     laws = (FOUR, *CONTROLLERS)
     what = "Under El Centro the peak acceleration of floor 2"
     return histories(c, EL_CENTRO, _Y, what, "m/s²", 1.0, laws)
 
 
 def drifts(c: Comparison) -> Page:
-    """Fig. 15: base drift under El Centro."""
+    """Return a picture of the base drift under El Centro."""
     laws = (FOUR, *CONTROLLERS)
     return histories(c, EL_CENTRO, _X, "The base drift under El Centro", "mm", 1e3, laws)
 
 
 def northridge(c: Comparison) -> Page | None:
-    """Fig. 16: acceleration of floor 2 under Northridge; None without a record."""
+    """Return a picture of floor 2's acceleration under Northridge; None without a record."""
     motion = c.strong[0]
     if motion == EL_CENTRO:
         return None
@@ -174,7 +171,7 @@ def northridge(c: Comparison) -> Page | None:
 
 
 def summary(c: Comparison) -> Page:
-    """Fig. 17: peak and RMS of floor 2 of every law, as shares of those at 0 V."""
+    """Return peak and RMS of floor 2 with every law, as shares of those at 0 V."""
     table: Any = c.table.set_index(["motion", "intensity [g]", "law"])
     cases = [(m.name, g) for m in c.motions for g in m.intensities]
     laws = (FOUR, *CONTROLLERS)
@@ -226,7 +223,7 @@ def summary(c: Comparison) -> Page:
 
 
 def voltages(c: Comparison) -> Page:
-    """Voltage over time and force over velocity of the three controllers, El Centro 0.6 g."""
+    """Return voltage over time and force over velocity of the controllers, El Centro 0.6 g."""
     frames = {law: c.frames[EL_CENTRO, 0.6, law] for law in CONTROLLERS}
     between = {
         law: float(((f["controller.voltage"] > 0) & (f["controller.voltage"] < 8)).mean())
@@ -264,33 +261,23 @@ def voltages(c: Comparison) -> Page:
     return page
 
 
-def _mark(axes: Axes, values: pd.Series[Any], unit: str) -> None:
-    """Mark the largest absolute value of a history."""
+def mark(axes: Axes, values: pd.Series[Any], unit: str) -> None:
+    """Mark the largest absolute value of a history, with its unit."""
     place = int(np.argmax(np.abs(values.to_numpy())))
     at, value = float(values.index.to_numpy()[place]), float(values.to_numpy()[place])
     axes.plot(at, value, "o", color=VERMILION, markersize=4, zorder=4)
     low, high = axes.get_xlim()
     left = at > low + 0.6 * (high - low)
-    label(axes, f"{abs(value):#.3g} {unit}", at, value, VERMILION, fontsize=8,
+    text = f"{abs(value):#.3g}".rstrip(".")
+    label(axes, f"{text} {unit}", at, value, VERMILION, fontsize=8,
           xytext=(-5 if left else 5, 0), ha="right" if left else "left", va="center")  # fmt: skip
 
 
-def _strong_part(frame: pd.DataFrame, longest: float = 10.0) -> tuple[float, float]:
-    """Return begin and end [s] of the part of a run in which most happens."""
+def strong_part(frame: pd.DataFrame, longest: float = 10.0) -> tuple[float, float]:
+    """Return begin and end [s] of the part of a run in which most happens, at most `longest` s."""
     y = frame[_Y].to_numpy()
     energy = np.cumsum(np.square(y))
     time = frame.index.to_numpy()
     begin = float(time[np.searchsorted(energy, 0.005 * energy[-1])])
     begin = max(0.0, np.floor(begin - 0.5))
     return begin, min(float(time[-1]), begin + longest)
-
-
-FIGURES: dict[str, tuple[str, Callable[[Comparison], Page | None]]] = {
-    "fig13-anti-windup": ("Fig. 13", anti_windup),
-    "fig14-accelerations-el-centro": ("Fig. 14", responses),
-    "fig15-drift-el-centro": ("Fig. 15", drifts),
-    "fig16-accelerations-northridge": ("Fig. 16", northridge),
-    "fig17-voltages": ("Fig. 17", voltages),
-    "summary": ("", summary),
-}
-"""File name to the paper's number and what draws it."""
