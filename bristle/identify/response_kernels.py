@@ -19,27 +19,11 @@ contact_force = structure.contact_force
 advance_effects = structure.advance_effects
 
 
-def _gain(P, B, h1, h2, A, G):  # type: ignore[no-untyped-def]
-    """Fill G with P F^T B^-1, B symmetric and positive; A is room to work."""
-    for i in range(3):
-        A[i, 0] = P[i, 0] + h1 * P[i, 1] + h2 * P[i, 2]
-        A[i, 1] = P[i, 1] + h1 * P[i, 2]
-        A[i, 2] = P[i, 2]
-    # Scaled by its diagonal, for its elements differ by many powers of ten.
-    s0, s1, s2 = 1.0 / np.sqrt(B[0, 0]), 1.0 / np.sqrt(B[1, 1]), 1.0 / np.sqrt(B[2, 2])
-    b, c, e = B[0, 1] * s0 * s1, B[0, 2] * s0 * s2, B[1, 2] * s1 * s2
-    det = 1.0 - e * e - b * b - c * c + 2.0 * b * c * e
-    i00, i11, i22 = (1.0 - e * e) / det, (1.0 - c * c) / det, (1.0 - b * b) / det
-    i01, i02, i12 = (c * e - b) / det, (b * e - c) / det, (b * c - e) / det
-    for i in range(3):
-        a0, a1, a2 = A[i, 0] * s0, A[i, 1] * s1, A[i, 2] * s2
-        G[i, 0] = (a0 * i00 + a1 * i01 + a2 * i02) * s0
-        G[i, 1] = (a0 * i01 + a1 * i11 + a2 * i12) * s1
-        G[i, 2] = (a0 * i02 + a1 * i12 + a2 * i22) * s2
-
-
 def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no-untyped-def]
     """Kalman filter and smoother for [x, v, a] under white jerk; return -log likelihood.
+
+    The way back is that of Bryson & Frazier (1963), which inverts no covariance: where one channel
+    alone is measured, those of position, speed and acceleration are nearly singular together.
 
     Parameters
     ----------
@@ -53,24 +37,10 @@ def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no
     n = len(y)
     h1, h2 = dt, 0.5 * dt * dt
     unit = (dt**5 / 20.0, dt**4 / 8.0, dt**3 / 6.0, dt**3 / 3.0, dt**2 / 2.0, dt)
-    m = np.zeros(3)
-    P = np.zeros((3, 3))
-    spread = np.zeros(3)
-    for c in range(3):
-        if have[c]:
-            m[c] = y[0, c]
-        for k in range(n):
-            spread[c] = max(spread[c], abs(y[k, c]))
-    guess = max(spread[0], spread[1] * dt, spread[2] * dt * dt) + 1e-12
-    P[0, 0] = r[0] * 4.0 if have[0] else guess * guess
-    P[1, 1] = r[1] * 4.0 if have[1] else (guess / dt) ** 2 / n
-    P[2, 2] = r[2] * 4.0 if have[2] else (guess / dt**2) ** 2 / n
-    means = np.zeros((n, 3))
-    predicted = np.zeros((n, 3))
-    covs = np.zeros((n, 3, 3))
-    predicted_covs = np.zeros((n, 3, 3))
-    G = np.zeros((3, 3))
-    A = np.zeros((3, 3))
+    m, P, column, L = np.zeros(3), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
+    _at_rest(y, r, have, dt, m, P, column)
+    predicted, covs = np.zeros((n, 3)), np.zeros((n, 3, 3))
+    gains, shares, sizes = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
     total = 0.0
     for k in range(n):
         if k > 0:
@@ -93,48 +63,104 @@ def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no
         for i in range(3):
             predicted[k, i] = m[i]
             for j in range(3):
-                predicted_covs[k, i, j] = P[i, j]
+                covs[k, i, j] = P[i, j]
         for c in range(3):
             if not have[c]:
                 continue
             S = P[c, c] + r[c]
             e = y[k, c] - m[c]
             total += 0.5 * (np.log(S) + e * e / S)
+            sizes[k, c], shares[k, c] = S, e / S
             for i in range(3):
-                spread[i] = P[c, i]
+                column[i] = P[c, i]
             for i in range(3):
-                m[i] += spread[i] / S * e
+                gains[k, c, i] = column[i] / S
+                m[i] += gains[k, c, i] * e
+            for i in range(3):
                 for j in range(3):
-                    P[i, j] -= spread[i] / S * spread[j]
+                    # The channel's own row without a difference: r may be tiny beside P.
+                    if i == c:
+                        P[i, j] = column[j] * (r[c] / S)
+                    elif j == c:
+                        P[i, j] = column[i] * (r[c] / S)
+                    else:
+                        P[i, j] -= gains[k, c, i] * column[j]
+    if backward:
         for i in range(3):
-            means[k, i] = m[i]
-            for j in range(3):
-                covs[k, i, j] = P[i, j]
-    if not backward:
-        return total
-    for i in range(3):
-        state[n - 1, i] = means[n - 1, i]
-        for j in range(3):
-            P[i, j] = covs[n - 1, i, j]
-    for k in range(n - 2, -1, -1):
-        _gain(covs[k], predicted_covs[k + 1], h1, h2, A, G)  # type: ignore[no-untyped-call]
+            m[i] = 0.0
+        _smooth_back(
+            predicted, covs, gains, shares, sizes, have, h1, h2, state, cov, m, column, L
+        )  # fmt: skip
+    return total
+
+
+def _at_rest(y, r, have, dt, m, P, size):  # type: ignore[no-untyped-def]
+    """Fill the state m (3,) before the first sample and its covariance P (3, 3).
+
+    Where a channel is missing the fastest change of the one below it says how large its signal is.
+    """
+    n = len(y)
+    fastest = 0.0
+    for c in range(3):
+        size[c] = 0.0
+        if have[c]:
+            m[c] = y[0, c]
+        for k in range(n):
+            size[c] = max(size[c], abs(y[k, c]))
+    for k in range(1, n):
+        fastest = max(fastest, abs(y[k, 0] - y[k - 1, 0]) / dt)
+    guess = max(size[0], size[1] * dt, size[2] * dt * dt) + 1e-12
+    speed, rise = guess / dt / np.sqrt(n), guess / dt**2 / np.sqrt(n)
+    if have[0] and not have[1]:
+        speed = 2.0 * fastest + 1e-12
+    if not have[2]:
+        rise = 2.0 * (size[1] if have[1] else fastest) / dt + 1e-12
+    P[0, 0] = r[0] * 4.0 if have[0] else guess * guess
+    P[1, 1] = r[1] * 4.0 if have[1] else speed * speed
+    P[2, 2] = r[2] * 4.0 if have[2] else rise * rise
+
+
+def _smooth_back(  # type: ignore[no-untyped-def]
+    predicted, covs, gains, shares, sizes, have, h1, h2, state, cov, m, row, L
+):
+    """Fill `state` and `cov` from what the filter kept; m, row (3,), L (3, 3) begin at zero."""
+    n = len(predicted)
+    for k in range(n - 1, -1, -1):
+        wanted = k >= n // 2
+        for c in (2, 1, 0):
+            if not have[c]:
+                continue
+            g0, g1, g2 = gains[k, c, 0], gains[k, c, 1], gains[k, c, 2]
+            m[c] -= g0 * m[0] + g1 * m[1] + g2 * m[2] + shares[k, c]
+            if wanted:  # L <- (I - g H)^T L (I - g H) + H^T H / S
+                for j in range(3):
+                    row[j] = g0 * L[0, j] + g1 * L[1, j] + g2 * L[2, j]
+                for j in range(3):
+                    L[c, j] -= row[j]
+                for i in range(3):
+                    row[i] = L[i, 0] * g0 + L[i, 1] * g1 + L[i, 2] * g2
+                for i in range(3):
+                    L[i, c] -= row[i]
+                L[c, c] += 1.0 / sizes[k, c]
         for i in range(3):
-            state[k, i] = means[k, i]
+            state[k, i] = predicted[k, i]
             for j in range(3):
-                state[k, i] += G[i, j] * (state[k + 1, j] - predicted[k + 1, j])
-                P[i, j] -= predicted_covs[k + 1, i, j]
-        for i in range(3):
-            for j in range(3):
-                A[i, j] = G[i, 0] * P[0, j] + G[i, 1] * P[1, j] + G[i, 2] * P[2, j]
-        for i in range(3):
-            for j in range(3):
-                P[i, j] = covs[k, i, j] + (
-                    A[i, 0] * G[j, 0] + A[i, 1] * G[j, 1] + A[i, 2] * G[j, 2]
-                )
+                state[k, i] -= covs[k, i, j] * m[j]
         if k == n // 2:
             for i in range(3):
-                cov[i] = P[i, i]
-    return total
+                cov[i] = covs[k, i, i]
+                for j in range(3):
+                    for q in range(3):
+                        cov[i] -= covs[k, i, j] * L[j, q] * covs[k, q, i]
+        m[2] += h1 * m[1] + h2 * m[0]
+        m[1] += h1 * m[0]
+        if wanted:  # L <- F^T L F
+            for i in range(3):
+                L[i, 2] += h1 * L[i, 1] + h2 * L[i, 0]
+                L[i, 1] += h1 * L[i, 0]
+            for j in range(3):
+                L[2, j] += h1 * L[1, j] + h2 * L[0, j]
+                L[1, j] += h1 * L[0, j]
 
 
 @cache
