@@ -52,7 +52,9 @@ def look_at(
     taken: set[str] = set()
     if present is not None and present.effects:
         values = {**base.model.values, **present.values}
-        base = fit(train, replace(present, law=linear.name, values=values), with_std=False)
+        limits = {**base.model.limits, **present.limits}
+        start = replace(present, law=linear.name, values=values, limits=limits)
+        base = fit(train, start, with_std=False)
         taken = set(present.effects).union(*(EFFECTS[name].excludes for name in present.effects))
     before = judge(base.model, train, held_out)
     able = [e for e in effects_of("structure") if hook in e.hooks() and e.name not in taken]
