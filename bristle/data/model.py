@@ -11,12 +11,20 @@ origin = "identified"
 
 [effects.gas_spring]
 parameters = { k = { value = 81.2, unit = "N/m", std = 3.0 } }
+
+[correlation]
+parameters = ["sigma_a", "gas_spring.k"]
+rows = [[1.0], [-0.42, 1.0]]
+
+`correlation` is how the errors of identified parameters go together (`data.correlation`); files
+without it open as before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -28,10 +36,18 @@ from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..physics.user import waiting, why_left_out
 from ..units import canonical, convert
+from .correlation import (
+    Array,
+    Correlation,
+    correlation_of_covariance,
+    covariance_of,
+    read_correlation,
+    set_correlation,
+)
 from .files import Toml, write_whole
 
 ORIGINS = ("reconstructed", "measured", "assumed", "identified")
-_KEYS = ("schema", "law", "building", "parameters", "effects")
+_KEYS = ("schema", "law", "building", "parameters", "effects", "correlation")
 _VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")
 
 
@@ -54,7 +70,8 @@ class StudyModel:
 
     `parameters` of the law by name; `effects` name to parameters; `building` the file of the
     structure, relative to the study, "" on a bench; `only_shown` the effects whose code must not
-    run yet: the model can be shown, not used.
+    run yet: the model can be shown, not used; `correlation` of the identified parameters' errors,
+    None where none was stored.
     """
 
     law: str
@@ -62,6 +79,7 @@ class StudyModel:
     effects: dict[str, dict[str, Value]] = field(default_factory=dict)
     building: str = ""
     only_shown: tuple[str, ...] = ()
+    correlation: Correlation | None = None
 
     @property
     def base_law(self) -> str:
@@ -113,6 +131,10 @@ class StudyModel:
             flat[name] = replace(
                 flat[name], value=convert(value, unit, own), std=spread, origin=origin
             )
+        # Errors of other values say nothing of these.
+        kept = (
+            self.correlation.of([n for n in flat if n not in values]) if self.correlation else None
+        )
         return replace(
             self,
             parameters={name: flat[name] for name in self.parameters},
@@ -120,7 +142,31 @@ class StudyModel:
                 effect: {own: flat[f"{effect}.{own}"] for own in named}
                 for effect, named in self.effects.items()
             },
+            correlation=kept,
         )
+
+    def with_covariance(self, names: Sequence[str], covariance: Array) -> StudyModel:
+        """Return the model with how the errors of these parameters go together.
+
+        Parameters
+        ----------
+        names : parameters, whose standard deviations the model has
+        covariance : (p, p) of their errors, in SI
+        """
+        return replace(self, correlation=correlation_of_covariance(names, covariance))
+
+    def uncertain(self) -> list[str]:
+        """Return the names of the parameters that have a standard deviation."""
+        return [n for n, v in self.flat().items() if v.std is not None and isfinite(v.std)]
+
+    def covariance(self) -> tuple[tuple[str, ...], Array]:
+        """Return the identified parameters and the covariance (p, p) of their errors in SI.
+
+        Without a stored correlation errors count as independent.
+        """
+        names, flat = self.uncertain(), self.flat()
+        own = [(flat[name].std or 0.0, flat[name].unit, self.declared(name).unit) for name in names]
+        return tuple(names), covariance_of(names, [convert(*one) for one in own], self.correlation)
 
     def with_effect(self, effect: str) -> StudyModel:
         """Return the model with one more effect, its parameters at their defaults."""
@@ -183,8 +229,12 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     building = toml.text((), data, "building")
     if building and not (beside / building).is_file():
         toml.error(("building",), f"there is no file {beside / building}.")
+    model = StudyModel(law, parameters, effects, building, tuple(only_shown))
+    correlation = None
+    if "correlation" in data:
+        correlation = read_correlation(toml, list(model.flat()), model.uncertain())
     toml.check()
-    return StudyModel(law, parameters, effects, building, tuple(only_shown))
+    return replace(model, correlation=correlation)
 
 
 def write_model(path: Path, model: StudyModel) -> None:
@@ -221,6 +271,7 @@ def model_text(model: StudyModel, beside: Path | None = None) -> str:
         _update(effects[name]["parameters"], _listed(values, _tables("", name)), True)
     if not model.effects:
         del document["effects"]
+    set_correlation(document, model.correlation, model.uncertain())
     return tomlkit.dumps(document)
 
 

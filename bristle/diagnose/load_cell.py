@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 from ..identify.assigned import corrected
 from ..identify.line import fit_line
 from ..identify.response import Response
-from ..identify.structure import StructureProblem, layer_run
+from ..identify.structure import StructureProblem, layer_problem, layer_run
 from ..physics.building import Building
 from ..physics.effect import instrument_of
 from ..physics.laws import law_of_part
@@ -76,7 +76,9 @@ def _search_cell(
 
     def problem(value: float, part: list[Response]) -> StructureProblem:
         delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
-        return StructureProblem([layer_run(corrected(r, delay, gain), building) for r in part])
+        return layer_problem(
+            [layer_run(corrected(r, delay, gain), building) for r in part], building
+        )
 
     def cost(value: float) -> float:
         return fit_line(problem(value, train), law_of_part("layer").name).cost

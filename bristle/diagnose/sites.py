@@ -51,7 +51,9 @@ def look_at(
     base = fit_line(train, linear.name)
     if present is not None and present.effects:
         values = {**base.model.values, **present.values}
-        base = fit(train, replace(present, law=linear.name, values=values), with_std=False)
+        limits = {**base.model.limits, **present.limits}
+        start = replace(present, law=linear.name, values=values, limits=limits)
+        base = fit(train, start, with_std=False)
     before = judge(base.model, train, held_out)
     names = joinable_at(site, base.model)
     if before.z <= rule.quiet and before.train <= rule.clean:

@@ -181,9 +181,9 @@ def _finish(
             zeta[r] = before[r]
         elif zeta[r] < 0.0:
             notes.append(
-                f"mode {r + 1} comes out with a damping ratio of {zeta[r]:.4f}; the building is "
-                "given 0"
+                f"mode {r + 1} comes out with a damping ratio of {zeta[r]:.4f}; it is given 0"
             )
+            zeta[r] = 0.0
     if first:
         notes.append(
             f"the damper's force was not measured: what is below {levels[0]} keeps its given values"
@@ -198,7 +198,7 @@ def _finish(
     slope = part.T / (2.0 * modes.omega[:, None])
     std_omega = np.sqrt(np.maximum(np.einsum("ri,ij,rj->r", slope, cov, slope), 0.0))
     weighted = np.array(building.M) @ modes.shapes
-    C = (weighted * (2.0 * np.maximum(zeta, 0.0) * modes.omega)) @ weighted.T
+    C = (weighted * (2.0 * zeta * modes.omega)) @ weighted.T
     freeze = [tuple(tuple(float(v) for v in row) for row in matrix) for matrix in (C,)]
     K = tuple(tuple(float(v) for v in row) for row in stiffness_matrix(building, stiffness))
     found = building._replace(C=freeze[0], K=K, stiffnesses=tuple(float(k) for k in stiffness))

@@ -66,7 +66,8 @@ class Fit:
 
     `model` with the values; `std` by name; `cost` the mean robust loss per sample on the runs
     fitted; `unidentified` names the parameters that the data cannot tell; `starts` how many starts
-    were tried, `agreed` how many of them came to this end.
+    were tried, `agreed` how many of them came to this end; `covariance` (p, p) that of the
+    parameters in `std`, in its order [SI], None without.
     """
 
     model: Model
@@ -76,6 +77,7 @@ class Fit:
     evaluations: int = 0
     starts: int = 1
     agreed: int = 1
+    covariance: Array | None = None
 
 
 class Scaled:
@@ -146,11 +148,14 @@ def fit(
         rough=scaled.rough,
     )
     best = scaled.at(found.theta)
-    std: dict[str, float] = {}
-    lost: tuple[str, ...] = ()
-    if with_std:
-        std, lost = _intervals(scaled, found.theta)
-    return Fit(best, std, found.cost, lost, found.sweeps)
+    if not with_std:
+        return Fit(best, {}, found.cost, (), found.sweeps)
+    covariance, lost = _intervals(scaled, found.theta)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
+    return Fit(
+        best, dict(zip(scaled.names, std, strict=True)), found.cost, lost, found.sweeps,
+        covariance=covariance,
+    )  # fmt: skip
 
 
 def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) -> Fit:
@@ -181,11 +186,13 @@ def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) 
     if best is not found:
         best = fit(problem, best.model, expectation=expected, max_evaluations=4)
     near = [one.model for one in ends if one.cost <= _AS_GOOD * best.cost]
-    std = {
-        name: float(np.hypot(own, _spread([m.value(name) for m in near], best.model.value(name))))
-        for name, own in best.std.items()
+    spread = {
+        name: _spread([m.value(name) for m in near], best.model.value(name)) for name in best.std
     }
-    return replace(best, std=std)
+    std = {name: float(np.hypot(own, spread[name])) for name, own in best.std.items()}
+    assert best.covariance is not None
+    more = np.diag(np.array([spread[name] for name in best.std]) ** 2)
+    return replace(best, std=std, covariance=best.covariance + more)
 
 
 def intervals_of(problem: Problem, model: Model) -> Fit:
@@ -209,8 +216,8 @@ def _spread(values: list[float], about: float) -> float:
     return float(np.sqrt(np.sum((np.array(values) - about) ** 2) / max(len(values) - 1, 1)))
 
 
-def _intervals(scaled: Scaled, theta: Array) -> tuple[dict[str, float], tuple[str, ...]]:
-    """Return the standard deviations by name, and the names that the data cannot tell.
+def _intervals(scaled: Scaled, theta: Array) -> tuple[Array, tuple[str, ...]]:
+    """Return the covariance (p, p) [SI], and the names that the data cannot tell.
 
     Covariance A^-1 B A^-1 of an M-estimator (Huber 1981, Robust Statistics, ch. 7): A = J'J over
     the samples within the quadratic part of the loss, B the covariance of J' psi under the drawn
@@ -242,8 +249,9 @@ def _intervals(scaled: Scaled, theta: Array) -> tuple[dict[str, float], tuple[st
     if float(np.mean(loss(r))) > _MISFIT**2 * HUBER_AT_ONE:
         B = _scores_of_blocks(J, r)
     covariance = inverse @ B @ inverse
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0)) / safe * scaled.scale
-    return dict(zip(scaled.names, std.tolist(), strict=True)), _lost(
+    size = scaled.scale / safe
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0)) * size
+    return covariance * np.outer(size, size), _lost(
         scaled, theta * scaled.scale, std, norms, vectors[:, weak]
     )
 

@@ -187,6 +187,14 @@ def _measure(p: Any, c: int, r: float, g: Any, s: Any, logs: Any) -> float:
     p[3] -= g1 * i1
     p[4] -= g1 * i2
     p[5] -= g2 * i2
+    # The channel's own row without a difference, for its variance may be tiny beside the state's.
+    left = r / size
+    if c == 0:
+        p[0], p[1], p[2] = i0 * left, i1 * left, i2 * left
+    elif c == 1:
+        p[1], p[3], p[4] = i0 * left, i1 * left, i2 * left
+    else:
+        p[2], p[4], p[5] = i0 * left, i1 * left, i2 * left
     return change
 
 

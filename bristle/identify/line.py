@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import lsq_linear
 
 from ..physics.inputs import Inputs
 from ..physics.laws import LAWS, Law
@@ -15,14 +16,21 @@ from .structure import StructureProblem
 
 Array = NDArray[np.float64]
 
+DAMPING = "c"
+"""The parameter of the linear laws that adds to the building's own damping."""
+
 
 def fit_line(problem: StructureProblem, law: str) -> Fit:
     """Return the linear law fitted to a problem, by weighted linear least squares in three passes.
 
-    The weights are those of Huber's loss at the expected noise.
+    The weights are those of Huber's loss at the expected noise. What the building and the line
+    damp together stays above zero; where the data push below, `c` is at its bound, without a
+    standard deviation. The bound goes along in the model's `limits`.
     """
     names = list(LAWS[law].parameters)
-    model = Model(law, (), dict.fromkeys(names, 0.0))
+    limits = {DAMPING: (-problem.damped, float("inf"))} if np.isfinite(problem.damped) else {}
+    model = Model(law, (), dict.fromkeys(names, 0.0), limits=limits)
+    bounds = np.array([model.bounds(name) for name in names]).T
     columns = [_columns(run, LAWS[law]) for run in problem.runs]
     A = np.concatenate(columns)
     force = np.concatenate([run.force for run in problem.runs])
@@ -33,7 +41,7 @@ def fit_line(problem: StructureProblem, law: str) -> Fit:
     theta = np.zeros(len(names))
     for _ in range(4):
         w = np.sqrt(weight) / sigma
-        theta = np.linalg.lstsq(A / scale * w[:, None], force * w, rcond=1e-10)[0]
+        theta = _within(A / scale * w[:, None], force * w, bounds * scale)
         z = np.abs(force - A @ (theta / scale)) / sigma
         spread = max(1.0, float(np.median(z)) / 0.6745)
         weight = np.minimum(1.0, 2.0 * spread / np.maximum(z, 1e-300))
@@ -41,12 +49,35 @@ def fit_line(problem: StructureProblem, law: str) -> Fit:
     model = replace(model, values=dict(zip(names, theta.tolist(), strict=True)))
     z = (force - A @ theta) / sigma
     cost = float(np.mean(np.where(np.abs(z) <= 2.0, 0.5 * z * z, 2.0 * np.abs(z) - 2.0)))
-    return Fit(model, _line_std(problem, model, columns), cost)
+    free = [name for name in names if not (name == DAMPING and at_bound(model))]
+    covariance = _line_covariance(
+        problem, model, [part[:, [names.index(n) for n in free]] for part in columns]
+    )
+    std = dict(zip(free, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    return Fit(model, std, cost, covariance=covariance)
 
 
-def _line_std(problem: StructureProblem, model: Model, columns: list[Array]) -> dict[str, float]:
-    """Return standard deviations by the sandwich formula with the drawn, correlated noise."""
-    count = len(model.values)
+def _within(A: Array, b: Array, bounds: Array) -> Array:
+    """Return the least squares solution (p,) of A theta = b within bounds (2, p)."""
+    theta = np.linalg.lstsq(A, b, rcond=1e-10)[0]
+    if np.all((bounds[0] <= theta) & (theta <= bounds[1])):
+        return np.asarray(theta)
+    Q, R = np.linalg.qr(A)
+    return np.asarray(lsq_linear(R, Q.T @ b, (bounds[0], bounds[1]), method="bvls").x)
+
+
+def at_bound(model: Model, name: str = DAMPING) -> bool:
+    """Return whether a line's parameter is at its lower bound."""
+    low, _ = model.bounds(name)
+    return bool(np.isfinite(low) and model.value(name) <= low + 1e-9 * abs(low))
+
+
+def _line_covariance(problem: StructureProblem, model: Model, columns: list[Array]) -> Array:
+    """Return the covariance (p, p) of the parameters whose columns (n, p) are given.
+
+    By the sandwich formula with the drawn, correlated noise.
+    """
+    count = columns[0].shape[1]
     bread, meat = np.zeros((count, count)), np.zeros((count, count))
     scores: list[Array] = []
     expected = problem.expectation(model)
@@ -58,8 +89,8 @@ def _line_std(problem: StructureProblem, model: Model, columns: list[Array]) -> 
         scores = [a + b for a, b in zip(scores, own, strict=True)] if scores else list(own)
     found = np.array(scores)
     inverse = np.linalg.pinv(bread)
-    covariance = inverse @ (meat + found.T @ found / max(len(found), 1)) @ inverse
-    return dict(zip(model.values, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    covariance: Array = inverse @ (meat + found.T @ found / max(len(found), 1)) @ inverse
+    return covariance
 
 
 def _columns(run: Run, law: type[Law]) -> Array:

@@ -4,6 +4,10 @@ Every level's displacement, velocity and acceleration are joined by a Kalman smo
 jerk. Where dry friction lets the acceleration jump, the jerk is given that jump: else the velocity
 would be smoothed across it, and a yield force would be held against the wrong side of v = 0.
 
+A level whose displacement was not measured integrates its velocity, and drifts. What is slow is
+therefore taken from the nearest level that has a displacement, and the storeys between by their
+equilibrium: far below the first mode they hardly deflect.
+
 Equilibrium is taken sample by sample from the accelerations as measured, for they and the forces
 jump together; their noise is white and known.
 """
@@ -16,10 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
+from scipy.signal import butter, sosfiltfilt
 
 from ..data.measurement import Measurement
 from ..errors import RecordError
-from ..physics.building import Building
+from ..physics.building import Building, frequencies
 from .drive import smooth_steps
 from .kalman import Samples, kalman_smooth, room
 from .prepare import SHORTEST
@@ -29,6 +34,10 @@ Array = NDArray[np.float64]
 
 JUMP = 6.0
 """A change of acceleration that is so many times what is usual from sample to sample is a jump."""
+
+SLOW = 0.3
+"""Share of the first natural frequency below which a displacement that was not measured is taken
+from equilibrium: storeys hardly deflect there, so that it needs their stiffness only roughly."""
 
 
 @dataclass(frozen=True)
@@ -65,19 +74,20 @@ def check_channels(measurement: Measurement, building: Building) -> None:
     """Raise a RecordError that names every channel that is missing.
 
     A building's response needs the ground acceleration and, of each level, the displacement or
-    velocity; a level without accelerometer needs one of them all the more.
+    velocity: what an accelerometer shows drifts away when it is integrated twice.
     """
-    missing = []
-    if not measurement.has("ground_acceleration"):
-        missing.append("ground_acceleration")
     levels = building.levels()
+    missing = [] if measurement.has("ground_acceleration") else ["ground_acceleration"]
     for level in levels:
-        if not (measurement.has(f"{level}_displacement") or measurement.has(f"{level}_velocity")):
-            missing.append(f"{level}_displacement")
+        able = (f"{level}_displacement", f"{level}_velocity")
+        if not any(measurement.has(channel) for channel in able):
+            alone = measurement.has(f"{level}_acceleration_absolute")
+            why = " (its acceleration alone drifts when it is integrated)" if alone else ""
+            missing.append(" or ".join(able) + why)
     if missing:
         raise RecordError(
-            f"{measurement.name}: {', '.join(missing)} missing. A run of {building.name!r} needs "
-            f"ground_acceleration and the displacement or velocity of {', '.join(levels)}."
+            f"{measurement.name}: missing {', and '.join(missing)}. A run of {building.name!r} "
+            f"needs ground_acceleration and the displacement or velocity of {', '.join(levels)}."
         )
     known = {f"{level}_" for level in levels}
     beyond = sorted(
@@ -130,31 +140,63 @@ def responses(
     for measurement in measurements:
         check_channels(measurement, building)
     smoothed = [[_level(m, name, looser) for name in building.levels()] for m in measurements]
+    corner = SLOW * frequencies(building)[0]
     longest = max(len(m.time) for m in measurements)
-    errors = [
-        _draws(longest, [run[i] for run in smoothed], measurements[0].step, draws, seed + i)
-        for i in range(building.size)
-    ]
-    return [
-        _response(m, building, levels, errors)
-        for m, levels in zip(measurements, smoothed, strict=True)
-    ]
+    made: dict[tuple[int, tuple[bool, ...]], Array] = {}
+    for i in range(building.size):
+        for have in dict.fromkeys(_instruments(run[i]) for run in smoothed):
+            alike = [run[i] for run in smoothed if _instruments(run[i]) == have]
+            made[i, have] = _draws(longest, alike, measurements[0].step, draws, seed + i)
+    out = []
+    for m, levels in zip(measurements, smoothed, strict=True):
+        errors = [made[i, _instruments(one)] for i, one in enumerate(levels)]
+        a, noise_a = _accelerations(m, building, levels)
+        levels, errors = _anchored(levels, errors, _deflected(building, a), m.step, corner)
+        out.append(_response(m, levels, errors, (a, noise_a)))
+    return out
+
+
+def _instruments(level: dict[str, Any]) -> tuple[bool, ...]:
+    """Return which of displacement, velocity and acceleration of a level were measured."""
+    return tuple(bool(one) for one in level["have"])
+
+
+def _accelerations(
+    m: Measurement, building: Building, levels: list[dict[str, Any]]
+) -> tuple[Array, Array]:
+    """Return the absolute acceleration (levels, n) [m/s2] and its noise (levels,).
+
+    Smoothed where a level has no accelerometer.
+    """
+    ground = m["ground_acceleration"]
+    noise_ground = m.noise.get("ground_acceleration", 0.0)
+    a, noise = [], []
+    for name, level in zip(building.levels(), levels, strict=True):
+        channel = f"{name}_acceleration_absolute"
+        own = m.has(channel)
+        a.append(m[channel] if own else level["state"][:, 2] + ground)
+        noise.append(
+            m.noise.get(channel, 0.0) if own else float(np.hypot(level["std"][2], noise_ground))
+        )
+    return np.array(a), np.array(noise)
+
+
+def _deflected(building: Building, a: Array) -> Array:
+    """Return how far springs alone deflect under accelerations (levels, n) [m/s2], (levels, n) m.
+
+    Differences of levels count: what is below the first one has the damper beside it.
+    """
+    below = np.cumsum((np.array(building.M) @ a)[::-1], axis=0)[::-1]
+    return np.asarray(np.cumsum(-below / np.array(building.stiffnesses)[:, None], axis=0))
 
 
 def _response(
-    m: Measurement, building: Building, levels: list[dict[str, Any]], errors: list[Array]
+    m: Measurement, levels: list[dict[str, Any]], errors: list[Array], absolute: tuple[Array, Array]
 ) -> Response:
+    """Return a measurement as a response; `absolute` are accelerations and their noise."""
     n = len(m.time)
-    ground = m["ground_acceleration"]
-    noise_ground = m.noise.get("ground_acceleration", 0.0)
-    a, noise_a, own = [], [], []
-    for name, level in zip(building.levels(), levels, strict=True):
-        channel = f"{name}_acceleration_absolute"
-        own.append(m.has(channel))
-        a.append(m[channel] if own[-1] else level["state"][:, 2] + ground)
-        noise_a.append(
-            m.noise.get(channel, 0.0) if own[-1] else float(np.hypot(level["std"][2], noise_ground))
-        )
+    a, noise_a = absolute
+    own = [level["have"][2] for level in levels]
     drive = next((c for c in ("voltage", "current") if m.has(c)), None)
     V, left = np.zeros(n), 0.0
     if drive:
@@ -163,8 +205,8 @@ def _response(
         m.name, m.step,
         np.array([level["state"][:, 0] for level in levels]),
         np.array([level["state"][:, 1] for level in levels]),
-        np.array(a), ground, m["force"] if m.has("force") else None, V, np.array(noise_a),
-        m.noise.get("force", 0.0), noise_ground, np.array(own),
+        a, m["ground_acceleration"], m["force"] if m.has("force") else None, V, noise_a,
+        m.noise.get("force", 0.0), m.noise.get("ground_acceleration", 0.0), np.array(own),
         np.array([level["std"] for level in levels]),
         np.array([error[:, :n] for error in errors]), left, drive is not None,
     )  # fmt: skip
@@ -194,13 +236,59 @@ def _level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
 
 
 def _samples(y: Array, r: Array, have: NDArray[np.bool_], dt: float) -> Samples:
-    """Return a level's channels (n, 3) of variances r (3,), with a wide guess of the beginning."""
+    """Return a level's channels (n, 3) of variances r (3,), with a wide guess of the beginning.
+
+    Where a channel is missing, the fastest change of the one below it says how large it is.
+    """
     n, largest = len(y), np.max(np.abs(y), axis=0)
+    fastest = float(np.max(np.abs(np.diff(y[:, 0])), initial=0.0)) / dt
     wide = max(largest[0], largest[1] * dt, largest[2] * dt * dt) + 1e-12
+    speed, rise = wide / dt / np.sqrt(n), wide / dt**2 / np.sqrt(n)
+    if have[0] and not have[1]:
+        speed = 2.0 * fastest + 1e-12
+    if not have[2]:
+        rise = 2.0 * (largest[1] if have[1] else fastest) / dt + 1e-12
     cov = np.zeros(6)
-    for c, (at, size) in enumerate(((0, wide), (3, wide / dt), (5, wide / dt**2))):
-        cov[at] = 4.0 * r[c] if have[c] else size**2 / (n if c else 1)
+    for c, (at, size) in enumerate(((0, wide), (3, speed), (5, rise))):
+        cov[at] = 4.0 * r[c] if have[c] else size**2
     return Samples(y, r, have, dt, np.where(have, y[0], 0.0), cov)
+
+
+def _anchored(
+    levels: list[dict[str, Any]], errors: list[Array], deflected: Array, dt: float, corner: float
+) -> tuple[list[dict[str, Any]], list[Array]]:
+    """Return levels and draws of their errors, with slow displacements from those measured.
+
+    Parameters
+    ----------
+    levels, errors : per level what `_level` and `_draws` return
+    deflected : (levels, n) how far the springs deflect [m]; see `_deflected`
+    dt, corner : sampling step [s]; frequency below which a displacement is not the level's own [Hz]
+    """
+    able = [i for i, level in enumerate(levels) if level["have"][0]]
+    levels, errors = list(levels), list(errors)
+    if not able or len(able) == len(levels):
+        return levels, errors
+    low = butter(2, min(2.0 * corner * dt, 0.5), output="sos")
+
+    def joined(own: Array, other: Array) -> Array:
+        """Return (..., n) the fast part of one displacement and the slow one of another."""
+        return np.asarray(own + sosfiltfilt(low, other - own, axis=-1))
+
+    for i, level in enumerate(levels):
+        if level["have"][0]:
+            continue
+        near = min(able, key=lambda k: abs(k - i))
+        state, std, error = level["state"].copy(), level["std"].copy(), errors[i].copy()
+        there = levels[near]["state"][:, 0] + deflected[i] - deflected[near]
+        state[:, 0] = joined(state[:, 0], there)
+        if len(error):
+            error[:, :, 0] = joined(error[:, :, 0], errors[near][:, :, 0])
+        # White noise of a velocity, integrated: its power above a corner f is r dt/(2 pi^2 f).
+        drift = np.sqrt(level["r"][1] * dt / (2.0 * np.pi**2 * corner))
+        std[0] = np.hypot(min(std[0], drift), levels[near]["std"][0])
+        levels[i], errors[i] = {**level, "state": state, "std": std}, error
+    return levels, errors
 
 
 def jumps(a: Array, dt: float) -> Array:
@@ -236,7 +324,10 @@ def _likeliest(
 
 
 def _draws(n: int, runs: list[dict[str, Any]], dt: float, draws: int, seed: int) -> Array:
-    """Return draws (d, n, 3) of the smoother's error at the median jerk and noise of the runs."""
+    """Return draws (d, n, 3) of the smoother's error at the median jerk and noise of the runs.
+
+    The runs have the same instruments.
+    """
     generator = np.random.default_rng(seed)
     jerk = float(np.median([run["jerk"] for run in runs]))
     r = np.median([run["r"] for run in runs], axis=0)

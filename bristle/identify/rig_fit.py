@@ -7,14 +7,19 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .assigned import at_site
 from .fit import Fit
+from .line import DAMPING, at_bound
 from .model import Model
 from .residuals import robust_z
 from .rig import DAMPER, ROLES, Rig, Site
 from .site_fit import fit_site, with_line
+from .structure import StructureProblem
 from .table import error_rms, force_rms
+
+Array = NDArray[np.float64]
 
 
 class SiteModel(NamedTuple):
@@ -43,8 +48,8 @@ class RigFit:
         values, std, lost = dict(model.values), {}, list[str]()
         damper = self.fits.get(DAMPER)
         for name in dict.fromkeys(name for found in self.fits.values() for name in found.std):
-            identifiable = [found for found in self.fits.values() if name in found.std]
-            if "." not in name and damper not in identifiable:
+            identifiable = self._telling(name)
+            if not identifiable:
                 continue
             values[name], std[name] = _mean(
                 [(f.model.value(name), f.std[name]) for f in identifiable]
@@ -58,20 +63,62 @@ class RigFit:
         return Fit(
             replace(model, values=values), std, max(f.cost for f in self.fits.values()),
             tuple(lost), starts=damper.starts if damper else 1,
-            agreed=damper.agreed if damper else 1,
+            agreed=damper.agreed if damper else 1, covariance=self._covariance(list(std)),
         )  # fmt: skip
+
+    def _telling(self, name: str) -> list[Fit]:
+        """Return the fits that tell a parameter; the damper's law has its own names."""
+        damper = self.fits.get(DAMPER)
+        able = self.fits.values() if "." in name else [damper] if damper else []
+        return [found for found in able if name in found.std]
+
+    def _covariance(self, names: list[str]) -> Array:
+        """Return the covariance (p, p) of parameters that sites share, each counted as `_mean`."""
+        total = np.zeros((len(names), len(names)))
+        telling = {name: self._telling(name) for name in names}
+        certainty = {n: sum(max(f.std[n], 1e-300) ** -2 for f in telling[n]) for n in names}
+        for found in self.fits.values():
+            own = list(found.std)
+            shared = [n for n in names if any(f is found for f in telling[n])]
+            if found.covariance is None or not shared:
+                continue
+            part = np.zeros((len(names), len(own)))
+            for name in shared:
+                weight = max(found.std[name], 1e-300) ** -2 / certainty[name]
+                part[names.index(name), own.index(name)] = weight
+            total += part @ found.covariance @ part.T
+        return total
 
     def notes(self) -> list[str]:
         """Return what was found of the lines, one sentence each."""
         out = []
         for name, found in self.fits.items():
             if self.sites[name].is_line:
-                texts = [
-                    f"{own} = {found.model.value(own):.5g} +- {1.96 * found.std[own]:.2g} {unit}"
-                    for own, unit in (("k", "N/m"), ("c", "N s/m")) if own in found.std
-                ]  # fmt: skip
-                out.append(f"{name}: " + ", ".join(texts) + " (fitted along, not in model.toml).")
+                out.append(f"{name}: {_line_text(found, self.sites[name])}")
         return out
+
+
+def _line_text(found: Fit, site: Site) -> str:
+    """Return what was found of a line; its damping is that of the building's file and its own."""
+    problem = site.train
+    already = problem.damped if isinstance(problem, StructureProblem) else 0.0
+    already = already if np.isfinite(already) else 0.0
+    texts = []
+    if "k" in found.std:
+        texts.append(f"k = {found.model.value('k'):.5g} +- {1.96 * found.std['k']:.2g} N/m")
+    if DAMPING in found.std and not at_bound(found.model):
+        whole = already + found.model.value(DAMPING)
+        texts.append(
+            f"c = {whole:.4g} +- {1.96 * found.std[DAMPING]:.2g} N s/m, {already:.4g} of the file"
+        )
+    text = ", ".join(texts) + " (fitted along, not in model.toml)."
+    if at_bound(found.model):
+        text += (
+            f" The data push its damping below zero, where it is held ({already:.4g} N s/m of the "
+            "file are taken away): something else feeds in what this damping would have to, such "
+            "as an effect that is missing or a velocity that is late."
+        )
+    return text
 
 
 def _mean(estimates: list[tuple[float, float]]) -> tuple[float, float]:

@@ -90,10 +90,11 @@ def _fit_line(own: Model, site: Site, also: Values) -> Fit:
     found = fit_line(train, own.law)
     if not own.effects:
         return found
-    grown = replace(found.model, held=own.held, limits=own.limits)
+    limits = {**found.model.limits, **own.limits}
+    grown = replace(found.model, held=own.held, limits=limits)
     for name in own.effects:
         grown = joined(name, grown, train)
-    tried = [replace(grown, held=own.held, limits=own.limits)]
+    tried = [replace(grown, held=own.held, limits=limits)]
     for values in (own.values, {n: v for n, v in also.items() if _belongs(n, own) and "." in n}):
         if values:
             tried.append(replace(tried[0], values={**grown.values, **values}))
@@ -103,9 +104,10 @@ def _fit_line(own: Model, site: Site, also: Values) -> Fit:
 def with_line(own: Model, site: Site) -> Model:
     """Return a model's part at a line's site with its line fitted, its effects as they stand."""
     train = _structure(site)
-    line = fit_line(train, own.law).model.values
+    line = fit_line(train, own.law).model
     held = tuple(name for name in own.values if "." in name)
-    own = replace(own, values={**line, **own.values}, held=held)
+    values, limits = {**line.values, **own.values}, {**line.limits, **own.limits}
+    own = replace(own, values=values, held=held, limits=limits)
     return fit(train, own, with_std=False).model if own.effects else own
 
 

@@ -56,17 +56,26 @@ class StructureProblem(Problem):
         0 for the first level (the isolation layer, the damper), else the storey's number.
     reconstructed : bool
         Whether the damper's force is a result of equilibrium, not measured.
+    damped : float
+        Damping that the building has there already [N s/m]: a line may take that away and no more.
     """
 
-    def __init__(self, runs: Sequence[Run], storey: int = 0, reconstructed: bool = False) -> None:
+    def __init__(
+        self,
+        runs: Sequence[Run],
+        storey: int = 0,
+        reconstructed: bool = False,
+        damped: float = float("inf"),
+    ) -> None:
         super().__init__(list(runs))
         self.storey = storey
         self.reconstructed = reconstructed
+        self.damped = damped
         self._along: dict[tuple[str, ...], Along] = {}
 
     def of(self, runs: list[Run]) -> StructureProblem:
         """Return the same problem for other runs."""
-        return StructureProblem(runs, self.storey, self.reconstructed)
+        return StructureProblem(runs, self.storey, self.reconstructed, self.damped)
 
     def along(self, effects: tuple[str, ...]) -> Along:
         """Return what gives the forces of these effects along a motion, made at first use."""
@@ -140,7 +149,7 @@ def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
                 force=run.force[part], draws=run.draws[:, part], skip=0, keep=run.keep[part],
             )
         )  # fmt: skip
-    return StructureProblem(runs, problem.storey, problem.reconstructed)
+    return problem.of(runs)
 
 
 def storey_run(response: Response, building: Building, level: int) -> StructureRun:
@@ -300,14 +309,30 @@ def problems_of(
         if storey == 0 or (level == 0 and damped and not measured):
             continue
         parts = [[storey_run(r, building, level) for r in part] for part in both]
-        problems[f"storey{storey}"] = tuple(StructureProblem(p, storey) for p in parts)
+        problems[f"storey{storey}"] = tuple(
+            StructureProblem(p, storey, damped=damping_below(building, level)) for p in parts
+        )
     if building.isolated and (measured or not damped):
         parts = [[layer_run(_unloaded(r), building) for r in part] for part in both]
-        problems["layer"] = tuple(StructureProblem(p) for p in parts)
+        problems["layer"] = tuple(layer_problem(p, building) for p in parts)
     if damped:
         parts = [[damper_run(r, building, law, linear_storeys) for r in part] for part in both]
         problems["damper"] = tuple(StructureProblem(p, 0, not measured) for p in parts)
     return problems  # type: ignore[return-value]
+
+
+def layer_problem(runs: Sequence[Run], building: Building) -> StructureProblem:
+    """Return runs of the isolation layer as a problem."""
+    return StructureProblem(runs, damped=damping_below(building, 0))
+
+
+def damping_below(building: Building, level: int) -> float:
+    """Return what a building's damping resists a drift rate below a level with [N s/m].
+
+    All levels above move as one then: the storey's own damping, and that of the mass above.
+    """
+    C = np.array(building.C)
+    return max(float(C[level:, level:].sum()), 0.0)
 
 
 def _unloaded(response: Response) -> Response:

@@ -297,9 +297,13 @@ def _with_fit(model: StudyModel, fit: Fit) -> StudyModel:
         {name: fit.std[name] for name in identifiable},
     )
     silent = [name for name in fit.unidentified if flat[name].free]
-    return found.with_values(
+    found = found.with_values(
         {name: _inside(model, name, fit.model.value(name)) for name in silent}, origin="assumed"
     )
+    if fit.covariance is None or not identifiable:
+        return found
+    index = [list(fit.std).index(name) for name in identifiable]
+    return found.with_covariance(identifiable, fit.covariance[np.ix_(index, index)])
 
 
 def _inside(model: StudyModel, name: str, value: float) -> float:

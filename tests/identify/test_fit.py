@@ -68,6 +68,8 @@ def test_the_truth_comes_back_within_its_intervals(law):
     # Of seven parameters one may lie beyond three standard deviations once in fifty times.
     assert max(map(abs, errors.values())) < 4.0, errors
     assert all(found.std[name] < 0.1 * truth[name] for name in truth)
+    assert np.sqrt(np.diag(found.covariance)) == pytest.approx(list(found.std.values()))
+    assert np.linalg.eigvalsh(found.covariance)[0] >= 0.0
     assert found.unidentified == ()
 
 

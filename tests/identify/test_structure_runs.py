@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
 from bristle.errors import RecordError
-from bristle.identify.line import fit_line
+from bristle.identify.line import at_bound, fit_line
 from bristle.identify.model import Model
-from bristle.identify.response import base_equilibrium, jumps, respond, shear
+from bristle.identify.response import base_equilibrium, jumps, respond, responses, shear
+from bristle.identify.rig import Site
+from bristle.identify.rig_fit import RigFit
 from bristle.identify.structure import (
     damper_run,
+    damping_below,
     layer_run,
     reconstructed,
     sliding,
@@ -149,3 +154,79 @@ def test_without_a_damper_the_layer_stands_alone():
     b = building(2, False, 2)
     run = measured(shake(b, 2, samples=3000), 2)
     assert set(structure_problems([run], [], b)) == {"storey1", "storey2"}
+
+
+CHANNELS = [
+    f"{level}_{what}"
+    for level in ("base", "floor1", "floor2")
+    for what in ("displacement", "velocity", "acceleration_absolute")
+]
+
+
+@pytest.mark.parametrize("gone", CHANNELS)
+def test_motion_is_as_sure_as_it_says_without_any_one_channel(truth, gone):
+    b, clean, _ = truth
+    response = respond(measured(clean, 11, without=(gone,)), b)
+    for i, level in enumerate(b.levels()):
+        for j, (what, found) in enumerate((("displacement", response.x), ("velocity", response.v))):
+            error = (found[i] - clean[f"{level}_{what}"])[25:]
+            # White jerk knows nothing of the jumps that friction gives the base's acceleration.
+            most = 2.5 if i == 0 else 1.5
+            assert np.std(error) < most * np.std(response.draws[i, :, 25:, j])
+            # Where a channel is missing its own is found from the others to some per cent.
+            assert np.std(error) < 0.05 * np.std(clean[f"{level}_{what}"])
+    assert np.all(np.isfinite(response.draws))
+
+
+def test_a_displacement_alone_gives_a_motion(truth):
+    b, clean, _ = truth
+    without = ("floor1_velocity", "floor1_acceleration_absolute")
+    response = respond(measured(clean, 11, without=without), b)
+    assert np.std(response.x[1] - clean["floor1_displacement"]) < 0.01 * np.std(response.x[1])
+    assert np.std(response.v[1] - clean["floor1_velocity"]) < 0.05 * np.std(response.v[1])
+    assert not response.accelerometer[1]
+
+
+def test_what_is_slow_in_an_integrated_velocity_is_taken_from_the_level_beside(truth):
+    b, clean, _ = truth
+    shifted = dict(clean)
+    for level in b.levels():  # an isolation layer that comes to rest elsewhere takes all along
+        shifted[f"{level}_displacement"] = clean[f"{level}_displacement"] + 2e-3
+    response = respond(measured(shifted, 11, without=("floor2_displacement",)), b)
+    assert np.mean(response.x[2]) == pytest.approx(
+        np.mean(shifted["floor2_displacement"]), rel=0.01
+    )
+
+
+def test_runs_of_one_rig_may_have_other_instruments(truth):
+    b, clean, _ = truth
+    both = [measured(clean, 1), measured(clean, 2, without=("floor2_acceleration_absolute",))]
+    first, second = responses(both, b)
+    assert first.accelerometer.tolist() == [True, True, True]
+    assert second.accelerometer.tolist() == [True, True, False]
+    assert np.std(first.draws[2, :, :, 1]) < np.std(second.draws[2, :, :, 1])
+
+
+def test_a_line_damps_and_says_where_the_data_push_it_below(truth):
+    b, clean, _ = truth
+    problem, _ = structure_problems([measured(clean, 11)], [], b)["storey1"]
+    assert problem.damped == pytest.approx(damping_below(b, 1))
+    assert 0.0 < problem.damped < 10.0
+    run = problem.runs[0]
+    fed = replace(run, force=run.force - 3.0 * problem.damped * run.v)
+    found = fit_line(problem.of([fed]), "linear_storey")
+    assert found.model.value("c") == -problem.damped
+    assert at_bound(found.model)
+    assert "c" not in found.std
+    assert found.covariance.shape == (2, 2)
+    assert found.model.value("k") == pytest.approx(b.stiffnesses[1], rel=0.05)
+    site = Site("storey1", lambda _role: problem, is_line=True)
+    (text,) = RigFit({"storey1": found}, {"storey1": site}).notes()
+    assert "push its damping below zero" in text
+    plain = fit_line(problem, "linear_storey")
+    assert plain.covariance == pytest.approx(plain.covariance.T)
+    assert np.sqrt(np.diag(plain.covariance)) == pytest.approx(list(plain.std.values()))
+    (text,) = RigFit({"storey1": plain}, {"storey1": site}).notes()
+    shown = float(text.split("c = ")[1].split()[0])
+    assert shown == pytest.approx(problem.damped + plain.model.value("c"), rel=1e-3)
+    assert f"{problem.damped:.4g} of the file" in text

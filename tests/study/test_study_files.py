@@ -155,6 +155,61 @@ def test_model_keeps_units_and_converts(tmp_path: Path) -> None:
     assert read_model(path) == fitted
 
 
+CORRELATED = (
+    'schema = 1\nlaw = "bingham"\n[parameters.f_c]\nvalue = 1.2\nunit = "kN"\nstd = 0.01\n'
+    "[parameters.c_0]\nvalue = 40.0\nstd = 2.0\n"
+    '[correlation]\nparameters = ["f_c", "c_0"]\nrows = [[1.0], [-0.5, 1.0]]\n'
+)
+
+
+def test_model_keeps_how_errors_go_together(tmp_path: Path) -> None:
+    path = tmp_path / "model.toml"
+    path.write_text(CORRELATED, encoding="utf-8")
+    model = read_model(path)
+    names, covariance = model.covariance()
+    assert names == ("f_c", "c_0")
+    assert covariance == pytest.approx(np.array([[100.0, -10.0], [-10.0, 4.0]]))
+    write_model(path, model)
+    assert read_model(path) == model
+    other = model.with_values({"c_0": 41.0}, {"c_0": 1.0})
+    assert other.covariance()[1] == pytest.approx(np.diag([100.0, 1.0])), "of other values"
+    again = other.with_covariance(("f_c", "c_0"), np.array([[100.0, 3.0], [3.0, 1.0]]))
+    assert again.covariance()[1] == pytest.approx(np.array([[100.0, 3.0], [3.0, 1.0]]))
+    write_model(path, again)
+    assert read_model(path) == again
+    write_model(path, replace(again, correlation=None))
+    assert "correlation" not in path.read_text(encoding="utf-8")
+    assert read_model(path).covariance()[1] == pytest.approx(np.diag([100.0, 1.0]))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("[-0.5, 1.0]", "[-1.5, 1.0]", "line 12.*row i has i numbers of -1 to 1"),
+        ("[-0.5, 1.0]", "[-0.5, 0.9]", "the last one 1"),
+        ("[-0.5, 1.0]", "[-0.5]", "row i has i numbers"),
+        ("[[1.0], [-0.5, 1.0]]", "5", "rows has to be the lower triangle for 2 parameters"),
+        ('["f_c", "c_0"]', '["f_c", "f_c"]', "each once"),
+        ('["f_c", "c_0"]', '["f_c", "c_1"]', 'no parameter "c_1"'),
+        ('["f_c", "c_0"]', '["f_c", "f_v"]', "f_v has no std"),
+        (
+            '["f_c", "c_0"]\nrows = [[1.0], [-0.5, 1.0]]',
+            '["f_c", "c_0", "f_v"]\nrows = [[1.0], [0.9, 1.0], [0.9, -0.9, 1.0]]',
+            "the matrix has the eigenvalue -0.8",
+        ),
+    ],
+)
+def test_errors_that_cannot_go_together_are_refused(
+    tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    path = tmp_path / "model.toml"
+    more = "[parameters.f_v]\nvalue = 1.0\nstd = 0.1\n" if "eigenvalue" in told else ""
+    assert old in CORRELATED
+    path.write_text(CORRELATED.replace(old, new) + more, encoding="utf-8")
+    with pytest.raises(StudyError, match=told):
+        read_model(path)
+
+
 def test_comments_of_a_model_stay(tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     write_model(path, new_model("bingham", ("gas_spring",)))
