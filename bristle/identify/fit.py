@@ -150,12 +150,14 @@ def fit(
     best = scaled.at(found.theta)
     if not with_std:
         return Fit(best, {}, found.cost, (), found.sweeps)
-    covariance, lost = _intervals(scaled, found.theta)
+    return _with_intervals(Fit(best, {}, found.cost, sweeps=found.sweeps), scaled, found.theta)
+
+
+def _with_intervals(found: Fit, scaled: Scaled, theta: Array) -> Fit:
+    covariance, lost = _intervals(scaled, theta)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
-    return Fit(
-        best, dict(zip(scaled.names, std, strict=True)), found.cost, lost, found.sweeps,
-        covariance=covariance,
-    )  # fmt: skip
+    by_name = dict(zip(scaled.names, std, strict=True))
+    return replace(found, std=by_name, unidentified=lost, covariance=covariance)
 
 
 def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) -> Fit:
@@ -205,10 +207,8 @@ def intervals_of(problem: Problem, model: Model) -> Fit:
     """
     scaled = Scaled(problem, model, problem.expectation(model))
     cost = float(np.mean(loss(scaled.residuals(scaled.start))))
-    if not scaled.names:
-        return Fit(model, {}, cost)
-    std, lost = _intervals(scaled, scaled.start)
-    return Fit(model, std, cost, lost)
+    found = Fit(model, {}, cost)
+    return _with_intervals(found, scaled, scaled.start) if scaled.names else found
 
 
 def _spread(values: list[float], about: float) -> float:

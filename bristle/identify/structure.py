@@ -139,7 +139,7 @@ def structure_run(
 
 def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
     """Return the problem with every so many samples: enough to choose among starts."""
-    runs = []
+    runs: list[Run] = []
     for run in problem.runs:
         assert isinstance(run, StructureRun)
         part = slice(run.skip, None, stride)
