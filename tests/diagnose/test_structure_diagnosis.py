@@ -13,6 +13,7 @@ from bristle.diagnose.conclusion import About, lookalikes, verdict_of
 from bristle.diagnose.decision import Decision
 from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.finding import Finding, of_decision
+from bristle.diagnose.inconsistent_runs import kind_of
 from bristle.diagnose.load_cell import load_cell
 from bristle.diagnose.opening import IN_BUILDING, Opening
 from bristle.diagnose.rule import BENCH, INSIDE
@@ -135,6 +136,41 @@ def test_bare_building_diagnosed_from_start_to_end():
     assert answer["ranking"][0]["effect"] == "duffing"
     assert answer["z_holdout_after"] == pytest.approx(1.0, abs=0.1)
     assert answer["z_holdout_before"] > 1.5
+    sites = {found["site"]: found for found in answer["findings"]}
+    assert list(sites) == list(found.findings)
+    assert "layer" in sites
+    assert all(0.0 < one["detectable"] < 0.05 for one in sites.values())
+    k_3 = sites["layer"]["values"]["duffing.k_3"]
+    assert 0.0 < k_3["std"] < 0.2 * abs(k_3["value"])
+    assert found.std["duffing.k_3"] == k_3["std"]
+    assert sites["layer"]["organised"][0]["coordinate"] == "displacement"
+    assert all("organised" not in one for site, one in sites.items() if site != "layer")
+    assert set(answer["noise_floor"]) >= {"base_displacement", "ground_acceleration"}
+
+
+def test_runs_of_two_buildings_contradict_each_other_at_the_site_that_differs():
+    b = building(2, True, 6)
+    other = lambda x, v: [400.0 * x[0], 0.0, 0.0]  # noqa: E731 a stiffer layer
+    runs = [measured(shake(b, 40 + i, friction, None if i % 2 else other), i) for i in range(4)]
+    found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b)
+    assert found.findings["layer"].kind == "insufficient"
+    assert found.kind == "insufficient"
+    assert "At the isolation layer: one model does not explain all runs together" in found.words
+    assert [found.findings[site].kind for site in ("storey1", "storey2")] == ["none", "none"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "train", "best", "now"),
+    [
+        ("unknown", 1.05, 1.05, "insufficient"),
+        ("unknown", 1.3, 1.3, "unknown"),
+        ("none", 1.2, 1.2, "insufficient"),
+        ("none", 1.1, 1.1, "none"),
+        ("effect", 1.3, 1.0, "effect"),
+    ],
+)
+def test_a_verdict_needs_runs_that_agree(kind, train, best, now):
+    assert kind_of(kind, trial((), 1.3, train), trial((), 1.0, best)) == now
 
 
 def test_what_a_reconstructed_force_cannot_tell_is_named():
