@@ -22,7 +22,7 @@ class Rival:
     """A force with one parameter, `SLOPE` its derivative, known to 1/sqrt(`held`)."""
 
     def __init__(self, force: np.ndarray, held: float) -> None:
-        self.force, self.held = force, np.array([[held]])
+        self.force, self.information = force, np.array([[held]])
 
     def on(self, _run: object) -> tuple[np.ndarray, np.ndarray]:
         """Return force and sensitivities."""
