@@ -122,23 +122,31 @@ def test_single_effect_must_be_the_whole_verdict():
 
 
 def test_class_counts_only_if_the_separate_test_finds_it_inseparable():
-    told = {"kind": "class", "effects": ["gas_spring", "asymmetry"]}
+    told = {"kind": "ambiguous", "effects": ["gas_spring", "asymmetry"]}
     assert score.names_effect(line({**told, "resolved": {"asymmetry": 0.4}}))
     assert not score.names_effect(line({**told, "resolved": {"asymmetry": 30.0}}))
     assert not score.names_effect(line(told)), "without the test nothing is inseparable"
     assert score.names_effect_or_class(line(told))
 
 
+def test_an_answer_that_was_stored_as_a_class_counts_as_ambiguous():
+    told = {"kind": "class", "effects": ["gas_spring", "asymmetry"]}
+    assert score.answer(line(told))["kind"] == "ambiguous"
+    assert score.names_effect(line({**told, "resolved": {"asymmetry": 0.4}}))
+
+
 def test_class_of_four_or_without_the_effect_is_wrong():
     four = ["gas_spring", "asymmetry", "stribeck", "flattening"]
     resolved = dict.fromkeys(four[1:], 0.1)
-    assert not score.names_effect(line({"kind": "class", "effects": four, "resolved": resolved}))
-    told = {"kind": "class", "effects": ["asymmetry", "stribeck"], "resolved": {}}
+    assert not score.names_effect(
+        line({"kind": "ambiguous", "effects": four, "resolved": resolved})
+    )
+    told = {"kind": "ambiguous", "effects": ["asymmetry", "stribeck"], "resolved": {}}
     assert not score.names_effect(line(told))
 
 
 def test_presliding_mount_and_backlash_count_as_one():
-    told = {"kind": "class", "effects": ["backlash", "mount_compliance"]}
+    told = {"kind": "ambiguous", "effects": ["backlash", "mount_compliance"]}
     assert score.names_it_alone(line(told, "backlash", "rigid"))
     assert not score.names_it_alone(line(told))
     told["effects"] = ["backlash", "stribeck"]
@@ -146,7 +154,7 @@ def test_presliding_mount_and_backlash_count_as_one():
 
 
 def test_false_alarm_is_anything_but_none():
-    for kind in ("effect", "class", "unknown", "insufficient"):
+    for kind in ("effect", "ambiguous", "unknown", "insufficient"):
         assert score.false_alarm(line({"kind": kind}, kind="none"))
     fault = {"channel": "force", "fault": "bias", "value": 1.0}
     assert score.false_alarm(line({"kind": "none", "sensors": [fault]}, kind="none"))
@@ -284,12 +292,12 @@ def on_building(answer: dict[str, Any], effect: str, late: bool = False, **more:
 
 
 def test_twins_of_a_reconstructed_force_need_no_test():
-    both = {"kind": "class", "effects": ["gas_spring", "duffing"]}
+    both = {"kind": "ambiguous", "effects": ["gas_spring", "duffing"]}
     assert score.names_in_building(on_building(both, "duffing", late=True))
     assert not score.names_in_building(on_building(both, "duffing")), "a load cell parts them"
-    rubs = {"kind": "class", "effects": ["base_friction"]}
+    rubs = {"kind": "ambiguous", "effects": ["base_friction"]}
     assert score.names_in_building(on_building(rubs, "base_friction", late=True))
-    other = {"kind": "class", "effects": ["duffing", "gas_spring", "end_stop"]}
+    other = {"kind": "ambiguous", "effects": ["duffing", "gas_spring", "end_stop"]}
     assert not score.names_in_building(on_building(other, "duffing", late=True))
     shown = other | {"resolved": {"end_stop": 1.0, "gas_spring": 9.0}}
     assert score.names_in_building(on_building(shown, "duffing", late=True))

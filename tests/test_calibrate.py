@@ -15,10 +15,10 @@ from benchmarks._blind import plan
 from benchmarks._blind.plan import Task
 from benchmarks._calibrate import page, replay, trials, varied
 from benchmarks._calibrate.trials import NotStoredError, Stored
-from bristle.diagnose import damper, decision, sites
+from bristle.diagnose import damper, decision, inconsistent_runs, sites
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.decision import decide
-from bristle.diagnose.rule import BENCH, DRIVE, SENSOR, SITE, DecisionRule
+from bristle.diagnose.rule import BENCH, DRIVE, INSIDE, SENSOR, SITE, DecisionRule
 from bristle.identify.fit import Model
 
 N = 5000
@@ -45,7 +45,9 @@ def test_every_field_says_what_it_decides_trades_and_how_it_was_found() -> None:
 
 
 def test_the_instances_differ_where_the_docs_say_so() -> None:
-    assert varied.instances() == {"BENCH": BENCH, "SITE": SITE, "SENSOR": SENSOR, "DRIVE": DRIVE}
+    assert varied.instances() == {
+        "BENCH": BENCH, "INSIDE": INSIDE, "SITE": SITE, "SENSOR": SENSOR, "DRIVE": DRIVE,
+    }  # fmt: skip
     assert varied.values_of("gain") == "0.02, SITE 0.03, SENSOR 0.03, DRIVE 0.03"
     assert varied.values_of("loud") == "0.9"
 
@@ -70,10 +72,11 @@ def fields_read(*functions: object) -> set[str]:
 
 
 def test_every_field_that_a_decision_reads_is_varied() -> None:
-    read = fields_read(decision, damper.is_organised, damper.kind_of)
+    read = fields_read(decision, damper.is_organised, inconsistent_runs.kind_of)
     assert read | {"least_excess"} == set(varied.BENCH_VALUES)
     site = (sites.decide_site, sites.lowers, sites.better, sites.equals, sites._rivals)
-    assert fields_read(*site) | {"least_excess"} == set(varied.SITE_VALUES)
+    read = fields_read(*site, inconsistent_runs.kind_of)
+    assert read | {"least_excess"} == set(varied.SITE_VALUES)
 
 
 def test_its_seeds_are_none_that_the_proof_can_draw(capsys: pytest.CaptureFixture[str]) -> None:
@@ -126,7 +129,7 @@ def test_a_value_trades_false_alarms_against_misses() -> None:
         ("none", "none", "unknown", (), ["none", "alarm"]),
         ("fault", "sensor_bias", "none", (), ["none"]),
         ("fault", "sensor_bias", "effect", ("stribeck",), ["none", "alarm"]),
-        ("effect", "stribeck", "class", ("coil_lag", "stribeck"), ["effect"]),
+        ("effect", "stribeck", "ambiguous", ("coil_lag", "stribeck"), ["effect"]),
         ("effect", "backlash", "effect", ("presliding",), ["effect"]),
         ("effect", "stribeck", "effect", ("coil_lag",), ["effect", "missed", "wrong"]),
         ("effect", "stribeck", "unknown", (), ["effect", "missed"]),

@@ -164,9 +164,9 @@ def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
 @pytest.mark.parametrize(
     ("edit", "words"),
     [
-        (("sigma_a", "sigma_x"), "sigma_x is not a parameter"),
-        (('law = "lugre"', 'law = "maxwell"'), "bingham, lugre"),
-        (("value = 650.0", 'value = "650"'), "finite number"),
+        (("sigma_a", "sigma_x"), 'there is no parameter "sigma_x"'),
+        (('law = "lugre"', 'law = "maxwell"'), 'there is no law "maxwell"'),
+        (("value = 650.0", 'value = "650"'), "number"),
         (("value = 650.0", "value = -650.0"), "outside"),
         (('unit = "N/m"', 'unit = "kg"'), "dimension"),
     ],

@@ -44,6 +44,8 @@ SITE_VALUES: dict[str, tuple[float, ...]] = {
     "rival": (1.1, 1.5, 2.0, 3.0, 5.0),
     "most_alternatives": (1, 2, 3, 4),
     "likelihood": (5.0, 20.0, 40.0, 80.0, 320.0),
+    "trained": (1.02, 1.05, 1.1, 1.15, 1.3),
+    "misfit": (1.05, 1.1, 1.15, 1.2, 1.3),
 }
 """The same at a building's layer and storeys."""
 

@@ -71,7 +71,7 @@ def signals_of(
     for name, spec in chosen.items():
         column = table.find(spec.column)
         unit = spec.unit or (column.unit.name if column.unit else "")
-        if not unit or column.text in table.words:
+        if not unit or column.text in table.not_numeric:
             if name in channels:
                 raise RecordError(f'{table.source}: "{column.text}" has no numbers or no unit.')
             continue
@@ -80,7 +80,7 @@ def signals_of(
         columns[name] = si, channel_unit(name)
     taken = {table.find(spec.column).text for spec in chosen.values()}
     for column in table.columns:
-        if column.text in taken or column.text in table.words or column.name in columns:
+        if column.text in taken or column.text in table.not_numeric or column.name in columns:
             continue
         if column.unit is not None and column.unit.name != "s":
             columns[column.name] = table.values[column.text], column.unit.name

@@ -90,6 +90,6 @@ def without_effects(model: Model) -> Model:
         model,
         effects=(),
         values={name: value for name, value in model.values.items() if own(name)},
-        held=tuple(name for name in model.held if own(name)),
+        fixed=tuple(name for name in model.fixed if own(name)),
         limits={name: bounds for name, bounds in model.limits.items() if own(name)},
     )

@@ -34,7 +34,7 @@ _ALIKE = 0.25  # parts of a pattern's size by which it may differ between voltag
 
 
 def sentences(comparison: Comparison, finder: Finder) -> tuple[str, ...]:
-    """Return three sentences: how wrong, where it turns, where it is right."""
+    """Return three sentences: how wrong, what the error depends on, where it is right."""
     return (_how_wrong(comparison), _where(comparison, finder), _where_right(comparison))
 
 
@@ -100,13 +100,13 @@ def _where(comparison: Comparison, finder: Finder) -> str:
     if first.alike:
         names = " and ".join(name_of(name, comparison.site) for name in first.alike[:2])
         also = f" (in these runs {names} tell{'s' * (len(first.alike) == 1)} the same)"
-    text = f"The error turns with {name_of(first.coordinate, comparison.site)}{also}: "
+    text = f"The error depends mainly on {name_of(first.coordinate, comparison.site)}{also}: "
     text += _pattern_text(first, comparison.predictions[0]) + _at_voltages(
         first, comparison, finder
     )
     second = comparison.second
     if second is not None and second.share > 0.03:
-        text += f"; what is left then turns with {name_of(second.coordinate, comparison.site)}"
+        text += f"; what is left then depends on {name_of(second.coordinate, comparison.site)}"
     return text + "."
 
 

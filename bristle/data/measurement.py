@@ -61,13 +61,13 @@ class Measurement:
         """Time from the first sample to the last [s]."""
         return float(self.time[-1] - self.time[0])
 
-    def told(self, *channels: str) -> NDArray[np.bool_]:
+    def valid(self, *channels: str) -> NDArray[np.bool_]:
         """Return at which samples (n,) all of these channels say something."""
-        told = self.measured
+        valid = self.measured
         for channel in channels:
             if channel in self.lost:
-                told = told & ~self.lost[channel]
-        return told
+                valid = valid & ~self.lost[channel]
+        return valid
 
     def has(self, *channels: str) -> bool:
         """Return whether all of these channels were measured."""
@@ -198,10 +198,11 @@ def _time(table: Table, spec: ChannelSpec | None) -> Array:
 def _in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
     """Return a column in the channel's SI unit."""
     column = table.find(spec.column)
-    if column.text in table.words:
+    if column.text in table.not_numeric:
         raise RecordError(
-            f'{table.source}: column "{column.text}" ({channel}): {table.words[column.text]}. Mend '
-            "the file, or leave the field empty where a value is missing."
+            f'{table.source}: column "{column.text}" ({channel}): '
+            f"{table.not_numeric[column.text]}. Mend the file, or leave the field "
+            "empty where a value is missing."
         )
     unit = spec.unit or (column.unit.name if column.unit else "")
     if not unit:

@@ -24,7 +24,7 @@ class Table:
     """Columns of numbers.
 
     `values` maps a column's text, its title in the file, to (n,) floats, NaN where a value is
-    missing. `words` says of a column that holds text where the first is. `lines` (n,) is the line
+    missing. `not_numeric` says of a column that holds text where it is. `lines` (n,) is the line
     of the file, or the row, that each sample is from, called `place`.
     """
 
@@ -33,7 +33,7 @@ class Table:
     values: dict[str, Array]
     lines: NDArray[np.int64]
     place: str = "line"
-    words: dict[str, str] = field(default_factory=dict)
+    not_numeric: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
     @property
@@ -81,7 +81,7 @@ def from_arrays(
     units: Mapping[str, str | None] | None = None,
     notes: tuple[str, ...] = (),
 ) -> Table:
-    """Return the table of named arrays (n,); what holds no numbers is named in `words`.
+    """Return the table of named arrays (n,); what holds no numbers is named in `not_numeric`.
 
     Parameters
     ----------
@@ -94,13 +94,13 @@ def from_arrays(
     size = len(next(iter(data.values()))) if data else 0
     columns = titles(list(data), [units.get(name) or "" for name in data])
     values: dict[str, Array] = {}
-    words: dict[str, str] = {}
+    not_numeric: dict[str, str] = {}
     for column, array in zip(columns, data.values(), strict=True):
         numbers = _numbers(array)
         values[column.text] = np.full(size, np.nan) if numbers is None else numbers
         if numbers is None:
-            words[column.text] = f"it holds {array.dtype} and no numbers"
-    return Table(source, columns, values, np.arange(1, size + 1), "row", words, notes)
+            not_numeric[column.text] = f"it holds {array.dtype} and no numbers"
+    return Table(source, columns, values, np.arange(1, size + 1), "row", not_numeric, notes)
 
 
 def _numbers(array: NDArray[Any]) -> Array | None:

@@ -37,12 +37,11 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ..errors import BristleError, DesignError, UnitError
+from ..data.model import read_model
+from ..errors import BristleError, DesignError, StudyError
 from ..physics.building import paper_building, read_building
-from ..physics.effect import EFFECTS, Effect
-from ..physics.laws import DEFAULT_OF_DESIGN, Law, base_and_variant, law_names
-from ..physics.parameter import fields_of
-from ..units import convert
+from ..physics.effect import EFFECTS
+from ..physics.laws import DEFAULT_OF_DESIGN
 from .sliding import Damper
 from .task import Scheduling, Task
 from .weights import LqgWeights, Weight, Weights
@@ -123,69 +122,27 @@ def task_from_data(data: Mapping[str, Any], folder: Path, where: str = "design")
 def damper_from_model(
     path: str | Path, v_max: float = 8.0, known_to: float | None = None
 ) -> Damper:
-    """Return the damper of a model file (schema 1: law, parameters, effects).
+    """Return the damper of a model.toml: its law with the effects that act in a damper.
+
+    Parameters
+    ----------
+    path : the file, as a study writes it
+    v_max : largest voltage [V]
+    known_to : largest speed [m/s] of the data behind the model, None where nobody says
 
     Raises
     ------
-    DesignError, UnitError
-        Naming the file and the key.
+    DesignError
+        With every mistake of the file and its line.
     """
-    path = Path(path)
     try:
-        with path.open("rb") as file:
-            data = tomllib.load(file)
-    except OSError as error:
-        raise DesignError(f"{path}: cannot be read ({error.strerror}).") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise DesignError(f"{path}: not valid TOML: {error}.") from error
-    law = str(data.get("law", ""))
-    if data.get("schema") != 1 or law not in law_names():
-        names = [name for name in law_names() if base_and_variant(name)[0].name == name]
-        raise DesignError(f"{path}: schema 1 and a law of {', '.join(names)} are right.")
-    base, _ = base_and_variant(law)
-    units = {name: parameter.unit for name, parameter in base.parameters.items()}
-    values = _model_values(_entries(data.get("parameters", {}), base), units, "", path)
-    effects = data.get("effects", {})
-    for name, table in effects.items():
-        if name not in EFFECTS:
-            raise DesignError(f"{path} [effects.{name}]: no effect is named {name!r}.")
-        known = {key: parameter.unit for key, parameter in EFFECTS[name].parameters.items()}
-        own = _entries(table.get("parameters", {}), EFFECTS[name])
-        values |= _model_values(own, known, name + ".", path)
-    on = tuple(name for name in effects if EFFECTS[name].site == "damper")
-    values = {key: value for key, value in values.items() if key.split(".")[0] in (*units, *on)}
-    return _located(lambda: Damper(law, values, on, v_max, known_to), str(path))
-
-
-def _entries(table: Mapping[str, Any], owner: type[Law] | type[Effect]) -> dict[str, Any]:
-    """Return a model's parameters with the lists of tables as one entry per value."""
-    out = dict(table)
-    for name, names in fields_of(owner.parameters, owner.tables).items():
-        if name in owner.tables and isinstance(out.get(name), list):
-            rows = out.pop(name)
-            out.update(
-                (entry, row if isinstance(row, dict) else {"value": row})
-                for entry, row in zip(names, rows, strict=False)
-            )
-    return out
-
-
-def _model_values(
-    table: Mapping[str, Any], units: Mapping[str, str], prefix: str, path: Path
-) -> dict[str, float]:
-    values = {}
-    for name, entry in table.items():
-        where = f"{path}: {prefix}{name}"
-        if name not in units:
-            raise DesignError(f"{where} is not a parameter; there are {', '.join(units)}.")
-        if not isinstance(entry, dict) or "value" not in entry:
-            raise DesignError(f"{where} must be a table with a value.")
-        value = _number(entry["value"], name, str(path))
-        try:
-            values[prefix + name] = convert(value, str(entry.get("unit", units[name])), units[name])
-        except UnitError as error:
-            raise UnitError(f"{where}: {error}") from None
-    return values
+        model = read_model(Path(path))
+    except StudyError as error:
+        raise DesignError(str(error)) from None
+    on = tuple(name for name in model.effects if EFFECTS[name].site == "damper")
+    own = {*model.parameters, *on}
+    values = {name: v for name, v in model.values().items() if name.partition(".")[0] in own}
+    return _located(lambda: Damper(model.law, values, on, v_max, known_to), str(path))
 
 
 def _weights(table: Mapping[str, Any], where: str) -> Weights:

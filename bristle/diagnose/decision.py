@@ -131,7 +131,14 @@ def in_part(name: str, best: Trial, explained: float) -> str:
 
 
 def gained(name: str, before: Trial, best: Trial, explained: float) -> str:
-    """Return the sentence that an effect lowers the error, `explained` its share of the excess."""
+    """Return the sentence that an effect lowers the error.
+
+    Parameters
+    ----------
+    name : of the effect
+    before, best : the trials of the model without it and with it
+    explained : the effect's share of the excess
+    """
     return (
         f"With {name} the {Z} on held-out runs falls from {before.z:.2f} to {best.z:.2f}; that is "
         f"{100.0 * explained:.0f} % of what exceeds the noise."

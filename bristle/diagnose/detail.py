@@ -73,7 +73,7 @@ def _with_intervals(found: Finding, opened: Opening) -> Finding:
     after = found.after
     assert after is not None
     if not opened.scope.sweeps:
-        fitted = intervals_of(opened.searched, after.model)
+        fitted = intervals_of(opened.problem, after.model)
     else:
         fitted = multistart_refit(opened.problem, after.model, opened.scope.sweeps)
     if opened.scope.sweeps and is_rough(after.model):

@@ -29,7 +29,7 @@ def diagnose(
     law: str = DEFAULT,
     effects: Sequence[str] = (),
     values: Mapping[str, float] | None = None,
-    held: Sequence[str] = (),
+    fixed: Sequence[str] = (),
     limits: Mapping[str, tuple[float, float]] | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
@@ -42,7 +42,7 @@ def diagnose(
     effects : the effects that the model has already
     values : its parameters where they were identified before, by name in SI; else they are
         identified here
-    held, limits : parameters that stay as they are, and a user's bounds; see `identify.Model`
+    fixed, limits : parameters that stay as they are, and a user's bounds; see `identify.Model`
     progress : called with a sentence at each stage
 
     Raises
@@ -50,7 +50,7 @@ def diagnose(
     RecordError
         If a run lacks a channel that is needed, or is too short for a fit.
     """
-    present = Model(law, tuple(effects), dict(values or {}), tuple(held), dict(limits or {}))
+    present = Model(law, tuple(effects), dict(values or {}), tuple(fixed), dict(limits or {}))
     known = values is not None
     return diagnose_rig(train, holdout, present, identified=known, say=progress or silent)
 

@@ -127,7 +127,7 @@ class _Rival:
     def __init__(self, model: Model, problem: Problem) -> None:
         self.model = model
         known = Search(problem, model, problem.expectation(model), model.free()).sensitivities()
-        self.held = known.T @ known
+        self.information = known.T @ known
 
     def on(self, run: Run) -> tuple[Array, Array]:
         """Return the force (n,) of a planned run and its sensitivities (n, p), in noises."""
@@ -146,7 +146,7 @@ def _contrast(rivals: Sequence[_Rival], run: Run) -> float:
     seen = [rival.on(run) for rival in rivals]
     least = np.inf
     for j, (own, J) in enumerate(seen):
-        normal = J.T @ J + rivals[j].held
+        normal = J.T @ J + rivals[j].information
         for i, (other, _) in enumerate(seen):
             if i != j:
                 apart = other - own

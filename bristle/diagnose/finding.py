@@ -80,7 +80,15 @@ class Finding:
 def of_decision(
     decision: Decision, before: Trial, trials: tuple[Trial, ...] = (), site: str = DAMPER
 ) -> Finding:
-    """Return the finding at a site that a decision is, with the trials of single effects."""
+    """Return the finding that a decision is.
+
+    Parameters
+    ----------
+    decision : what the trials of a site lead to
+    before : the trial of the site's model as it was
+    trials : those of single effects, best first
+    site : "damper", "layer", "storey1" ...
+    """
     best = decision.best
     return Finding(
         site, decision.kind, decision.effects, before.z, best.z, decision.explained,

@@ -146,8 +146,8 @@ def _explains(
     if not restart:
         return False
     own = identify(
-        part, model.law, model.effects, 2, held=model.held,
-        values={name: model.value(name) for name in model.held}, limits=model.limits,
+        part, model.law, model.effects, 2, fixed=model.fixed,
+        values={name: model.value(name) for name in model.fixed}, limits=model.limits,
     )  # fmt: skip
     return _z(own.model, part) <= rule.misfit
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..compare.scale import rms
 from ..identify.fit import Model, Problem
 from ..identify.search_context import Expected, Search
 from ..identify.start_grid import initial_guesses
@@ -61,12 +62,12 @@ def untestable(
         [s[run.skip :] for run, (_, s, _) in zip(problem.runs, expected, strict=True)]
     )
     force = np.concatenate([run.force[run.skip :] for run in problem.runs])
-    size = float(np.linalg.norm(force / sigma))
+    size = rms(force / sigma)
     out = []
     for name in joinable(model) if able is None else able:
         change = _change(name, model, problem, expected, base)
-        raw = float(np.linalg.norm(change)) / size
-        left = float(np.linalg.norm(change - basis @ (basis.T @ change))) / size
+        raw = rms(change) / size
+        left = rms(change - basis @ (basis.T @ change)) / size
         if raw < rule.silent or rule.typical * left / raw < visible:
             out.append(name)
     return sorted(out)
@@ -78,4 +79,4 @@ def _change(name: str, model: Model, problem: Problem, expected: Expected, base:
     for start in initial_guesses(name, model, problem):
         with_it = Search(problem, start, expected, [])
         found.append(with_it.residuals(with_it.start) - base)
-    return max(found, key=lambda change: float(np.linalg.norm(change)))
+    return max(found, key=rms)

@@ -122,7 +122,7 @@ def _zero_of_force(
     own = f"{carrier.name}.{carrier.offset}"
     others = tuple(f"{carrier.name}.{n}" for n in carrier.parameters if n != carrier.offset)
     start = replace(
-        base, effects=(*base.effects, carrier.name), held=(*base.held, *others),
+        base, effects=(*base.effects, carrier.name), fixed=(*base.fixed, *others),
         values={**base.values, **dict.fromkeys(others, 0.0), own: offset},
     )  # fmt: skip
     fitted = refine(start, train)

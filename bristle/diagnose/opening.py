@@ -140,7 +140,7 @@ def opening(
 
 def _identified(present: Model, problem: Problem) -> Model:
     found = identify(
-        problem, present.law, present.effects, held=present.held, limits=present.limits
+        problem, present.law, present.effects, fixed=present.fixed, limits=present.limits
     )
     return found.model
 
@@ -202,7 +202,7 @@ def _left(runs: Sequence[Measurement]) -> list[Measurement]:
     return [
         run
         for run in runs
-        if len(run.time) < SHORTEST or np.count_nonzero(run.told(*run.channels)) >= SHORTEST
+        if len(run.time) < SHORTEST or np.count_nonzero(run.valid(*run.channels)) >= SHORTEST
     ]
 
 

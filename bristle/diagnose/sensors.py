@@ -4,6 +4,9 @@ Displacement and velocity are redundant: one is the integral of the other. So ga
 offset of either show without any model of the damper. A clipped channel repeats its extreme. A
 force of the wrong sign yields energy. What no redundancy shows (the gain of force or voltage, the
 zero of displacement) changes no force that the model predicts: refitting absorbs it.
+
+`data.relation` looks at columns before anything is known of them; here the velocity is integrated
+over pieces, so that an instrument's lag, corner and bias show, and how sure they are.
 """
 
 from __future__ import annotations

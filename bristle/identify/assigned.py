@@ -28,8 +28,8 @@ def at_site(model: Model, site: str, sites: Container[str]) -> Model:
         law = law_of_part(site).name
     own = {n: v for n, v in model.values.items() if _belongs(n, effects, site)}
     limits = {n: v for n, v in model.limits.items() if _belongs(n, effects, site)}
-    held = tuple(n for n in model.held if _belongs(n, effects, site))
-    return Model(law, effects, own, held, limits)
+    fixed = tuple(n for n in model.fixed if _belongs(n, effects, site))
+    return Model(law, effects, own, fixed, limits)
 
 
 def _belongs(name: str, effects: tuple[str, ...], site: str) -> bool:

@@ -286,7 +286,7 @@ def identify(
     starts: int = 4,
     *,
     values: Mapping[str, float] | None = None,
-    held: tuple[str, ...] = (),
+    fixed: tuple[str, ...] = (),
     limits: Mapping[str, tuple[float, float]] | None = None,
 ) -> Fit:
     """Fit a law from several starts; return the best fit with its intervals.
@@ -296,8 +296,8 @@ def identify(
     problem : the runs
     law, effects : names of the law and of the effects that are on
     starts : how many starting points are tried
-    values : parameters of effects to begin with, and those of `held` ones [SI]
-    held, limits : see `Model`
+    values : parameters of effects to begin with, and those of `fixed` ones [SI]
+    fixed, limits : see `Model`
 
     Returns
     -------
@@ -310,9 +310,9 @@ def identify(
         for effect in effects
         for own in _parameters(effect)
     } | dict(values or {})
-    model = Model(law, effects, given, held, dict(limits or {}))
+    model = Model(law, effects, given, fixed, dict(limits or {}))
     driven = LAWS[law].driven() if steady(problem) else ()
-    silent = tuple(name for name in driven if name not in held)
+    silent = tuple(name for name in driven if name not in fixed)
     model = without(model, silent)
     trials = start_models(problem, model, starts)
     expected = problem.expectation(trials[0])

@@ -55,14 +55,14 @@ class Run:
 class Model:
     """A law with effects and the values of their parameters by name, in SI.
 
-    `held` names parameters that a fit leaves alone; `limits` are a user's bounds by name, inside
+    `fixed` names parameters that a fit leaves alone; `limits` are a user's bounds by name, inside
     of what is physical.
     """
 
     law: str
     effects: tuple[str, ...] = ()
     values: dict[str, float] = field(default_factory=dict)
-    held: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()
     limits: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def free(self) -> list[str]:
@@ -74,8 +74,8 @@ class Model:
             idle = () if self.law_class.has("bristle") else joined.bristles
             fixed = (*CHOICES, *joined.assumed, *idle)
             names += [f"{effect}.{name}" for name in joined.parameters if name not in fixed]
-        held = {*self.held, *self.law_class.idle(self.values)}
-        return [name for name in names if name not in held]
+        out = {*self.fixed, *self.law_class.idle(self.values)}
+        return [name for name in names if name not in out]
 
     @property
     def law_class(self) -> type[Law]:
@@ -200,8 +200,8 @@ def _spread(parts: list[Array]) -> float:
 def without(model: Model, names: tuple[str, ...]) -> Model:
     """Return a model with more parameters held at zero."""
     values = {**model.values, **dict.fromkeys(names, 0.0)}
-    held = tuple(dict.fromkeys((*model.held, *names)))
-    return replace(model, values=values, held=held)
+    fixed = tuple(dict.fromkeys((*model.fixed, *names)))
+    return replace(model, values=values, fixed=fixed)
 
 
 def steady(problem: Problem) -> bool:

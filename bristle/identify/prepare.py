@@ -76,7 +76,7 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     # Where one of two channels of the motion is lost, the other one tells it.
     alone = tuple(c for c in ("displacement", "velocity") if measurement.has(c))
     needed = ("force", drive or "", *(alone if len(alone) == 1 else ()))
-    known = measurement.told(*needed)
+    known = measurement.valid(*needed)
     force = measurement["force"]
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
@@ -106,7 +106,7 @@ def _seen(measurement: Measurement, channel: str) -> Array | None:
     """Return a channel with NaN where a sample was filled in or lost, None if it is not there."""
     if not measurement.has(channel):
         return None
-    return np.where(measurement.told(channel), measurement[channel], np.nan)
+    return np.where(measurement.valid(channel), measurement[channel], np.nan)
 
 
 def _noise_of_force(measurement: Measurement) -> float:

@@ -43,7 +43,7 @@ def _fit_law(own: Model, site: Site, count: int, also: Values) -> Fit:
     layer = [name for name in own.effects if EFFECTS[name].site == "structure"]
     if not layer:
         found = identify(
-            site.train, own.law, own.effects, count, values=own.values, held=own.held,
+            site.train, own.law, own.effects, count, values=own.values, fixed=own.fixed,
             limits=own.limits,
         )  # fmt: skip
     else:  # of a reconstructed force the layer's effects are a part
@@ -64,7 +64,7 @@ def _fit_grown(bare: Model, own: Model, layer: list[str], site: Site) -> Fit:
     grown = without.model
     for name in layer:
         grown = joined(name, grown, _structure(site))
-    whole = refine(replace(grown, effects=own.effects, held=own.held), site.train)
+    whole = refine(replace(grown, effects=own.effects, fixed=own.fixed), site.train)
     return replace(fit(site.train, whole), starts=without.starts, agreed=without.agreed)
 
 
@@ -72,9 +72,9 @@ def fit_damper(problem: Problem, present: Model) -> Fit:
     """Return the damper's law fitted anew, with the effects that the model has already."""
     effects = present.effects
     known = {n: v for n, v in present.values.items() if n.partition(".")[0] in effects}
-    kept = {n: v for n, v in present.values.items() if n in present.held}
+    kept = {n: v for n, v in present.values.items() if n in present.fixed}
     return identify(
-        problem, present.law, effects, values={**known, **kept}, held=present.held,
+        problem, present.law, effects, values={**known, **kept}, fixed=present.fixed,
         limits=present.limits,
     )  # fmt: skip
 
@@ -91,10 +91,10 @@ def _fit_line(own: Model, site: Site, also: Values) -> Fit:
     if not own.effects:
         return found
     limits = {**found.model.limits, **own.limits}
-    grown = replace(found.model, held=own.held, limits=limits)
+    grown = replace(found.model, fixed=own.fixed, limits=limits)
     for name in own.effects:
         grown = joined(name, grown, train)
-    tried = [replace(grown, held=own.held, limits=limits)]
+    tried = [replace(grown, fixed=own.fixed, limits=limits)]
     for values in (own.values, {n: v for n, v in also.items() if _belongs(n, own) and "." in n}):
         if values:
             tried.append(replace(tried[0], values={**grown.values, **values}))
@@ -105,9 +105,9 @@ def with_line(own: Model, site: Site) -> Model:
     """Return a model's part at a line's site with its line fitted, its effects as they stand."""
     train = _structure(site)
     line = fit_line(train, own.law).model
-    held = tuple(name for name in own.values if "." in name)
+    fixed = tuple(name for name in own.values if "." in name)
     values, limits = {**line.values, **own.values}, {**line.limits, **own.limits}
-    own = replace(own, values=values, held=held, limits=limits)
+    own = replace(own, values=values, fixed=fixed, limits=limits)
     return fit(train, own, with_std=False).model if own.effects else own
 
 

@@ -40,7 +40,7 @@ def initial_guesses(effect: str, base: Model, problem: Problem) -> list[Model]:
     """
     bases = [dict(base.values)]
     falling, over = base.law_class.falling()
-    if EFFECTS[effect].needs == ("v",) and over and not {*falling, over} & set(base.held):
+    if EFFECTS[effect].needs == ("v",) and over and not {*falling, over} & set(base.fixed):
         for size, width in RELAXED:
             relaxed = {name: size * base.value(name) for name in falling}
             bases.append({**base.values, **relaxed, over: width * base.value(over)})

@@ -33,7 +33,7 @@ def start_models(problem: Problem, model: Model, count: int) -> list[Model]:
     Parameters
     ----------
     model : Model
-        Its `held` parameters keep their values; its effects are left as they are.
+        Its `fixed` parameters keep their values; its effects are left as they are.
     """
     net = _Net(problem, model)
     cost, linear = net.solve()
@@ -81,7 +81,7 @@ class _Net:
 
     def _nodes(self, name: str, shape: Shape) -> Array:
         model = self.model_0
-        if name in model.held:
+        if name in model.fixed:
             return np.array([model.value(name)])
         low, high = model.bounds(name)
         size = self.problem.size(self.law.parameters[name].unit)
@@ -139,9 +139,9 @@ class _Net:
         ]
         G, b = self.gram[np.ix_(at, at)], self.right[at]
         theta = np.array([model.value(name) for name in self.linear])
-        free = np.array([name not in model.held for name in self.linear])
+        free = np.array([name not in model.fixed for name in self.linear])
         free &= np.diag(G) > 0.0
-        theta[~free & np.array([name not in model.held for name in self.linear])] = 0.0
+        theta[~free & np.array([name not in model.fixed for name in self.linear])] = 0.0
         b = b - G[:, ~free] @ theta[~free]
         G, b = G[np.ix_(free, free)], b[free]
         size = np.sqrt(np.diag(G))
@@ -162,7 +162,7 @@ class _Net:
         for (name, grid), k in zip(self.grids.items(), node, strict=True):
             values[name] = float(grid[k])
         for name in (*self.linear, *self.grids):
-            if name not in model.held:
+            if name not in model.fixed:
                 unit = self.law.parameters[name].unit
                 low, high = model.bounds(name)
                 least = _AT_LEAST * self.problem.size(unit)

@@ -163,7 +163,7 @@ class Effect:
         What else does the same to a building's damper whose force no load cell shows, and in a
         sentence why: {name of an effect, or what it is in words: sentence}.
     absorbed_by
-        The part of the damper's law (`LAW_PARTS`) that then takes the effect up whole.
+        The part of the damper's law (`law.PARTS`) that then takes the effect up whole.
     mimics
         Faults of sensors that its absence may look like (`MIMICKED`): they are weighed against it.
     faults

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ..errors import PhysicsError
+from .law_check import PARTS
 
 if TYPE_CHECKING:
     from .effect import Effect
-
-LAW_PARTS = ("yield", "viscous")
-"""Parts of a damper's law that may take up what an effect of the structure does."""
 
 MIMICKED = ("force_bias", "late_drive")
 """Faults of a sensor that an effect may look like: the force's zero, a drive on record late."""
@@ -46,7 +44,7 @@ def check_verdict(effect: type[Effect], where: str) -> None:
     """Refuse class data that a verdict could not be made from."""
     for field, given, known in (
         ("mimics", effect.mimics, MIMICKED),
-        ("absorbed_by", [effect.absorbed_by] if effect.absorbed_by else [], LAW_PARTS),
+        ("absorbed_by", [effect.absorbed_by] if effect.absorbed_by else [], PARTS),
     ):
         wrong = [one for one in given if one not in known]
         if wrong:

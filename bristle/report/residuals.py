@@ -101,5 +101,5 @@ def headline(comparison: Comparison) -> str:
     text = f"The model's {what} is wrong by {times} times what noise explains"
     if comparison.first:
         along = name_of(comparison.first.coordinate, comparison.site)
-        text += f"; the error turns with {along}"
+        text += f"; the error depends mainly on {along}"
     return text

@@ -29,7 +29,7 @@ def comparison_tables(comparison: Comparison) -> list[Table]:
 
 def site_table(comparison: Comparison) -> Table:
     """Return the error at each site of a building, the worst first."""
-    header = ["site", "z", "95 %", "error [N]", "of RMS", "noise [N]", "turns with"]
+    header = ["site", "z", "95 %", "error [N]", "of RMS", "noise [N]", "depends on"]
     return "Error at every site, each over its own noise (z)", header, [
         _site(one) for one in comparison.sites
     ]  # fmt: skip

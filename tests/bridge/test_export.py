@@ -231,7 +231,7 @@ def test_a_bad_effect_of_ones_own_is_left_out_with_a_note(
 
     (bench.effects_folder / "own_spring.py").write_text(OWN.replace("p.k * q.x", "p.k / q.x"))
     said: list[str] = []
-    nothing = Diagnosis("none", (), "Nothing is missing.")
+    nothing = Diagnosis("none", (), ("Nothing is missing.",))
     monkeypatch.setattr(learning, "diagnose_rig", lambda *given, **more: nothing)
     study = Study(bench.folder)
     assert learning.diagnose_study(study, write=False, say=said.append) == nothing

@@ -133,7 +133,7 @@ def test_sentences_say_the_numbers_of_a_spring_that_is_missing():
     assert rms == pytest.approx(found.total.rms, rel=0.05)
     assert share == pytest.approx(100.0 * found.total.share, rel=0.05)
     assert z == pytest.approx(found.z, rel=0.005)
-    assert "turns with displacement" in where
+    assert "depends mainly on displacement" in where
     assert "pushes back up to" in where
     assert "more than the model" in where
     assert "to either side" in where

@@ -90,7 +90,7 @@ def test_words_among_numbers_are_told_with_their_line(tmp_path: Path) -> None:
     rows = body(",").split("\n")
     rows[20] = "0.040000,OVER,1.0"
     table = read(tmp_path, "time [s],x [mm],F [kN]\n" + "\n".join(rows))
-    assert table.words == {"x [mm]": 'line 22: "OVER" is no number'}
+    assert table.not_numeric == {"x [mm]": 'line 22: "OVER" is no number'}
 
 
 def test_last_line_cut_off_is_said(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ def test_none_where_nothing_helps_and_the_error_is_noise():
     found = decide(trial(1.02), [trial(1.02, "stribeck"), trial(1.015, "coil_lag")], refuse)
     assert found.kind == "none"
     assert found.effects == ()
-    assert "1.02 times the noise" in found.reasons[0]
+    assert "error / noise (z) = 1.02" in found.reasons[0]
 
 
 def test_a_gain_below_the_smallest_is_none_and_above_it_an_effect():
@@ -83,18 +83,17 @@ def test_an_effect_of_another_form_keeps_its_name_and_says_that_a_residual_remai
     trials = [trial(1.4, "gas_spring"), trial(2.6, "stribeck")]
     found = decide(trial(3.0), trials, no_more)
     assert (found.kind, found.effects) == ("effect", ("gas_spring",))
-    assert any("residual remains" in reason for reason in found.reasons)
+    assert any("different functional form" in reason for reason in found.reasons)
 
 
-def test_rivals_that_the_data_cannot_part_are_a_class():
+def test_rivals_that_the_data_cannot_distinguish_are_ambiguous():
     trials = [trial(1.010, "asymmetry"), trial(1.011, "gas_spring"), trial(2.0, "stribeck")]
     found = decide(trial(3.0), trials, refuse)
-    assert found.kind == "class"
+    assert found.kind == "ambiguous"
     assert found.effects == ("asymmetry", "gas_spring")
-    assert any("cannot tell" in reason for reason in found.reasons)
 
 
-def test_a_class_has_three_members_at_most():
+def test_three_alternatives_are_named_at_most():
     trials = [trial(1.01 + 1e-4 * k, name) for k, name in enumerate("abcdef")]
     assert decide(trial(3.0), trials, refuse).effects == ("a", "b", "c")
 

@@ -22,7 +22,7 @@ class Rival:
     """A force with one parameter, `SLOPE` its derivative, known to 1/sqrt(`held`)."""
 
     def __init__(self, force: np.ndarray, held: float) -> None:
-        self.force, self.held = force, np.array([[held]])
+        self.force, self.information = force, np.array([[held]])
 
     def on(self, _run: object) -> tuple[np.ndarray, np.ndarray]:
         """Return force and sensitivities."""
@@ -58,8 +58,8 @@ def test_a_plan_stays_within_what_the_rig_has_done():
     assert np.max(np.abs(v)) <= max(np.max(np.abs(r.v)) for r in problem.runs) * 1.001
     assert V.min() >= min(0.0, *(r.V.min() for r in problem.runs))
     assert V.max() <= max(r.V.max() for r in problem.runs)
-    assert plan.words().startswith("Run a s")
-    assert "Go beyond" in replace(plan, deviations=1.0).words()
+    assert plan.sentence().startswith("Run a s")
+    assert "Go beyond" in replace(plan, deviations=1.0).sentence()
 
 
 def _run_of(samples: int):

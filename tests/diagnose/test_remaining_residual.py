@@ -7,10 +7,10 @@ import pytest
 
 from bristle.compare.patterns import LEVEL, ResidualPattern
 from bristle.diagnose import remaining_residual
-from bristle.diagnose.bench import without_drive
-from bristle.diagnose.remaining_residual import most_telling, sentences
+from bristle.diagnose.conclusion import About, verdict_of
+from bristle.diagnose.finding import Finding
+from bristle.diagnose.remaining_residual import most_telling
 from bristle.diagnose.rule import BENCH
-from bristle.diagnose.verdict import Diagnosis
 
 NONE = np.zeros(0)
 
@@ -41,7 +41,6 @@ def test_a_significant_place_is_named_before_one_that_tells_little_more(rings):
 def test_not_before_one_that_tells_far_more(rings):
     found = [pattern("rest", 0.26, sure=False), pattern("acceleration", 0.9 * BENCH.half * 0.26)]
     assert most_telling(found, None, None) == "rest"
-    assert "beyond chance" in sentences("rest", found)[0]
 
 
 def test_what_rings_and_follows_nothing_else_clearly_has_a_frequency(rings):
@@ -61,17 +60,13 @@ def test_what_rings_after_each_reversal_has_a_frequency(rings):
 
 def test_nothing_is_named_where_there_is_no_place(rings):
     assert most_telling([], None, None) == ""
-    assert sentences("", []) == []
 
 
 @pytest.mark.parametrize(
-    ("channels", "kind", "doubted"),
-    [(("force",), "unknown", True), (("force",), "none", False), (("current",), "unknown", False)],
+    ("driven", "kind", "doubted"),
+    [(False, "unknown", True), (False, "none", False), (True, "unknown", False)],
 )
-def test_a_drive_that_nobody_recorded_leaves_a_doubt(channels, kind, doubted):
-    class Bare:
-        def has(self, channel: str) -> bool:
-            return channel in channels
-
-    found = without_drive(Diagnosis(kind, (), "Something."), [Bare()])
+def test_a_drive_that_nobody_recorded_leaves_a_doubt(driven, kind, doubted):
+    shown = Finding("damper", kind, (), 2.0, 2.0, 0.0, 0.01, reasons=("Something.",))
+    found = verdict_of({"damper": shown}, About(driven=driven))
     assert ("Neither voltage nor current" in found.words) is doubted

@@ -157,11 +157,11 @@ def test_a_channel_cut_on_one_side():
     assert (fault.channel, fault.fault) == ("force", "clipping")
     for before, after in zip(spoilt, corrected(spoilt, [fault]), strict=True):
         cut = before["force"] == before["force"].max()
-        told, level = after.told("force"), before["force"].max()
+        told, level = after.valid("force"), before["force"].max()
         assert not told[cut].any()
         far = before["force"] < level - 5.0 * before.noise["force"]
         assert told[far].all()
-        assert after.told("displacement").all()
+        assert after.valid("displacement").all()
 
 
 def test_noise_that_comes_after_the_cut_is_lost_with_it():
@@ -178,7 +178,7 @@ def test_noise_that_comes_after_the_cut_is_lost_with_it():
     for after, end in zip(corrected(spoilt, [fault]), level, strict=True):
         beyond = np.abs(after["force"]) > 0.985 * end
         assert beyond.sum() > 100
-        assert np.mean(after.told("force")[beyond]) < 0.1
+        assert np.mean(after.valid("force")[beyond]) < 0.1
 
 
 def test_a_coarse_instrument_is_not_clipped():

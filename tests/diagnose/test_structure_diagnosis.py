@@ -9,14 +9,15 @@ from shaken import building, friction, measured, shake
 from bristle.diagnose import damper as of_damper
 from bristle.diagnose import diagnose_rig, equilibrium, opening
 from bristle.diagnose.candidates import Trial
+from bristle.diagnose.conclusion import About, lookalikes, verdict_of
 from bristle.diagnose.decision import Decision
 from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.finding import Finding, of_decision
+from bristle.diagnose.inconsistent_runs import kind_of
 from bristle.diagnose.load_cell import load_cell
-from bristle.diagnose.opening import Opening
-from bristle.diagnose.rule import BENCH
+from bristle.diagnose.opening import IN_BUILDING, Opening
+from bristle.diagnose.rule import BENCH, INSIDE
 from bristle.diagnose.sites import look_at, shortened
-from bristle.diagnose.verdict import lookalikes, of_sites
 from bristle.errors import RecordError
 from bristle.identify.fit import Model
 from bristle.identify.response import responses
@@ -78,16 +79,17 @@ def test_the_hidden_effect_is_named_at_its_site(effect):
 def test_nothing_is_found_where_nothing_is_hidden():
     found, _, _ = findings(None)
     assert [f.kind for f in found.values()] == ["none"] * 3
-    assert all(0.0 < f.detectable < 0.05 for f in found.values())
 
 
 def test_a_force_of_no_effect_is_unknown_and_its_coordinate_named():
     def ripple(x, v):
         return [0.4 * np.sin(2.0 * np.pi * x[0] / 0.002), 0.0, 0.0]
 
-    found, _, _ = findings(ripple)
-    assert found["layer"].kind == "unknown"
-    assert found["layer"].coordinate == "displacement"
+    b, runs = runs_of(ripple)
+    found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b)
+    assert found.findings["layer"].kind == "unknown"
+    assert (found.kind, found.coordinate) == ("unknown", "displacement")
+    assert "The remaining error depends mainly on displacement." in found.words
 
 
 @pytest.mark.parametrize(("what", "value"), [("delay", 0.008), ("force_gain", 1.15)])
@@ -134,6 +136,41 @@ def test_bare_building_diagnosed_from_start_to_end():
     assert answer["ranking"][0]["effect"] == "duffing"
     assert answer["z_holdout_after"] == pytest.approx(1.0, abs=0.1)
     assert answer["z_holdout_before"] > 1.5
+    sites = {found["site"]: found for found in answer["findings"]}
+    assert list(sites) == list(found.findings)
+    assert "layer" in sites
+    assert all(0.0 < one["detectable"] < 0.05 for one in sites.values())
+    k_3 = sites["layer"]["values"]["duffing.k_3"]
+    assert 0.0 < k_3["std"] < 0.2 * abs(k_3["value"])
+    assert found.std["duffing.k_3"] == k_3["std"]
+    assert sites["layer"]["organised"][0]["coordinate"] == "displacement"
+    assert all("organised" not in one for site, one in sites.items() if site != "layer")
+    assert set(answer["noise_floor"]) >= {"base_displacement", "ground_acceleration"}
+
+
+def test_runs_of_two_buildings_contradict_each_other_at_the_site_that_differs():
+    b = building(2, True, 6)
+    other = lambda x, v: [400.0 * x[0], 0.0, 0.0]  # noqa: E731 a stiffer layer
+    runs = [measured(shake(b, 40 + i, friction, None if i % 2 else other), i) for i in range(4)]
+    found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b)
+    assert found.findings["layer"].kind == "insufficient"
+    assert found.kind == "insufficient"
+    assert "At the isolation layer: one model does not explain all runs together" in found.words
+    assert [found.findings[site].kind for site in ("storey1", "storey2")] == ["none", "none"]
+
+
+@pytest.mark.parametrize(
+    ("kind", "train", "best", "now"),
+    [
+        ("unknown", 1.05, 1.05, "insufficient"),
+        ("unknown", 1.3, 1.3, "unknown"),
+        ("none", 1.2, 1.2, "insufficient"),
+        ("none", 1.1, 1.1, "none"),
+        ("effect", 1.3, 1.0, "effect"),
+    ],
+)
+def test_a_verdict_needs_runs_that_agree(kind, train, best, now):
+    assert kind_of(kind, trial((), 1.3, train), trial((), 1.0, best)) == now
 
 
 def test_what_a_reconstructed_force_cannot_tell_is_named():
@@ -151,14 +188,14 @@ def test_findings_of_sites_become_one_verdict():
         return Finding(site, kind, effects, 3.0, 1.0, 1.0, 0.01, coordinate="velocity")
 
     both = {"layer": at("layer", "effect", "duffing"), "storey1": at("storey1", "none")}
-    assert of_sites(both).effects == ("duffing",)
+    assert verdict_of(both, About()).effects == ("duffing",)
     both["storey1"] = at("storey1", "effect", "storey_softening")
-    found = of_sites(both)
+    found = verdict_of(both, About())
     assert (found.kind, found.effects) == ("effect", ("duffing", "storey_softening"))
     both["storey1"] = at("storey1", "unknown")
-    found = of_sites(both)
+    found = verdict_of(both, About())
     assert (found.kind, found.coordinate) == ("unknown", "velocity")
-    assert "Besides, duffing is missing (layer)." in found.words
+    assert "Besides, the model misses duffing (layer)." in found.words
 
 
 def test_missing_channels_are_named():
@@ -189,7 +226,7 @@ def test_late_velocity_of_the_base_is_a_sensor_fault_and_not_physics():
 
 def test_lag_of_a_velocity_is_its_instrument():
     lag = SensorFault("velocity", "lag", 0.004, 1e-4, "Velocity lags.")
-    found = of_sites({"layer": NOTHING}, sensors=(lag,))
+    found = verdict_of({"layer": NOTHING}, About(sensors=(lag,)))
     assert (found.kind, found.effects) == ("effect", ("velocity_sensor",))
     assert found.sites == {"velocity_sensor": "sensor"}
     assert "velocity_sensor (sensor)" in found.words
@@ -214,7 +251,7 @@ def test_effects_of_the_damper_are_searched_only_where_one_could_matter(
 
     monkeypatch.setattr(opening, "try_all", search)
     none = StructureProblem([])
-    inside = Opening(trial((), z, train), none, none, (), {}, (), none)
+    inside = Opening(trial((), z, train), none, none, part=none, rule=INSIDE, scope=IN_BUILDING)
     found = of_damper.look_at_damper(inside)
     assert len(asked) == searched
     assert found.kind == "none"

@@ -12,7 +12,7 @@ from bristle.check.user_effects import refused, usable
 from bristle.cli import main
 from bristle.cli._effect_template import template
 from bristle.diagnose.candidates import joinable
-from bristle.diagnose.verdict import lookalikes
+from bristle.diagnose.conclusion import lookalikes
 from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
 from bristle.identify.model import REFERENCE, Model, Problem, Run
@@ -239,7 +239,7 @@ def test_the_search_and_the_verdict_take_what_an_effect_says_of_itself(tmp_path:
         ('start_limits = {"v_s": (1.0, 0.5)}', "start_limits"),
         ('start_ties = ("f_s",)', "tie(p, sizes)"),
         ('mimics = ("late",)', "mimics names"),
-        ('absorbed_by = "spring"', "absorbed_by names"),
+        ('absorbed_by = "bearing"', "absorbed_by names"),
         ('offset = "v_s"', "a parameter in N is right"),
         ('offset = "f_s"', "all other parameters may be zero"),
         ('mass = "f_s"', "a parameter in kg is right"),

@@ -22,8 +22,8 @@ from bristle.study import Study, create_study
 VALUES = {"f_c": 1.3, "f_v": 0.8, "c_0": 20.0, "c_v": 0.01, "v_n": 5.0, "exponent": 0.0}
 VOID = {"meta", "img", "br", "hr", "link", "input"}
 VERDICT = {
-    "schema": 1,
-    "kind": "class",
+    "schema": 2,
+    "kind": "ambiguous",
     "effects": ["stribeck", "flattening"],
     "ranking": [
         {"effect": "stribeck", "z_holdout": 1.041, "gain": 0.21},
@@ -124,7 +124,9 @@ def test_what_the_lab_wrote_is_text_and_no_markup(page):
 
 def test_the_page_says_what_the_study_holds(page, folder):
     text = text_of(page)
-    assert "The model misses either stribeck or flattening; these data cannot say which." in text
+    assert (
+        "The model misses either stribeck or flattening. The data cannot distinguish them." in text
+    )
     assert "A sine of 12 mm at 3 Hz &amp; 6 V tells the two apart." in text
     assert "Sensor: gain of velocity, 1.05." in text
     assert "displacement 0.042 mm" in text
@@ -175,7 +177,10 @@ def test_a_single_run_is_said_to_be_weaker(tmp_path):
     [
         ({"kind": "none", "detectable": 0.031}, "3.1 % of the force would have been seen"),
         ({"kind": "effect", "effects": ["gas_spring"]}, "The model misses gas_spring"),
-        ({"kind": "unknown", "coordinate": "displacement"}, "it is organised by displacement"),
+        (
+            {"kind": "unknown", "coordinate": "displacement"},
+            "The remaining error depends mainly on displacement.",
+        ),
         ({"kind": "insufficient", "words": "All runs are equal."}, "All runs are equal."),
         ({"kind": "effect", "effects": ["mine"]}, "mine is an effect of the user&#x27;s own"),
     ],
@@ -198,7 +203,7 @@ def test_the_command_writes_the_file_and_says_where(folder, tmp_path, capsys):
     assert main(["report", str(folder), "--out", str(other), "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["report"] == str(other)
-    assert answer["verdict"] == "class"
+    assert answer["verdict"] == "ambiguous"
     assert answer["z_holdout"] > 0.0
     assert other.read_text() == (folder / "reports" / "report.html").read_text()
 

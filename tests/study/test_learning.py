@@ -56,7 +56,7 @@ def study(diagnosed, tmp_path):
 
 def test_the_verdict_file_holds_what_a_program_needs(study):
     verdict = json.loads((study.folder / "verdict.json").read_text())
-    assert verdict["schema"] == 1
+    assert verdict["schema"] == 2
     assert verdict["kind"] == "effect"
     assert verdict["effects"] == ["gas_spring"]
     ranking = verdict["ranking"]
@@ -70,11 +70,14 @@ def test_the_verdict_file_holds_what_a_program_needs(study):
     assert "gas_spring" not in verdict["untestable"]
     assert isinstance(verdict["noise_floor"], dict)
     assert verdict["sensors"] == []
-    assert verdict["words"]
+    assert verdict["words"].startswith("The model misses gas_spring. With gas_spring the error / ")
+    assert verdict["sites"] == {"gas_spring": "damper"}
+    (at_damper,) = verdict["findings"]
+    assert at_damper["values"]["gas_spring.k"]["std"] > 0.0
 
 
 def test_a_channel_that_the_study_turns_is_told_with_the_verdict(study, monkeypatch):
-    nothing = lambda *_given, **_more: Diagnosis("none", (), "Nothing is missing.")  # noqa: E731
+    nothing = lambda *_given, **_more: Diagnosis("none", (), ("Nothing is missing.",))  # noqa: E731
     monkeypatch.setattr(learning, "diagnose_rig", nothing)
     assert diagnose_study(study, write=False).sensors == ()
     path = study.folder / "study.toml"

@@ -52,7 +52,7 @@ def test_the_layer_whose_spring_stiffens_is_the_worst_site_along_displacement(st
     how, where, _ = found.sentences
     assert "misses the force of the isolation layer" in how
     assert "the damper and storey 1 are right within their noise" in how
-    assert where.startswith("The error turns with displacement")
+    assert where.startswith("The error depends mainly on displacement")
     assert "it pushes back" in where
 
 
@@ -79,7 +79,7 @@ def test_a_storey_that_softens_is_named_along_its_drift(tmp_path):
     assert {one.site for one in found.sites if one.fails} == {"storey1"}
     assert found.quantity == "shear of storey 1"
     assert found.first.coordinate == "displacement"
-    assert found.sentences[1].startswith("The error turns with drift: ")
+    assert found.sentences[1].startswith("The error depends mainly on drift: ")
 
 
 def test_a_wrong_damper_is_the_worst_site_of_a_clean_building(clean):

@@ -7,6 +7,7 @@ from math import log10
 
 import numpy as np
 
+from ..derived import numerical_derivative
 from ..measurement import Measurement
 from ..relation import (
     Relation,
@@ -102,25 +103,6 @@ def check_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
             "force",
             -abs(share),
         )
-
-
-def numerical_derivative(x: Array, v: Array, step: float) -> str:
-    """Return which difference of x a velocity is, "" if it is none of them."""
-    scale = float(np.std(v))
-    if scale == 0.0 or len(x) < 10:
-        return ""
-    centre = (x[2:] - x[:-2]) / (2.0 * step)
-    one_sided = np.diff(x) / step
-    kinds = {
-        "central differences": (centre, v[1:-1]),
-        "backward differences": (one_sided, v[1:]),
-        "forward differences": (one_sided, v[:-1]),
-    }
-    for name, (made, given) in kinds.items():
-        # What is written with few digits differs by their rounding.
-        if float(np.median(np.abs(made - given))) < 1e-3 * scale:
-            return name
-    return ""
 
 
 def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -> Iterator[Finding]:

@@ -55,7 +55,7 @@ class Body:
 
     values: list[Array]
     lines: NDArray[np.int64]
-    words: dict[int, str] = field(default_factory=dict)
+    not_numeric: dict[int, str] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
 
@@ -120,7 +120,7 @@ def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
     wide = len(layout.numeric)
     rows: list[list[float]] = []
     places: list[int] = []
-    words: dict[int, str] = {}
+    not_numeric: dict[int, str] = {}
     notes: list[str] = []
     full = [k for k in range(first, len(lines)) if lines[k].strip() and not is_comment(lines[k])]
     infinite = 0
@@ -140,7 +140,8 @@ def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
         for index, text in enumerate(fields):
             value = _value(text, layout.comma)
             if value is None:
-                words.setdefault(index, f'line {k + 1}: "{shortened(text.strip())}" is no number')
+                why = f'line {k + 1}: "{shortened(text.strip())}" is no number'
+                not_numeric.setdefault(index, why)
             infinite += value == float("inf")
             row.append(float("nan") if value is None or value == float("inf") else value)
         rows.append(row)
@@ -148,7 +149,7 @@ def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
     if infinite:
         notes.append(f"{infinite} infinite values are taken as missing")
     array = np.array(rows, dtype=float).reshape(len(rows), wide)
-    return Body([array[:, k].copy() for k in range(wide)], np.array(places), words, notes)
+    return Body([array[:, k].copy() for k in range(wide)], np.array(places), not_numeric, notes)
 
 
 def _value(text: str, comma: bool) -> float | None:

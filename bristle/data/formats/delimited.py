@@ -57,9 +57,9 @@ def read(content: bytes, name: str) -> Table:
     ):
         notes.append("the run that wrote this file did not come to its end")
     columns = _instants(columns, body, lines, layout)
-    words = {columns[index].text: text for index, text in body.words.items()}
+    not_numeric = {columns[index].text: text for index, text in body.not_numeric.items()}
     values = {column.text: body.values[k] for k, column in enumerate(columns)}
-    return Table(name, columns, values, body.lines, "line", words, (*notes, *body.notes))
+    return Table(name, columns, values, body.lines, "line", not_numeric, (*notes, *body.notes))
 
 
 def _decode(content: bytes, name: str) -> tuple[str, list[str]]:
@@ -206,10 +206,10 @@ def _without_empty(columns: tuple[Column, ...], body: Body) -> tuple[tuple[Colum
         k
         for k, column in enumerate(columns)
         if not (column.text == f"column {k + 1}" and np.isnan(body.values[k]).all())
-        or k in body.words
+        or k in body.not_numeric
     ]
     body.values = [body.values[k] for k in kept]
-    body.words = {kept.index(k): text for k, text in body.words.items() if k in kept}
+    body.not_numeric = {kept.index(k): text for k, text in body.not_numeric.items() if k in kept}
     return tuple(columns[k] for k in kept), body
 
 
@@ -218,7 +218,7 @@ def _instants(
 ) -> tuple[Column, ...]:
     """Turn columns of dates and times of day into seconds since the first."""
     out = list(columns)
-    for index in list(body.words):
+    for index in list(body.not_numeric):
         try:
             instants = [
                 datetime.fromisoformat(layout.split(lines[line - 1].strip())[index].strip('" '))
@@ -229,7 +229,7 @@ def _instants(
         body.values[index] = np.array(
             [(instant - instants[0]).total_seconds() for instant in instants]
         )
-        del body.words[index]
+        del body.not_numeric[index]
         out[index] = replace(columns[index], unit=parse_unit("s"))
         body.notes.append(f'"{columns[index].text}" holds instants: taken as s since the first')
     return tuple(out)

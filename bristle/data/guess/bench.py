@@ -77,7 +77,7 @@ def _from_data(search: Search, chosen: dict[str, Candidate]) -> None:
         column
         for column in search.table.columns
         if column.text not in taken
-        and column.text not in search.table.words
+        and column.text not in search.table.not_numeric
         and column.unit is None
         and usable(search.table.values[column.text]).all()
         and not _rises(search.column(column.text))

@@ -50,7 +50,7 @@ def candidate_of(search: Search, column: Column, time: str) -> Candidate | None:
     """Return what a column can be by name and unit, None where it can be nothing."""
     # A column of words is none; one word among numbers is told when the column is read.
     finite = usable(search.table.values[column.text])
-    if column.text == time or np.mean(finite) < 0.5 * (column.text in search.table.words):
+    if column.text == time or np.mean(finite) < 0.5 * (column.text in search.table.not_numeric):
         return None
     if not finite.any():
         return None

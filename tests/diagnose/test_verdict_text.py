@@ -1,0 +1,117 @@
+"""A verdict in words, from verdict.json of any schema."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from bristle.diagnose.conclusion import About, verdict_of
+from bristle.diagnose.faults import SensorFault
+from bristle.diagnose.finding import Finding
+from bristle.diagnose.verdict_file import current
+from bristle.diagnose.verdict_text import HEADINGS, headline, sentences, untestable
+from bristle.errors import StudyError
+from bristle.study.study import Study
+
+
+def at(site, kind="none", *effects, **more):
+    """Return what a site shows."""
+    reasons = more.pop("reasons", ("With it z falls.",) if effects else ())
+    return Finding(site, kind, effects, 3.0, 1.0, 0.9, 0.012, reasons=reasons, **more)
+
+
+def said(**findings):
+    return verdict_of(findings, About()).as_dict()
+
+
+@pytest.mark.parametrize(
+    ("verdict", "says"),
+    [
+        ({"kind": "effect", "effects": ["a", "b"]}, "The model misses a and b."),
+        ({"kind": "ambiguous", "effects": ["a", "b"]}, "The model misses either a or b. The data "),
+        ({"kind": "ambiguous", "effects": ["a", "b", "c"]}, "The model misses one of a, b and c. "),
+        ({"kind": "unknown", "effects": []}, "The model misses something that no known effect"),
+        ({"kind": "none", "effects": []}, "These data show nothing that the model misses."),
+        ({"kind": "insufficient", "effects": []}, "These data carry no verdict."),
+    ],
+)
+def test_every_kind_has_a_headline(verdict, says):
+    assert verdict["kind"] in HEADINGS
+    assert headline(verdict).startswith(says)
+
+
+def test_a_bench_names_no_site_and_a_building_does():
+    assert said(damper=at("damper", "effect", "stribeck"))["words"] == (
+        "The model misses stribeck. With it z falls."
+    )
+    both = said(layer=at("layer", "effect", "duffing"), damper=at("damper", "effect", "stribeck"))
+    assert both["words"] == (
+        "The model misses duffing (layer) and stribeck (damper). "
+        "At the isolation layer: with it z falls. At the damper: with it z falls."
+    )
+
+
+def test_what_the_rest_depends_on_is_told_with_how_sure_that_is():
+    verdict = {"kind": "unknown", "effects": [], "coordinate": "rest", "reasons": []}
+    chance = [{"coordinate": "rest", "share": 0.1, "p": 0.2}]
+    assert "beyond chance" in sentences({**verdict, "organised": chance})[-1]
+    sure = [{**chance[0], "p": 0.001}]
+    assert sentences({**verdict, "organised": sure})[-1].startswith("The remaining error depends ")
+    assert "beyond chance" not in sentences({**verdict, "coordinate": "frequency"})[-1]
+
+
+def test_the_coordinate_of_a_storey_is_its_drift():
+    storey = at("storey1", "unknown", coordinate="displacement", reasons=("No.",))
+    assert said(storey1=storey, layer=at("layer"))["words"].endswith("depends mainly on drift.")
+
+
+def test_effects_that_no_run_showed_are_told_with_their_sites():
+    hidden = {"storey1": at("storey1", untestable=("storey_softening",)), "layer": at("layer")}
+    verdict = said(**hidden)
+    assert verdict["untestable"] == ["storey_softening"]
+    assert untestable(verdict) == ["storey_softening (storey1)"]
+    one = said(damper=at("damper", untestable=("coil_lag",)))
+    assert untestable(one) == ["coil_lag"]
+
+
+def test_a_fault_is_told_once():
+    text = "Velocity lags."
+    lag = SensorFault("velocity", "lag", 0.004, 1e-4, text)
+    verdict = verdict_of({"damper": at("damper")}, About(sensors=(lag,))).as_dict()
+    assert verdict["words"].count(text) == 1
+    assert verdict["effects"] == ["velocity_sensor"]
+
+
+def test_runs_that_contradict_each_other_leave_no_verdict_where_nothing_else_is_named():
+    bad = at("storey1", "insufficient", reasons=("One model does not explain all runs.",))
+    assert said(storey1=bad, layer=at("layer"))["kind"] == "insufficient"
+    assert said(storey1=bad, layer=at("layer", "effect", "duffing"))["kind"] == "effect"
+    assert said(storey1=bad, layer=at("layer", "unknown"))["kind"] == "unknown"
+
+
+OLD = {
+    "schema": 1, "kind": "class", "effects": ["stribeck", "flattening"], "ranking": [],
+    "sensors": [{"channel": "force", "fault": "bias", "value": 1.0, "words": "It is off."}],
+    "words": "These data cannot tell: stribeck, flattening. It is off.",
+}  # fmt: skip
+
+
+def test_a_verdict_of_schema_1_is_read_in_the_words_of_schema_2(tmp_path):
+    now = current(OLD)
+    assert (now["schema"], now["kind"]) == (2, "ambiguous")
+    assert sentences(now) == [headline(now), OLD["words"]]
+    assert current({**OLD, "kind": "effect"})["kind"] == "effect"
+    study = Study.__new__(Study)
+    study.folder = tmp_path
+    assert study.verdict() is None
+    (tmp_path / "verdict.json").write_text(json.dumps(OLD))
+    assert study.verdict() == now
+
+
+@pytest.mark.parametrize("change", [{"schema": 3}, {"schema": None}, {"kind": "perhaps"}])
+def test_a_verdict_that_this_version_does_not_know_is_refused(change):
+    with pytest.raises(StudyError, match=r"rig/verdict\.json: (schema|kind) = .*diagnose"):
+        current({**OLD, **change}, "rig/verdict.json")
+    with pytest.raises(StudyError, match="'class'"):
+        current({**OLD, "schema": 2})
