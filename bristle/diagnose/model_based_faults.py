@@ -132,7 +132,8 @@ def _zero_of_force(
     trial = judge(replace(base, values=plain), right[0], right[1])
     fault = SensorFault(
         "force", "bias", offset, _deviation(_left(trial.model, right[0])),
-        f"Force shows {offset:.3g} N whatever the motion and the voltage, without the stiffness of "
+        f"Force shows {plain(offset)} N whatever the motion and the voltage, without the "
+        f"stiffness of "
         "a spring: the zero of the load cell is off, or a preload acts on the rod.",
     )  # fmt: skip
     return ModelBasedFault(fault, right[0], right[1], trial)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..quantity import plain
 from .assigned import at_site
 from .fit import Fit
 from .model import Model
@@ -67,7 +68,8 @@ class RigFit:
         for name, found in self.fits.items():
             if self.sites[name].is_line:
                 texts = [
-                    f"{own} = {found.model.value(own):.5g} +- {1.96 * found.std[own]:.2g} {unit}"
+                    f"{own} = {plain(found.model.value(own), 5)} "
+                    f"+- {plain(1.96 * found.std[own], 2)} {unit}"
                     for own, unit in (("k", "N/m"), ("c", "N s/m")) if own in found.std
                 ]  # fmt: skip
                 out.append(f"{name}: " + ", ".join(texts) + " (fitted along, not in model.toml).")
