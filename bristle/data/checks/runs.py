@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...quantity import plain
+from ...quantity import plain, quantity
 from ..channels import DRIVE
 from ..measurement import Measurement
 from ..noise import is_switched
@@ -243,14 +243,15 @@ def _two_rigs(runs: list[Excitation]) -> Iterator[Finding]:
         if len(alike) < 3:  # this run counts
             continue
         usual = float(np.median([one for one in alike if one is not None]))
-        ratio = float(run.resisting or 0.0) / usual
+        own = float(run.resisting or 0.0)
+        ratio = own / usual
         if not 0.4 < ratio < 2.5:
             yield Finding(
                 "two rigs",
                 "warning",
-                f"force resists with {plain(run.resisting, 4)} N on average, and with "
-                f"{plain(usual, 4)} N in "
-                f"the middle one of {len(alike)} runs of like voltage and speed.",
+                f"force resists with {quantity(own, 'N', 4, usual)} on average, and with "
+                f"{quantity(usual, 'N', 4)} in the middle one of {len(alike)} runs of like voltage "
+                "and speed.",
                 "Is it of another damper, or in another unit? Then keep it in a study of its own.",
                 run.run,
                 "force",
