@@ -1,5 +1,9 @@
 """What can go wrong, one class per layer, each with the exit code of the command line."""
 
+from __future__ import annotations
+
+from os import PathLike
+
 
 class BristleError(Exception):
     """Base of every error that bristle raises on purpose.
@@ -60,7 +64,7 @@ class TrustError(BristleError):
     `path` is the file, `text` the code that would run, "" where consent cannot be kept, `why`.
     """
 
-    def __init__(self, path, text="", why=""):  # type: ignore[no-untyped-def]
+    def __init__(self, path: PathLike[str], text: str = "", why: str = "") -> None:
         self.path = path
         self.text = text
         said = (

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..findings import command
+from ..quantity import plain
 
 if TYPE_CHECKING:
     from ..study.building import IdentifiedBuilding
@@ -37,15 +38,14 @@ def text(found: IdentifiedBuilding) -> str:
     lines = [f"{fit.building.name}: {len(levels)} level(s), masses as given", ""]
     lines.append(f"  {'stiffness below':16} {'given':>12} {'found':>12} N/m   95 % interval")
     for i, level in enumerate(levels):
-        lines.append(
-            f"  {level:16} {found.given.stiffnesses[i]:>12.6g} {fit.stiffnesses[i]:>12.6g}       "
-            f"{_interval(fit.stiffnesses[i], fit.std_stiffnesses[i])}"
-        )
+        given, now = (plain(one[i], 6) for one in (found.given.stiffnesses, fit.stiffnesses))
+        half = _interval(fit.stiffnesses[i], fit.std_stiffnesses[i])
+        lines.append(f"  {level:16} {given:>12} {now:>12}       {half}")
     lines += ["", f"  {'mode':>4} {'frequency':>12} Hz  {'95 %':18} {'damping ratio':>14}  95 %"]
     for r, (f, ratio) in enumerate(zip(fit.frequencies, fit.damping_ratios, strict=True)):
         lines.append(
-            f"  {r + 1:>4} {f:>12.5g}     {_interval(f, fit.std_frequencies[r]):18} "
-            f"{ratio:>14.4g}  {_interval(ratio, fit.std_damping_ratios[r])}"
+            f"  {r + 1:>4} {plain(f, 5):>12}     {_interval(f, fit.std_frequencies[r]):18} "
+            f"{plain(ratio, 4):>14}  {_interval(ratio, fit.std_damping_ratios[r])}"
         )
     if fit.unidentified:
         lines += ["", f"These data cannot tell: {', '.join(fit.unidentified)}."]
@@ -72,5 +72,5 @@ def _interval(value: float, std: float) -> str:
     """Return half of a 95 % interval, and what share of the value it is."""
     if not np.isfinite(std):
         return "as given"
-    share = f"  {196.0 * std / abs(value):.2g} %" if value else ""
-    return f"+- {1.96 * std:.2g}{share}"
+    share = f"  {plain(196.0 * std / abs(value), 2)} %" if value else ""
+    return f"+- {plain(1.96 * std, 2)}{share}"

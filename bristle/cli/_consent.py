@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 
 from ..errors import TrustError
 
@@ -30,7 +31,7 @@ def given(error: TrustError) -> bool:
     sys.stderr.flush()
     if sys.stdin.readline().strip().lower() not in ("y", "yes"):
         return False
-    remember(error.path, error.text)
+    remember(Path(error.path), error.text)
     return True
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..findings import command
+from ..quantity import plain, scale
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -44,21 +45,25 @@ def text(added: Added, folder: Path) -> str:
     found = added.identified
     before, after = found.before, found.after
     lines = [f"Step {added.step.number}: {added.step.what} ({added.step.why})", ""]
-    lines.append(f"  {'':24} {'before':>10} {'after':>10}")
-    for key, name in (
-        ("z_train", "z, training runs"),
-        ("z_holdout", "z, held-out runs"),
-        ("rms_train", "RMS [N], training"),
-        ("rms_holdout", "RMS [N], held out"),
+    lines.append(f"  {'':32} {'before':>10} {'after':>10}")
+    factor, unit = scale("N", before.get("rms_train", 0.0))
+    low = f"RMS below {found.cutoff:g} Hz" if found.cutoff else "RMS"
+    for key, name, times in (
+        ("z_train", "z, training runs", 1.0),
+        ("z_holdout", "z, held-out runs", 1.0),
+        ("rms_train", f"{low} [{unit}], training", factor),
+        ("rms_holdout", f"{low} [{unit}], held out", factor),
     ):
         if key in after:
-            lines.append(f"  {name:24} {before[key]:>10.4g} {after[key]:>10.4g}")
+            cells = [plain(times * errors[key], 4) for errors in (before, after)]
+            lines.append(f"  {name:32} {cells[0]:>10} {cells[1]:>10}")
     lines.append("")
     for row in found.parameters():
         if row["name"].partition(".")[0] in added.effects:
             half = row["interval95"]
-            interval = f"+- {half:.2g}" if half is not None else row["how"]
-            lines.append(f"  {row['name']:28} {row['value']:>12.5g} {row['unit']:10} {interval}")
+            interval = f"+- {plain(half, 2)}" if half is not None else row["how"]
+            value = plain(row["value"], 5)
+            lines.append(f"  {row['name']:28} {value:>12} {row['unit']:10} {interval}")
     if "z_holdout" in after and after["z_holdout"] >= before["z_holdout"]:
         lines += ["", "The error on runs not seen did not fall:  " + command("undo", folder)]
     return "\n".join([*lines, "", f"Next:  {command('diagnose', folder)}"])

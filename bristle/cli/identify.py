@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..findings import command
+from ..quantity import plain, quantity, short_z
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -108,28 +109,30 @@ def _parameters(found: Identified) -> list[str]:
         half = row["interval95"]
         if half is not None:
             size = abs(row["value"])
-            interval = f"+- {half:.2g}" + (f"  {100.0 * half / size:.2g} %" if size else "")
+            share = f"  {plain(100.0 * half / size, 2)} %" if size else ""
+            interval = f"+- {plain(half, 2)}{share}"
         else:
             interval = row["how"]
-        rows.append(f"  {row['name']:24} {row['value']:>12.6g} {row['unit']:11} {interval}")
+        rows.append(f"  {row['name']:24} {plain(row['value'], 6):>12} {row['unit']:11} {interval}")
     return [f"  {'parameter':24} {'value':>12} {'unit':11} 95 % interval", *rows]
 
 
 def _errors(found: Identified) -> list[str]:
     low = f"below {found.cutoff:g} Hz" if found.cutoff else "without a filter"
     lines = [f"  {'error of the force ' + low:34} {'before':>22} {'after':>22}"]
+    size = found.before["rms_train"]
     for role, name in (("train", "training runs"), ("holdout", "held-out runs")):
         if f"rms_{role}" not in found.after:
             continue
         cells = [
-            f"{errors[f'rms_{role}']:.4g} N ({errors[f'share_{role}']:.1%})"
+            f"{quantity(errors[f'rms_{role}'], 'N', 4, size)} ({errors[f'share_{role}']:.1%})"
             for errors in (found.before, found.after)
         ]
         lines.append(f"  {name:34} {cells[0]:>22} {cells[1]:>22}")
     for role, name in (("train", "z, training runs"), ("holdout", "z, held-out runs")):
         if f"z_{role}" in found.after:
             before, after = found.before[f"z_{role}"], found.after[f"z_{role}"]
-            lines.append(f"  {name:34} {before:>22.3g} {after:>22.3g}")
+            lines.append(f"  {name:34} {short_z(before):>22} {short_z(after):>22}")
     return [*lines, "  z: error over the noise that a true model would show; a true model has 1."]
 
 
@@ -141,11 +144,13 @@ def _laws(found: Identified, folder: Path) -> list[str]:
         f"  {'law':18} {'training':>11} {'held out':>11} {'of force':>9} {'|v| > 1 mm/s':>13} "
         f"{'starts':>8}"
     ]
+    size = max(row.train for row in found.table)
     for row in found.table:
-        holdout = f"{row.holdout:.4g} N" if row.holdout == row.holdout else "-"
+        cells = [quantity(one, "N", 4, size) for one in (row.train, row.holdout, row.moving)]
+        held_out = cells[1] if row.holdout == row.holdout else "-"
         lines.append(
-            f"  {row.law:18} {row.train:>9.4g} N {holdout:>11} {row.share:>9.1%} "
-            f"{row.moving:>11.4g} N {row.agreed:>3} of {row.starts}"
+            f"  {row.law:18} {cells[0]:>11} {held_out:>11} {row.share:>9.1%} {cells[2]:>13} "
+            f"{row.agreed:>3} of {row.starts}"
         )
     own = {row.law: row.holdout if row.holdout == row.holdout else row.train for row in found.table}
     for name in own:
@@ -166,7 +171,7 @@ def _next(found: Identified, folder: Path) -> list[str]:
     z = max(found.after.get("z_holdout", 0.0), found.after["z_train"])
     if z > 1.15:
         return [
-            f"The error is {z:.3g} times what noise explains. Next: where it is,  "
+            f"The error is {short_z(z)} times what noise explains. Next: where it is,  "
             f"{command('compare', folder)} ; what is missing,  {command('diagnose', folder)}"
         ]
     then = command("diagnose", folder)

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..quantity import plain
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -149,15 +150,15 @@ def _print(found: Passive, files: dict[str, Path]) -> None:
     print(f"{found.statistic} of {found.output} [{found.unit}]")
     print(f"{'':{width}}  best voltage   value {heads}")
     for motion, best, row in zip(found.motions, found.best, found.values, strict=True):
-        values = "".join(f"{row[k]:9.4g}" for k in at)
-        print(f"{motion.name:{width}}  {best.voltage:10.2f} V {best.value:7.4g} {values}")
+        values = "".join(f"{plain(row[k], 4):>9}" for k in at)
+        print(f"{motion.name:{width}}  {best.voltage:10.2f} V {plain(best.value, 4):>7} {values}")
     print("for all of them")
     for goal, text in _GOALS.items():
         optimum = found.goals[goal]
         value = (
             f"at most {100 * (optimum.value - 1):.1f} % above"
             if goal == "regret"
-            else f"{optimum.value:.4g}"
+            else f"{plain(optimum.value, 4)}"
         )
         print(f"  {text}: {optimum.voltage:.2f} V ({value})")
     print(f"{found.runs} runs")

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..quantity import plain
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -123,7 +124,7 @@ def _print_plain(frame: pd.DataFrame, written: dict[str, Path]) -> None:
     for row in summarise(frame):
         unit = row.unit if row.unit and row.unit != "1" else ""
         table.add_row(
-            row.name, f"{row.peak:.5g}", f"{row.time_of_peak:.4g}", f"{row.rms:.5g}", unit
+            row.name, plain(row.peak, 5), plain(row.time_of_peak, 4), plain(row.rms, 5), unit
         )
     Console(highlight=False).print(table)
     print(f"{len(frame)} rows in {made['wall_time']:.2f} s")

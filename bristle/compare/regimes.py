@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.search import z_scale
+from ..quantity import plain, quantity
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -79,10 +80,11 @@ def speed_classes(speed: Array | None) -> list[tuple[str, Mask]]:
         return []
     top = float(np.quantile(speed, 0.98))
     low, high = 0.25 * top, 0.6 * top
+    below, above = (quantity(speed, "m/s", 2, top) for speed in (low, high))
     return [
-        (f"at low speed (below {1e3 * low:.2g} mm/s)", speed < low),
+        (f"at low speed (below {below})", speed < low),
         ("at middle speed", (speed >= low) & (speed < high)),
-        (f"at high speed (above {1e3 * high:.2g} mm/s)", speed >= high),
+        (f"at high speed (above {above})", speed >= high),
     ]
 
 
@@ -94,6 +96,6 @@ def voltage_classes(V: Array | None) -> list[tuple[str, Mask]]:
     off, middle = 0.05 * top, 0.5 * top
     return [
         ("at 0 V", off >= V),
-        (f"at low voltage (below {middle:.2g} V)", (off < V) & (middle > V)),
-        (f"at high voltage (above {middle:.2g} V)", middle <= V),
+        (f"at low voltage (below {plain(middle, 2)} V)", (off < V) & (middle > V)),
+        (f"at high voltage (above {plain(middle, 2)} V)", middle <= V),
     ]

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.channels import is_channel
+from ..quantity import plain, quantity, short_z
 from .coordinates import SHOWN
 from .names import joined, name_of, site_name, site_names
 from .patterns import Finder, ResidualPattern
@@ -40,18 +42,20 @@ def sentences(comparison: Comparison, finder: Finder) -> tuple[str, ...]:
 
 def _how_wrong(comparison: Comparison) -> str:
     total = comparison.total
-    what, unit = comparison.quantity.replace("_", " "), comparison.unit
+    known = is_channel(comparison.quantity)
+    what = comparison.quantity.replace("_", " ") if known else f'output "{comparison.quantity}"'
     where = f"{_WHICH[comparison.seen]} the model misses"
-    size = f"{total.rms:.2g} {unit} RMS"
+    size = f"{quantity(total.rms, comparison.unit, 2, total.signal)} RMS"
     if total.share == total.share:
-        size += f" ({_percent(total.share)} of the {what})"
+        size += f" ({_percent(total.share)} of {'the ' + what if known else 'its own'})"
     step = ""
     if total.numerical_z > _STEP:
-        step = f"; the step of the calculation alone makes {total.numerical_z:.2g} times the noise"
+        times = plain(total.numerical_z, 2)
+        step = f"; the step of the calculation alone makes {times} times the noise"
     if total.rms > _SPIKY * total.z * total.noise:
         size += ", much of it in short spikes"
     if not comparison.right:
-        times = f"{total.z:.3g}" if total.z < 100.0 else f"{total.z:.0f}"
+        times = plain(total.z)
         text = f"{where} the {what} by {size}, {times} times what its noise would explain{step}"
     else:
         text = f"{where} the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}"
@@ -65,7 +69,7 @@ def _elsewhere(comparison: Comparison) -> str:
     right = [one for one in others if one.identifiable and not one.fails]
     text = ""
     if fail:
-        listed = [f"{site_name(one.site)} (z = {one.z:.3g})" for one in fail[:_NAMED]]
+        listed = [f"{site_name(one.site)} (z = {short_z(one.z)})" for one in fail[:_NAMED]]
         if len(fail) > _NAMED:
             listed.append(f"{len(fail) - _NAMED} more sites")
         text += f"; it fails {'' if comparison.right else 'too '}at {joined(listed)}"
@@ -132,7 +136,7 @@ def _where_right(comparison: Comparison) -> str:
     best = min(every, key=lambda one: one.z)
     if comparison.right:
         return f"It does best {best.text} (z = {best.z:.2f})."
-    text = f"Nowhere is it right within its noise: it does best {best.text} (z = {best.z:.3g})"
+    text = f"Nowhere is it right within its noise: it does best {best.text} (z = {short_z(best.z)})"
     return text + (f"; {loud}." if loud else ".")
 
 
@@ -156,24 +160,31 @@ def _loudest(comparison: Comparison) -> str:
     share = sum(comparison.spectrum.bands[i].share for i in chosen)
     low = comparison.spectrum.bands[min(chosen)].low
     high = comparison.spectrum.bands[max(chosen)].high
-    span = f"below {high:.3g} Hz" if low == 0.0 else f"between {low:.3g} and {high:.3g} Hz"
+    span = f"below {plain(high)} Hz" if low == 0.0 else f"between {plain(low)} and {plain(high)} Hz"
     return f"{_percent(share)} of what exceeds the noise lies {span}"
 
 
 def _pattern_text(pattern: ResidualPattern, prediction: RunPrediction) -> str:
     """Return how a residual goes along a coordinate: "beyond 8 mm it pushes back 0.4 N more"."""
-    hot, unit = _hot(pattern), prediction.unit
+    hot = _hot(pattern)
     peak = float(np.max(np.abs(pattern.mean)))
     if not hot:
-        return f"by up to {peak:.2g} {unit}"
+        return f"by up to {_amount(peak, prediction)}"
     clear = pattern.mean[np.abs(pattern.mean) > 2.0 * pattern.std]
     changes = int(np.count_nonzero(np.diff(np.sign(clear))))
     if changes >= _RIPPLES and pattern.coordinate in ("displacement", "velocity", "acceleration"):
-        return f"it goes up and down {changes + 1} times along it, by up to {peak:.2g} {unit}"
+        most = _amount(peak, prediction)
+        return f"it goes up and down {changes + 1} times along it, by up to {most}"
     mirrored = _mirrored(pattern, hot, prediction)
     if mirrored:
         return mirrored
     return "; ".join(_one(pattern, begin, end, prediction) for begin, end in hot[:2])
+
+
+def _amount(value: float, prediction: RunPrediction) -> str:
+    """Return an amount of what is compared, in the unit that the whole of it is read in."""
+    whole = float(np.sqrt(np.mean(prediction.measured**2)))
+    return quantity(value, prediction.unit, 2, whole)
 
 
 def _hot(pattern: ResidualPattern) -> list[tuple[int, int]]:
@@ -208,7 +219,7 @@ def _mirrored(
     edge = factor * 0.5 * float(pattern.low[c] - pattern.high[b])
     left, right = _largest(pattern.mean, a, b), _largest(pattern.mean, c, d)
     size = 0.5 * (abs(left) + abs(right))
-    where = f"beyond {edge:.2g} {shown} to either side"
+    where = f"beyond {plain(edge, 2)} {shown} to either side"
     if left * right > 0.0:
         return f"{where} {_acts(pattern, right, 0.0, size, prediction)}"
     return f"{where} {_acts(pattern, right, 1.0, size, prediction)}"
@@ -234,7 +245,7 @@ def _acts(
     `side` is where along the coordinate; 0 for a pattern alike on both sides.
     """
     unit = prediction.unit
-    up_to = f"up to {amount:.2g} {unit}"
+    up_to = f"up to {_amount(amount, prediction)}"
     more = "more" if size > 0.0 else "less"
     if unit != "N":
         return f"it is {up_to} {'higher' if size > 0.0 else 'lower'} than the model's"
@@ -263,19 +274,19 @@ def _location(pattern: ResidualPattern, begin: int, end: int) -> str:
         return "throughout"
     if name == "time_since_reversal":
         if begin == 0:
-            return f"in the first {high:.2g} ms after the motion turns"
-        return f"later than {low:.2g} ms after the motion turns"
+            return f"in the first {plain(high, 2)} ms after the motion turns"
+        return f"later than {plain(low, 2)} ms after the motion turns"
     if name == "dissipated_energy":
         if begin == 0:
-            return f"before {high:.2g} J are dissipated"
-        return f"once {low:.2g} J are dissipated"
+            return f"before {plain(high, 2)} J are dissipated"
+        return f"once {plain(low, 2)} J are dissipated"
     if name == "voltage" and high - low < 0.02 * factor * float(np.ptp(pattern.centre)):
-        return f"at {0.5 * (low + high):.2g} {unit}"
+        return f"at {plain(0.5 * (low + high), 2)} {unit}"
     if begin == 0:
-        return f"below {high:.2g} {unit}"
+        return f"below {plain(high, 2)} {unit}"
     if end == last:
-        return f"{'after' if name == 'time' else 'above'} {low:.2g} {unit}"
-    return f"between {low:.2g} and {high:.2g} {unit}"
+        return f"{'after' if name == 'time' else 'above'} {plain(low, 2)} {unit}"
+    return f"between {plain(low, 2)} and {plain(high, 2)} {unit}"
 
 
 def _at_voltages(pattern: ResidualPattern, comparison: Comparison, finder: Finder) -> str:
@@ -294,8 +305,10 @@ def _at_voltages(pattern: ResidualPattern, comparison: Comparison, finder: Finde
     if abs(high - low) <= max(_ALIKE * max(abs(low), abs(high)), doubt):
         return ", at every voltage alike" if doubt < 0.7 else ""
     peak = float(np.max(np.abs(pattern.mean)))
-    unit = comparison.unit
-    parts = f"{low * peak:.2g} {unit} below {middle:.2g} V, {high * peak:.2g} {unit} above"
+    one = comparison.predictions[0]
+    parts = (
+        f"{_amount(low * peak, one)} below {plain(middle, 2)} V, {_amount(high * peak, one)} above"
+    )
     return f", {'more' if high > low else 'less'} at high voltage ({parts})"
 
 
@@ -313,7 +326,7 @@ def size_of(
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %" if share < 0.995 else f"{100.0 * share:.0f} %"
+    return f"{plain(100.0 * share, 2 if share < 0.995 else 3)} %"
 
 
 def begin(text: str) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from .. import __version__
 from ..errors import StudyError
 from ..findings import unknown, written
 from ..lines import KeyPath, key_lines
@@ -61,6 +62,14 @@ def read_json(path: Path) -> dict[str, Any]:
     return found
 
 
+def other_schema(found: Any) -> str:
+    """Return what is said of a file's schema that this version does not read."""
+    return (
+        f"schema is {written(found)}, of another version of bristle; this one, {__version__}, "
+        "reads 1. Nothing is changed; open it with the version that made it."
+    )
+
+
 class Toml:
     """A TOML file with the line of every key; collects what is wrong with it.
 
@@ -100,10 +109,18 @@ class Toml:
                 self.error((*keys, key), unknown("key", key, names))
 
     def schema(self) -> None:
-        """Note a schema that this version does not read."""
-        if self.data.get("schema") != 1:
-            found = written(self.data["schema"]) if "schema" in self.data else "missing"
-            self.error(("schema",), f"schema is {found}; this version reads 1.")
+        """Note that there is no schema; refuse one that this version does not read.
+
+        Raises
+        ------
+        StudyError
+            If the file is of another version: its other keys are not judged then.
+        """
+        if "schema" not in self.data:
+            self.error(("schema",), "schema is missing; schema = 1 is right.")
+        elif self.data["schema"] != 1:
+            self.error(("schema",), other_schema(self.data["schema"]))
+            self.check()
 
     def text(self, keys: KeyPath, table: Mapping[str, Any], key: str, default: str = "") -> str:
         """Return a text of a table, noting what is none.

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..data.checks.clipping import stands_at_top
 from ..data.measurement import Measurement
+from ..quantity import plain
 from .faults import SensorFault
 from .rule import SENSOR, DecisionRule
 
@@ -35,7 +36,7 @@ def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[Se
                 SensorFault(
                     channel, "clipping", level, 0.0,
                     f"{channel.capitalize()} repeats the very same extreme in {len(limits)} "
-                    f"run{'s' * (len(limits) > 1)}: its range ended at {level:.4g} (SI).",
+                    f"run{'s' * (len(limits) > 1)}: its range ended at {plain(level, 4)} (SI).",
                 )
             )  # fmt: skip
     return found

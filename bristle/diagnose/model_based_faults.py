@@ -21,6 +21,7 @@ from ..identify.search import HUBER_AT_ONE, losses
 from ..identify.search_context import refine, residuals
 from ..identify.start_grid import SearchContext, ranked_guesses
 from ..physics.effect import EFFECTS, Effect, effects_of
+from ..quantity import quantity
 from .candidates import Trial, joinable, judge, short_search
 from .corrected import earlier
 from .faults import SensorFault
@@ -132,8 +133,8 @@ def _zero_of_force(
     trial = judge(replace(base, values=plain), right[0], right[1])
     fault = SensorFault(
         "force", "bias", offset, _deviation(_left(trial.model, right[0])),
-        f"Force shows {offset:.3g} N whatever the motion and the voltage, without the stiffness of "
-        "a spring: the zero of the load cell is off, or a preload acts on the rod.",
+        f"Force shows {quantity(offset, 'N')} whatever the motion and the voltage, without the "
+        "stiffness of a spring: the zero of the load cell is off, or a preload acts on the rod.",
     )  # fmt: skip
     return ModelBasedFault(fault, right[0], right[1], trial)
 

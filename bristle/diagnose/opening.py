@@ -17,6 +17,7 @@ from ..identify.rig import DAMPER, Seeds, bench_rig
 from ..identify.search_context import refine
 from ..identify.structure import StructureProblem
 from ..physics.effect import effects_of
+from ..quantity import plain
 from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .corrected import corrected
 from .faults import SensorFault, words_of
@@ -227,7 +228,8 @@ def _lacking(
         out.append("The force is constant: there is nothing to explain.")
     elif spread < rule.quietest * noise:
         out.append(
-            f"The force's noise, {noise:.3g} N, is nearly the force itself, {spread:.3g} N RMS: "
+            f"The force's noise, {plain(noise)} N, is nearly the force itself, {plain(spread)} "
+            f"N RMS: "
             f"at least {rule.quietest:g} times are needed."
         )
     for channel in ("displacement", "velocity"):

@@ -19,6 +19,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from ..data.derived import LATE, derived_velocity
 from ..data.measurement import Measurement
+from ..quantity import plain
 from .clipping import clipped
 from .faults import SensorFault
 from .rule import SENSOR, DecisionRule
@@ -61,7 +62,8 @@ def _computed(runs: Sequence[Measurement], how: Mapping[str, str]) -> list[Senso
         SensorFault(
             "velocity", "derived", value, 0.0,
             f"Velocity is the {how[first.name]} difference of displacement, half a sample "
-            f"({1e3 * abs(value):.3g} ms) {'late' if value > 0.0 else 'early'}: it was computed, "
+            f"({plain(1e3 * abs(value))} ms) {'late' if value > 0.0 else 'early'}: it was "
+            f"computed, "
             "not measured, and is left out.",
         )
     ]  # fmt: skip
@@ -101,7 +103,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
             SensorFault(
                 "velocity", "high-pass", theta[4] * gain, std[4] * gain,
                 "Velocity lacks what is slow in the rate of displacement, as from a geophone with "
-                f"a corner near {theta[4] * gain / (2.0 * np.pi):.2g} Hz.",
+                f"a corner near {plain(theta[4] * gain / (2.0 * np.pi), 2)} Hz.",
             )
         )  # fmt: skip
         return found
@@ -125,7 +127,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
         found.append(
             SensorFault(
                 "velocity", "bias", bias, bias_std,
-                f"Velocity shows {bias:.3g} m/s too much: its integral runs away from "
+                f"Velocity shows {plain(bias)} m/s too much: its integral runs away from "
                 "displacement.",
             )
         )  # fmt: skip

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import not_usable
+from ..quantity import short_z as short_z
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -208,11 +209,6 @@ def _broken(text: str, width: float, per_inch: float) -> str:
 def percent(share: float, digits: int = 1) -> str:
     """Return a share as text: "8.6 %"."""
     return f"{round(100.0 * share, digits) + 0.0:.{digits}f} %"  # + 0.0: no minus before a zero
-
-
-def short_z(z: float) -> str:
-    """Return z as text, with the digits that tell it from 1."""
-    return f"{z:.2f}" if z < 10.0 else f"{z:.3g}" if z < 100.0 else f"{z:.0f}"
 
 
 def zero_lines(axes: Axes) -> None:

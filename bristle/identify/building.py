@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
+from ..quantity import plain
 from .equilibrium_system import SKIP, EquilibriumSystem, cross_products, modes_of, ratios_of
 from .response import Response, responses
 from .search import z_scale
@@ -110,7 +111,7 @@ def identify_structure(
         i = int(np.argmin(ended.stiffness))
         raise RecordError(
             f"{measurements[0].name}: the stiffness below {building.levels()[i]} comes out as "
-            f"{ended.stiffness[i]:.4g} N/m. Check signs and units of its displacement and "
+            f"{plain(ended.stiffness[i], 4)} N/m. Check signs and units of its displacement and "
             "acceleration, and the masses of the building."
         )
     return _finish(runs, building, ended, first, free)
@@ -206,7 +207,8 @@ def _finish(
     worst = int(np.nanargmax(z))
     if z[worst] > MISFIT:
         notes.append(
-            f"equilibrium at {levels[worst]} leaves {z[worst]:.3g} times the noise: the building "
+            f"equilibrium at {levels[worst]} leaves {plain(z[worst])} times the noise: the "
+            f"building "
             "is not linear there, or its masses are not as given, or the displacements are not "
             "what the accelerations say. The values are those of the linear building that comes "
             "nearest, and the intervals hold for it alone"

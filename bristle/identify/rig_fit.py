@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..quantity import plain
 from .assigned import at_site
 from .fit import Fit
 from .line import DAMPING, at_bound
@@ -105,16 +106,16 @@ def _line_text(found: Fit, site: Site) -> str:
     already = already if np.isfinite(already) else 0.0
     texts = []
     if "k" in found.std:
-        texts.append(f"k = {found.model.value('k'):.5g} +- {1.96 * found.std['k']:.2g} N/m")
+        k, error = plain(found.model.value("k"), 5), plain(1.96 * found.std["k"], 2)
+        texts.append(f"k = {k} +- {error} N/m")
     if DAMPING in found.std and not at_bound(found.model):
-        whole = already + found.model.value(DAMPING)
-        texts.append(
-            f"c = {whole:.4g} +- {1.96 * found.std[DAMPING]:.2g} N s/m, {already:.4g} of the file"
-        )
+        whole = plain(already + found.model.value(DAMPING), 4)
+        error = plain(1.96 * found.std[DAMPING], 2)
+        texts.append(f"c = {whole} +- {error} N s/m, {plain(already, 4)} of the file")
     text = ", ".join(texts) + " (fitted along, not in model.toml)."
     if at_bound(found.model):
         text += (
-            f" The data push its damping below zero, where it is held ({already:.4g} N s/m of the "
+            f" The data push its damping below zero, where it is held ({plain(already, 4)} N s/m of the "
             "file are taken away): something else feeds in what this damping would have to, such "
             "as an effect that is missing or a velocity that is late."
         )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from ..compare.names import name_of
 from ..draw.style import Page, look
+from ..quantity import plain
 from .panels import (
     draw_error,
     draw_history,
@@ -97,7 +98,7 @@ def headline(comparison: Comparison) -> str:
         if comparison.sites and not any(one.fails for one in comparison.sites):
             return "The model is right within its noise at every site"
         return f"The model's {what} is right within its noise (z = {z:.2f})"
-    times = f"{z:.2g}" if z < 100.0 else f"{z:.0f}"
+    times = plain(z, 2 if z < 100.0 else 3)
     text = f"The model's {what} is wrong by {times} times what noise explains"
     if comparison.first:
         along = name_of(comparison.first.coordinate, comparison.site)

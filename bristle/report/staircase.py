@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import log10
 from typing import TYPE_CHECKING, Any
 
-from ..draw.style import short_z
+from ..quantity import plain, quantity, short_z
 
 if TYPE_CHECKING:
     from rich.text import Text
@@ -63,8 +63,11 @@ class Staircase:
         lines = [[(f"{'':{wide}}  {title}", "dim")]]
         for name, one in zip(names, self.history_steps, strict=True):
             lines.append([(f"{name[:wide]:{wide}}  ", "bold"), *self._line(one, top, mark)])
-        lines.append([(f"{'  noise floor':{wide}}  ", "dim"), (f"| {self.floor:.3g}", "green")])
+        lines.append([(f"{'  noise floor':{wide}}  ", "dim"), (f"| {plain(self.floor)}", "green")])
         return lines
+
+    def _size(self) -> float:
+        return max((one.rms for one in self.history_steps if one.rms is not None), default=0.0)
 
     def _line(self, one: HistoryStep, top: float, mark: str) -> list[tuple[str, str]]:
         if one.z is None:
@@ -73,7 +76,7 @@ class Staircase:
         share = log10(max(one.z / self.floor, 1.0)) / log10(top / self.floor)
         bar = mark * max(1, round(WIDTH * share))
         colour = "green" if done else "dark_orange"
-        about = [] if one.rms is None else [f"{one.rms:.3g} {self.unit} RMS"]
+        about = [] if one.rms is None else [f"{quantity(one.rms, self.unit, 3, self._size())} RMS"]
         about += [] if one.z_train is None else [f"training z = {short_z(one.z_train)}"]
         tail = f"   {', '.join(about)}" if about else ""
         return [(bar, colour), (f" {short_z(one.z)}", f"bold {colour}"), (tail, "dim")]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import platform
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..compare.names import site_name
 from ..diagnose.verdict_text import HEADINGS, about, sentences, separating
-from ..draw.style import percent, short_z
+from ..draw.style import percent
 from ..errors import BristleError
 from ..findings import command
+from ..quantity import quantity, short_z
 from . import html
 from .reproduce import commands
 from .residuals import headline
@@ -106,8 +107,6 @@ def gather(study: Study) -> Content:
 
 def _with_error(step: HistoryStep, against: RigComparer, study: Study) -> HistoryStep:
     """Return a step with its z where the history does not tell it: an edit by hand."""
-    from dataclasses import replace
-
     import numpy as np
 
     from ..data.model import read_model
@@ -198,7 +197,7 @@ def _tiles(content: Content) -> str:
             f"error / noise (z) on held-out runs; 95 %: {low:.2f} to {high:.2f}",
         ),
         (
-            f"{now.total.rms:.2g} {now.unit}",
+            quantity(now.total.rms, now.unit, 2, now.total.signal),
             f"RMS error at all frequencies, {percent(now.total.share)} of the {now.quantity}'s RMS",
         ),
     ]
@@ -275,12 +274,9 @@ def _sites(content: Content) -> list[str]:
 
 def _history(content: Content) -> str:
     with_z = [one for one in content.history_steps if one.z is not None]
-    header = ["step", "what", "z held-out", "z training", "error [N]", "why"]
+    header = ["step", "what", "z held-out", "z training", "why"]
     rows = [
-        [
-            str(step.number), step.what, _or_dash(one.z), _or_dash(one.z_train),
-            "-" if one.rms is None else f"{one.rms:.3g}", step.why,
-        ]
+        [str(step.number), step.what, _or_dash(one.z), _or_dash(one.z_train), step.why]
         for step, one in zip(content.steps, content.history_steps, strict=True)
     ]  # fmt: skip
     picture = ""
@@ -289,16 +285,15 @@ def _history(content: Content) -> str:
         from .study_pictures import staircase_page
 
         fall = " → ".join(_or_dash(one.z) for one in with_z)
-        cut = content.study.settings.cut_off
-        low = f", below {cut:g} Hz" if cut else ""
+        # Their forces are low-passed, and those of the rest of the page are not: z tells it all.
         picture = html.figure(
-            png(staircase_page(with_z)),
+            png(staircase_page([replace(one, rms=None) for one in with_z])),
             f"The staircase of the history: z on held-out runs {fall}",
             "The error of each model of the history, on runs that no fit has seen (blue) and on "
-            "those that it was fitted to (grey), over what noise explains; forces are RMS "
-            f"errors{low}. A model at the green floor cannot be told from the truth by these data.",
+            "those that it was fitted to (grey), over what noise explains. A model at the "
+            "green floor cannot be told from the truth by these data.",
         )  # fmt: skip
-    return html.section("How the error fell", picture, html.table(header, rows, numbers=(2, 3, 4)))
+    return html.section("How the error fell", picture, html.table(header, rows, numbers=(2, 3)))
 
 
 def _before_after(content: Content) -> str:

@@ -23,6 +23,7 @@ from ..draw.style import (
     look,
     short_z,
 )
+from ..quantity import quantity
 from .panels import (
     draw_loop,
     draw_map,
@@ -104,7 +105,7 @@ def _step_marks(axes: Axes, i: int, one: HistoryStep, before: float | None, unit
     """Write z and error over a step, and at its riser by how much the error fell."""
     assert one.z is not None
     z = short_z(one.z)
-    rms = "" if one.rms is None else f"  {one.rms:.2g} {unit}"
+    rms = "" if one.rms is None else f"  {quantity(one.rms, unit, 2)}"
     label(axes, f"z = {z}{rms}", i, one.z, INK, xytext=(0, 7), ha="center", va="bottom")
     if before is None or before <= 0.0:
         return

@@ -12,6 +12,7 @@ from ..data.channels import channel_unit, is_channel
 from ..diagnose.verdict_text import about, untestable
 from ..draw.style import MINUS, TIMES, percent
 from ..physics.effect import EFFECTS
+from ..quantity import plain, quantity
 from .tables import run_table
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def parameter_table(model: StudyModel) -> tuple[list[str], list[list[str]], list
 def with_interval(value: float, std: float | None) -> tuple[str, str]:
     """Return a value with the digits that its interval leaves, and the interval: "± 12"."""
     if std is None or not isfinite(std) or std <= 0.0:
-        return f"{value:.5g}", "-"
+        return plain(value, 5), "-"
     half = 1.96 * std
     size = max(abs(value), half)
     power = 3 * floor(log10(size) / 3.0) if not 1e-3 <= size < 1e5 else 0
@@ -95,8 +96,8 @@ def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str]
         role = ("held out" if "last" in run.name else "train") if single else roles.get(file, "")
         rows.append(
             [
-                run.name, "held out" if role == "holdout" else role, f"{run.duration:.4g}",
-                f"{run.sampling.rate:.5g}", str(len(run.time)), ", ".join(run.channels),
+                run.name, "held out" if role == "holdout" else role, plain(run.duration, 4),
+                plain(run.sampling.rate, 5), str(len(run.time)), ", ".join(run.channels),
             ]
         )  # fmt: skip
     return header, rows
@@ -165,18 +166,14 @@ def untestable_rows(verdict: Mapping[str, Any] | None) -> list[list[str]]:
     return rows
 
 
-_LAB = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
-
-
 def in_lab_unit(value: float, unit: str) -> str:
-    """Return a quantity in SI as an engineer reads it: lengths in mm."""
-    factor, shown = _LAB.get(unit, (1.0, unit))
-    return f"{factor * value:.3g} {shown}"
+    """Return a quantity in SI as an engineer reads it: lengths in mm, large forces in kN."""
+    return quantity(value, unit)
 
 
 def number(value: Any) -> str:
     """Return a number of a JSON file as text, "-" where it is none."""
-    return f"{value:.3g}" if isinstance(value, int | float) else "-"
+    return plain(value) if isinstance(value, int | float) else "-"
 
 
 def share(value: Any) -> str:

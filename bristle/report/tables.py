@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from ..compare.names import name_of, site_name
 from ..compare.sentences import FAINT, begin
-from ..draw.style import percent, short_z
+from ..draw.style import percent
+from ..quantity import plain, scale, short_z
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
@@ -29,41 +30,47 @@ def comparison_tables(comparison: Comparison) -> list[Table]:
 
 def site_table(comparison: Comparison) -> Table:
     """Return the error at each site of a building, the worst first."""
-    header = ["site", "z", "95 %", "error [N]", "of RMS", "noise [N]", "depends on"]
-    return "Error at every site, each over its own noise (z)", header, [
-        _site(one) for one in comparison.sites
+    known = [one.total.signal for one in comparison.sites if one.identifiable]
+    factor, unit = scale("N", max(known, default=0.0))
+    header = ["site", "z", "95 %", f"error [{unit}]", "of RMS", f"noise [{unit}]", "depends on"]
+    return "Error at every site, each over its own noise (z); RMS at all frequencies", header, [
+        _site(one, factor) for one in comparison.sites
     ]  # fmt: skip
 
 
-def _site(one: SiteError) -> list[str]:
+def _site(one: SiteError, factor: float) -> list[str]:
     name = site_name(one.site).removeprefix("the ")
     if not one.identifiable:
         return [name, "-", "too few samples", "-", "-", "-", "-"]
     (low, high), total, pattern = one.z_interval, one.total, one.pattern
     worth = pattern is not None and pattern.share >= FAINT
     return [
-        name, short_z(one.z), f"{short_z(low)} - {short_z(high)}", f"{total.rms:.3g}",
-        percent(total.share), f"{total.noise:.3g}",
+        name, short_z(one.z), f"{short_z(low)} - {short_z(high)}", plain(factor * total.rms),
+        percent(total.share), plain(factor * total.noise),
         name_of(pattern.coordinate, one.site) if pattern is not None and worth else "-",
     ]  # fmt: skip
 
 
 def run_table(comparison: Comparison) -> Table:
     """Return the error on each run and over all, with the numerical error beside it."""
-    unit = comparison.unit
+    factor, unit = scale(comparison.unit, comparison.total.signal)
     header = ["run", "z", f"error [{unit}]", "of RMS", f"noise [{unit}]", "half step [z]"]
     runs = [*comparison.runs]
-    rows = [_run(one) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
-    title = "Error over the noise that a true model would show (z), and what half the step changes"
+    rows = [_run(one, factor) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
+    title = (
+        "Error over the noise that a true model would show (z), RMS at all frequencies, and what "
+        "half the step changes"
+    )
     if comparison.sites:
         title = f"{begin(site_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
     return title, header, rows
 
 
-def _run(run: RunError) -> list[str]:
-    numerical = f"{run.numerical_z:.2g}" if run.numerical_z == run.numerical_z else "not tried"
+def _run(run: RunError, factor: float) -> list[str]:
+    numerical = plain(run.numerical_z, 2) if run.numerical_z == run.numerical_z else "not tried"
     return [
-        run.name, short_z(run.z), f"{run.rms:.3g}", percent(run.share), f"{run.noise:.3g}",
+        run.name, short_z(run.z), plain(factor * run.rms), percent(run.share),
+        plain(factor * run.noise),
         numerical,
     ]  # fmt: skip
 
@@ -79,16 +86,17 @@ def _pattern(pattern: ResidualPattern, site: str) -> list[str]:
     name = name_of(pattern.coordinate, site)
     name += ", with the direction of motion" if pattern.turned else ""
     excess = percent(pattern.of_excess, 0) if pattern.of_excess == pattern.of_excess else "-"
-    chance = f"{pattern.p:.1g}" if pattern.p >= 0.001 else "< 0.001"
+    chance = plain(pattern.p, 1) if pattern.p >= 0.001 else "< 0.001"
     return [name, percent(pattern.share), excess, chance]
 
 
 def band_table(comparison: Comparison) -> Table:
     """Return the error in octaves against the noise in each."""
-    header = ["band [Hz]", "z", f"error [{comparison.unit}]", "of what exceeds noise", "coherence"]
+    factor, unit = scale(comparison.unit, comparison.total.signal)
+    header = ["band [Hz]", "z", f"error [{unit}]", "of what exceeds noise", "coherence"]
     rows = [
         [
-            f"{band.low:.3g} - {band.high:.3g}", short_z(band.z), f"{band.rms:.2g}",
+            f"{plain(band.low)} - {plain(band.high)}", short_z(band.z), plain(factor * band.rms, 2),
             percent(band.share, 0), f"{band.coherence:.2f}",
         ]
         for band in comparison.spectrum.bands

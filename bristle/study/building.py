@@ -13,6 +13,7 @@ from ..errors import StudyError
 from ..identify.building import StructureFit, equilibrium, identify_structure
 from ..identify.building_file import building_text
 from ..physics.building import Building, frequencies
+from ..quantity import plain
 from .history import Step
 from .rig import building_of
 from .study import Study
@@ -108,7 +109,7 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
     origin = (
         f"Identified from the response: {counted}.",
         f"Masses and start values: {model.building or 'the built-in building'}.",
-        "Frequencies [Hz]: " + ", ".join(f"{f:.4g}" for f in frequencies(fit.building)),
+        "Frequencies [Hz]: " + ", ".join(f"{plain(f, 4)}" for f in frequencies(fit.building)),
         "Comments give half of the 95 % interval.",
     )
     with study.writing():

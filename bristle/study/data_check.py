@@ -14,6 +14,7 @@ from ..data.checks.motion import check_force, check_motion, velocity_of_run
 from ..data.checks.runs import Excitation, check_runs
 from ..data.measurement import Measurement
 from ..data.relation import band
+from ..quantity import plain, scale
 from .study import Study
 
 _HEADINGS = {"error": "To mend", "warning": "To know", "note": "Noted"}
@@ -81,12 +82,13 @@ def _table(runs: tuple[Measurement, ...]) -> list[str]:
         high = max(float(run[channel].max()) for run in there)
         noise = float(np.median([run.noise.get(channel, 0.0) for run in there]))
         rms = float(np.median([np.std(run[channel]) for run in there]))
-        share = f"{100.0 * noise / rms:8.2g}" if rms > 0.0 else f"{'':>8}"
+        share = plain(100.0 * noise / rms, 2) if rms > 0.0 else ""
+        factor, unit = scale(there[0].units[channel], max(abs(low), abs(high)))
         colours = [facts.colour for run in there if (facts := run.noise_facts.get(channel))]
         colour = max(set(colours), key=colours.count) if colours else "given"
         lines.append(
-            f"{channel:28} {there[0].units[channel]:6} {low:11.4g} {high:11.4g} {noise:9.2g} "
-            f"{share} % {colour}"
+            f"{channel:28} {unit:6} {plain(factor * low, 4):>11} {plain(factor * high, 4):>11} "
+            f"{plain(factor * noise, 2):>9} {share:>8} % {colour}"
         )
     return lines
 
@@ -138,7 +140,7 @@ def _check_run(run: Measurement, level: str) -> list[Finding]:
         findings += check_force(run, velocity)
     filled = float(np.mean(~run.measured))
     if filled > 0.05:
-        text = f"{100 * filled:.2g} % of the samples were missing and are filled."
+        text = f"{plain(100 * filled, 2)} % of the samples were missing and are filled."
         findings.append(
             Finding("filled", "warning", text, "Record at a steady rate.", run.name, value=filled)
         )
@@ -146,7 +148,8 @@ def _check_run(run: Measurement, level: str) -> list[Finding]:
         top = band(velocity, run.step)
         if top > 0.2 / run.step:
             text = (
-                f"motion reaches {top / 1.5:.3g} Hz at {run.sampling.rate:.4g} samples per second: "
+                f"motion reaches {plain(top / 1.5)} Hz at {plain(run.sampling.rate, 4)} "
+                f"samples per second: "
                 "fewer than ten per period."
             )
             findings.append(

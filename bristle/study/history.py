@@ -14,7 +14,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..data.files import read_json, write_json, write_whole
+from .. import __version__
+from ..data.files import other_schema, read_json, write_json, write_whole
 from ..errors import StudyError
 
 _NUMBER = re.compile(r"\d{3,}")
@@ -61,6 +62,8 @@ class History:
         """Return one step; StudyError if its file is damaged."""
         path = self.path(number) / "step.json"
         data = read_json(path)
+        if data.get("schema", 1) != 1:
+            raise StudyError(f"{path}: {other_schema(data['schema'])}")
         try:
             return Step(
                 int(data["number"]),
@@ -73,6 +76,11 @@ class History:
             raise StudyError(
                 f"{path}: no step of a study: {error!r} is missing or wrong."
             ) from None
+
+    def made_by(self, number: int) -> str:
+        """Return the version of bristle that made a step, "" where it is not told."""
+        path = self.path(number) / "step.json"
+        return str(read_json(path).get("bristle", "")) if path.is_file() else ""
 
     def path(self, number: int) -> Path:
         """Return the folder of a step."""
@@ -89,7 +97,8 @@ class History:
         draft = Path(tempfile.mkdtemp(dir=self.folder, prefix=".draft-"))
         try:
             write_whole(draft / "model.toml", model)
-            write_json(draft / "step.json", {"schema": 1, **asdict(step)})
+            made = {"schema": 1, "bristle": __version__}
+            write_json(draft / "step.json", {**made, **asdict(step)})
             draft.chmod(0o755)
             draft.replace(self.path(step.number))
         except OSError as error:

@@ -18,6 +18,7 @@ from ..identify.rig import DAMPER, Rig, bench_rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
 from ..identify.table import LawError, error_table
 from ..physics.laws import DEFAULT, base_and_variant, law_names
+from ..quantity import plain
 from ..units import convert
 from .identified import Identified
 from .rig import rig_of
@@ -168,7 +169,7 @@ def _by_site(models: SiteModels) -> list[str]:
     if "" in problems:
         return []
     z = {n: robust_z(p, models[n].model) for n, p in problems.items() if p is not None}
-    text = ", ".join(f"{site} {z[site]:.3g}" for site in sorted(z, key=lambda site: -z[site]))
+    text = ", ".join(f"{site} {plain(z[site])}" for site in sorted(z, key=lambda site: -z[site]))
     return [f"z on held-out runs by site: {text}; the errors' z is the worst site's."]
 
 
@@ -271,8 +272,9 @@ def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float
     if same and same[0].train < 0.95 * after["rms_train"]:
         notes.append(
             f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
-            f"the force alone, as in the table, would leave {same[0].train:.4g} N in place of "
-            f"{after['rms_train']:.4g} N."
+            f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N in "
+            f"place of "
+            f"{plain(after['rms_train'], 4)} N."
         )
     return notes
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from filelock import FileLock, Timeout
 
+from .. import __version__
 from ..data.files import read_json, write_json, write_whole
 from ..data.measurement import Measurement, read_measurements
 from ..data.model import StudyModel, model_text, read_model
@@ -190,9 +191,20 @@ class Study:
         TrustError
             If the model has an effect whose code must not run yet.
         """
-        model = read_model(self.folder / "model.toml", to_show=to_show)
+        try:
+            model = read_model(self.folder / "model.toml", to_show=to_show)
+        except StudyError as error:
+            raise StudyError(f"{error}{self._other_version()}") from None
         self._seen = self._state()
         return model
+
+    def _other_version(self) -> str:
+        """Return that another version of bristle wrote the present model, "" where this one did."""
+        numbers = self.history.numbers()
+        made_by = self.history.made_by(numbers[-1]) if numbers else ""
+        if made_by in ("", __version__):
+            return ""
+        return f"\n  bristle {made_by} wrote this model, and this is bristle {__version__}."
 
     def steps(self) -> list[Step]:
         """Return the history, the first model included."""

@@ -136,7 +136,7 @@ def test_the_page_says_what_the_study_holds(page, folder):
     for run in Study(folder).settings.runs:
         assert run.file in text
     assert "the force declines through a run" in text  # what temperature would look like
-    assert "bristle add rig gas_spring" in text
+    assert "bristle add rig_again gas_spring" in text
     for z in ("4.30", "1.60", "1.041"):
         assert z in text
 

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...quantity import plain
 from ..channels import DRIVE
 from ..measurement import Measurement
 from ..noise import Noise, is_switched
@@ -51,7 +52,7 @@ def _still(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:
     if channel in DRIVE:
         return  # a constant voltage is a matter of excitation
     unit, value = run.units[channel], float(values[0])
-    what = "zero" if value == 0.0 else f"{value:.6g} {unit}"
+    what = "zero" if value == 0.0 else f"{plain(value, 6)} {unit}"
     level: Level = "warning" if channel in ("acceleration", "holding_force") else "error"
     yield Finding(
         "still", level, f"{channel} is {what} throughout.", _MOTIONLESS, run.name, channel
@@ -76,8 +77,10 @@ def _clipped(
     yield Finding(
         "clipping",
         "warning",
-        f"{channel} stays at exactly {level:.6g} {run.units[channel]} in {stretches} stretches, "
-        f"{100.0 * share:.2g} % of the samples: it is cut off by its instrument or amplifier.",
+        f"{channel} stays at exactly {plain(level, 6)} {run.units[channel]} in {stretches} "
+        f"stretches, "
+        f"{plain(100.0 * share, 2)} % of the samples: it is cut off by its instrument or "
+        f"amplifier.",
         "Repeat the run with a larger range, or leave it out: what is cut off is lost.",
         run.name,
         channel,
@@ -93,12 +96,13 @@ def _noise(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:
     share = std / rms if rms else 0.0
     unit = run.units[channel]
     if facts is None:
-        text = f"noise of {channel}: {std:.3g} {unit}, as given ({100 * share:.2g} % of its RMS)."
+        part = plain(100 * share, 2)
+        text = f"noise of {channel}: {plain(std)} {unit}, as given ({part} % of its RMS)."
         yield Finding("noise", "note", text, "", run.name, channel, share)
         return
-    text = f"noise of {channel}: {std:.3g} {unit}, {100 * share:.2g} % of its RMS"
+    text = f"noise of {channel}: {plain(std)} {unit}, {plain(100 * share, 2)} % of its RMS"
     if facts.quantum and facts.quantum > 2.0 * std:
-        text += f"; it is written in steps of {facts.quantum:.3g} {unit}"
+        text += f"; it is written in steps of {plain(facts.quantum)} {unit}"
     yield from _coloured(run, channel, text, facts, share)
 
 
@@ -130,8 +134,8 @@ def _drift(run: Measurement, x: Array, velocity: Array | None) -> Iterator[Findi
         yield Finding(
             "drift",
             "warning",
-            f"the middle of the displacement drifts by {1e3 * slope:.3g} mm over the run, of "
-            f"{1e3 * span:.3g} mm in all.",
+            f"the middle of the displacement drifts by {plain(1e3 * slope)} mm over the run, of "
+            f"{plain(1e3 * span)} mm in all.",
             "Let the instrument warm up, or say in notes that the motion itself is so.",
             run.name,
             "displacement",
@@ -141,7 +145,8 @@ def _drift(run: Measurement, x: Array, velocity: Array | None) -> Iterator[Findi
         yield Finding(
             "zero",
             "note",
-            f"displacement runs from {1e3 * float(x.min()):.4g} to {1e3 * float(x.max()):.4g} mm: "
+            f"displacement runs from {plain(1e3 * float(x.min()), 4)} to "
+            f"{plain(1e3 * float(x.max()), 4)} mm: "
             "its zero is not the middle of the motion.",
             "Effects of position are told from such data only up to that zero.",
             run.name,
@@ -160,8 +165,8 @@ def _force_offset(run: Measurement, force: Array, velocity: Array) -> Iterator[F
     yield Finding(
         "offset",
         "warning" if abs(offset) > 0.1 * rms else "note",
-        f"force at equal speeds to both sides has a mean of {offset:.4g} N "
-        f"({100 * offset / rms:.3g} % of its RMS): the zero of the load cell, a preload, or an "
+        f"force at equal speeds to both sides has a mean of {plain(offset, 4)} N "
+        f"({plain(100 * offset / rms)} % of its RMS): the zero of the load cell, a preload, or an "
         "asymmetric damper.",
         "Note the load cell's reading without a damper; asymmetry shows only beside it.",
         run.name,

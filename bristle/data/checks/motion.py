@@ -7,6 +7,7 @@ from math import log10
 
 import numpy as np
 
+from ...quantity import plain
 from ..derived import numerical_derivative
 from ..measurement import Measurement
 from ..relation import (
@@ -121,9 +122,10 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
         )
         return
     gain = (
-        f"{upper} is {found.gain:.4g} (+-{2 * found.gain_std:.1g}) times the derivative of {lower}"
+        f"{upper} is {plain(found.gain, 4)} (+-{plain(2 * found.gain_std, 1)}) times the "
+        f"derivative of {lower}"
     )
-    after = f"; what is left is {100 * found.residual:.2g} % of it"
+    after = f"; what is left is {plain(100 * found.residual, 2)} % of it"
     off = abs(found.gain - 1.0)
     if found.gain < 0.0 or off > 0.25:
         size = abs(found.gain)
@@ -151,7 +153,8 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
         yield Finding(
             "delay",
             "warning",
-            f"{upper} comes {1e3 * abs(found.delay):.3g} ms (+-{2e3 * found.delay_std:.1g}) {late} "
+            f"{upper} comes {plain(1e3 * abs(found.delay))} ms "
+            f"(+-{plain(2e3 * found.delay_std, 1)}) {late} "
             f"than {lower}.",
             "Filters of two instruments differ: use the same on both, or one of the channels.",
             value=abs(found.delay),

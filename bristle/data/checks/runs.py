@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...quantity import plain, quantity
 from ..channels import DRIVE
 from ..measurement import Measurement
 from ..noise import is_switched
@@ -130,14 +131,15 @@ def _too_short(runs: list[Excitation]) -> Iterator[Finding]:
         yield Finding(
             "short",
             "error",
-            f"all runs together hold {total:.2g} cycles of motion in {seconds:.3g} s: too few for "
+            f"all runs together hold {plain(total, 2)} cycles of motion in {plain(seconds)} s: "
+            f"too few for "
             "a model to be fitted and judged.",
             "Record ten cycles or more at several speeds.",
         )
         return
     for run in runs:
         if run.speed > 0.0 and run.cycles < 2.0:
-            text = f"holds {run.cycles:.2g} cycles of motion in {run.duration:.3g} s."
+            text = f"holds {plain(run.cycles, 2)} cycles of motion in {plain(run.duration)} s."
             yield Finding(
                 "short", "warning", text, "Record longer runs.", run.run, value=-run.cycles
             )
@@ -162,7 +164,7 @@ def _drive(runs: list[Excitation]) -> Iterator[Finding]:
         return
     seen = sorted({round(run.levels[0][0], 6) for run in constant})
     distinct = _distinct(seen)
-    levels = ", ".join(f"{one:.4g}" for one in distinct)
+    levels = ", ".join(f"{plain(one, 4)}" for one in distinct)
     if len(distinct) == 1:
         text = f"{name} is {levels} {unit} in all runs: "
         text += (
@@ -178,15 +180,15 @@ def _drive(runs: list[Excitation]) -> Iterator[Finding]:
 
 def _moving_drive(runs: list[Excitation], name: str, unit: str) -> Iterator[Finding]:
     low, high = min(run.range[0] for run in runs), max(run.range[1] for run in runs)
-    yield Finding(
-        "drive", "note", f"{name} moves between {low:.4g} and {high:.4g} {unit} within runs."
-    )
+    text = f"{name} moves between {plain(low, 4)} and {plain(high, 4)} {unit} within runs."
+    yield Finding("drive", "note", text)
     levels = _distinct(sorted(level for run in runs for level, _ in run.levels))
     if all(run.levels for run in runs) and len(levels) == 2:
         yield Finding(
             "drive levels",
             "warning",
-            f"{name} has two levels, {levels[0]:.4g} and {levels[1]:.4g} {unit}: saturation cannot "
+            f"{name} has two levels, {plain(levels[0], 4)} and {plain(levels[1], 4)} {unit}: "
+            f"saturation cannot "
             "be told from a force that grows evenly with it.",
             "Use three levels or more.",
         )
@@ -217,7 +219,8 @@ def _beyond(train: list[Excitation], holdout: list[Excitation]) -> Iterator[Find
                 yield Finding(
                     "beyond",
                     "warning",
-                    f"{name} reaches {factor * value(run):.3g} {unit}, and {factor * known:.3g} in "
+                    f"{name} reaches {plain(factor * value(run))} {unit}, and "
+                    f"{plain(factor * known)} in "
                     "the runs for training: the model is judged where it was not fitted.",
                     "Exchange the roles of two runs in study.toml.",
                     run.run,
@@ -240,13 +243,15 @@ def _two_rigs(runs: list[Excitation]) -> Iterator[Finding]:
         if len(alike) < 3:  # this run counts
             continue
         usual = float(np.median([one for one in alike if one is not None]))
-        ratio = float(run.resisting or 0.0) / usual
+        own = float(run.resisting or 0.0)
+        ratio = own / usual
         if not 0.4 < ratio < 2.5:
             yield Finding(
                 "two rigs",
                 "warning",
-                f"force resists with {run.resisting:.4g} N on average, and with {usual:.4g} N in "
-                f"the middle one of {len(alike)} runs of like voltage and speed.",
+                f"force resists with {quantity(own, 'N', 4, usual)} on average, and with "
+                f"{quantity(usual, 'N', 4)} in the middle one of {len(alike)} runs of like voltage "
+                "and speed.",
                 "Is it of another damper, or in another unit? Then keep it in a study of its own.",
                 run.run,
                 "force",

@@ -1,0 +1,75 @@
+"""Numbers as people write them: no powers of ten, N or kN and mm by the size of the rig."""
+
+from __future__ import annotations
+
+from math import floor, isfinite, log10
+
+_LONGEST = 9  # digits after the point beyond which a number is told as a power of ten
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+# By SI unit: from which size on which unit is shown, and what its values are multiplied by.
+_SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "m": ((0.0, 1e3, "mm"), (10.0, 1.0, "m")),
+    "m/s": ((0.0, 1e3, "mm/s"), (10.0, 1.0, "m/s")),
+    "N": ((0.0, 1.0, "N"), (2e3, 1e-3, "kN"), (2e6, 1e-6, "MN")),
+    "J": ((0.0, 1.0, "J"), (2e3, 1e-3, "kJ"), (2e6, 1e-6, "MJ")),
+}
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """Return a number with some significant digits and without a power of ten.
+
+    220, not 2.2e+02. Digits before the point that are not significant are zeros. What would take
+    more than nine digits after the point is a power of ten as it is printed: 2.5 × 10⁻¹².
+    """
+    if not isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    power = floor(log10(abs(value)))
+    rounded = round(value, digits - 1 - power)
+    places = digits - 1 - floor(log10(abs(rounded))) if rounded else 0
+    if power < -_LONGEST or power > 15:
+        return f"{value / 10.0**power:.{digits - 1}f} × 10{str(power).translate(_RAISED)}"  # noqa: RUF001
+    text = f"{rounded:.{max(places, 0)}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def scale(unit: str, size: float) -> tuple[float, str]:
+    """Return the factor and the unit in which values in an SI unit are shown.
+
+    Parameters
+    ----------
+    unit : str
+        The unit that values are in.
+    size : float
+        How large they are on this rig, in that unit: one page has one unit.
+    """
+    found = (1.0, unit)
+    for least, factor, shown in _SCALES.get(unit, ()):
+        if abs(size) >= least:
+            found = factor, shown
+    return found
+
+
+def quantity(value: float, unit: str, digits: int = 3, size: float | None = None) -> str:
+    """Return a value with its unit: "220 N", "1.3 kN", "110 mm/s".
+
+    Parameters
+    ----------
+    value : float
+        In `unit`.
+    unit : str
+        An SI unit, or any other, which is then kept; "1" for none.
+    digits : int
+        Significant digits.
+    size : float, optional
+        How large such values are on this rig; else the value itself decides on the unit.
+    """
+    factor, shown = scale(unit, value if size is None else size)
+    return f"{plain(factor * value, digits)} {'' if shown == '1' else shown}".rstrip()
+
+
+def short_z(z: float) -> str:
+    """Return z as text, with the digits that tell it from 1."""
+    return f"{z:.2f}" if z < 10.0 else plain(z)

@@ -1,0 +1,78 @@
+"""Numbers as people write them, in units of the rig's size; no command prints a power of ten."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from study.made import bench_run, write
+
+from bristle.cli import main
+from bristle.quantity import plain, quantity, scale, short_z
+from bristle.study import create_study
+
+POWER = re.compile(r"\d[eE][+-]?\d")
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [
+        (220.0, 2, "220"), (2.2e5, 2, "220000"), (0.00023, 2, "0.00023"), (99.96, 3, "100"),
+        (99.96, 4, "99.96"), (0.0, 3, "0"), (-0.5, 3, "-0.5"), (1234567.0, 3, "1230000"),
+        (1e-12, 2, "1.0 \u00d7 10⁻¹²"), (float("nan"), 3, "-"), (9.996, 3, "10"), (0.1, 3, "0.1"),
+    ],
+)  # fmt: skip
+def test_a_number_has_its_digits_and_no_power_of_ten(value: float, digits: int, text: str) -> None:
+    assert plain(value, digits) == text
+
+
+def test_the_rigs_size_decides_on_the_unit() -> None:
+    assert quantity(220.0, "N", 2) == "220 N"
+    assert quantity(1340.0, "N", 2) == "1300 N"
+    assert quantity(220.0, "N", 2, 5e4) == "0.22 kN"
+    assert quantity(5.2e4, "N") == "52 kN"
+    assert quantity(0.11, "m/s", 2) == "110 mm/s"
+    assert quantity(0.3, "1") == "0.3"
+    assert scale("N", 3.0) == (1.0, "N")
+    assert scale("V", 3e9) == (1.0, "V")
+    assert short_z(1.234) == "1.23"
+    assert short_z(1234.5) == "1230"
+
+
+@pytest.fixture(scope="module", params=[1.0, 1e-2, 2e5], ids=["bench", "tiny", "huge"])
+def rig(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a study of a damper of some 10 N, of 0.1 N, and of 2 MN."""
+    folder = tmp_path_factory.mktemp("rig")
+    files = []
+    for k in (1, 2, 3):
+        columns = bench_run(k, 2.0)
+        columns["F [N]"] = request.param * columns["F [N]"]
+        files.append(write(folder / "lab" / f"run_{k}.csv", columns))
+    create_study(folder / "rig", files)
+    return folder / "rig"
+
+
+@pytest.mark.parametrize(
+    "line", ["study check", "compare", "identify --starts 1 --no-table", "report"]
+)
+def test_no_command_prints_a_power_of_ten(
+    line: str, rig: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*line.split(), str(rig)]) == 0
+    told = capsys.readouterr()
+    assert not POWER.search(told.out), told.out
+    if line == "report":
+        page = (rig / "reports" / "report.html").read_text(encoding="utf-8")
+        hashes = r"<td[^>]*>[0-9a-f]{16}</td>"
+        text = re.sub(rf"<style.*?</style>|{hashes}|<[^>]*>", " ", page, flags=re.DOTALL)
+        assert [text[m.start() - 30 : m.end() + 10] for m in POWER.finditer(text)] == []
+
+
+@pytest.mark.slow
+def test_nor_does_a_diagnosis(rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for line in ("identify", "diagnose", "add", "compare", "report"):
+        words = [line, str(rig), *(["stribeck"] if line == "add" else [])]
+        assert main(words) == 0
+        told = capsys.readouterr()
+        assert not POWER.search(told.out), told.out
