@@ -62,6 +62,13 @@ def test_the_template_builds_runs_and_conforms(
     assert report.ok, report.to_text()
 
 
+def test_the_page_shows_the_template_without_its_comments(file: Path) -> None:
+    lines = [line for line in file.read_text().splitlines() if not line.strip().startswith("#")]
+    page = (ROOT / "docs" / "own_controller.md").read_text(encoding="utf-8")
+    shown = page.partition("```py\n")[2].partition("```")[0]
+    assert shown.splitlines() == lines
+
+
 def test_it_samples_on_its_own_clock(file: Path) -> None:
     build(plan(str(file)), file.parent)
     settings = {"controller.fmu": "MyController.fmu", "run.stop": 0.5, "run.step": 0.0005}

@@ -8,7 +8,7 @@ from bristle.fmu.own_controller import OwnController
 
 
 class {cls}(OwnController):
-    """{title}: brakes the base on its way out, the more the faster, and lets it return freely."""
+    """{title}: brakes the base on its way out, and lets it return freely."""
 
     # Numbers that are kept from one sample to the next, 0 at first; () for none.
     memory = ("speed",)
