@@ -8,7 +8,7 @@ from bristle.fmu.own_controller import OwnController
 
 
 class {cls}(OwnController):
-    """{title}: brakes the base on its way out, and lets it return freely."""
+    """{title}: brakes the base the more, the faster it moves."""
 
     # Numbers that are kept from one sample to the next, 0 at first; () for none.
     memory = ("speed",)
@@ -29,9 +29,7 @@ class {cls}(OwnController):
     def command(self, measured, memory):
         share = 1.0 - exp(-2.0 * pi * self.corner * self.sample_period)
         speed = memory.speed + share * (abs(measured.base_velocity) - memory.speed)
-        outward = measured.base_displacement * measured.base_velocity > 0.0
-        voltage = self.gain * speed if outward else 0.0
-        return voltage, (speed,)
+        return self.gain * speed, (speed,)
 '''
 
 
