@@ -20,7 +20,10 @@ HELP = "build a component into an FMU"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle build`."""
     parser.add_argument(
-        "component", metavar="COMPONENT", help="a name of `bristle list components`"
+        "component",
+        metavar="COMPONENT",
+        help="a name of `bristle list components`, or the Python file of one of your own, which "
+        "is run",
     )
     parser.add_argument(
         "--from", dest="building", type=Path, metavar="FILE", help="building file, for a Structure"

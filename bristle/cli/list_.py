@@ -122,7 +122,7 @@ def _scenarios() -> Rows:
     for file in stock_scenarios():
         with file.open("rb") as stream:
             title = tomllib.load(stream).get("title", file.stem)
-        rows.append({"name": file.stem, "title": title})
+        rows.append({"name": file.stem, "title": title, "file": str(file)})
     return rows
 
 

@@ -58,7 +58,7 @@ def main(arguments: argparse.Namespace) -> int:
     overrides = parse_overrides(arguments.overrides)
     file = resolve_scenario(arguments.file)
     folder = Path(arguments.out or Path("results", run_name(file, overrides)))
-    output = Output(folder, arguments.format)
+    output = Output(folder, arguments.format, lambda line: print(line, file=sys.stderr, flush=True))
     code, trouble = 0, ""
     try:
         frame = execute(file, overrides, arguments.engine, output, True, end_process=True)

@@ -34,7 +34,7 @@ _PACKAGE = Path(__file__).resolve().parent.parent
 _BUNDLED = (
     "errors.py", "units.py", "physics/**/*.py", "control/**/*.py", "component/**/*.py",
     "fmu/slave.py", "fmu/model_description.py", "fmu/component.py", "fmu/source.py",
-    "fmu/damper.py", "fmu/controller.py",
+    "fmu/damper.py", "fmu/controller.py", "fmu/own_controller.py",
 )  # fmt: skip
 _NAMESPACE = UUID("7c0b8c8e-3d0f-5d0a-9b55-62726973746c")
 _OPTIONS = {
@@ -108,7 +108,7 @@ def plan(
     Parameters
     ----------
     component : str
-        A built-in component.
+        A built-in component, or the Python file of one of the user's own, which is run.
     name : str, optional
         The model's name; else the component's.
     building : path, optional
@@ -129,7 +129,7 @@ def plan(
     """
     path = catalogue.source(component)
     kind = catalogue.component_class(path)
-    chosen = component if name is None else name
+    chosen = kind.__name__ if name is None else name
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]*", chosen):
         raise BuildError(f'"{chosen}" is no model name: letters, digits and _ are right.')
     baked: dict[str, Any] = {"name": chosen}

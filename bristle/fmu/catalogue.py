@@ -38,13 +38,17 @@ def component_names() -> list[str]:
 
 
 def source(name: str) -> Path:
-    """Return the source file of a component.
+    """Return the source file of a component, or the file itself where a name is that of one.
 
     Raises
     ------
     BuildError
         If there is no component of that name; the text names the nearest.
     """
+    if name.endswith(".py"):
+        if not Path(name).is_file():
+            raise BuildError(f"{name}: there is no such file.")
+        return Path(name).absolute()
     try:
         return sources()[name]
     except KeyError:
@@ -98,7 +102,10 @@ def _load(path: Path) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
-    spec.loader.exec_module(module)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a component of the user's own raises
+        raise BuildError(f"{path}: {type(error).__name__}: {error}") from error
     return module
 
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..draw.style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
+from .summary import by_component, foreign, judged_by, reals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,7 +23,9 @@ if TYPE_CHECKING:
 
 _TOP = re.compile(r"(?P<component>.*)\.floor(?P<floor>\d+)_acceleration_absolute")
 _SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (1.0, "")}
+_MOTIONS = ("displacement", "velocity")
 _MOST_HISTORIES = 5
+_MOST_OTHERS = 12
 _HISTORY, _LOOP = 1.75, 3.55
 """Heights of the panels with their titles [in]."""
 _DPI = 160
@@ -34,8 +38,8 @@ def run_figure(frame: pd.DataFrame, path: str | Path, *, title: str = "") -> Non
     """Draw a run into an image file.
 
     Panels: absolute acceleration of the top floor, base drift, voltages that vary, force over
-    displacement and over velocity of the dampers. What the scenario does not have is left out; if
-    nothing of it is there, its first outputs are drawn over time.
+    displacement and over velocity of the dampers. Outputs of components that none of these shows
+    follow over time, foreign FMUs with all of them; what the scenario does not have is left out.
 
     Parameters
     ----------
@@ -58,11 +62,16 @@ def draw_run(frame: pd.DataFrame, title: str = "") -> Page:
     """Return the figure of a run, drawn and not yet written; see `run_figure`."""
     run = _Run(frame)
     histories, loops = run.histories(), run.loops()
+    others = run.others()
+    histories += others[:_MOST_OTHERS]
     if not histories and not loops:
         histories = [run.history(name, name) for name in run.reals()[:4]]
     room = _HISTORY * len(histories) + 0.3 * bool(histories) + _LOOP * bool(loops)
     with look():
-        page = Page(9.6, room + 0.1, title or run.title(), run.subtitle())
+        subtitle = run.subtitle()
+        if len(others) > _MOST_OTHERS:
+            subtitle += f"; {len(others) - _MOST_OTHERS} further panels left out, see the results"
+        page = Page(9.6, room + 0.1, title or run.title(), subtitle)
         if histories:
             below = _LOOP * bool(loops)
             grid = page.grid(len(histories), 1, top=0.35, bottom=below + 0.45, row_gap=0.45)
@@ -87,9 +96,10 @@ def _draw_histories(figure: Figure, grid: GridSpec, histories: list[Draw]) -> No
 
 @dataclass(frozen=True)
 class _Run:
-    """What can be drawn of a frame of results."""
+    """What can be drawn of a frame of results; `shown` are the outputs that panels have so far."""
 
     frame: pd.DataFrame
+    shown: set[str] = field(default_factory=set)
 
     @property
     def made(self) -> dict[str, Any]:
@@ -111,7 +121,7 @@ class _Run:
         return "; ".join(parts)
 
     def reals(self) -> list[str]:
-        return [str(name) for name in self.frame if self.frame[name].dtype.kind == "f"]
+        return reals(self.frame)
 
     def histories(self) -> list[Draw]:
         """Return accelerations and drifts of every structure, and voltages that vary."""
@@ -119,27 +129,28 @@ class _Run:
         for name in self.reals():
             if match := _TOP.fullmatch(name):
                 tops[match["component"]] = max(int(match["floor"]), tops.get(match["component"], 0))
-        many, draws = len(tops) > 1, []
+        many, made = len(tops) > 1, []
         for component, floor in tops.items():
             of = f", {component}" if many else ""
             name = f"{component}.floor{floor}_acceleration_absolute"
             ground = self.wires().get(f"{component}.ground_acceleration", "")
             what = f"Absolute acceleration of floor {floor}{of}"
-            draws.append(self.history(name, what, ground=ground))
+            made.append(partial(self.history, name, what, ground=ground))
             base = f"{component}.base_displacement"
             drift = base if base in self.frame else f"{component}.drift1"
             what = "Base drift" if drift == base else "Drift of the first storey"
             if drift in self.frame:
-                draws.append(self.history(drift, what + of, stroke=drift == base and not many))
+                stroke = drift == base and not many
+                made.append(partial(self.history, drift, what + of, stroke=stroke))
         if not tops:
             moved = [name for name in self.reals() if name.endswith(".displacement")]
-            draws += [self.history(name, f"Displacement, {name[:-13]}") for name in moved]
-        draws += [self.history(name, f"Voltage, {name[:-8]}") for name in self._varying()]
-        return draws[:_MOST_HISTORIES]
+            made += [partial(self.history, name, f"Displacement, {name[:-13]}") for name in moved]
+        made += [partial(self.history, name, f"Voltage, {name[:-8]}") for name in self._varying()]
+        return [make() for make in made[:_MOST_HISTORIES]]
 
     def _varying(self) -> list[str]:
         names = [name for name in self.reals() if name.endswith(".voltage")]
-        return [name for name in names if np.ptp(self.frame[name].to_numpy()) > 0.0]
+        return [name for name in names if self._moves(name)]
 
     def wires(self) -> dict[str, str]:
         """Return the connections of the scenario, input to output."""
@@ -148,6 +159,7 @@ class _Run:
 
     def history(self, name: str, title: str, *, stroke: bool = False, ground: str = "") -> Draw:
         """Return what draws one output over time, its peak marked, over that of the ground."""
+        self.shown.update((name, ground))
 
         def draw(axes: Axes) -> None:
             time = self.frame.index.to_numpy()
@@ -161,7 +173,9 @@ class _Run:
             axes.margins(x=0.0, y=0.2)
             if len(time) > 1:
                 axes.set_xlim(time[0], time[-1])
-            words = f" {unit} at {{time:.4g}} s" + (self._of_stroke() if stroke else "")
+            words = f"{' ' if unit else ''}{unit} at {{time:.4g}} s" + (
+                self._of_stroke() if stroke else ""
+            )
             _mark_peak(axes, time, values, words)
 
         return draw
@@ -172,18 +186,59 @@ class _Run:
             return ""
         return f", {np.nanmax(self.frame[ratios[0]].to_numpy()):.0%} of the damper's stroke"
 
+    def others(self) -> list[Draw]:
+        """Return what is drawn of the components that no other panel shows, by their units."""
+        strange, draws, judged = foreign(self.frame), [], set(judged_by(self.frame))
+        for component, names in by_component(self.reals()).items():
+            if component in strange:
+                names = [name for name in names if name not in self.shown]
+            elif self.shown & set(names):
+                continue
+            else:  # what never changes says nothing, but of a run that has nothing else
+                names = [name for name in names if name in judged and self._moves(name)]
+            units: dict[str, list[str]] = {}
+            for name in names:
+                units.setdefault(self._shown(name)[1], []).append(name)
+            for unit, alike in units.items():
+                groups = [alike[i : i + len(COLOURS)] for i in range(0, len(alike), len(COLOURS))]
+                draws += [self._together(component, group, unit) for group in groups]
+        return draws
+
+    def _moves(self, name: str) -> bool:
+        return bool(np.ptp(self.frame[name].to_numpy()) > 0.0)
+
+    def _together(self, component: str, names: list[str], unit: str) -> Draw:
+        """Return what draws outputs of one unit over time; a single one with its peak."""
+        if len(names) == 1:
+            return self.history(names[0], names[0])
+
+        def draw(axes: Axes) -> None:
+            axes.axhline(0.0, color=PALE, linewidth=0.8, zorder=1)
+            for name, colour in zip(names, COLOURS, strict=False):
+                values, _ = self._shown(name)
+                short = name.partition(".")[2]
+                axes.plot(self.frame.index, values, color=colour, linewidth=0.9, label=short)
+            axes.set_title(component + _bracketed(unit))
+            axes.margins(x=0.0, y=0.12)
+            axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(names),
+                        labelcolor="linecolor", fontsize=8, borderaxespad=0.2)  # fmt: skip
+
+        return draw
+
     def loops(self) -> list[Draw]:
         """Return force over displacement and force over velocity of all dampers."""
         wires = self.wires()
         dampers = [name[:-6] for name in self.reals() if name.endswith(".force")]
         draws = []
-        for motion in ("displacement", "velocity"):
+        for motion in _MOTIONS:
             pairs = [
                 (damper, source)
                 for damper in dampers
                 if (source := wires.get(f"{damper}.{motion}", "")) in self.frame
             ]
             if pairs:
+                self.shown.update(f"{damper}.force" for damper, _ in pairs)
+                self.shown.update(source for _, source in pairs)
                 draws.append(self._loop(motion, pairs))
         return draws
 

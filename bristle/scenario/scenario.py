@@ -80,7 +80,8 @@ class Scenario:
 
     `title` is the file's unless overrides changed what runs (see `naming.changed_title`).
 
-    `algorithm` is "gauss-seidel" (components step in their order) or "jacobi".
+    `algorithm` is "gauss-seidel" (components step in their order) or "jacobi". `findings` are the
+    warnings and notes of its check.
     """
 
     file: Path
@@ -90,6 +91,7 @@ class Scenario:
     algorithm: str
     components: tuple[Component, ...]
     connections: tuple[Connection, ...]
+    findings: tuple[Finding, ...] = ()
 
     @property
     def steps(self) -> int:
@@ -197,7 +199,9 @@ def _read(
     if ("title",) not in document.overridden and needs_title(document.changed):
         title = changed_title(components, document.changed)
     connections = tuple(Connection(w.target, w.input, w.source, w.output) for w in wires)
-    scenario = Scenario(path, title, run.stop, run.step, run.algorithm, components, connections)
+    scenario = Scenario(
+        path, title, run.stop, run.step, run.algorithm, components, connections, tuple(found)
+    )
     return scenario, found
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -22,17 +22,26 @@ _OURS = ("results.csv", "results.parquet", "figure.png", "log")
 class Output:
     """Where a run's files go; None as the folder means that nothing is written.
 
+    `show` gets the warnings and notes of the scenario's check before the run; by default they are
+    in the log alone.
+
     Raises
     ------
     RunError
         The folder cannot be made or written to, exit code 2.
     """
 
-    def __init__(self, folder: Path | None, format: str = "csv") -> None:
+    def __init__(
+        self,
+        folder: Path | None,
+        format: str = "csv",
+        show: Callable[[str], None] = lambda line: None,
+    ) -> None:
         if format not in FORMATS:
             raise not_usable(f'format "{format}" is not known; there are: {", ".join(FORMATS)}.')
         self.folder = folder
         self.format = format
+        self.show = show
         self._made: list[Path] = []
         self._writer: CsvWriter | None = None
         self._log: TextIO | None = None

@@ -17,6 +17,7 @@ from bristle.errors import RunError, ScenarioError
 from bristle.paper import stiction
 from bristle.paper.figures import make, paper_figures
 from bristle.report.figures import draw_run, run_figure
+from bristle.report.summary import summarise
 
 # The sine loops at 2 Hz, 0.1 m/s: largest force [N] and energy per cycle [J] of an independent
 # integration at tight tolerance.
@@ -99,6 +100,47 @@ def test_a_fixed_building_shows_the_drift_of_its_first_storey() -> None:
 def test_outputs_that_are_not_known_are_drawn_over_time() -> None:
     frame = a_run({"plant.pressure": SINE, "plant.flow": -SINE}, {"plant.pressure": "Pa"})
     assert titles(frame) == ["plant.pressure [Pa]", "plant.flow"]
+
+
+FOREIGN = """
+[components.house]
+fmu = "Structure"
+[components.sensors]
+fmu = "Sensors"
+[components.held]
+fmu = "SignalSource"
+[components.pump]
+fmu = "/others/Pump.fmu"
+"""
+
+
+def test_every_component_is_drawn_and_a_foreign_one_with_all_its_outputs() -> None:
+    own = {
+        "sensors.damper_force_measured": SINE,
+        "held.value": np.ones_like(SINE),
+        "pump.force": SINE,
+        "pump.pressure": SINE,
+        "pump.inlet": -SINE,
+        "pump.idle": np.zeros_like(SINE),
+    }
+    units = {"pump.force": "N", "pump.pressure": "Pa", "pump.inlet": "Pa"}
+    frame = a_run(BUILDING | own, UNITS | units, scenario=FOREIGN)
+    assert titles(frame)[-4:] == [
+        "sensors.damper_force_measured", "pump.force [N]", "pump [Pa]", "pump.idle",
+    ]  # fmt: skip
+    labels = [text.get_text() for axes in draw_run(frame).figure.axes if axes.get_legend()
+              for text in axes.get_legend().get_texts()]  # fmt: skip
+    assert labels == ["pressure", "inlet"]
+    shown = [row.name for row in summarise(frame)]
+    assert set(own) <= set(shown), "in the table too"
+    assert "house.floor1_displacement" not in shown
+
+
+def test_panels_beyond_reason_are_left_out_and_said_so() -> None:
+    many = {f"pump.p{i}": SINE for i in range(20)}
+    page = draw_run(a_run(many, {f"pump.p{i}": f"m{i}" for i in range(20)}, scenario=FOREIGN))
+    assert len(page.figure.axes) == 12
+    assert "8 further panels left out" in " ".join(text.get_text() for text in page.figure.texts)
 
 
 @pytest.mark.parametrize(

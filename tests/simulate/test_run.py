@@ -107,6 +107,36 @@ def test_a_run_with_another_value_has_a_title_and_a_folder_of_its_own(
     assert frame.attrs["made"]["title"] in done.stdout.replace("\n", " ")
 
 
+NOTED = """
+schema = 1
+[run]
+stop = 0.1
+step = 0.01
+[components.signal]
+fmu = "SignalSource"
+[components.motion]
+fmu = "PrescribedMotion"
+[components.damper]
+fmu = "LuGreDamper"
+[connections]
+"damper.displacement" = "motion.displacement"
+"damper.velocity" = "motion.velocity"
+"damper.voltage" = "signal.value"
+"""
+
+
+def test_notes_on_units_that_check_shows_are_shown_and_logged(tmp_path: Path) -> None:
+    (tmp_path / "bench.toml").write_text(NOTED)
+    done = command("bench.toml", "--no-figure", cwd=tmp_path)
+    note = (
+        'note: bench.toml:15: "signal.value" has no unit; "damper.voltage" takes its values as [V].'
+    )
+    assert (done.returncode, done.stderr) == (0, f"{note}\n")
+    assert note in (tmp_path / "results" / "bench" / "log").read_text().splitlines()
+    for name in ("signal.value", "motion.displacement", "damper.force"):
+        assert name in done.stdout
+
+
 def test_json_gives_peaks_and_rms_with_units(fine: Path, tmp_path: Path) -> None:
     done = command(fine, "--json", "--no-figure", "--set", "sum.gain=3", cwd=tmp_path)
     answer = json.loads(done.stdout)

@@ -1,0 +1,192 @@
+"""A controller of one's own: its file, its FMU, a run; and copies of stock scenarios."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from math import exp, pi
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bristle.cli import main
+from bristle.conformance import conform
+from bristle.errors import ScenarioError
+from bristle.fmu import catalogue
+from bristle.fmu.build import build, plan
+from bristle.scenario.scenario import load_scenario, stock_scenarios
+from bristle.scenario.stock import copy_scenario
+from bristle.scenario.text import scenario_text
+from bristle.simulate.run import IncompleteRunError, run
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def file(here: Path, capsys: pytest.CaptureFixture[str]) -> Path:
+    """Return the file of a new controller."""
+    assert main(["components", "new", "my_controller"]) == 0
+    assert "bristle build my_controller.py" in capsys.readouterr().out
+    return here / "my_controller.py"
+
+
+def test_the_template_builds_runs_and_conforms(
+    file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["build", "my_controller.py"]) == 0
+    assert "MyController.fmu: built" in capsys.readouterr().out
+    frame = run(
+        "el_centro_0p6g_clipped",
+        {"controller.fmu": "MyController.fmu", "controller.gain": 40.0, "controller.v_max": 5.0,
+         "run.stop": 4.0, "run.step": 0.002},
+    )  # fmt: skip
+    # The law again, by hand: a sample every 2 ms, at each row.
+    speed, wanted = 0.0, []
+    for v in frame["structure.base_velocity"]:
+        speed += (1.0 - exp(-2.0 * pi * 10.0 * 0.002)) * (abs(v) - speed)
+        wanted.append(40.0 * speed)
+    assert frame["controller.command_raw"].to_numpy() == pytest.approx(wanted, abs=1e-9)
+    voltage = frame["controller.voltage"].to_numpy()
+    assert voltage == pytest.approx(np.clip(wanted, 0.0, 5.0), abs=1e-9)
+    assert voltage.max() == 5.0, "the limit was reached"
+    report = conform("MyController.fmu")
+    assert report.ok, report.to_text()
+
+
+def test_the_page_shows_the_template_without_its_comments(file: Path) -> None:
+    lines = [line for line in file.read_text().splitlines() if not line.strip().startswith("#")]
+    page = (ROOT / "docs" / "own_controller.md").read_text(encoding="utf-8")
+    shown = page.partition("```py\n")[2].partition("```")[0]
+    assert shown.splitlines() == lines
+
+
+def test_it_samples_on_its_own_clock(file: Path) -> None:
+    build(plan(str(file)), file.parent)
+    settings = {"controller.fmu": "MyController.fmu", "run.stop": 0.5, "run.step": 0.0005}
+    frame = run("el_centro_0p6g_clipped", settings)
+    raw = frame["controller.command_raw"].to_numpy()
+    for k in (1, 2, 3):
+        assert np.array_equal(raw[k::4][: len(raw[::4]) - 1], raw[::4][:-1]), "held over 2 ms"
+
+
+@pytest.mark.parametrize(
+    ("new", "words"),
+    [
+        ("return speed, ()", "0 numbers to remember; memory names 1"),
+        ("return 1.0 / 0.0, (speed,)", "division by zero"),
+        ("return float('nan'), (speed,)", "not finite"),
+    ],
+)
+def test_a_law_that_goes_wrong_stops_the_run_with_its_words(
+    file: Path, new: str, words: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    old, text = "return self.gain * speed, (speed,)", file.read_text()
+    assert old in text
+    late = new.replace("return", "if measured.base_velocity > 0.01:\n            return")
+    file.write_text(text.replace(old, f"{late}\n        {old}"))
+    build(plan(str(file)), file.parent)
+    with pytest.raises(IncompleteRunError, match="controller in the step from"):
+        run("el_centro_0p6g_clipped", {"controller.fmu": "MyController.fmu", "run.stop": 4.0})
+    assert words in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("MyController", "small letters"),
+        ("my controller", "small letters"),
+        ("_mine", "small letters"),
+        ("skyhook", "is a built-in component"),
+        ("my_controller", "is there already"),
+    ],
+)
+def test_a_name_that_cannot_be_is_refused(
+    file: Path, name: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = file.read_text()
+    assert main(["components", "new", name]) == 2
+    assert words in capsys.readouterr().err
+    assert [path.name for path in file.parent.glob("*.py")] == [file.name]
+    assert file.read_text() == before
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("import nothing_like_it\n", "No module named 'nothing_like_it'"),
+        ("def broken(:\n", "SyntaxError"),
+        ("x = 1\n", "0 component classes"),
+    ],
+)
+def test_a_file_that_is_no_component_is_one_message(
+    here: Path, text: str, words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (here / "bad.py").write_text(text)
+    assert main(["build", "bad.py"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("BuildError: ")
+    assert words in err
+    assert main(["build", "gone.py"]) == 2
+    assert "there is no such file" in capsys.readouterr().err
+
+
+def test_components_and_scenarios_are_listed_without_a_further_word(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for command in ("components", "scenarios"):
+        assert main(["list", command]) == 0
+        listed = capsys.readouterr().out
+        assert main([command]) == 0
+        assert capsys.readouterr().out == listed
+
+
+def test_list_scenarios_prints_paths(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["list", "scenarios", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)
+    assert [row["file"] for row in rows] == [str(file) for file in stock_scenarios()]
+    main(["list", "scenarios"])
+    assert str(stock_scenarios()[0]) in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("stock", stock_scenarios(), ids=lambda file: file.stem)
+def test_a_copy_of_a_stock_scenario_runs_the_same(here: Path, stock: Path) -> None:
+    file = copy_scenario(stock.stem)
+    assert file == Path(stock.name)
+    one, other = load_scenario(file.absolute()), load_scenario(stock)
+    assert scenario_text(one) == scenario_text(other)
+    assert "#:schema" not in file.read_text()
+
+
+def test_a_copy_overwrites_nothing_and_names_what_is_near(
+    here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["scenarios", "copy", "no_damper", "mine.toml"]) == 0
+    assert "bristle run mine.toml" in capsys.readouterr().out
+    (here / "mine.toml").write_text("mine")
+    assert main(["scenarios", "copy", "no_damper", "mine.toml"]) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert (here / "mine.toml").read_text() == "mine"
+    assert main(["scenarios", "copy", "no_dampr"]) == 2
+    assert 'Did you mean "no_damper"?' in capsys.readouterr().err
+    assert main(["scenarios", "copy"]) == 2
+    with pytest.raises(ScenarioError, match="cannot be written"):
+        copy_scenario("no_damper", here / "gone" / "mine.toml")
+
+
+@pytest.mark.parametrize(("option", "words"), [("--help", "--list"), ("--list", "LuGreDamper")])
+def test_build_fmus_helps_and_lists(option: str, words: str) -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "build_fmus.py"), option],
+        capture_output=True, text=True, timeout=120, check=True,
+    )  # fmt: skip
+    assert words in done.stdout
+    if option == "--list":
+        assert done.stdout.split() == catalogue.component_names()
