@@ -115,9 +115,10 @@ def _line_text(found: Fit, site: Site) -> str:
     text = ", ".join(texts) + " (fitted along, not in model.toml)."
     if at_bound(found.model):
         text += (
-            f" The data push its damping below zero, where it is held ({plain(already, 4)} N s/m of the "
-            "file are taken away): something else feeds in what this damping would have to, such "
-            "as an effect that is missing or a velocity that is late."
+            " The data push its damping below zero, where it is held "
+            f"({plain(already, 4)} N s/m of the file are taken away): something else feeds in what "
+            "this damping would have to, such as an effect that is missing or a velocity that is "
+            "late."
         )
     return text
 
