@@ -139,9 +139,9 @@ def render(content: Content) -> str:
         _reproduce(content),
     ]
     foot = (
-        f"bristle {html.escape(__version__)}. z is the error over the noise that a true model "
-        "would show, force and measured motion together, by a scale that a few large errors do not "
-        "carry: 1 is as good as these data can tell."
+        f"bristle {html.escape(__version__)}. Error / noise (z) is the error over the noise floor, "
+        "which a true model would show: the noise of force and measured motion together. A few "
+        "large errors do not carry it; z = 1 is as good as these data can tell."
     )
     return html.page(settings.title, [part for part in body if part], foot)
 

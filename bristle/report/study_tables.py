@@ -145,14 +145,14 @@ def ranking_table(
 
 
 def noise_floor(verdict: Mapping[str, Any] | None) -> str:
-    """Return the noise that the verdict rests on, in words; "" where it is not told."""
+    """Return the noise floor of a verdict as a sentence; "" where it is not told."""
     floor = (verdict or {}).get("noise_floor") or {}
     parts = [
         f"{name} {in_lab_unit(value, channel_unit(name) if is_channel(name) else '')}".strip()
         for name, value in floor.items()
         if isinstance(value, int | float)
     ]
-    return f"Noise that the verdict rests on: {', '.join(parts)}." if parts else ""
+    return f"Noise floor of the verdict: {', '.join(parts)}." if parts else ""
 
 
 def untestable_rows(verdict: Mapping[str, Any] | None) -> list[list[str]]:

@@ -151,7 +151,7 @@ def test_bare_building_diagnosed_from_start_to_end():
 def test_runs_of_two_buildings_contradict_each_other_at_the_site_that_differs():
     b = building(2, True, 6)
     other = lambda x, v: [400.0 * x[0], 0.0, 0.0]  # noqa: E731 a stiffer layer
-    runs = [measured(shake(b, 40 + i, friction, None if i % 2 else other), i) for i in range(4)]
+    runs = [measured(shake(b, 40 + i, None, None if i % 2 else other), i) for i in range(4)]
     found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b)
     assert found.findings["layer"].kind == "insufficient"
     assert found.kind == "insufficient"
