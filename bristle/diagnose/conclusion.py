@@ -34,7 +34,7 @@ class About:
     driven: bool = True
 
 
-def verdict_of(findings: Mapping[str, Finding], about: About) -> Diagnosis:
+def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     """Return one verdict from what the sites of a rig show.
 
     Parameters
