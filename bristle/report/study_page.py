@@ -170,9 +170,9 @@ def _where(content: Content) -> str:
     from .tables import pattern_table
 
     _, header, rows = pattern_table(now)
-    along = "the two coordinates that organise it most"
+    along = "the two coordinates that it depends on most"
     if now.second:
-        along = "the coordinate that organises it most, and what is left after that along the next"
+        along = "the coordinate that it depends on most, and what is left after that along the next"
     caption = (
         f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
         "interval, the blue band twice the expected noise. Below: its spectrum against that of "
