@@ -91,9 +91,9 @@ def _where(comparison: Comparison, finder: Finder) -> str:
         most = (
             "the error beyond chance"
             if first is None
-            else f"more than {_percent(first.share)} of it"
+            else f"more than {_percent(first.share)} of the error"
         )
-        return f"No coordinate organises {most}{f'; {loud}' if loud else ''}."
+        return f"No coordinate explains {most}{f'; {loud}' if loud else ''}."
     if comparison.right:
         text = _pattern_text(first, comparison.predictions[0])
         return (

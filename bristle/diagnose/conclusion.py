@@ -34,7 +34,7 @@ class About:
     driven: bool = True
 
 
-def verdict_of(findings: Mapping[str, Finding], about: About) -> Diagnosis:
+def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     """Return one verdict from what the sites of a rig show.
 
     Parameters
@@ -147,7 +147,7 @@ def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
             gain = float(finding.coordinate)
             text = (
                 f"The load cell shows {gain:.4g} times the force that equilibrium asks for "
-                f"(z {finding.z_before:.3g} before, {finding.z_after:.3g} with that set right)."
+                f"({Z} {finding.z_before:.3g} before, {finding.z_after:.3g} with that corrected)."
             )
             out.append(SensorFault("force", "gain", gain, float("nan"), text))
     return out

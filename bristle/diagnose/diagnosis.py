@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from ..data.measurement import Measurement
 from ..identify.model import Model
 from ..identify.rig import DAMPER
+from ..identify.structure import StructureProblem
 from ..physics.building import Building
 from ..physics.laws import DEFAULT
 from .bench import BenchRuns
-from .conclusion import verdict_of
+from .conclusion import conclude
 from .damper import look_at_damper
 from .detail import detailed
 from .equilibrium import BuildingRuns
@@ -88,12 +89,9 @@ def diagnose_rig(
     else:
         runs = BuildingRuns(train, holdout, present, building, say)
     findings: dict[str, Finding] = {}
-    for name, (own, other) in runs.lines().items():
+    for name, pair in runs.lines().items():
         say(f"{name}: effects of the structure")
-        found = look_at(name, own, other, runs.part(name))
-        assert found.before is not None
-        site = Opening(found.before, own, other, rule=SITE, scope=IN_BUILDING)
-        findings[name] = detailed(contradicted(found, site), site)
+        findings[name] = _line(name, pair, runs.part(name))
     runs.correct(findings)
     opened = runs.open_damper()
     if isinstance(opened, Insufficient):
@@ -103,8 +101,16 @@ def diagnose_rig(
     if opened is not None:
         found = look_at_damper(opened, say)
         excused = runs.excused(found, findings)
-        if excused is found:  # what an instrument explains contradicts nothing
-            excused = contradicted(found, opened)
         say("intervals")
-        findings[DAMPER] = detailed(excused, opened)
-    return verdict_of(findings, runs.about())
+        # What an instrument explains contradicts nothing.
+        settled = excused if excused is not found else contradicted(found, opened)
+        findings[DAMPER] = detailed(settled, opened)
+    return conclude(findings, runs.about())
+
+
+def _line(name: str, pair: tuple[StructureProblem, StructureProblem], present: Model) -> Finding:
+    """Return what a layer or storey shows, on its runs for training and held out."""
+    found = look_at(name, *pair, present)
+    assert found.before is not None
+    opened = Opening(found.before, *pair, rule=SITE, scope=IN_BUILDING)
+    return detailed(contradicted(found, opened), opened)

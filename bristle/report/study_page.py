@@ -9,24 +9,15 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..compare.names import site_name
-from ..diagnose.verdict_text import HEADINGS, about, sentences, separating
 from ..draw.style import percent
 from ..errors import BristleError
-from ..findings import command
 from ..quantity import quantity, short_z
 from . import html
 from .reproduce import commands
 from .residuals import headline
 from .staircase import HistoryStep, history_steps
-from .study_tables import (
-    data_table,
-    data_words,
-    noise_floor,
-    parameter_table,
-    ranking_table,
-    run_errors,
-    untestable_rows,
-)
+from .study_tables import data_table, data_words, parameter_table, run_errors
+from .study_verdict import untold_section, verdict_section
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
@@ -34,10 +25,6 @@ if TYPE_CHECKING:
     from ..data.model import StudyModel
     from ..study.history import Step
     from ..study.study import Study
-
-
-_TONES = {"none": "green", "effect": "blue", "ambiguous": "purple", "unknown": "red"}
-"""Colours of the kinds of a verdict."""
 
 
 @dataclass(frozen=True)
@@ -130,60 +117,22 @@ def render(content: Content) -> str:
         f"<h1>{html.escape(settings.title)}</h1>",
         html.paragraphs(f"A damper on a {rig}, held against its model: {what}.", kind="soft"),
         f'<div class="notes">{html.escape(settings.notes)}</div>' if settings.notes.strip() else "",
-        _verdict(content),
+        verdict_section(content.verdict, study.name),
         _tiles(content),
         _history(content),
         _before_after(content),
         _where(content),
         _parameters(content),
         _data(content),
-        _untold(content),
+        untold_section(content.verdict),
         _reproduce(content),
     ]
     foot = (
-        f"bristle {html.escape(__version__)}. z is the error over the noise that a true model "
-        "would show, force and measured motion together, by a scale that a few large errors do not "
-        "carry: 1 is as good as these data can tell."
+        f"bristle {html.escape(__version__)}. Error / noise (z) is the error over the noise floor, "
+        "which a true model would show: the noise of force and measured motion together. A few "
+        "large errors do not carry it; z = 1 is as good as these data can tell."
     )
     return html.page(settings.title, [part for part in body if part], foot)
-
-
-def _verdict(content: Content) -> str:
-    verdict = content.verdict
-    if verdict is None:
-        kind, heading, texts = "", "Not diagnosed", _undiagnosed(content.study.name)
-    else:
-        kind, texts = str(verdict["kind"]), sentences(verdict)
-        heading = HEADINGS[kind]
-        if kind in ("effect", "ambiguous"):
-            texts[1:1] = [about(str(name)) for name in verdict["effects"]]
-    inner = [
-        f'<div class="verdict" style="--tone: var(--{_TONES.get(kind, "soft")})">',
-        f'<div class="kind">{html.escape(heading)}</div>',
-        html.paragraphs(texts[0], kind="say"),
-        html.paragraphs(*texts[1:]),
-        "</div>",
-    ]
-    rows = ranking_table(verdict)
-    if rows:
-        header, cells, strong = rows
-        inner.append("<h3>The evidence</h3>")
-        inner.append(
-            html.paragraphs(
-                "Each effect was tried inside the model, everything refitted, and judged on runs "
-                "that no fit has seen.", kind="soft",
-            )
-        )  # fmt: skip
-        inner.append(html.table(header, cells, numbers=(1, 2), strong=strong))
-    inner.append(html.paragraphs(noise_floor(verdict), kind="soft"))
-    return "\n".join(part for part in inner if part)
-
-
-def _undiagnosed(name: str) -> list[str]:
-    return [
-        "No diagnosis has been made of the present model.",
-        f"{command('diagnose', name)} tells what it misses, and how sure that is.",
-    ]
 
 
 def _tiles(content: Content) -> str:
@@ -222,9 +171,9 @@ def _where(content: Content) -> str:
     from .tables import pattern_table
 
     _, header, rows = pattern_table(now)
-    along = "the two coordinates that organise it most"
+    along = "the two coordinates that it depends on most"
     if now.second:
-        along = "the coordinate that organises it most, and what is left after that along the next"
+        along = "the coordinate that it depends on most, and what is left after that along the next"
     caption = (
         f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
         "interval, the blue band twice the expected noise. Below: its spectrum against that of "
@@ -343,29 +292,6 @@ def _data(content: Content) -> str:
         html.table(*data_words(measured), numbers=(1, 2)),
         html.items(content.notes),
     )
-
-
-def _untold(content: Content) -> str:
-    hidden = untestable_rows(content.verdict)
-    parts = [
-        html.paragraphs(
-            "These effects could be there all the same: either the data do not excite them, or "
-            "refitting the model takes them up.", kind="soft",
-        ),
-        html.table(["effect", "what it does", "what it would look like"], hidden),
-    ] if hidden else []  # fmt: skip
-    experiment = separating(content.verdict or {})
-    if experiment:
-        parts.append("<h3>The experiment that would tell</h3>")
-        parts.append(html.paragraphs(experiment))
-    if not parts:
-        none = (
-            "No diagnosis has been made of this model, so nothing is known of what it could miss."
-        )
-        parts = [
-            html.paragraphs(none if content.verdict is None else "The diagnosis names nothing.")
-        ]
-    return html.section("What could not be tested", *parts)
 
 
 def _reproduce(content: Content) -> str:

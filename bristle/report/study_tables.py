@@ -8,10 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..data.channels import channel_unit, is_channel
-from ..diagnose.verdict_text import about, untestable
 from ..draw.style import MINUS, TIMES, percent
-from ..physics.effect import EFFECTS
 from ..quantity import plain, quantity
 from .tables import run_table
 
@@ -128,11 +125,12 @@ def run_errors(comparison: Comparison) -> tuple[list[str], list[list[str]]]:
 
 
 def ranking_table(
-    verdict: dict[str, Any] | None,
+    verdict: Mapping[str, Any] | None,
 ) -> tuple[list[str], list[list[str]], list[int]] | None:
     """Return header, rows and the rows of the effects that the verdict names; None without any."""
     ranking = (verdict or {}).get("ranking") or []
     named = set((verdict or {}).get("effects") or [])
+    several = len({entry.get("site") for entry in ranking}) > 1
     rows: list[list[str]] = []
     strong: list[int] = []
     for entry in ranking[:_RANKED]:
@@ -141,29 +139,9 @@ def ranking_table(
             strong.append(len(rows))
         z = entry.get("z_holdout")
         text = f"{z:.3f}" if isinstance(z, int | float) and z < 10.0 else number(z)
-        rows.append([effect, text, share(entry.get("gain"))])
+        at = f" ({entry['site']})" if several else ""
+        rows.append([effect + at, text, share(entry.get("gain"))])
     return (["with this effect", "z held-out", "lower by"], rows, strong) if rows else None
-
-
-def noise_floor(verdict: Mapping[str, Any] | None) -> str:
-    """Return the noise that the verdict rests on, in words; "" where it is not told."""
-    floor = (verdict or {}).get("noise_floor") or {}
-    parts = [
-        f"{name} {in_lab_unit(value, channel_unit(name) if is_channel(name) else '')}".strip()
-        for name, value in floor.items()
-        if isinstance(value, int | float)
-    ]
-    return f"Noise that the verdict rests on: {', '.join(parts)}." if parts else ""
-
-
-def untestable_rows(verdict: Mapping[str, Any] | None) -> list[list[str]]:
-    """Return rows of the effects that could not be tested: name, what it does and would show."""
-    rows = []
-    for told in untestable(verdict or {}):
-        name = told.partition(" ")[0]
-        effect = EFFECTS.get(name)
-        rows.append([told, about(name), effect.expect if effect else "-"])
-    return rows
 
 
 def in_lab_unit(value: float, unit: str) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 from bristle.compare.patterns import LEVEL, ResidualPattern
 from bristle.diagnose import remaining_residual
-from bristle.diagnose.conclusion import About, verdict_of
+from bristle.diagnose.conclusion import About, conclude
 from bristle.diagnose.finding import Finding
 from bristle.diagnose.remaining_residual import most_telling
 from bristle.diagnose.rule import BENCH
@@ -68,5 +68,5 @@ def test_nothing_is_named_where_there_is_no_place(rings):
 )
 def test_a_drive_that_nobody_recorded_leaves_a_doubt(driven, kind, doubted):
     shown = Finding("damper", kind, (), 2.0, 2.0, 0.0, 0.01, reasons=("Something.",))
-    found = verdict_of({"damper": shown}, About(driven=driven))
+    found = conclude({"damper": shown}, About(driven=driven))
     assert ("Neither voltage nor current" in found.words) is doubted

@@ -9,7 +9,7 @@ from shaken import building, friction, measured, shake
 from bristle.diagnose import damper as of_damper
 from bristle.diagnose import diagnose_rig, equilibrium, opening
 from bristle.diagnose.candidates import Trial
-from bristle.diagnose.conclusion import About, lookalikes, verdict_of
+from bristle.diagnose.conclusion import About, conclude, lookalikes
 from bristle.diagnose.decision import Decision
 from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.finding import Finding, of_decision
@@ -151,7 +151,7 @@ def test_bare_building_diagnosed_from_start_to_end():
 def test_runs_of_two_buildings_contradict_each_other_at_the_site_that_differs():
     b = building(2, True, 6)
     other = lambda x, v: [400.0 * x[0], 0.0, 0.0]  # noqa: E731 a stiffer layer
-    runs = [measured(shake(b, 40 + i, friction, None if i % 2 else other), i) for i in range(4)]
+    runs = [measured(shake(b, 40 + i, None, None if i % 2 else other), i) for i in range(4)]
     found = diagnose_rig(runs[:2], runs[2:], Model("lugre"), b)
     assert found.findings["layer"].kind == "insufficient"
     assert found.kind == "insufficient"
@@ -188,12 +188,12 @@ def test_findings_of_sites_become_one_verdict():
         return Finding(site, kind, effects, 3.0, 1.0, 1.0, 0.01, coordinate="velocity")
 
     both = {"layer": at("layer", "effect", "duffing"), "storey1": at("storey1", "none")}
-    assert verdict_of(both, About()).effects == ("duffing",)
+    assert conclude(both, About()).effects == ("duffing",)
     both["storey1"] = at("storey1", "effect", "storey_softening")
-    found = verdict_of(both, About())
+    found = conclude(both, About())
     assert (found.kind, found.effects) == ("effect", ("duffing", "storey_softening"))
     both["storey1"] = at("storey1", "unknown")
-    found = verdict_of(both, About())
+    found = conclude(both, About())
     assert (found.kind, found.coordinate) == ("unknown", "velocity")
     assert "Besides, the model misses duffing (layer)." in found.words
 
@@ -226,7 +226,7 @@ def test_late_velocity_of_the_base_is_a_sensor_fault_and_not_physics():
 
 def test_lag_of_a_velocity_is_its_instrument():
     lag = SensorFault("velocity", "lag", 0.004, 1e-4, "Velocity lags.")
-    found = verdict_of({"layer": NOTHING}, About(sensors=(lag,)))
+    found = conclude({"layer": NOTHING}, About(sensors=(lag,)))
     assert (found.kind, found.effects) == ("effect", ("velocity_sensor",))
     assert found.sites == {"velocity_sensor": "sensor"}
     assert "velocity_sensor (sensor)" in found.words

@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from bristle.diagnose.conclusion import About, verdict_of
+from bristle.diagnose.conclusion import About, conclude
 from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.finding import Finding
 from bristle.diagnose.verdict_file import current
@@ -22,7 +22,7 @@ def at(site, kind="none", *effects, **more):
 
 
 def said(**findings):
-    return verdict_of(findings, About()).as_dict()
+    return conclude(findings, About()).as_dict()
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_effects_that_no_run_showed_are_told_with_their_sites():
 def test_a_fault_is_told_once():
     text = "Velocity lags."
     lag = SensorFault("velocity", "lag", 0.004, 1e-4, text)
-    verdict = verdict_of({"damper": at("damper")}, About(sensors=(lag,))).as_dict()
+    verdict = conclude({"damper": at("damper")}, About(sensors=(lag,))).as_dict()
     assert verdict["words"].count(text) == 1
     assert verdict["effects"] == ["velocity_sensor"]
 

@@ -10,7 +10,7 @@ from house_made import study_of
 from shaken import building, friction
 
 from bristle.cli import diagnose as diagnose_command
-from bristle.diagnose.conclusion import About, verdict_of
+from bristle.diagnose.conclusion import About, conclude
 from bristle.diagnose.finding import Finding
 from bristle.errors import StudyError
 from bristle.identify.assigned import at_site, unassigned
@@ -78,7 +78,7 @@ def test_each_effect_acts_at_its_own_site():
 
 def test_wrong_load_cell_is_a_sensor_fault_and_no_effect():
     cell = Finding("force", "effect", ("force_gain",), 3.0, 1.0, 1.0, 0.01, coordinate="1.15")
-    found = verdict_of({"layer": cell}, About())
+    found = conclude({"layer": cell}, About())
     assert (found.kind, found.effects) == ("none", ())
     assert [(f.channel, f.fault, f.value) for f in found.sensors] == [("force", "gain", 1.15)]
     assert "1.15 times" in found.as_dict()["sensors"][0]["words"]
@@ -86,7 +86,7 @@ def test_wrong_load_cell_is_a_sensor_fault_and_no_effect():
 
 def test_mass_of_the_base_is_a_rival_in_words_alone():
     damper = Finding("damper", "effect", ("fluid_inertia",), 2.0, 1.0, 1.0, float("nan"))
-    found = verdict_of({"damper": damper}, About("reconstructed"))
+    found = conclude({"damper": damper}, About("reconstructed"))
     assert (found.kind, found.effects) == ("ambiguous", ("fluid_inertia",))
     assert all(name in EFFECTS for name in found.effects)
     assert "a mass of the base that the file does not know" in found.words

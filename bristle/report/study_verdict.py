@@ -1,0 +1,94 @@
+"""The verdict's parts of a study's report: what is missing, on what evidence, what was not told."""
+
+from __future__ import annotations
+
+from ..data.channels import channel_unit, is_channel
+from ..diagnose.verdict_text import HEADINGS, Verdict, about, sentences, separating, untestable
+from ..findings import command
+from ..physics.effect import EFFECTS
+from . import html
+from .study_tables import in_lab_unit, ranking_table
+
+_TONES = {"none": "green", "effect": "blue", "ambiguous": "purple", "unknown": "red"}
+"""Colours of the kinds of a verdict."""
+
+
+def verdict_section(verdict: Verdict | None, name: str) -> str:
+    """Return the verdict on a study of this name as HTML, with its evidence."""
+    if verdict is None:
+        kind, heading, texts = "", "Not diagnosed", _undiagnosed(name)
+    else:
+        kind, texts = str(verdict["kind"]), sentences(verdict)
+        heading = HEADINGS[kind]
+        if kind in ("effect", "ambiguous"):
+            texts[1:1] = [about(str(one)) for one in verdict["effects"]]
+    inner = [
+        f'<div class="verdict" style="--tone: var(--{_TONES.get(kind, "soft")})">',
+        f'<div class="kind">{html.escape(heading)}</div>',
+        html.paragraphs(texts[0], kind="say"),
+        html.paragraphs(*texts[1:]),
+        "</div>",
+    ]
+    rows = ranking_table(verdict)
+    if rows:
+        header, cells, strong = rows
+        inner.append("<h3>The evidence</h3>")
+        inner.append(
+            html.paragraphs(
+                "Each effect was tried inside the model, everything refitted, and judged on runs "
+                "that no fit has seen.", kind="soft",
+            )
+        )  # fmt: skip
+        inner.append(html.table(header, cells, numbers=(1, 2), strong=strong))
+    inner.append(html.paragraphs(noise_floor(verdict), kind="soft"))
+    return "\n".join(part for part in inner if part)
+
+
+def _undiagnosed(name: str) -> list[str]:
+    return [
+        "No diagnosis has been made of the present model.",
+        f"{command('diagnose', name)} tells what it misses, and how sure that is.",
+    ]
+
+
+def noise_floor(verdict: Verdict | None) -> str:
+    """Return the noise floor of a verdict as a sentence; "" where it is not told."""
+    floor = (verdict or {}).get("noise_floor") or {}
+    parts = [
+        f"{name} {in_lab_unit(value, channel_unit(name) if is_channel(name) else '')}".strip()
+        for name, value in floor.items()
+        if isinstance(value, int | float)
+    ]
+    return f"Noise floor of the verdict: {', '.join(parts)}." if parts else ""
+
+
+def untestable_rows(verdict: Verdict | None) -> list[list[str]]:
+    """Return rows of the effects that could not be tested: name, what it does and would show."""
+    rows = []
+    for told in untestable(verdict or {}):
+        name = told.partition(" ")[0]
+        effect = EFFECTS.get(name)
+        rows.append([told, about(name), effect.expect if effect else "-"])
+    return rows
+
+
+def untold_section(verdict: Verdict | None) -> str:
+    """Return what could not be tested as HTML, and the experiment that would tell."""
+    hidden = untestable_rows(verdict)
+    parts = [
+        html.paragraphs(
+            "These effects could be there all the same: either the data do not excite them, or "
+            "refitting the model takes them up.", kind="soft",
+        ),
+        html.table(["effect", "what it does", "what it would look like"], hidden),
+    ] if hidden else []  # fmt: skip
+    experiment = separating(verdict or {})
+    if experiment:
+        parts.append("<h3>The experiment that would tell</h3>")
+        parts.append(html.paragraphs(experiment))
+    if not parts:
+        none = (
+            "No diagnosis has been made of this model, so nothing is known of what it could miss."
+        )
+        parts = [html.paragraphs(none if verdict is None else "The diagnosis names nothing.")]
+    return html.section("What could not be tested", *parts)
