@@ -18,7 +18,7 @@ from typing import Any, Self
 
 PATIENCE = 1.5
 """Seconds that a component may take to finish its step after Ctrl-C."""
-HURRY = 1.5
+HURRY = 1.0
 """Seconds that a command may take to end after Ctrl-C."""
 
 
@@ -71,9 +71,16 @@ class Hurry:
 
     def __enter__(self) -> Self:
         self._restore: Callable[[], None] | None = None
+        self._hook = sys.unraisablehook
         if threading.current_thread() is threading.main_thread():
             self._restore = _watch(_end_process, HURRY)
+            sys.unraisablehook = self._unraisable
         return self
+
+    def _unraisable(self, lost: sys.UnraisableHookArgs) -> None:
+        """Keep quiet of a Ctrl-C that went into a callback of a library and was lost there."""
+        if not isinstance(lost.exc_value, KeyboardInterrupt):
+            self._hook(lost)
 
     def __exit__(
         self,
@@ -83,6 +90,7 @@ class Hurry:
     ) -> None:
         if self._restore is not None:
             self._restore()
+            sys.unraisablehook = self._hook
 
 
 def _end_process() -> None:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba.core import types
+from numba.core import event, types
 from numba.extending import intrinsic
 
 from .progress import tell
@@ -48,6 +48,18 @@ def _record(typing: Any, kind: Any, values: Any) -> Any:
     return made(kind, values), code
 
 
+class _Told(event.Listener):  # type: ignore[misc]
+    """Tells that numba compiles, which may take a minute; what it finds on disk it only reads."""
+
+    def on_start(self, event: Any) -> None:
+        tell("compiling the laws, once")
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+event.register("numba:compile", _Told())
+
 # numba asks for the folder of its cache in a global of its own, more than once per function.
 _FOLDER = Lock()
 
@@ -72,8 +84,6 @@ def compiled(
         Whether to keep the machine code on disk.
     """
     folder = _folder(function) if keep else None
-    if folder is None or not any(folder.iterdir()):
-        tell("compiling the laws, once")
     with _FOLDER:
         before = numba.config.CACHE_DIR
         numba.config.CACHE_DIR = str(folder or "")

@@ -6,6 +6,7 @@ told: a library is silent.
 
 from __future__ import annotations
 
+import os
 import shutil
 import sys
 import threading
@@ -25,8 +26,10 @@ _PATIENCE = 0.3
 """Seconds after which something that is not yet done gets a bar."""
 _PLAIN_AFTER = 5.0
 """Seconds without a word after which a plain line is due."""
+_AGAIN = 30.0
+"""Seconds after which a plain line is told again, with how long it takes."""
 _SOON = 3.0
-"""Seconds left below which none are told."""
+"""Seconds, left or spent, below which none are told."""
 
 _teller: ContextVar[Callable[[str], None] | None] = ContextVar("teller", default=None)
 
@@ -51,14 +54,20 @@ def telling(teller: Callable[[str], None] | None) -> Iterator[None]:
 class Line:
     """Shows texts on stderr: overwritten on a terminal; in a pipe only after some silence.
 
-    A context; the terminal's line is cleared at its end, and before anything is printed there.
+    A context; the terminal's line is cleared at its end, and before anything is printed there. What
+    takes long is told with its seconds, so that nobody takes it for dead.
     """
 
     def __init__(self) -> None:
         self._live = sys.stderr.isatty()
-        self._last = time.monotonic()
-        self._shown = False
         self._stdout = sys.stdout
+        self._process = os.getpid()
+        self._lock = threading.Lock()
+        self._over = threading.Event()
+        self._ticking: threading.Thread | None = None
+        self._text = ""
+        self._since = self._last = time.monotonic()  # of the text, and of the last plain line
+        self._shown = ""
 
     def __enter__(self) -> Self:
         if self._live and self._stdout.isatty():
@@ -72,23 +81,49 @@ class Line:
         trace: TracebackType | None,
     ) -> None:
         sys.stdout = self._stdout
+        self._over.set()
+        if self._ticking is not None:
+            self._ticking.join()
         self.clear()
 
     def clear(self) -> None:
-        """Take the line away, where one is shown."""
-        if self._shown:
+        """Take the terminal's line away, where one is shown."""
+        if self._live and self._shown:
             print("\r\033[2K", end="", file=sys.stderr, flush=True)
-            self._shown = False
+            self._shown = ""
 
     def say(self, text: str) -> None:
         """Show a text, if it is time for one."""
+        if os.getpid() != self._process:
+            return  # a forked process: the first one tells
+        with self._lock:
+            if text != self._text:
+                self._text, self._since = text, time.monotonic()
+            self._show()
+        if self._ticking is None:
+            self._ticking = threading.Thread(target=self._tick, name="bristle-line", daemon=True)
+            self._ticking.start()
+
+    def _tick(self) -> None:
+        while not self._over.wait(1.0):
+            with self._lock:
+                self._show()
+
+    def _show(self) -> None:
+        now = time.monotonic()
+        spent = int(now - self._since)
         if self._live:
-            width = max(20, shutil.get_terminal_size().columns - 5)
-            print(f"\r\033[2K{text[:width]} ...\r", end="", file=sys.stderr, flush=True)
-            self._shown = True
-        elif time.monotonic() - self._last >= _PLAIN_AFTER:
+            text = f"{self._text}, {spent} s" if spent >= _SOON else self._text
+            if text != self._shown:
+                width = max(20, shutil.get_terminal_size().columns - 5)
+                print(f"\r\033[2K{text[:width]} ...\r", end="", file=sys.stderr, flush=True)
+                self._shown = text
+            return
+        same = self._text == self._shown
+        if now - self._last >= (_AGAIN if same else _PLAIN_AFTER):
+            text = f"{self._text}, {spent} s" if same else self._text
             print(f"{text} ...", file=sys.stderr, flush=True)
-            self._last = time.monotonic()
+            self._shown, self._last = self._text, now
 
 
 class _Clearing:
@@ -183,6 +218,8 @@ class Progress:
 
     def __enter__(self) -> Self:
         self._telling.__enter__()
+        if self._wanted and not self._live:
+            tell(self._title)
         return self
 
     def __exit__(

@@ -153,6 +153,7 @@ def _prepare(folder: Path, found: list[Block]) -> dict[str, str]:
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m bristle.cli "$@"\n')
     command.chmod(0o755)
     environment = {**os.environ, "PYTHONPATH": str(sources), "COLUMNS": "100", "NO_COLOR": "1"}
+    environment["BRISTLE_STATE"] = str(folder / ".state")
     environment["PATH"] = f"{command.parent}{os.pathsep}{os.environ['PATH']}"
     return environment
 

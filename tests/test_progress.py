@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -64,6 +66,19 @@ def test_a_pipe_gets_few_plain_lines(
     assert "\033" not in told.err
 
 
+def test_what_takes_long_is_told_though_nothing_more_is_said(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(progress, "_PLAIN_AFTER", 0.5)
+    monkeypatch.setattr(progress, "_AGAIN", 1.5)
+    with Line() as line, telling(line.say):
+        tell("compiling the laws, once")
+        time.sleep(4.5)
+    first, second, *_ = capsys.readouterr().err.splitlines()
+    assert first == "compiling the laws, once ..."
+    assert re.fullmatch(r"compiling the laws, once, \d s \.\.\.", second)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-terminal is needed")
 def test_a_terminal_has_one_line_that_is_gone_before_the_answer(
     monkeypatch: pytest.MonkeyPatch,
@@ -80,7 +95,9 @@ def test_a_terminal_has_one_line_that_is_gone_before_the_answer(
             print("the answer", flush=True)
         assert sys.stdout is stream
         stream.flush()
-    shown = os.read(ours, 4096).decode()
+    shown = ""
+    while "the answer\r\n" not in shown:
+        shown += os.read(ours, 4096).decode()
     os.close(theirs)
     os.close(ours)
     assert shown.count("\n") == 1
@@ -92,7 +109,9 @@ def test_a_bar_in_a_pipe_tells_its_share(capsys: pytest.CaptureFixture[str]) -> 
     with telling(said.append), Progress("controllers", 50, True) as bar:
         bar.show(1)
         bar.show(25)
-    assert [text.partition(",")[0] for text in said] == ["controllers: 2 %", "controllers: 50 %"]
+    assert [text.partition(",")[0] for text in said] == [
+        "controllers", "controllers: 2 %", "controllers: 50 %",
+    ]  # fmt: skip
     said.clear()
     with telling(said.append), Progress("controllers", 50, False) as bar:
         bar.show(25)

@@ -14,7 +14,7 @@ from bristle import trust
 from bristle.cli import main
 from bristle.cli._consent import plain
 from bristle.cli._effect_template import template
-from bristle.errors import PhysicsError, TrustError
+from bristle.errors import PhysicsError, StudyError, TrustError
 from bristle.physics import user
 from bristle.physics.effect import EFFECTS
 from bristle.study import Study, create_study
@@ -176,6 +176,14 @@ def test_a_text_that_changes_while_it_is_loaded_takes_its_effect_away(mailed: Pa
     with pytest.raises(TrustError):
         study.usable_effects()
     assert "seal" not in EFFECTS
+
+
+def test_a_file_that_is_gone_is_not_waited_for(mailed: Path) -> None:
+    study = Study(mailed)
+    (mailed / "effects" / "seal.py").unlink()
+    assert study.usable_effects() == []
+    with pytest.raises(StudyError, match=r'effect "seal"'):
+        study.model()
 
 
 def test_python_consents_by_an_argument_or_a_context(mailed: Path, marker: Path) -> None:

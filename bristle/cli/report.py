@@ -47,7 +47,7 @@ def main(arguments: argparse.Namespace) -> int:
         }
         print(json.dumps(answer, indent=2, ensure_ascii=False))
         return 0
-    stairs = Staircase(content.history_steps)
+    stairs = Staircase(content.history_steps, cut_off=study.settings.cut_off)
     if sys.stdout.isatty():
         from rich.console import Console
 

@@ -68,7 +68,7 @@ def main(arguments: argparse.Namespace) -> int:
         frame, trouble = error.frame, str(error)
         code = 1 if isinstance(error, IncompleteRunError) else 130
     written = {"results": folder / f"results.{output.format}", "log": folder / "log"}
-    if not arguments.no_figure:
+    if not arguments.no_figure and code != 130:  # whoever presses Ctrl-C waits for nothing more
         from ..report.figures import run_figure
 
         try:

@@ -208,13 +208,14 @@ def _auto(arguments: argparse.Namespace) -> int:
 
     study = Study(arguments.folder)
     quiet = arguments.json or not sys.stdout.isatty()
+    low = study.settings.cut_off
     shown: list[int] = []
 
     def show() -> None:
         steps = study.steps()
         if quiet:
             return
-        print(f"\n{staircase(steps)}\n", flush=True)
+        print(f"\n{staircase(steps, cut_off=low)}\n", flush=True)
         shown.append(len(steps))
 
     learned = learn(study, on_step=show)
@@ -224,6 +225,6 @@ def _auto(arguments: argparse.Namespace) -> int:
         print(json.dumps(learned.as_dict(), indent=2, ensure_ascii=False))
         return 0
     if not shown:
-        print(f"{staircase(study.steps())}\n")
+        print(f"{staircase(study.steps(), cut_off=low)}\n")
     print(text(learned.verdict.as_dict(), arguments.folder))
     return 0

@@ -95,7 +95,10 @@ def load_effects(folder: Path) -> list[Loaded]:
     files = sorted(folder.glob("*.py")) if folder.is_dir() else []
     here = {path.resolve() for path in files}
     gone = [path for path in _known if path.parent == folder.resolve() and path not in here]
-    changed = any(_forget(path) for path in gone)
+    taken = [_forget(path) for path in gone]
+    changed = any(taken)
+    for path in [path for path in _waiting if path.parent == folder.resolve() and path not in here]:
+        del _waiting[path]
     found = []
     for path in files:
         loaded, new = _load(path.resolve(), path)

@@ -35,12 +35,14 @@ class HistoryStep:
 class Staircase:
     """The steps of a history; `str` gives plain text, rich prints it in colour.
 
-    `floor` is the z that noise alone explains.
+    `floor` is the z that noise alone explains; `cut_off` [Hz] of the low-pass on the forces whose
+    RMS errors are told, 0 for none.
     """
 
     history_steps: tuple[HistoryStep, ...]
     floor: float = 1.0
     unit: str = "N"
+    cut_off: float = 0.0
 
     def __str__(self) -> str:
         return "\n".join("".join(text for text, _ in line).rstrip() for line in self._lines("#"))
@@ -76,13 +78,16 @@ class Staircase:
         share = log10(max(one.z / self.floor, 1.0)) / log10(top / self.floor)
         bar = mark * max(1, round(WIDTH * share))
         colour = "green" if done else "dark_orange"
-        about = [] if one.rms is None else [f"{quantity(one.rms, self.unit, 3, self._size())} RMS"]
+        low = f" below {self.cut_off:g} Hz" if self.cut_off else ""
+        about = (
+            [] if one.rms is None else [f"{quantity(one.rms, self.unit, 3, self._size())} RMS{low}"]
+        )
         about += [] if one.z_train is None else [f"training z = {short_z(one.z_train)}"]
         tail = f"   {', '.join(about)}" if about else ""
         return [(bar, colour), (f" {short_z(one.z)}", f"bold {colour}"), (tail, "dim")]
 
 
-def staircase(steps: Sequence[Step], noise_floor: float = 1.0) -> Staircase:
+def staircase(steps: Sequence[Step], noise_floor: float = 1.0, cut_off: float = 0.0) -> Staircase:
     """Return the staircase of a history, to print as it is or to show live.
 
     Parameters
@@ -92,6 +97,8 @@ def staircase(steps: Sequence[Step], noise_floor: float = 1.0) -> Staircase:
         judged", unless the next one's `before` holds them.
     noise_floor : float
         z that noise alone explains.
+    cut_off : float
+        Hz, of the low-pass on the forces whose RMS errors the steps hold; 0 for none.
 
     Examples
     --------
@@ -101,7 +108,7 @@ def staircase(steps: Sequence[Step], noise_floor: float = 1.0) -> Staircase:
     0 identify     ######################################## 4.00
       noise floor  | 1
     """
-    return Staircase(tuple(history_steps(steps)), noise_floor)
+    return Staircase(tuple(history_steps(steps)), noise_floor, cut_off=cut_off)
 
 
 def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
