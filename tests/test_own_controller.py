@@ -16,6 +16,8 @@ from bristle.conformance import conform
 from bristle.errors import ScenarioError
 from bristle.fmu import catalogue
 from bristle.fmu.build import build, plan
+from bristle.fmu.controller import MEASURED
+from bristle.fmu.own_controller import Measured
 from bristle.scenario.scenario import load_scenario, stock_scenarios
 from bristle.scenario.stock import copy_scenario
 from bristle.scenario.text import scenario_text
@@ -66,6 +68,10 @@ def test_the_page_shows_the_template_without_its_comments(file: Path) -> None:
     page = (ROOT / "docs" / "own_controller.md").read_text(encoding="utf-8")
     shown = page.partition("```py\n")[2].partition("```")[0]
     assert shown.splitlines() == lines
+
+
+def test_what_is_measured_are_the_ports_of_every_controller() -> None:
+    assert Measured._fields == tuple(MEASURED)
 
 
 def test_it_samples_on_its_own_clock(file: Path) -> None:

@@ -77,8 +77,8 @@ def _beyond_stroke(report: Report) -> list[dict[str, Any]]:
     from ..paper.comparison.tables import beyond_stroke
 
     names = ["motion", "intensity [g]", "law", "peak base drift [mm]", BEYOND]
-    rows = beyond_stroke(report.comparison)[names].to_dict(orient="records")
-    return [{str(name): value for name, value in row.items()} for row in rows]
+    rows: Any = beyond_stroke(report.comparison)[names].to_dict(orient="records")
+    return list(rows)
 
 
 def _print(report: Report) -> None:

@@ -13,8 +13,19 @@ from typing import Any, ClassVar, NamedTuple
 from ..component.clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
 from .controller import MEASURED, SampledSlave
 
-Measured = namedtuple("Measured", tuple(MEASURED))
-Measured.__doc__ = "What a controller measures at a sample, in SI: the values of its inputs."
+
+class Measured(NamedTuple):
+    """What a controller measures at a sample: the values of its inputs, in their order.
+
+    `floor_acceleration` [m/s2] and `base_displacement` [m], `base_velocity` [m/s], `damper_force`
+    [N].
+    """
+
+    floor_acceleration: float
+    base_displacement: float
+    base_velocity: float
+    damper_force: float
+
 
 VOLTAGE, COMMAND_RAW, SCHEDULING = range(3)
 
@@ -26,7 +37,7 @@ class Constants(NamedTuple):
     v_max: float
     answer: Callable[[Measured, Any], Any]
     memory: Any
-    count: int
+    kept: int
 
 
 class Functions:
@@ -35,7 +46,7 @@ class Functions:
     @staticmethod
     def start(time: float, inputs: Any, c: Constants, state: Any, outputs: Any, work: Any) -> int:
         """Take the first sample, with nothing remembered; arguments as in `component`."""
-        state[:] = [0.0] * c.count + [time, 1.0]
+        state[:] = [0.0] * c.kept + [time, 1.0]
         _sample(inputs, c, state, outputs)
         return 0
 
@@ -66,13 +77,13 @@ class Functions:
 def _sample(inputs: Any, c: Constants, state: Any, outputs: Any) -> None:
     """Ask the law, keep what it remembers, limit the voltage."""
     measured = Measured(*inputs)
-    wanted, kept = c.answer(measured, c.memory(*state[: c.count]))
+    wanted, kept = c.answer(measured, c.memory(*state[: c.kept]))
     kept = [float(value) for value in kept]
-    if len(kept) != c.count:
+    if len(kept) != c.kept:
         raise ValueError(
-            f"command returned {len(kept)} numbers to remember; memory names {c.count}."
+            f"command returned {len(kept)} numbers to remember; memory names {c.kept}."
         )
-    state[: c.count] = kept
+    state[: c.kept] = kept
     wanted = float(wanted)
     outputs[VOLTAGE] = min(max(wanted, 0.0), c.v_max)
     outputs[COMMAND_RAW], outputs[SCHEDULING] = wanted, measured.base_velocity
@@ -113,7 +124,7 @@ class OwnController(SampledSlave):
         raise NotImplementedError
 
     def setup(self) -> tuple[Any, list[float], int]:
-        kept = namedtuple("Memory", self.memory)
+        named = namedtuple("Memory", self.memory)  # type: ignore[misc]
         count = len(self.memory)
-        c = Constants(self["sample_period"], self["v_max"], self.command, kept, count)
+        c = Constants(self["sample_period"], self["v_max"], self.command, named, count)
         return c, [0.0] * count + [self.time, 0.0], len(MEASURED)

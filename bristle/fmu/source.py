@@ -25,7 +25,8 @@ class SourceSlave(ComponentSlave):
         # A source computes so little that looking things up would show: they lie in one tuple, and
         # the constants in a plain one, which Python takes apart faster than a named one.
         shown = slice(self._shown_first, self._shown_after)
-        self._bound = self._given, tuple(self.constants), self._values, shown
+        constants: Any = tuple(self.constants)
+        self._bound = self._given, constants, self._values, shown
 
     def refresh(self) -> None:
         given, constants, values, shown = self._bound
