@@ -165,7 +165,7 @@ def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
     ("edit", "words"),
     [
         (("sigma_a", "sigma_x"), "sigma_x is not a parameter"),
-        (('law = "lugre"', 'law = "maxwell"'), "bingham, lugre"),
+        (('law = "lugre"', 'law = "maxwell"'), "bingham, bouc_wen, dahl, lugre"),
         (("value = 650.0", 'value = "650"'), "finite number"),
         (("value = 650.0", "value = -650.0"), "outside"),
         (('unit = "N/m"', 'unit = "kg"'), "dimension"),

@@ -25,6 +25,7 @@ from typing import Any
 from uuid import UUID, uuid5
 
 from ..errors import BuildError
+from ..physics.user import own_laws
 from ..resources import fmus_folder
 from . import catalogue
 from .slave import BAKED
@@ -50,7 +51,7 @@ class Plan:
     """Everything that decides an FMU's bytes.
 
     `name` is the model's name, `component` its source; `baked` goes into the FMU as JSON, `files`
-    as resources; `effects` are effect files of the user's own, bundled beside the library's.
+    as resources; `effects` and `laws` are files of the user's own, bundled beside the library's.
     """
 
     name: str
@@ -58,6 +59,7 @@ class Plan:
     baked: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, Path] = field(default_factory=dict)
     effects: tuple[Path, ...] = ()
+    laws: tuple[Path, ...] = ()
 
     def digest(self) -> str:
         """Return the digest of the content, 12 hexadecimal digits."""
@@ -65,7 +67,8 @@ class Plan:
         for part in (_library_digest(), self.name, json.dumps(self.baked, sort_keys=True)):
             content.update(part.encode())
         named = [(self.component.name, self.component), *sorted(self.files.items())]
-        for name, path in [*named, *((path.name, path) for path in sorted(self.effects))]:
+        own = (*sorted(self.effects), *sorted(self.laws))
+        for name, path in [*named, *((path.name, path) for path in own)]:
             content.update(name.encode())
             content.update(path.read_bytes())
         return content.hexdigest()[:12]
@@ -153,7 +156,9 @@ def plan(
         catalogue.describe(component, building, effects=effects)  # refuses what is wrong with them
     if starts:
         baked["starts"] = _checked_starts(component, building, effects, starts)
-    return Plan(chosen, path, baked, files, effects)
+    law = getattr(kind, "law", "")
+    laws = tuple(file for name, file in own_laws().items() if name == law)
+    return Plan(chosen, path, baked, files, effects, laws)
 
 
 def _checked_starts(
@@ -231,6 +236,7 @@ def _build_elsewhere(what: Plan, guid: str, target: Path) -> None:
         "baked": what.baked,
         "files": {name: str(path) for name, path in what.files.items()},
         "effects": [str(path) for path in what.effects],
+        "laws": [str(path) for path in what.laws],
         "guid": guid,
         "target": str(target),
     }
@@ -248,8 +254,8 @@ def _serve() -> None:
     """Build what stands on the standard input; the other end of `_build_elsewhere`."""
     order = json.load(sys.stdin)
     files = {name: Path(path) for name, path in order["files"].items()}
-    effects = tuple(Path(path) for path in order["effects"])
-    what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects)
+    effects, laws = (tuple(Path(path) for path in order[key]) for key in ("effects", "laws"))
+    what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects, laws)
     with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
         _pack(_build_loose(what, order["guid"], Path(temporary)), Path(order["target"]))
 
@@ -278,6 +284,8 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
         (inner / "__init__.py").write_text("", encoding="utf-8")
     for path in what.effects:
         _copy_renamed(path, package / "physics" / "effects" / path.name, package.name)
+    for path in what.laws:
+        _copy_renamed(path, package / "physics" / "laws" / path.name, package.name)
     script = folder / f"{what.component.stem}_{digest}.py"
     _copy_renamed(what.component, script, package.name)
     (folder / BAKED).write_text(

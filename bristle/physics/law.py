@@ -117,8 +117,9 @@ class Law:
     rate
         Rates of the states, as a tuple. A law with states has it.
     advance
-        States after q.dt at constant velocity q.v, as a tuple, where that is known exactly. It sees
-        `p` at the voltage of the step's end. A law that has states and none of it moves by `rate`.
+        States after q.dt at constant velocity q.v, as a tuple, where that is known exactly or as
+        well as exactly. It sees `p` at a voltage within the step; a law with a lag of its own sees
+        in q.V the mean of the step. A law that has states and none of it moves by `rate`.
     force
         Of a building's part: its force [N], at arrays as well.
     """

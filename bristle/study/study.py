@@ -17,7 +17,7 @@ from ..data.measurement import Measurement, read_measurements
 from ..data.model import StudyModel, model_text, read_model
 from ..errors import StudyError
 from ..identify.prepare import SHORTEST
-from ..physics.user import Loaded, load_effects
+from ..physics.user import Loaded, load_effects, load_laws
 from .history import History, Step
 from .new import make_folder
 from .settings import ROLES, Settings, read_settings
@@ -72,12 +72,16 @@ class Study:
         self.history = History(self.folder)
         self._lock = FileLock(self.folder / ".lock")
         self._complete_unfinished()
+        self.own_laws = load_laws(self.laws_folder)
         self.own_effects = load_effects(self.effects_folder)
         self.settings: Settings = read_settings(self.folder / "study.toml")
         self._seen = self._state()
 
     own_effects: list[Loaded]
     """The files of effects/, each with its effect or why it is left out."""
+
+    own_laws: list[Loaded]
+    """The files of laws/, each with its law or why it is left out."""
 
     @classmethod
     def open(cls, folder: Path | str) -> Study:
@@ -100,16 +104,22 @@ class Study:
         """Where the user's own effects are."""
         return self.folder / "effects"
 
+    @property
+    def laws_folder(self) -> Path:
+        """Where the user's own laws are."""
+        return self.folder / "laws"
+
     def usable_effects(self) -> list[str]:
-        """Register the user's own effects that can be compiled; return why others are left out.
+        """Register the user's own effects and laws that can be compiled; say why others cannot be.
 
         Call it before a fit or a diagnosis: an effect that cannot be compiled would take all others
         along.
         """
         from ..check.user_effects import usable
 
+        self.own_laws = usable(load_laws(self.laws_folder))
         self.own_effects = usable(load_effects(self.effects_folder))
-        return [one.error for one in self.own_effects if one.error]
+        return [one.error for one in (*self.own_laws, *self.own_effects) if one.error]
 
     @property
     def reports_folder(self) -> Path:
