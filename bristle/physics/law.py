@@ -15,8 +15,9 @@ from typing import Any, ClassVar, NamedTuple
 
 from ..errors import PhysicsError
 from .command import Constant as Constant  # laws, users' own as well, take these from here
-from .command import Form, Monotone
+from .command import Form
 from .command import Linear as Linear
+from .command import Monotone as Monotone
 from .command import Quadratic as Quadratic
 from .field_check import check_fields
 from .inputs import Inputs
