@@ -36,7 +36,8 @@ def main() -> int:
     if sys.argv[1:2] == ["laws"] and len(sys.argv) > 2:
         from .laws import main as laws
 
-        return laws(sys.argv[2:])
+        show(laws(sys.argv[2:]))
+        return 0
     names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")

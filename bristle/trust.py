@@ -16,14 +16,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from .errors import TrustError
 from .physics import user
 from .resources import state_folder
-
-if TYPE_CHECKING:
-    from .physics.effect import Effect
 
 VARIABLE = "BRISTLE_TRUST"
 """The environment variable that consents to all code, for CI: 1 is yes."""
@@ -101,13 +98,15 @@ def require(path: Path, text: str) -> None:
     remember(path, text)
 
 
-def load_effects(folder: Path, *, trust: bool = False) -> list[user.Loaded]:
-    """Return the effects of a folder's files, registered, and those that are left out.
+def load(folder: Path, word: str = "effect", *, trust: bool = False) -> list[user.Loaded]:
+    """Return the effects or laws of a folder's files, registered, and those that are left out.
 
     Parameters
     ----------
     folder : path
-        The folder with one file per effect; it need not exist.
+        The folder with one file per effect or law; it need not exist.
+    word : str
+        "effect" or "law". Load laws first: an effect joins those that are there.
     trust : bool
         Whether to consent to what they hold. Without it a text that has not run here before is
         left out, and `physics.user.waiting` says so.
@@ -118,16 +117,18 @@ def load_effects(folder: Path, *, trust: bool = False) -> list[user.Loaded]:
         If consent cannot be kept.
     """
     with granted(trust):
-        return user.load_effects(folder)
+        return user.load(folder, word)
 
 
-def load_effect(path: Path, *, trust: bool = False) -> type[Effect]:
-    """Return the effect of one file, registered.
+def load_file(path: Path, word: str = "effect", *, trust: bool = False) -> Any:
+    """Return the effect or law of one file, registered.
 
     Parameters
     ----------
     path : path
         The file.
+    word : str
+        "effect" or "law".
     trust : bool
         Whether to consent to what it holds.
 
@@ -139,7 +140,7 @@ def load_effect(path: Path, *, trust: bool = False) -> type[Effect]:
         If nobody consented to its code.
     """
     with granted(trust):
-        return user.load_effect(path)
+        return user.load_file(path, word)
 
 
 def _consent(text: str) -> Path:

@@ -218,12 +218,12 @@ def test_a_file_made_here_is_trusted_and_checking_it_is_consent(
     monkeypatch.chdir(tmp_path)
     assert main(["effects", "new", "rub"]) == 0
     file = tmp_path / "rub.py"
-    assert trust.load_effect(file).name == "rub"
+    assert trust.load_file(file).name == "rub"
     file.write_text(file.read_text().replace("Parameter(0.2,", "Parameter(0.4,"))
     with pytest.raises(TrustError):
-        trust.load_effect(file)
+        trust.load_file(file)
     assert main(["effects", "check", "rub.py"]) == 0
-    assert trust.load_effect(file).parameters["f_s"].value == 0.4
+    assert trust.load_file(file).parameters["f_s"].value == 0.4
     other = tmp_path / "sent.py"
     other.write_text(template("sent"))
     assert main(["effects", "check", "sent.py"]) == 2
@@ -240,14 +240,14 @@ def test_links_and_odd_files_are_no_way_round(tmp_path: Path, marker: Path) -> N
     (folder / "folder.py").mkdir()
     os.mkfifo(folder / "pipe.py")
     (folder / "gone.py").symlink_to(tmp_path / "nowhere")
-    found = {one.name: one.error for one in trust.load_effects(folder)}
+    found = {one.name: one.error for one in trust.load(folder)}
     assert set(found) == {"linked", "folder", "pipe", "gone"}
     assert all(found.values())
     assert not marker.exists()
     through = tmp_path / "door"
     through.symlink_to(folder, target_is_directory=True)
     with pytest.raises(TrustError):
-        trust.load_effect(through / ".." / "effects" / "linked.py")
+        trust.load_file(through / ".." / "effects" / "linked.py")
     assert not marker.exists()
 
 
@@ -257,7 +257,7 @@ def test_a_file_imports_nothing_beside_it(tmp_path: Path, marker: Path) -> None:
         file = tmp_path / "rub.py"
         file.write_text(template("rub").replace("from math import tanh", line))
         with pytest.raises(PhysicsError, match=r"is imported"):
-            trust.load_effect(file, trust=True)
+            trust.load_file(file, trust=True)
     assert not marker.exists()
 
 
@@ -265,7 +265,7 @@ def test_a_text_in_another_coding_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "rub.py"
     file.write_text("# -*- coding: utf-7 -*-\n" + template("rub"))
     with pytest.raises(PhysicsError, match="utf-8 is right"):
-        trust.load_effect(file, trust=True)
+        trust.load_file(file, trust=True)
 
 
 def test_nothing_hides_in_what_is_shown() -> None:

@@ -1,4 +1,4 @@
-"""Whether an effect of a user's can be compiled: what Python runs, numba may refuse."""
+"""Whether a user's effect or law can be compiled: what Python runs, numba may refuse."""
 
 from __future__ import annotations
 
@@ -9,35 +9,36 @@ from typing import Any
 
 from ..physics import user
 from ..physics.effect import Effect, Q
+from ..physics.inputs import Inputs
+from ..physics.law import Law
 from ..resources import cache_folder
 
 
 def usable(effects: Iterable[user.Loaded]) -> list[user.Loaded]:
     """Return the same, with those left out, and unregistered, that numba cannot compile.
 
-    All effects of a site are compiled into one function, so a bad one would take the others along.
-    What has passed is remembered in the cache by its digest.
+    All laws and effects of a site are compiled into one function, so a bad one would take the
+    others along. What has passed is remembered in the cache by its digest.
     """
     out = []
     for loaded in effects:
-        flaw = refused(loaded.effect) if loaded.effect is not None else None
-        if flaw is not None and loaded.effect is not None:
+        flaw = refused(loaded.made) if loaded.made is not None else None
+        if flaw is not None:
             message = f"{loaded.path}, line {flaw[0]}: {flaw[1]}"
-            user.leave_out(loaded.effect, message)
+            user.leave_out(loaded.made, message)
             loaded = user.Loaded(loaded.path, None, message)
         out.append(loaded)
     return out
 
 
-def refused(effect: type[Effect]) -> tuple[int, str] | None:
-    """Return line and reason why a hook cannot be compiled, None if all can."""
+def refused(made: type[Effect] | type[Law]) -> tuple[int, str] | None:
+    """Return line and reason why a hook of an effect or law cannot be compiled, None if all can."""
     from ..jit import compiled, digest
 
-    q = Q(*(0.01 * (1 + k) for k in range(len(Q._fields))))
-    z = effect.State(*(0.01 for _ in effect.states))
-    p = effect.values_of({})
-    for hook, function in effect.hooks().items():
-        shape = f"{len(effect.states)}_{len(effect.parameters)}"
+    q, p = _given(made)
+    z = made.State(*(0.01 for _ in made.states))
+    for hook, function in made.hooks().items():
+        shape = f"{len(made.states)}_{len(made.parameters)}"
         mark = cache_folder() / "numba" / "passed" / f"{digest(function)}_{shape}"
         if mark.is_file():
             continue
@@ -52,6 +53,13 @@ def refused(effect: type[Effect]) -> tuple[int, str] | None:
             mark.parent.mkdir(parents=True, exist_ok=True)
             mark.touch()
     return None
+
+
+def _given(made: type[Effect] | type[Law]) -> tuple[Any, Any]:
+    """Return the q and p that a hook is tried with."""
+    if issubclass(made, Law):
+        return Inputs(0.01, 0.02, 0.03, 4.0, 0.05, 0.06, 0.0, False), made.at({}, 4.0)
+    return Q(*(0.01 * (1 + k) for k in range(len(Q._fields)))), made.values_of({})
 
 
 def _same(found: Any, plain: Any) -> bool:

@@ -59,8 +59,10 @@ class Damper:
     def __post_init__(self) -> None:
         if self.law not in law_names():
             raise DesignError(f"damper: law = {self.law!r}; there are {', '.join(law_names())}.")
-        if not self.kind.exact():
-            raise DesignError(f"damper: law = {self.law!r} has no closed form of steady sliding.")
+        if not self.kind.exact() or self.kind.felt:
+            raise DesignError(
+                f"damper: law = {self.law!r} has no closed form of steady sliding at a voltage."
+            )
         if not (isfinite(self.v_max) and self.v_max > 0.0):
             raise DesignError(
                 f"damper: v_max = {self.v_max!r} V leaves nothing to control; it must be positive."

@@ -25,6 +25,7 @@ from typing import Any
 from uuid import UUID, uuid5
 
 from ..errors import BuildError
+from ..physics.user import own_laws
 from ..resources import fmus_folder
 from ..trust import require
 from . import catalogue
@@ -51,7 +52,7 @@ class Plan:
     """Everything that decides an FMU's bytes.
 
     `name` is the model's name, `component` its source; `baked` goes into the FMU as JSON, `files`
-    as resources; `effects` are effect files of the user's own, bundled beside the library's.
+    as resources; `effects` and `laws` are files of the user's own, bundled beside the library's.
     """
 
     name: str
@@ -59,6 +60,7 @@ class Plan:
     baked: Mapping[str, Any] = field(default_factory=dict)
     files: Mapping[str, Path] = field(default_factory=dict)
     effects: tuple[Path, ...] = ()
+    laws: tuple[Path, ...] = ()
 
     def digest(self) -> str:
         """Return the digest of the content, 12 hexadecimal digits."""
@@ -66,7 +68,8 @@ class Plan:
         for part in (_library_digest(), self.name, json.dumps(self.baked, sort_keys=True)):
             content.update(part.encode())
         named = [(self.component.name, self.component), *sorted(self.files.items())]
-        for name, path in [*named, *((path.name, path) for path in sorted(self.effects))]:
+        own = (*sorted(self.effects), *sorted(self.laws))
+        for name, path in [*named, *((path.name, path) for path in own)]:
             content.update(name.encode())
             content.update(path.read_bytes())
         return content.hexdigest()[:12]
@@ -154,7 +157,9 @@ def plan(
         catalogue.describe(component, building, effects=effects)  # refuses what is wrong with them
     if starts:
         baked["starts"] = _checked_starts(component, building, effects, starts)
-    return Plan(chosen, path, baked, files, effects)
+    law = getattr(kind, "law", "")
+    laws = tuple(file for name, file in own_laws().items() if name == law)
+    return Plan(chosen, path, baked, files, effects, laws)
 
 
 def _checked_starts(
@@ -232,6 +237,7 @@ def _build_elsewhere(what: Plan, guid: str, target: Path) -> None:
         "baked": what.baked,
         "files": {name: str(path) for name, path in what.files.items()},
         "effects": [str(path) for path in what.effects],
+        "laws": [str(path) for path in what.laws],
         "guid": guid,
         "target": str(target),
     }
@@ -249,8 +255,8 @@ def _serve() -> None:
     """Build what stands on the standard input; the other end of `_build_elsewhere`."""
     order = json.load(sys.stdin)
     files = {name: Path(path) for name, path in order["files"].items()}
-    effects = tuple(Path(path) for path in order["effects"])
-    what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects)
+    effects, laws = (tuple(Path(path) for path in order[key]) for key in ("effects", "laws"))
+    what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects, laws)
     with tempfile.TemporaryDirectory(prefix="bristle_build_") as temporary:
         _pack(_build_loose(what, order["guid"], Path(temporary)), Path(order["target"]))
 
@@ -263,6 +269,13 @@ def built_guid(path: Path) -> str | None:
     except (OSError, KeyError, zipfile.BadZipFile, zlib.error):
         return None
     return found.group(1).decode() if found else None
+
+
+def _write_own(path: Path, folder: Path, package: str) -> None:
+    """Copy a user's file into a package, if it may run: pythonfmu runs it."""
+    text = path.read_text(encoding="utf-8-sig")
+    require(path, text)
+    _write_renamed(text, folder / path.name, package)
 
 
 def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
@@ -278,9 +291,9 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
     for inner in (package, package / "fmu"):
         (inner / "__init__.py").write_text("", encoding="utf-8")
     for path in what.effects:
-        text = path.read_text(encoding="utf-8-sig")
-        require(path, text)  # pythonfmu runs it
-        _write_renamed(text, package / "physics" / "effects" / path.name, package.name)
+        _write_own(path, package / "physics" / "effects", package.name)
+    for path in what.laws:
+        _write_own(path, package / "physics" / "laws", package.name)
     script = folder / f"{what.component.stem}_{digest}.py"
     _write_renamed(what.component.read_text(encoding="utf-8"), script, package.name)
     (folder / BAKED).write_text(

@@ -14,12 +14,27 @@ from typing import Any
 
 from .. import units
 from ..errors import BuildError
-from ..resources import components_folder
+from ..physics.law import LAWS
+from ..physics.user import own_laws
+from ..resources import cache_folder, components_folder
 from .component import EffectSlave
 from .description import Description, Variable
 from .slave import Slave
 
 _PACKAGE = Path(__file__).resolve().parent.parent
+_OWN_DAMPER = '''"""FMU: a damper by the law {law}, a user's own."""
+
+from bristle.fmu.damper import DamperSlave
+
+
+class {component}(DamperSlave):
+    """{about}"""
+
+    law = "{law}"
+
+    def declare(self):
+        super().declare()
+'''
 
 
 @cache
@@ -49,6 +64,9 @@ def source(name: str) -> Path:
         if not Path(name).is_file():
             raise BuildError(f"{name}: there is no such file.")
         return Path(name).absolute()
+    own = {_own_component(law): law for law in own_laws()}
+    if name in own:
+        return _own_source(own[name])
     try:
         return sources()[name]
     except KeyError:
@@ -67,10 +85,31 @@ def component_of_law(law: str) -> str:
     BuildError
         If there is none.
     """
+    if law in own_laws():
+        return _own_component(law)
     for name, path in sources().items():
         if getattr(component_class(path), "law", "") == law:
             return name
     raise BuildError(f"no component is a damper of the law {law}: components/ needs one.")
+
+
+def _own_component(law: str) -> str:
+    """Return the name of the component that is a damper of a user's own law."""
+    return "Own" + "".join(word[:1].upper() + word[1:] for word in law.split("_")) + "Damper"
+
+
+def _own_source(law: str) -> Path:
+    """Return the file of the component that is a damper of a user's own law, written if need be."""
+    path = cache_folder() / "components" / f"{law}_damper.py"
+    about = LAWS[law].first_line().replace("\\", "/").replace('"', "'")
+    text = _OWN_DAMPER.format(law=law, component=_own_component(law), about=about)
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise BuildError(f"{path}: cannot be written ({error.strerror or error}).") from None
+    return path
 
 
 @cache
@@ -135,11 +174,11 @@ def instantiate(
     BuildError, DesignError, PhysicsError
         If there is no such component; if a file is wrong.
     """
-    from ..trust import load_effect
+    from ..trust import load_file
 
     baked: dict[str, Any] = {"building": read_building_data(building)} if building else {}
     kind = component_class(source(name))
-    own = [load_effect(path) for path in effects]
+    own = [load_file(path) for path in effects]
     if own:
         baked["own"] = [effect.name for effect in own]
     if controller:

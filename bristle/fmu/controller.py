@@ -161,7 +161,8 @@ def declare_anti_windup(slave: Slave, rate: float) -> None:
 
 def invertible() -> list[type[Law]]:
     """Return the laws that can be inverted, the default first."""
-    found = [law for law in laws_of("damper") if law.affine() and law.exact()]
+    known = [law for law in laws_of("damper") if not law.own]  # an FMU carries the library's
+    found = [law for law in known if law.affine() and law.exact() and not law.felt]
     return sorted(found, key=lambda law: law.name != DEFAULT)
 
 

@@ -92,7 +92,7 @@ def step(
     if n_own > 0:
         xs, vs = inner_motion(setup, begin, z0)
         xe, ve = inner_motion(setup, end, z0)
-        V = felt_voltage(setup, end, z0)
+        V = 0.5 * (felt_voltage(setup, begin, z0) + felt_voltage(setup, end, z0))
         inner = Inputs(
             0.5 * (xs + xe), 0.5 * (vs + ve), end.a, V, end.dt, end.energy, end.stick_force,
             end.sticks,
@@ -224,7 +224,7 @@ def setup_of(
     return Setup(
         law_code(law), row(pack(law, values)), slots(on), slots(moving or [0]), len(moving),
         advances(effects), len(kind.states) if kind.exact() else 0, kind.has("sign"),
-        any(on) or not kind.exact(),
+        any(on) or not kind.exact() or bool(kind.felt),
     )  # fmt: skip
 
 

@@ -156,8 +156,6 @@ def _law_steps(slots: Slots, head: str, middle: list[str]) -> str:
         if law.hook("advance") is not None:
             advanced = f"{law.name}_advance(m, {law_state(law)}, k)"
             lines += [*middle, f"{_targets(law, 'z1')} = {advanced}"]
-            if law.felt:
-                lines.append(f"k = {law_values(law, felt='z1')}")
         lines += [f"s = {law_state(law).replace('z[', 'z1[')}", f"rest = {_forces(law, False)}"]
         return [*lines, *(_friction(f"{law.name}_limit(q, s, k)") if law.has("sign") else [])]
 

@@ -13,7 +13,8 @@ from typing import Any, Callable, ClassVar, NamedTuple
 
 from ..errors import PhysicsError
 from . import laws as _laws  # noqa: F401  (importing it registers the laws)
-from .effect_check import check_search, check_verdict
+from .effect_check import FIELDS, check_search, check_verdict
+from .field_check import check_fields
 from .law import LAWS, PARTS, Law, laws_of
 from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
 from .parameter import Table as Table
@@ -214,6 +215,7 @@ class Effect:
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         if cls.name:
+            check_fields(cls, f"effect {cls.name!r} ({cls.__module__}.{cls.__qualname__})", FIELDS)
             cls.parameters = all_parameters(cls.parameters, cls.tables)
             cls.State = named("State", tuple(cls.states))
             cls.Values = named("Values", tuple(cls.fields()))

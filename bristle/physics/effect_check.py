@@ -6,6 +6,16 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from ..errors import PhysicsError
+from .field_check import (
+    ANY_BY_NAME,
+    GRIDS,
+    PARAMETERS,
+    SWITCH,
+    TABLES,
+    TEXT,
+    TEXT_BY_NAME,
+    TEXTS,
+)
 from .law_check import PARTS
 
 if TYPE_CHECKING:
@@ -13,6 +23,21 @@ if TYPE_CHECKING:
 
 MIMICKED = ("force_bias", "late_drive")
 """Faults of a sensor that an effect may look like: the force's zero, a drive on record late."""
+
+
+FIELDS = {
+    **dict.fromkeys(("name", "site", "kind", "shows", "source", "expect"), TEXT),
+    **dict.fromkeys(("family", "absorbed_by", "offset", "mass"), TEXT),
+    **dict.fromkeys(("laws", "acts_on", "needs", "bristles", "assumed", "joint", "late"), TEXTS),
+    **dict.fromkeys(("excludes", "start_ties", "mimics", "faults"), TEXTS),
+    **dict.fromkeys(("contact", "passive", "zero_at_rest"), SWITCH),
+    **dict.fromkeys(("states", "starts", "lookalikes"), TEXT_BY_NAME),
+    **dict.fromkeys(("start_grid", "start_limits"), ANY_BY_NAME),
+    "parameters": PARAMETERS,
+    "tables": TABLES,
+    "start_shares": GRIDS,
+}
+"""The class data of an effect, and of which kind each is."""
 
 
 def check_search(effect: type[Effect], where: str) -> None:

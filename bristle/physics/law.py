@@ -14,11 +14,17 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
 
 from ..errors import PhysicsError
-from .command import Constant, Form, Monotone
+from .command import Constant as Constant  # laws, users' own as well, take these from here
+from .command import Form
+from .command import Linear as Linear
+from .command import Monotone as Monotone
+from .command import Quadratic as Quadratic
+from .field_check import check_fields
 from .inputs import Inputs
-from .law_check import ALL_HOOKS, HOOKS, check_law
+from .law_check import ALL_HOOKS, FIELDS, HOOKS, check_law
 from .law_check import PARTS as PARTS
 from .parameter import CHOICES, Parameter, Table, all_parameters, fields_of, named
+from .parameter import interpolate as interpolate
 from .tuples import FACTORS, values_of_law
 
 FOREVER = 1e15
@@ -94,6 +100,8 @@ class Law:
         Of a building's part: "layer" or "storey", and the parameter that is its linear stiffness.
     source
         Where it is from, with the year.
+    own
+        Whether it is a user's own, outside the library; `user.load_laws` sets it.
 
     Hooks
     -----
@@ -110,8 +118,9 @@ class Law:
     rate
         Rates of the states, as a tuple. A law with states has it.
     advance
-        States after q.dt at constant velocity q.v, as a tuple, where that is known exactly. It sees
-        `p` at the voltage of the step's end. A law that has states and none of it moves by `rate`.
+        States after q.dt at constant velocity q.v, as a tuple, where that is known exactly or as
+        well as exactly. It sees `p` at a voltage within the step; a law with a lag of its own sees
+        in q.V the mean of the step. A law that has states and none of it moves by `rate`.
     force
         Of a building's part: its force [N], at arrays as well.
     """
@@ -132,6 +141,7 @@ class Law:
     place: ClassVar[str] = ""
     stiffness: ClassVar[str] = ""
     source: ClassVar[str] = ""
+    own: ClassVar[bool] = False
     State: ClassVar[Any]
     Values: ClassVar[Any]
 
@@ -139,6 +149,7 @@ class Law:
         super().__init_subclass__(**kwargs)
         if not cls.name:
             return
+        check_fields(cls, f"law {cls.name!r} ({cls.__module__}.{cls.__qualname__})", FIELDS)
         cls.parameters = all_parameters(cls.parameters, cls.tables)
         if any(not isinstance(form, Constant) for form in cls.command.values()):
             cls.parts = tuple(dict.fromkeys((*cls.parts, "command")))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 from ..errors import PhysicsError
-from .command import Monotone
+from .command import Form, Monotone
+from .field_check import PARAMETERS, TABLES, TEXT, TEXT_BY_NAME, TEXTS, by_name
 from .parameter import check_numbers
 
 if TYPE_CHECKING:
@@ -24,6 +26,9 @@ PARTS = ("yield", "sign", "bristle", "viscous", "spring", "command")
     command   something depends on the command; found from `command`
 """
 
+SIGNALS = ("x", "v", "a", "V")
+"""Signals that a state may begin with."""
+
 HOOKS = {
     "limit": "sign",
     "yielding": "yield",
@@ -34,6 +39,38 @@ HOOKS = {
 """The hooks that give a force [N], each with the part of which it is the force."""
 
 ALL_HOOKS = (*HOOKS, "rate", "advance", "force")
+
+
+FIELDS = {
+    **dict.fromkeys(("name", "site", "place", "stiffness", "source", "felt"), TEXT),
+    **dict.fromkeys(("parts", "contains", "assumed"), TEXTS),
+    **dict.fromkeys(("states", "starts"), TEXT_BY_NAME),
+    "parameters": PARAMETERS,
+    "tables": TABLES,
+    "command": by_name(
+        'a dictionary such as {"yield_force": Linear("f_c", "f_v")}',
+        lambda one: isinstance(one, Form) and all(isinstance(n, str) for n in one.names()),
+    ),
+    "shapes": by_name(
+        'a dictionary such as {"v_s": Shape(0.02, 5.0, 9, ("f_c", "f_v"))}', lambda one: _shape(one)
+    ),
+    "variants": by_name(
+        'a dictionary such as {"plain": Variant({"k": 0.0})}', lambda one: _variant(one)
+    ),
+}
+"""The class data of a law, and of which kind each is."""
+
+
+def _shape(one: Any) -> bool:
+    """Return whether this is a `law.Shape` that a search could begin from."""
+    low, high, nodes, shapes, _ = one
+    return 0.0 < low <= high and isinstance(nodes, int) and nodes > 0 and isinstance(shapes, tuple)
+
+
+def _variant(one: Any) -> bool:
+    """Return whether this is a `law.Variant`."""
+    values, idle, lacks = one
+    return isinstance(values, Mapping) and isinstance(idle, tuple) and isinstance(lacks, str)
 
 
 def check_law(law: type[Law]) -> None:
@@ -62,8 +99,25 @@ def _check_names(law: type[Law], where: str) -> None:
             raise PhysicsError(f"{where}: command of {quantity} names {lacking}, no parameters.")
         if isinstance(form, Monotone) and form.table not in law.tables:
             raise PhysicsError(f"{where}: command of {quantity}: {form.table} is no table.")
+        if isinstance(form, Monotone) and law.tables[form.table].bounds[0] < 0.0:
+            raise PhysicsError(
+                f"{where}: the table {form.table} over the command is not monotone: its values are "
+                f"what the quantity gains from knot to knot, and its bounds "
+                f"{law.tables[form.table].bounds} let it fall. Bounds that begin at 0 are right."
+            )
         if quantity in places and quantity not in form.names():
             raise PhysicsError(f"{where}: {quantity} is a quantity and a parameter.")
+    if law.felt and law.states.get(law.felt) != "V":
+        raise PhysicsError(f"{where}: felt = {law.felt!r}; the name of a state in V is right.")
+    wrong = [n for n, signal in law.starts.items() if n not in law.states or signal not in SIGNALS]
+    if wrong:
+        raise PhysicsError(
+            f"{where}: starts of {wrong}; a state's name and one of {SIGNALS} is right."
+        )
+    for field, names in (("assumed", law.assumed), ("stiffness", (law.stiffness,))):
+        lacking = [name for name in names if name and name not in law.parameters]
+        if lacking:
+            raise PhysicsError(f"{where}: {field} names {lacking}, no parameters of it.")
     for name, shape in law.shapes.items():
         lacking = [n for n in (name, *shape.shapes) if n not in law.parameters]
         if lacking:

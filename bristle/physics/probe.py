@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import traceback
 from functools import partial
 from itertools import product
 from math import copysign, inf, isfinite
@@ -10,8 +9,8 @@ from typing import Any, Callable
 
 from .effect import Effect, Q, Sizes
 from .parameter import CHOICES
-
-"""Parameters that are choices of a form: they may make a hook jump."""
+from .probe_call import call, refuse_jump
+from .user_text import FlawError
 
 RANGES = {
     "x": 0.01, "v": 0.2, "a": 5.0, "V": 8.0, "drift": 0.01, "drift_rate": 0.1, "rod_x": 0.01,
@@ -19,16 +18,11 @@ RANGES = {
 }  # fmt: skip
 """How far the signals of a small rig go, over which a hook is asked for jumps."""
 
-JUMP = 1e-3
-"""A change within nothing, by the whole range of a hook, that counts as a jump."""
+FURTHER = (10.0, 0.1, 100.0, 0.01, 1e3)
+"""Factors on the signals at which a parameter that moved nothing is looked at again."""
 
-
-class FlawError(Exception):
-    """What is wrong with an effect of a user's, and the line where."""
-
-    def __init__(self, text: str, line: int = 0) -> None:
-        super().__init__(text)
-        self.line = line
+SHARES = (0.0, 0.2, 0.5, 0.8, 1.0)
+"""Shares of a parameter's range at which it is."""
 
 
 def probe(effect: type[Effect]) -> None:
@@ -117,31 +111,9 @@ def _call(
     effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float], finite: bool = True
 ) -> tuple[float, ...]:
     """Return what a hook gives, as a tuple; FlawError if that is not right."""
-    function: Callable[..., Any] = getattr(effect, hook)
-    line = function.__code__.co_firstlineno + 1
-    p = effect.values_of(values)
-    try:
-        found = function(q, z, p)
-    except Exception as error:
-        frames = traceback.extract_tb(error.__traceback__)
-        inner = [f.lineno for f in frames if f.filename == function.__code__.co_filename]
-        raise FlawError(
-            f"{hook} raises {type(error).__name__}: {error}, at {_place(effect, q, values)}.",
-            (inner[-1] or 0) if inner else line,
-        ) from None
     wanted = {"rate": len(effect.states), "advance": len(effect.states), "motion": 2}.get(hook)
-    if wanted is not None:
-        if not isinstance(found, tuple) or len(found) != wanted:
-            what = f"a tuple of {wanted}: the states" if hook != "motion" else "x, v"
-            raise FlawError(f"{hook} returns {found!r}; {what} is right.", line)
-    else:
-        found = (found,)
-    for value in found:
-        if isinstance(value, bool) or not isinstance(value, (int, float)):
-            raise FlawError(f"{hook} returns {value!r}; a number is right.", line)
-        if finite and not isfinite(value):
-            raise FlawError(f"{hook} returns {value!r} at {_place(effect, q, values)}.", line)
-    return tuple(float(value) for value in found)
+    given = (q, z, effect.values_of(values))
+    return call(getattr(effect, hook), given, wanted, partial(_place, effect, q, values), finite)
 
 
 def _place(effect: type[Effect], q: Q, values: dict[str, float]) -> str:
@@ -158,7 +130,7 @@ def _smooth_in_signals(effect: type[Effect], values: dict[str, float]) -> None:
         low = 0.0 if signal == "V" else -RANGES[signal]
         for q, hook in product(_signals()[1:7], hooks):
             given = partial(_at_signal, effect, hook, q, _state(effect, q, values), values, signal)
-            _refuse_jump(effect, hook, given, low, RANGES[signal], f"q.{signal}")
+            refuse_jump(getattr(effect, hook), given, (low, RANGES[signal]), f"q.{signal}")
 
 
 def _at_signal(
@@ -183,13 +155,34 @@ def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> Non
             if name in CHOICES:
                 moved = moved or given(0.0) != given(1.0)
             else:
-                moved = _refuse_jump(effect, hook, given, 0.0, 1.0, f"p.{name}", 24) or moved
-        # Of a table some knots may lie where no signal of this small rig comes.
+                jumped = refuse_jump(getattr(effect, hook), given, (0.0, 1.0), f"p.{name}", 24)
+                moved = jumped or moved
+        moved = moved or _moved_far_out(effect, name, (low, high), values)
+        # Of a table some knots may lie where no signal of any rig comes.
         moving[field_of[name]] = moving.get(field_of[name], False) or moved
     for field, moved in moving.items():
         if not moved:
             line = getattr(effect, next(iter(effect.hooks()))).__code__.co_firstlineno
             raise FlawError(f"p.{field} moves nothing: no measurement could tell it.", line)
+
+
+def _moved_far_out(
+    effect: type[Effect], name: str, bounds: tuple[float, float], values: dict[str, float]
+) -> bool:
+    """Return whether a parameter moves a hook in larger or smaller motion than that of the rig.
+
+    What begins beyond a knot, such as a stop behind a gap, does nothing before it.
+    """
+    for factor, signal, hook in product(FURTHER, _signals()[1:], effect.hooks()):
+        q = Q(*(factor * one for one in signal))._replace(dt=signal.dt, storey=signal.storey)
+        try:
+            z = _state(effect, q, values)
+            given = partial(_at_parameter, effect, hook, q, z, values, name, *bounds)
+            if len({given(share) for share in SHARES}) > 1:
+                return True
+        except FlawError:  # so far out it need not be right
+            continue
+    return False
 
 
 def _at_parameter(
@@ -200,39 +193,3 @@ def _at_parameter(
     by_decades = low > 0.0 and high > 100.0 * low
     value = low * (high / low) ** share if by_decades else low + (high - low) * share
     return _call(effect, hook, q, z, {**values, name: value})
-
-
-def _refuse_jump(
-    effect: type[Effect], hook: str, given: Callable[[float], tuple[float, ...]], low: float,
-    high: float, what: str, count: int = 40,
-) -> bool:  # fmt: skip
-    """Refuse a hook that jumps between low and high; return whether it changes at all."""
-    points = [low + (high - low) * (k + 0.37) / count for k in range(-1, count + 1)]
-    points = [min(max(point, low), high) for point in points]
-    rows = [given(point) for point in points]
-    moved = False
-    for column in range(len(rows[0])):
-        values = [row[column] for row in rows]
-        size = max(values) - min(values)
-        if size == 0.0:
-            continue
-        moved = True
-        steps = [abs(b - a) for a, b in zip(values, values[1:])]
-        k = steps.index(max(steps))
-        a, b = points[k], points[k + 1]
-        left, right = values[k], values[k + 1]
-        for _ in range(50):
-            middle = 0.5 * (a + b)
-            between = given(middle)[column]
-            if abs(between - left) >= abs(right - between):
-                b, right = middle, between
-            else:
-                a, left = middle, between
-        if abs(right - left) > JUMP * size:
-            line = getattr(effect, hook).__code__.co_firstlineno + 1
-            raise FlawError(
-                f"{hook} jumps by {abs(right - left):.3g} with {what}: it is not differentiable, "
-                "and no fit could follow it. A smooth step such as tanh(v/v_s) is right.",
-                line,
-            )
-    return moved

@@ -155,7 +155,7 @@ def _table(at: SiteModel, task: FitTask) -> list[LawError]:
 
 
 def _tabled(own: str) -> tuple[str, ...]:
-    """Return the laws of the table: the model's, and those that a step moves on exactly.
+    """Return the laws of the table: the model's, and those that a step moves on by `advance`.
 
     What is integrated by its rates takes minutes to fit; whoever wants it asks for it by name.
     """

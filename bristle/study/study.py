@@ -20,7 +20,7 @@ from ..errors import StudyError
 from ..findings import command
 from ..identify.prepare import SHORTEST
 from ..physics.user import Loaded, waiting
-from ..trust import load_effects
+from ..trust import load
 from .history import History, Step
 from .new import make_folder
 from .settings import ROLES, Settings, read_settings
@@ -81,12 +81,16 @@ class Study:
         self.history = History(self.folder)
         self._lock = FileLock(self.folder / ".lock")
         self._complete_unfinished()
-        self.own_effects = load_effects(self.effects_folder, trust=trust)
+        self.own_laws = load(self.laws_folder, "law", trust=trust)
+        self.own_effects = load(self.effects_folder, trust=trust)
         self.settings: Settings = read_settings(self.folder / "study.toml")
         self._seen = self._state()
 
     own_effects: list[Loaded]
     """The files of effects/, each with its effect or why it is left out."""
+
+    own_laws: list[Loaded]
+    """The files of laws/, each with its law or why it is left out."""
 
     @classmethod
     def open(cls, folder: Path | str, *, trust: bool = False) -> Study:
@@ -109,8 +113,13 @@ class Study:
         """Where the user's own effects are."""
         return self.folder / "effects"
 
+    @property
+    def laws_folder(self) -> Path:
+        """Where the user's own laws are."""
+        return self.folder / "laws"
+
     def usable_effects(self) -> list[str]:
-        """Register the user's own effects that can be compiled; return why others are left out.
+        """Register the user's own effects and laws that can be compiled; say why others cannot be.
 
         Call it before a fit or a diagnosis: an effect that cannot be compiled would take all others
         along.
@@ -122,12 +131,12 @@ class Study:
         """
         from ..check.user_effects import usable
 
-        found = load_effects(self.effects_folder)
-        for one in found:
+        laws, effects = load(self.laws_folder, "law"), load(self.effects_folder)
+        for one in (*laws, *effects):
             if untrusted := waiting(one.path):
                 raise untrusted
-        self.own_effects = usable(found)
-        return [one.error for one in self.own_effects if one.error]
+        self.own_laws, self.own_effects = usable(laws), usable(effects)
+        return [one.error for one in (*self.own_laws, *self.own_effects) if one.error]
 
     @property
     def reports_folder(self) -> Path:

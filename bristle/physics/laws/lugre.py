@@ -11,7 +11,7 @@ from ..parameter import Parameter
 
 
 class LuGre(Law):
-    """Modified LuGre damper with the mean bristle deflection z.
+    """Modified LuGre damper: bristles with the mean deflection z bend before they slip.
 
         f  = (sigma_a + sigma_0 V) z + sigma_1 z' + (sigma_2 + sigma_b V) v exp(-|v|/v_n)
         z' = v - a_0 |v| z

@@ -1,0 +1,83 @@
+"""List the laws that a damper can have, or tell all of one.
+
+bristle laws new NAME starts a law of your own; bristle laws check FILE tests it.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from . import _own
+
+if TYPE_CHECKING:
+    from ..physics.law import Law
+
+HELP = "list the laws of a damper, tell all of one, start or check one of your own"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle laws`."""
+    _own.add_arguments(parser, "law")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Print a table of the laws, everything about one, or start or check a user's own."""
+    from ..physics.effect import EFFECTS
+    from ..physics.laws import law_names, laws_of
+    from ._law_template import template
+
+    taken = (*law_names(), *law_names("structure"), *EFFECTS)
+    own = _own.Own("law", lambda: {law.name: law for law in laws_of("damper")}, taken, template)
+    return _own.main(arguments, own, tell, _print_one, _print_table)
+
+
+def tell(law: type[Law]) -> dict[str, Any]:
+    """Return what users are told of a law: class data, first line and formula of its text."""
+    from ..physics.effect import effects_of
+
+    about, text = _own.text_of(law)
+    return {
+        "name": law.name,
+        "about": about,
+        "text": text,
+        "parts": list(law.parts),
+        "contains": list(law.contains),
+        "command": {
+            quantity: [type(form).__name__.lower(), *form.names()]
+            for quantity, form in law.command.items()
+        },
+        "source": law.source,
+        "states": dict(law.states),
+        "variants": [f"{law.name}_{suffix}" for suffix in law.variants],
+        "inverse": law.affine() and law.exact() and not law.felt,
+        "effects": [effect.name for effect in effects_of("damper", law.name)],
+        "parameters": _own.parameters_of(law),
+    }
+
+
+def _print_one(found: dict[str, Any]) -> None:
+    print(f"{found['about']}\n")
+    print(found["text"])
+    print(f"\nParts: {', '.join(found['parts'])}.")
+    if found["contains"]:
+        print(f"Contains: {', '.join(found['contains'])}; no effect of that kind is offered.")
+    for quantity, (form, *names) in found["command"].items():
+        print(f"Over the voltage: {quantity} is {form}, by {', '.join(names)}.")
+    print(f"Inverse for controllers: {'yes' if found['inverse'] else 'no'}.")
+    print(f"Effects that join it: {', '.join(found['effects'])}.")
+    print(f"Source: {found['source']}.\n")
+    print("\n".join(_own.parameter_lines(found, "")))
+    print(f"\nIn a study:  bristle identify STUDY --law {found['name']}")
+
+
+def _print_table(rows: list[dict[str, Any]]) -> None:
+    """Print the laws, each in a block of lines."""
+    for row in rows:
+        print(f"{row['name']}: {row['about']}")
+        print(f"  parts: {', '.join(row['parts'])}")
+        if row["contains"]:
+            print(f"  contains: {', '.join(row['contains'])}")
+        print(f"  parameters: {', '.join(_own.shortly(row))}")
+        print(f"  source: {row['source']}")
+    print("All of one:  bristle laws NAME")
