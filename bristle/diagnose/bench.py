@@ -66,9 +66,10 @@ class BenchRuns:
         """Return the verdict, which is the damper's finding with the instruments that show."""
         opened, found = self._opened, findings[DAMPER]
         assert opened is not None
+        faults = (*opened.faults, *found.sensors)
         made = Diagnosis(
-            found.kind, found.effects, of_damper(found, opened.faults), findings,
-            sensors=opened.faults, untestable=found.untestable, coordinate=found.coordinate,
+            found.kind, found.effects, of_damper(found, faults), findings,
+            sensors=faults, untestable=found.untestable, coordinate=found.coordinate,
             noise=opened.noise,
         )  # fmt: skip
         return without_drive(with_instrument(made), [*self._train, *self._holdout])

@@ -14,6 +14,7 @@ from ..physics.effect import EFFECTS
 from .candidates import Trial, judge
 from .decision import Decision, decide
 from .experiments import separating
+from .faults import SensorFault
 from .finding import Finding, of_decision
 from .inconsistent_runs import groups, inconsistent_runs
 from .limits import detectable, untestable
@@ -21,6 +22,7 @@ from .opening import Opening, Progress, Trials, silent
 from .remaining_residual import remaining_residual
 from .rule import BENCH, SITE, DecisionRule
 from .sites import better, equals
+from .zero import free_zero, zero_fault
 
 
 def look_at_damper(opened: Opening, say: Progress = silent, rule: DecisionRule = BENCH) -> Finding:
@@ -33,21 +35,35 @@ def look_at_damper(opened: Opening, say: Progress = silent, rule: DecisionRule =
     before, inside = opened.before, opened.brief is not None
     if inside and max(before.z, before.train) <= rule.quiet:
         return of_decision(decide(before, [], lambda _first: [], rule=rule), before)
-    made = Trials(opened, say)
-    organised = False
-    if not inside and made.patterns:
-        first = made.patterns[0]
-        organised = is_organised(first.share, first.p, rule)
-    decision = decide(before, made.single, made.grow, organised, made.reduce, rule)
+    made, decision = _decided(opened, say, rule)
+    sensors: tuple[SensorFault, ...] = ()
+    freed = free_zero(opened, decision)
+    if freed is not None:
+        say("the zero of the force is fitted along with every effect")
+        again, other = _decided(freed, say, rule)
+        zero = zero_fault(freed.problem, other)
+        if zero is not None:
+            opened, made, decision, sensors = freed, again, other, (zero,)
+            before = opened.before
     if inside:
         if decision.kind in ("none", "unknown", "insufficient"):
             decision = _rare(before, made.single, rule) or decision
-        return of_decision(decision, before, tuple(made.single))
+        return replace(of_decision(decision, before, tuple(made.single)), sensors=sensors)
     kind, reasons = _kind_and_reasons(decision, opened, rule)
     found = of_decision(decision, before, tuple(made.single))
-    found = replace(found, kind=kind, reasons=tuple(reasons))
+    found = replace(found, kind=kind, reasons=tuple(reasons), sensors=sensors)
     say("intervals")
     return _with_intervals(_with_limits(found, opened, made, rule), opened)
+
+
+def _decided(opened: Opening, say: Progress, rule: DecisionRule) -> tuple[Trials, Decision]:
+    """Return the trials of effects at a damper, and the decision that they lead to."""
+    made = Trials(opened, say)
+    organised = False
+    if opened.brief is None and made.patterns:
+        first = made.patterns[0]
+        organised = is_organised(first.share, first.p, rule)
+    return made, decide(opened.before, made.single, made.grow, organised, made.reduce, rule)
 
 
 def _with_limits(found: Finding, opened: Opening, made: Trials, rule: DecisionRule) -> Finding:

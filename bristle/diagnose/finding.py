@@ -11,6 +11,7 @@ from ..identify.rig import DAMPER
 from .candidates import Trial
 from .decision import Decision
 from .experiments import Experiment
+from .faults import SensorFault
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class Finding:
 
     Of a bench's damper there is more: `std` by parameter [SI] of what the data identify,
     `patterns` of the residual that is left, `untestable` effects, the `experiment` that would tell
-    the members of a class apart.
+    the members of a class apart; `sensors` are faults that only the model with the named effects
+    shows.
     """
 
     site: str
@@ -45,6 +47,7 @@ class Finding:
     patterns: tuple[ResidualPattern, ...] = ()
     untestable: tuple[str, ...] = ()
     experiment: Experiment | None = None
+    sensors: tuple[SensorFault, ...] = ()
 
 
 def of_decision(decision: Decision, before: Trial, trials: tuple[Trial, ...] = ()) -> Finding:
