@@ -44,6 +44,7 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     """
     reconstructed = about.force == "reconstructed"
     sensors = (*about.sensors, *_of_load_cell(findings))
+    sensors += tuple(fault for found in findings.values() for fault in found.sensors)
     parts = [replace(f, kind="none", effects=()) if _is_gain(f) else f for f in findings.values()]
     named: list[str] = []
     rivals: list[str] = []

@@ -12,26 +12,48 @@ from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
 from .candidates import Trial, judge
 from .decision import Decision, Z, as_noise, decide, gained
+from .faults import SensorFault
 from .finding import Finding, of_decision
 from .opening import Opening, Progress, Trials, silent
 from .rule import BENCH, SITE, DecisionRule
 from .sites import better, equals
+from .zero import free_zero, zero_fault
 
 
-def look_at_damper(opened: Opening, say: Progress = silent) -> Finding:
-    """Return what a damper's law lacks, by `opened.rule`."""
+def look_at_damper(opened: Opening, say: Progress = silent) -> tuple[Finding, Opening]:
+    """Return what a damper's law lacks, by `opened.rule`.
+
+    Returns
+    -------
+    finding; and what the look began with: with the zero of the force free where that is off
+    """
     before, rule = opened.before, opened.rule
     if not opened.scope.rank_all and max(before.z, before.train) <= rule.quiet:
-        return of_decision(as_noise(before, ()), before)
-    made = Trials(opened, say)
+        return of_decision(as_noise(before, ()), before), opened
+    made, decision = _decided(opened, say)
+    sensors: tuple[SensorFault, ...] = ()
+    freed = free_zero(opened, decision)
+    if freed is not None:
+        say("the zero of the force is fitted along with every effect")
+        again, other = _decided(freed, say)
+        zero = zero_fault(freed.problem, other)
+        if zero is not None:
+            opened, made, decision, sensors = freed, again, other, (zero,)
+            before = opened.before
+    if not decision.effects:
+        decision = _rare(before, made.single, rule) or decision
+    found = replace(of_decision(decision, before, tuple(made.single)), sensors=sensors)
+    patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
+    return replace(found, patterns=patterns), opened
+
+
+def _decided(opened: Opening, say: Progress) -> tuple[Trials, Decision]:
+    """Return the trials of effects at a damper, and the decision that they lead to."""
+    made, rule = Trials(opened, say), opened.rule
     organised = rule.organised < 1.0 and bool(made.patterns)
     if organised:
         organised = is_organised(made.patterns[0].share, made.patterns[0].p, rule)
-    decision = decide(before, made.single, made.grow, organised, made.reduce, rule)
-    if not decision.effects:
-        decision = _rare(before, made.single, rule) or decision
-    found = of_decision(decision, before, tuple(made.single))
-    return replace(found, patterns=tuple(made.patterns)) if rule.organised < 1.0 else found
+    return made, decide(opened.before, made.single, made.grow, organised, made.reduce, rule)
 
 
 def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:

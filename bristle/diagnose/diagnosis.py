@@ -99,7 +99,7 @@ def diagnose_rig(
             "insufficient", (), opened.reasons, sensors=opened.faults, noise=opened.noise
         )
     if opened is not None:
-        found = look_at_damper(opened, say)
+        found, opened = look_at_damper(opened, say)
         excused = runs.excused(found, findings)
         say("intervals")
         # What an instrument explains contradicts nothing.

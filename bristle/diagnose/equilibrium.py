@@ -27,6 +27,7 @@ from .corrected import corrected
 from .damper import excused_by_sensor, left_by_filter
 from .finding import Finding
 from .load_cell import load_cell
+from .masses import Shaken, suited_masses, text_of_masses
 from .opening import IN_BUILDING, Opening, Progress, median_noise
 from .rule import BENCH, INSIDE, SITE, DecisionRule
 from .sensors import SensorFault, sensor_faults
@@ -72,7 +73,10 @@ class BuildingRuns:
         found, self._present = corrected_for_delay(found, present)
         self._train, self._holdout = found[: len(right[0])], found[len(right[0]) :]
         self._straight = linear_storeys(self._present.effects)
-        self._problems = self._made(building)
+        shaken = Shaken(self._train, self._holdout, self._present.law, self._straight)
+        self._building = suited_masses(shaken, building)
+        self._masses = text_of_masses(building, self._building)
+        self._problems = self._made(self._building)
         self._notes: list[str] = []
 
     def _made(self, building: Building) -> dict[str, Pair]:
@@ -156,7 +160,7 @@ class BuildingRuns:
         """Return what the verdict tells beside the findings of the sites."""
         reconstructed = DAMPER in self._problems and self._problems[DAMPER][0].reconstructed
         force = "reconstructed" if reconstructed else "measured"
-        return About(force, self._sensors, self._noise, tuple(self._notes))
+        return About(force, self._sensors, self._noise, (*self._masses, *self._notes))
 
 
 def _suits(suited: Pair, given: Pair, present: Model, rule: DecisionRule = BENCH) -> bool:

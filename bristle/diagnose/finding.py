@@ -14,6 +14,7 @@ from ..identify.rig import DAMPER
 from .candidates import Trial
 from .decision import Decision
 from .experiments import Experiment
+from .faults import SensorFault
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,8 @@ class Finding:
 
     `std` is by parameter [SI], of what the data identify; `patterns` those of the residual;
     `untestable` the effects that the site's runs do not show; `experiment` the run that would
-    distinguish alternatives, where the rig's motion can be chosen.
+    distinguish alternatives, where the rig's motion can be chosen; `sensors` are faults that only
+    the model with the named effects shows.
     """
 
     site: str
@@ -48,6 +50,7 @@ class Finding:
     patterns: tuple[ResidualPattern, ...] = ()
     untestable: tuple[str, ...] = ()
     experiment: Experiment | None = None
+    sensors: tuple[SensorFault, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return what verdict.json holds of the site."""

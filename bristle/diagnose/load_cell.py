@@ -60,6 +60,8 @@ def load_cell(
         return None
     if z_1 > rule.clean and share < rule.share:
         return None
+    if not delay and abs(gain - 1.0) <= rule.mass_doubt:
+        return None  # masses that are not known better would do the same
     name = instrument_of("force", "delay") if delay else FORCE_GAIN
     right = tuple([corrected(r, delay, gain) for r in part] for part in (train, holdout))
     faulty = replace(

@@ -342,6 +342,14 @@ class DecisionRule:
     mass_known: float = 0.01
     """The same of a mass. Trades and found: as `stiffness_known`."""
 
+    mass_doubt: float = 0.09
+    """Share by which a mass may differ from its file, and a load cell's gain for the same reason.
+
+    Three standard deviations of 3 %. Trades: above, gains of the load cell and effects that act
+    like masses are taken for the file's; below, errors of the file read as faults and as effects.
+    Found: stated, what buildings are known to that were never weighed.
+    """
+
     farthest: float = 2.0
     """Standard deviations by which a file's numbers may move. Trades and found: as they."""
 

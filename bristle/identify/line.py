@@ -31,7 +31,7 @@ def fit_line(problem: StructureProblem, law: str) -> Fit:
     limits = {DAMPING: (-problem.damped, float("inf"))} if np.isfinite(problem.damped) else {}
     model = Model(law, (), dict.fromkeys(names, 0.0), limits=limits)
     bounds = np.array([model.bounds(name) for name in names]).T
-    columns = [_columns(run, LAWS[law]) for run in problem.runs]
+    columns = [line_columns(run, LAWS[law]) for run in problem.runs]
     A = np.concatenate(columns)
     force = np.concatenate([run.force for run in problem.runs])
     noise = [max(run.noise, 1e-300) for run in problem.runs]
@@ -93,7 +93,7 @@ def _line_covariance(problem: StructureProblem, model: Model, columns: list[Arra
     return covariance
 
 
-def _columns(run: Run, law: type[Law]) -> Array:
+def line_columns(run: Run, law: type[Law]) -> Array:
     """Return the force (n, p) of each parameter of a linear law at 1, the others at zero."""
     zero = np.zeros_like(run.x)
     q = Inputs(run.x, run.v, run.a, run.V, run.dt, 0.0, 0.0, False)

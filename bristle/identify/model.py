@@ -109,6 +109,9 @@ def law_parameters(law: str) -> dict[str, Parameter]:
 class Problem:
     """Runs held against a model: predictions, and the noise that a true model would show."""
 
+    free_zero = False
+    """Whether the force's zero is fitted along with every model; see `residuals.zero_of`."""
+
     def __init__(self, runs: list[Run]) -> None:
         self.runs = runs
         self._benches: dict[tuple[str, tuple[str, ...]], Bench] = {}
@@ -116,7 +119,18 @@ class Problem:
 
     def of(self, runs: list[Run]) -> Problem:
         """Return a problem of the same kind for other runs, such as a part of these."""
+        made = self._made_of(runs)
+        made.free_zero = self.free_zero
+        return made
+
+    def _made_of(self, runs: list[Run]) -> Problem:
         return Problem(runs)
+
+    def with_free_zero(self) -> Problem:
+        """Return the same runs with the force's zero fitted along with every model."""
+        made = self.of(self.runs)
+        made.free_zero = True
+        return made
 
     def size(self, unit: str) -> float:
         """Return the typical size on this rig of a parameter of some unit, in SI."""

@@ -9,12 +9,19 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from ..physics.effect import EFFECTS
 from .model import Model, Problem
-from .search import z_scale
+from .search import HUBER, z_scale
 
 Array = NDArray[np.float64]
 Expected = list[tuple[Array, Array, Array]]
 """Per run: bias (n,) and noise (n,) expected of a true model's residual, and draws (d, n) of it."""
+
+BLOCK = 250
+"""Samples, longer than a residual's correlation."""
+
+PASSES = 5
+"""Weighted means until the constant of a residual has settled."""
 
 FINITE = 1e6
 """What counts as the normalised residual where a prediction is not finite."""
@@ -26,11 +33,65 @@ def over_noise(error: Array, sigma: Array) -> Array:
 
 
 def errors(problem: Problem, model: Model, expected: Expected) -> list[Array]:
-    """Return per run the error (n - skip,) [N]: measured less predicted, less the expected bias."""
-    return [
+    """Return per run the error (n - skip,) [N]: measured less predicted, less the expected bias.
+
+    Where the force's zero is fitted along, less that zero as well; a model with an effect that has
+    a constant force of its own has none besides.
+    """
+    found = [
         (run.force - problem.predict(model, run) - bias)[run.skip :]
         for run, (bias, _, _) in zip(problem.runs, expected, strict=True)
     ]
+    if not problem.free_zero or has_offset(model):
+        return found
+    zero = _constant(problem, found, expected)
+    return [error - zero for error in found]
+
+
+def has_offset(model: Model) -> bool:
+    """Return whether an effect of a model has a constant force of its own that a fit moves."""
+    return any(
+        EFFECTS[name].offset and f"{name}.{EFFECTS[name].offset}" not in model.held
+        for name in model.effects
+    )
+
+
+def zero_of(problem: Problem, model: Model) -> tuple[float, float]:
+    """Return the constant [N] by which the force is above a model's, and its standard deviation.
+
+    It is that of Huber's loss over all runs; the deviation is from the scatter of blocks.
+    """
+    expected = problem.expectation(model)
+    found = [
+        (run.force - problem.predict(model, run) - bias)[run.skip :]
+        for run, (bias, _, _) in zip(problem.runs, expected, strict=True)
+    ]
+    zero = _constant(problem, found, expected)
+    sigma = [e[1][run.skip :] for run, e in zip(problem.runs, expected, strict=True)]
+    weight = np.concatenate(sigma) ** -2.0
+    left = (np.concatenate(found) - zero) * weight
+    edges = np.arange(0, len(left), min(BLOCK, max(1, len(left) // 20)))
+    return zero, float(np.sqrt(np.sum(np.add.reduceat(left, edges) ** 2)) / weight.sum())
+
+
+def _constant(problem: Problem, found: list[Array], expected: Expected) -> float:
+    """Return the constant of errors per run (n - skip,) [N] by weighted Huber means."""
+    error = np.concatenate(found)
+    sigma = np.concatenate(
+        [e[1][run.skip :] for run, e in zip(problem.runs, expected, strict=True)]
+    )
+    finite = np.isfinite(error)
+    error, base = error[finite], sigma[finite] ** -2.0
+    if not len(error):
+        return 0.0
+    zero, weight = 0.0, base
+    for turn in range(PASSES):
+        zero = float(np.dot(weight, error) / weight.sum())
+        z = np.abs(error - zero) * np.sqrt(base)
+        if turn == 0:  # held from then on, so that the constant is smooth in the parameters
+            spread = max(1.0, float(np.median(z)) / 0.6745)
+        weight = base * np.minimum(1.0, HUBER * spread / np.maximum(z, 1e-300))
+    return zero
 
 
 def residuals(problem: Problem, model: Model, expected: Expected) -> Array:

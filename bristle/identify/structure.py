@@ -75,6 +75,11 @@ class StructureProblem(Problem):
 
     def of(self, runs: list[Run]) -> StructureProblem:
         """Return the same problem for other runs."""
+        made = super().of(runs)
+        assert isinstance(made, StructureProblem)
+        return made
+
+    def _made_of(self, runs: list[Run]) -> StructureProblem:
         return StructureProblem(runs, self.storey, self.reconstructed, self.damped)
 
     def along(self, effects: tuple[str, ...]) -> Along:

@@ -18,6 +18,14 @@ from .motion import velocity_of_run
 
 _LEVELS = 12  # at most; a voltage with more moves continuously
 
+BEYOND = 1.15
+"""How far a held-out run may reach beyond those for training, as a ratio."""
+
+_ANOTHER = "Record another run for training that reaches as far."
+
+Check = tuple[str, Any, str, float]
+"""What is held against the runs for training: its name, its value, its unit and a factor."""
+
 
 @dataclass(frozen=True)
 class Excitation:
@@ -114,10 +122,11 @@ def check_runs(
 ) -> tuple[list[Finding], list[Excitation]]:
     """Return what is found in all runs together, and what each of them excites."""
     excitations = [excitation_of(run, level) for run in (*train, *holdout)]
+    parts = bool({run.source for run in train} & {run.source for run in holdout})
     findings = [
         *_too_short(excitations),
         *_drive(excitations),
-        *_beyond(excitations[: len(train)], excitations[len(train) :]),
+        *_beyond(excitations[: len(train)], excitations[len(train) :], parts),
         *_two_rigs(excitations),
         *_steps([*train, *holdout]),
     ]
@@ -203,11 +212,14 @@ def _distinct(levels: list[float]) -> list[float]:
     return out
 
 
-def _beyond(train: list[Excitation], holdout: list[Excitation]) -> Iterator[Finding]:
-    """Report held-out runs that leave the range of those for training."""
+def _beyond(train: list[Excitation], holdout: list[Excitation], parts: bool) -> Iterator[Finding]:
+    """Report held-out runs that leave the range of those for training.
+
+    `parts`: whether runs for training and held out are parts of one file, which has one role.
+    """
     if not train or not holdout:
         return
-    checks: list[tuple[str, Any, str, float]] = [
+    checks: list[Check] = [
         ("speed", lambda run: run.speed, "m/s", 1.0),
         ("stroke", lambda run: run.stroke, "mm", 1e3),
         ("voltage", lambda run: run.range[1], "V or A", 1.0),
@@ -215,18 +227,46 @@ def _beyond(train: list[Excitation], holdout: list[Excitation]) -> Iterator[Find
     for name, value, unit, factor in checks:
         known = max(map(value, train))
         for run in holdout:
-            if known > 0.0 and value(run) > 1.15 * known:
+            if known > 0.0 and value(run) > BEYOND * known:
                 yield Finding(
                     "beyond",
                     "warning",
                     f"{name} reaches {plain(factor * value(run))} {unit}, and "
                     f"{plain(factor * known)} in "
                     "the runs for training: the model is judged where it was not fitted.",
-                    "Exchange the roles of two runs in study.toml.",
+                    _exchange(run, train, holdout, checks) if not parts else _ANOTHER,
                     run.run,
                     name,
                     value(run) / known,
                 )
+
+
+def _exchange(
+    run: Excitation, train: list[Excitation], holdout: list[Excitation], checks: list[Check]
+) -> str:
+    """Return which two runs are to exchange their roles so that training reaches as far as `run`.
+
+    For it the run for training goes that the others for training reach furthest beyond; what is
+    held out then must stay within what is not.
+    """
+
+    def left(goes: Excitation) -> float:
+        """Return how far the held-out runs would leave the others, as a ratio."""
+        kept = [one for one in train if one is not goes] + [run]
+        judged = [one for one in holdout if one is not run] + [goes]
+        reach = [max(map(value, kept)) for _, value, _, _ in checks]
+        return max(
+            value(one) / known
+            for (_, value, _, _), known in zip(checks, reach, strict=True)
+            for one in judged
+            if known > 0.0
+        )
+
+    goes = min(train, key=left)
+    text = f'Exchange the roles in study.toml: {run.run} to "train", {goes.run} to "holdout"'
+    if left(goes) <= BEYOND:
+        return text + "."
+    return text + "; other runs reach further than those for training still, so measure more."
 
 
 def _two_rigs(runs: list[Excitation]) -> Iterator[Finding]:

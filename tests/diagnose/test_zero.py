@@ -1,0 +1,120 @@
+"""A load cell off its zero beside an effect: the effect alone is named, and the zero is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from test_model_based_faults import problems
+
+from bristle.diagnose import damper as of_damper
+from bristle.diagnose.candidates import judge
+from bristle.diagnose.decision import Decision
+from bristle.diagnose.opening import Opening
+from bristle.diagnose.zero import free_zero, zero_fault
+from bristle.identify.fit import Model, identify
+from bristle.identify.residuals import errors, has_offset, robust_z, zero_of
+
+OFFSET = 0.6
+HIDDEN = {"effects": ("stribeck",), "values": {"stribeck.rise": 0.5}}
+
+
+def opened(**choices):
+    """Return what a diagnosis of runs with a shifted force begins with, and the true model."""
+    train, held_out = (
+        problem.of([replace(run, force=run.force + OFFSET) for run in problem.runs])
+        for problem in problems(**choices)
+    )
+    model = identify(train, "bingham", starts=2).model
+    return Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
+
+
+def test_the_zero_is_fitted_along_with_every_model():
+    train, _ = problems()
+    model = identify(train, "bingham", starts=2).model
+    off = train.of([replace(run, force=run.force + OFFSET) for run in train.runs])
+    zero, std = zero_of(off, model)
+    assert zero == pytest.approx(OFFSET, abs=4.0 * std)
+    assert 0.0 < std < 0.01
+    assert robust_z(off, model) > 5.0
+    free = off.with_free_zero()
+    assert robust_z(free, model) == pytest.approx(robust_z(train, model), rel=0.01)
+    assert free.of(free.runs[:1]).free_zero
+    assert not off.free_zero
+    left = np.concatenate(errors(free, model, free.expectation(model)))
+    assert abs(np.mean(left)) < 4.0 * std
+    fitted = identify(free, "bingham", starts=2).model
+    for name in model.free():
+        assert fitted.value(name) == pytest.approx(model.value(name), rel=1e-2)
+
+
+def test_an_effect_with_a_constant_force_of_its_own_has_no_zero_besides():
+    train, _ = problems()
+    spring = Model("bingham", ("gas_spring",), {"gas_spring.preload": 0.0})
+    assert has_offset(spring)
+    assert not has_offset(replace(spring, held=("gas_spring.preload",)))
+    free = train.with_free_zero()
+    same = zip(
+        errors(train, spring, train.expectation(spring)),
+        errors(free, spring, free.expectation(spring)),
+        strict=True,
+    )
+    assert all(np.array_equal(*pair) for pair in same)
+
+
+def of(kind, opening, model=None):
+    """Return a decision for a model on the runs of an opening."""
+    trial = opening.before if model is None else judge(model, opening.problem, opening.held_out)
+    return Decision(kind, trial.effects, trial, 0.9, ())
+
+
+def fitted(opening, effects):
+    """Return a model with effects fitted to the training runs."""
+    return identify(opening.problem, "bingham", effects, starts=1).model
+
+
+def test_a_zero_is_freed_where_a_constant_is_left_or_a_second_effect_took_it_up():
+    opening = opened(**HIDDEN)
+    freed = free_zero(opening, of("unknown", opening))
+    assert freed is not None
+    assert freed.problem.free_zero
+    assert freed.held_out.free_zero
+    assert freed.before.z < opening.before.z
+    alone = of("effect", freed, fitted(freed, ("stribeck",)))
+    assert alone.best.z == pytest.approx(1.0, abs=0.1)
+    fault = zero_fault(freed.problem, alone)
+    assert fault is not None
+    assert (fault.channel, fault.fault) == ("force", "bias")
+    assert fault.value == pytest.approx(OFFSET, abs=max(4.0 * fault.std, 0.01))
+    assert "beside stribeck" in fault.words
+    assert "static preload on the rod would look the same" in fault.words
+    pair = of("effect", opening, fitted(opening, ("stribeck", "gas_spring")))
+    assert free_zero(opening, pair) is not None
+    assert free_zero(opening, of("none", opening)) is None
+    assert zero_fault(freed.problem, pair) is None, "the spring's preload is that constant"
+
+
+def test_a_spring_that_says_more_than_a_zero_stays():
+    train, held_out = problems(
+        effects=("gas_spring",),
+        values={"gas_spring.k": 150.0, "gas_spring.preload": OFFSET, "gas_spring.k_2": 0.0},
+    )
+    model = identify(train, "bingham", starts=2).model
+    opening = Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
+    assert free_zero(opening, of("effect", opening, fitted(opening, ("gas_spring",)))) is None
+
+
+def test_without_an_offset_nothing_is_tried_again():
+    train, held_out = problems(**HIDDEN)
+    model = identify(train, "bingham", starts=2).model
+    opening = Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
+    assert free_zero(opening, of("unknown", opening)) is None
+
+
+@pytest.mark.slow
+def test_an_effect_is_named_alone_and_the_zero_told():
+    found = of_damper.look_at_damper(opened(**HIDDEN))
+    assert (found.kind, found.effects) == ("effect", ("stribeck",))
+    (fault,) = found.sensors
+    assert fault.value == pytest.approx(OFFSET, abs=0.02)
