@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.channels import is_channel
 from ..quantity import plain, quantity, short_z
 from .coordinates import SHOWN
 from .names import joined, name_of, site_name, site_names
@@ -42,7 +41,7 @@ def sentences(comparison: Comparison, finder: Finder) -> tuple[str, ...]:
 
 def _how_wrong(comparison: Comparison) -> str:
     total = comparison.total
-    known = is_channel(comparison.quantity)
+    known = comparison.quantity.islower()  # words; "F_kN" is a name that somebody gave an output
     what = comparison.quantity.replace("_", " ") if known else f'output "{comparison.quantity}"'
     where = f"{_WHICH[comparison.seen]} the model misses"
     size = f"{quantity(total.rms, comparison.unit, 2, total.signal)} RMS"

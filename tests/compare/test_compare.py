@@ -225,3 +225,19 @@ def test_a_channel_without_noise_is_refused():
 def test_a_short_run_is_refused():
     with pytest.raises(RecordError, match="100 samples"):
         compare_predictions(predictions_with(count=1, n=100))
+
+
+def test_an_output_with_a_name_of_its_own_is_called_by_it_and_a_large_rig_has_kilonewtons():
+    held = [
+        replace(
+            one, quantity="F_kN", measured=1e5 * one.measured, predicted=1e5 * one.predicted,
+            noise=1e5 * one.noise, sigma=1e5 * one.sigma,
+        )
+        for one in predictions_with(lambda c: -40.0 * c["displacement"])
+    ]  # fmt: skip
+    how, where, right = compare_predictions(held).sentences
+    assert 'misses the output "F_kN" by ' in how
+    assert " kN RMS (" in how
+    assert "% of its own" in how
+    assert " kN more" in where or " kN less" in where
+    assert not re.search(r"\de[+-]\d", how + where + right)
