@@ -178,11 +178,9 @@ def step(
     sticks = c.moving_mass > 0.0
     stick = stick_force(now[HOLDING_FORCE], v1, c.moving_mass, dt) if sticks else 0.0
     end = record(Inputs, (x1, v1, a1, V1, dt, energy, stick, sticks))
-    if c.linear:
-        begin = record(Inputs, (x0, v0, a0, V0, dt, energy, stick, sticks))
+    begin = record(Inputs, (x0, v0, a0, V0, dt, energy, stick, sticks)) if c.linear else end
+    if c.linear or c.setup.active:  # one call: compiled code grows with each
         force, friction = law_step(c.setup, begin, end, state, new_state, work)
-    elif c.setup.active:
-        force, friction = law_step(c.setup, end, end, state, new_state, work)
     else:
         force, friction = hold_law(c.setup.law, c.setup.p, end, state, new_state)
     energy += 0.5 * dt * (force0 * v0 + force * v1)
