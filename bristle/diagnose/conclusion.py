@@ -57,7 +57,8 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
         # What is no effect, such as a mass of the base, is an alternative in words alone.
         known = [one for one in (*part.effects, *twins) if one in EFFECTS]
         (named if sure else rivals).extend(known if part.kind != "unknown" else [])
-        sites.update({e: sites.get(e, _site_of(e, part.site)) for e in part.effects})
+        acting = [*part.effects, *known]
+        sites.update({e: sites.get(e, _site_of(e, part.site)) for e in acting})
     kind = _kind_of([part.kind for part in parts], named, rivals)
     if kind in ("none", "effect") and (shown := instruments_of(sensors)):
         kind, named = "effect", [*shown, *named]

@@ -54,12 +54,16 @@ def headline(verdict: Verdict) -> str:
 
 
 def effects_at(verdict: Verdict) -> list[str]:
-    """Return the effects, each with its site where the rig has several: "duffing (layer)"."""
-    sites = verdict.get("sites") or {}
-    several = bool(set(sites.values()) - {DAMPER}) or len(verdict.get("findings") or []) > 1
+    """Return the effects, each with its sites where the rig has several: "duffing (layer)"."""
+    sites, findings = verdict.get("sites") or {}, verdict.get("findings") or []
+    several = bool(set(sites.values()) - {DAMPER}) or len(findings) > 1
     names = [str(name) for name in verdict.get("effects") or []]
     names += [str(one) for one in verdict.get("alternatives") or []]
-    return [f"{one} ({sites[one]})" if several and one in sites else one for one in names]
+    if not several:
+        return names
+    at = {one: [found["site"] for found in findings if one in found["effects"]] for one in names}
+    places = {one: at[one] if len(at[one]) > 1 else [sites[one]] for one in names if one in sites}
+    return [f"{one} ({', '.join(places[one])})" if one in places else one for one in names]
 
 
 def _one_of(effects: Sequence[str]) -> str:

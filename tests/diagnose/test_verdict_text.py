@@ -52,6 +52,15 @@ def test_a_bench_names_no_site_and_a_building_does():
     )
 
 
+def test_an_effect_at_two_sites_and_one_that_looks_alike_have_their_sites():
+    both = {f"storey{i}": at(f"storey{i}", "effect", "storey_softening") for i in (1, 2)}
+    assert headline(said(**both)) == "The model misses storey_softening (storey1, storey2)."
+    damper = {"storey1": at("storey1"), "damper": at("damper", "effect", "gas_spring")}
+    verdict = conclude(damper, About("reconstructed")).as_dict()
+    assert verdict["sites"] == {"gas_spring": "damper", "duffing": "layer"}
+    assert headline(verdict).startswith("The model misses either gas_spring (damper) or duffing (l")
+
+
 def test_what_the_rest_depends_on_is_told_with_how_sure_that_is():
     verdict = {"kind": "unknown", "effects": [], "coordinate": "rest", "reasons": []}
     chance = [{"coordinate": "rest", "share": 0.1, "p": 0.2}]
