@@ -23,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Print a table of the laws, everything about one, or start or check a user's own."""
+    from ..physics import effects as _registered  # noqa: F401  (importing registers them)
     from ..physics.effect import EFFECTS
     from ..physics.laws import law_names, laws_of
     from ._law_template import template

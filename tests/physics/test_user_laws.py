@@ -223,6 +223,7 @@ def test_the_command_starts_checks_and_lists(
     said = capsys.readouterr().out
     assert "Parts: yield, bristle, viscous, command." in said
     assert "rho = 500 1/m" in said
+    assert "Effects that join it: asymmetry, " in said
     assert main(["laws", "dal"]) == 2
     assert 'Did you mean "dahl"?' in capsys.readouterr().err
 
