@@ -39,7 +39,7 @@ from typing import Any, TypeVar
 
 from ..errors import BristleError, DesignError, UnitError
 from ..physics.building import paper_building, read_building
-from ..physics.effect import EFFECTS, Effect
+from ..physics.effect import EFFECTS, Effect, plain_name
 from ..physics.laws import DEFAULT_OF_DESIGN, Law, base_and_variant, law_names
 from ..physics.parameter import fields_of
 from ..units import convert
@@ -152,9 +152,16 @@ def damper_from_model(
         known = {key: parameter.unit for key, parameter in EFFECTS[name].parameters.items()}
         own = _entries(table.get("parameters", {}), EFFECTS[name])
         values |= _model_values(own, known, name + ".", path)
-    on = tuple(name for name in effects if EFFECTS[name].site == "damper")
-    values = {key: value for key, value in values.items() if key.split(".")[0] in (*units, *on)}
-    return _located(lambda: Damper(law, values, on, v_max, known_to), str(path))
+    in_building = "building" in data  # else a damper on a bench: all of its effects are in it
+    on = tuple(
+        name
+        for name in effects
+        if EFFECTS[name].site == "damper" or ("damper" in EFFECTS[name].sites and not in_building)
+    )
+    kept = (*units, *on)
+    values = {plain_name(k): value for k, value in values.items() if k.split(".")[0] in kept}
+    inside = tuple(map(plain_name, on))
+    return _located(lambda: Damper(law, values, inside, v_max, known_to), str(path))
 
 
 def _entries(table: Mapping[str, Any], owner: type[Law] | type[Effect]) -> dict[str, Any]:

@@ -162,10 +162,11 @@ class Trials:
         assert isinstance(held_out, StructureProblem)
         if not problem.reconstructed:
             return []
+        able = [e.key("structure") for e in effects_of("structure") if "force" in e.hooks()]
         return [
-            try_effect(effect.name, first.model, problem, held_out)
-            for effect in effects_of("structure")
-            if "force" in effect.hooks() and effect.name not in first.model.effects
+            try_effect(name, first.model, problem, held_out)
+            for name in able
+            if name not in first.model.effects
         ]
 
 

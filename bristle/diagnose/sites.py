@@ -55,8 +55,8 @@ def look_at(
         base = fit(train, replace(present, law=linear.name, values=values), with_std=False)
         taken = set(present.effects).union(*(EFFECTS[name].excludes for name in present.effects))
     before = judge(base.model, train, held_out)
-    able = [e for e in effects_of("structure") if hook in e.hooks() and e.name not in taken]
-    names = [e.name for e in able]
+    able = [e.key("structure") for e in effects_of("structure") if hook in e.hooks()]
+    names = [name for name in able if name not in taken]
     if before.z <= rule.quiet and before.train <= rule.clean:
         names = []  # a line leaves nothing that a further effect could explain
     trials = [try_effect(name, base.model, train, held_out) for name in names]

@@ -17,6 +17,38 @@ MIMICKED = ("force_bias", "late_drive")
 """Faults of a sensor that an effect may look like: the force's zero, a drive on record late."""
 
 
+def check_sites(
+    effect: type[Effect], where: str, known: tuple[str, ...],
+    shared: tuple[tuple[str, ...], tuple[str, ...]],
+) -> None:  # fmt: skip
+    """Refuse sites that there are not, and what an effect of several cannot use at all of them.
+
+    Parameters
+    ----------
+    effect, where : the class, and how a message begins
+    known : the sites that there are
+    shared : the hooks and the signals that a damper and a structure both have
+    """
+    if not (isinstance(effect.sites, tuple) and effect.sites):
+        raise PhysicsError(f"{where}: sites = {effect.sites!r}; a tuple of {known} is right.")
+    for site in effect.sites:
+        if site not in known:
+            raise PhysicsError(f"{where}: site {site!r} is none of {known}.")
+    if len(effect.sites) == 1:
+        return
+    if len(set(effect.sites)) < len(effect.sites) or "sensor" in effect.sites:
+        raise PhysicsError(f'{where}: sites = {effect.sites}; each once, and "sensor" alone.')
+    for what, used, both in (
+        ("defines", tuple(effect.hooks()), shared[0]),
+        ("needs", effect.needs, shared[1]),
+    ):
+        wrong = [one for one in used if one not in both]
+        if wrong:
+            raise PhysicsError(
+                f"{where}: {what} {wrong}, which not all of its sites have; {list(both)} they do."
+            )
+
+
 def check_search(effect: type[Effect], where: str) -> None:
     """Refuse starts that a search could not begin from."""
     grids: list[tuple[str, Mapping[str, tuple[float, ...]]]] = [
