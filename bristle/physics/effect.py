@@ -13,11 +13,16 @@ test bench, which has one site, the plain name does.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import new_class
 from typing import Any, Callable, ClassVar, NamedTuple
 
 from ..errors import PhysicsError
 from . import laws as _laws  # noqa: F401  (importing it registers the laws)
 from .effect_check import check_search, check_sites, check_verdict
+from .effect_names import AT as AT  # the rest of the package takes these from here
+from .effect_names import EFFECTS as EFFECTS
+from .effect_names import exclude as exclude
+from .effect_names import plain_name as plain_name
 from .law import LAWS, PARTS, Law, laws_of
 from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
 from .parameter import Table as Table
@@ -25,9 +30,6 @@ from .parameter import all_parameters, check_numbers, fields_of, named
 from .parameter import interpolate as interpolate
 
 SITES = ("damper", "structure", "sensor")
-
-AT = "@"
-"""Stands between an effect's name and a site that is not its first."""
 
 CHANNELS = ("force", "velocity")
 """Channels whose instrument a sensor's effect may be."""
@@ -103,35 +105,6 @@ class Sizes(NamedTuple):
     v: float  # m/s
     V: float  # V
     force: float  # N
-
-
-class Registry(dict[str, "type[Effect]"]):
-    """The effects by name; NAME@SITE gives an effect as it is at another one of its sites.
-
-    Iteration goes over the plain names.
-    """
-
-    def __missing__(self, key: str) -> type[Effect]:
-        name, _, site = key.partition(AT)
-        if name != key and name in self and site in self[name].sites[1:]:
-            return self[name].at(site)
-        raise KeyError(key)
-
-    def __contains__(self, key: object) -> bool:
-        if super().__contains__(key):
-            return True
-        name, at, site = str(key).partition(AT)
-        return bool(at) and super().__contains__(name) and site in self[name].sites[1:]
-
-    def get(self, key: str, default: Any = None) -> Any:
-        """Return the effect of a name, or of NAME@SITE; the default where there is none."""
-        try:
-            return self[key]
-        except KeyError:
-            return default
-
-
-EFFECTS: Registry = Registry()
 
 
 class Effect:
@@ -301,9 +274,10 @@ class Effect:
             return cls
         known: dict[str, type[Effect]] = cls.__dict__.get("_elsewhere") or {}
         if site not in known:
-            data = {"site": site, "sites": (site,), "__doc__": cls.__doc__}
-            data["__module__"] = cls.__module__
-            known[site] = type(cls)(cls.__name__, (cls,), data, register=False)
+            own = {"site": site, "sites": (site,), "__doc__": cls.__doc__}
+            own["__module__"] = cls.__module__
+            apart = {"register": False}
+            known[site] = new_class(cls.__name__, (cls,), apart, lambda names: names.update(own))
             cls._elsewhere = known
         return known[site]
 
@@ -408,17 +382,3 @@ def instrument_of(channel: str, fault: str) -> str:
     """Return the sensor effect that is a kind of fault of a channel, "" if none is."""
     known = [e for e in effects_of("sensor") if e.shows == channel and fault in e.faults]
     return min(known, key=lambda effect: effect.own).name if known else ""
-
-
-def plain_name(key: str) -> str:
-    """Return the effect's name of NAME, NAME@SITE, or of either with a parameter behind it."""
-    name, dot, parameter = key.partition(".")
-    return name.partition(AT)[0] + dot + parameter
-
-
-def exclude(one: str, other: str) -> bool:
-    """Return whether two effects, by a model's names, cannot be together at one site."""
-    first, second = EFFECTS[one], EFFECTS[other]
-    if (AT in one or AT in other) and first.site != second.site:
-        return False
-    return second.name in first.excludes or first.name in second.excludes
