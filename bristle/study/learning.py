@@ -136,9 +136,11 @@ def _as_named_here(name: str, bench: bool) -> str:
     own, at, site = name.partition(AT)
     if not at or own not in EFFECTS or site not in EFFECTS[own].sites:
         return name
-    if bench:
-        return own if site == "damper" else name
-    return EFFECTS[own].key(site)
+    if not bench:
+        return EFFECTS[own].key(site)
+    if site == "structure":
+        raise StudyError(f"{name}: a test bench has no structure; {own} is that of the damper.")
+    return own
 
 
 def _refuse(model: StudyModel, name: str, bench: bool) -> None:
