@@ -25,6 +25,7 @@ from benchmarks._blind.plan import CASES
 from benchmarks._rows import Row
 
 BUILDINGS = 40
+SHARED = 40
 MARK = "<!-- measured -->"
 
 
@@ -35,6 +36,10 @@ def options() -> argparse.ArgumentParser:
     parser.add_argument(
         "--structure", type=int, metavar="N", default=BUILDINGS,
         help=f"how many on buildings, on top ({BUILDINGS}; every second without a load cell)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--shared", type=int, metavar="N", default=SHARED,
+        help=f"how many with an end stop in the damper of a bench, on top ({SHARED})",
     )  # fmt: skip
     parser.add_argument("--seed", type=int, help="of the plan; else that of the last run")
     parser.add_argument("--fresh", action="store_true", help="draw a seed that nobody has seen")
@@ -62,17 +67,28 @@ def seed_of(arguments: argparse.Namespace) -> int:
     return secrets.randbelow(plan.RESERVED) if last is None else last
 
 
-def chosen(seed: int, cases: int, buildings: int, only: str = "") -> list[plan.Task]:
-    """Return the tasks of the bench's plan and, on top, those of the buildings' plan."""
-    bench = [] if only == "structure" else plan.make_plan(seed, cases, only)
-    return bench + (plan.make_structure_plan(seed, buildings) if only in ("", "structure") else [])
+def chosen(
+    seed: int, cases: int, buildings: int, only: str = "", shared: int = 0
+) -> list[plan.Task]:
+    """Return the tasks of the bench's plan and, on top, those of the plans of their own.
+
+    Parameters
+    ----------
+    seed : of all plans
+    cases, buildings, shared : how many on the bench, on buildings, and of the kind "shared"
+    only : one of `plan.KINDS`, or "" for all
+    """
+    tasks = [] if only in ("structure", "shared") else plan.make_plan(seed, cases, only)
+    if only in ("", "structure"):
+        tasks = tasks + plan.make_structure_plan(seed, buildings)
+    return tasks + (plan.make_shared_plan(seed, shared) if only in ("", "shared") else [])
 
 
 def main(given: Sequence[str] | None = None) -> int:
     """Run what is not finished and print the table; 130 if interrupted, with all that is kept."""
     arguments = options().parse_args(given)
     seed = seed_of(arguments)
-    tasks = chosen(seed, arguments.cases, arguments.structure, arguments.only)
+    tasks = chosen(seed, arguments.cases, arguments.structure, arguments.only, arguments.shared)
     path = record.path_of(seed)
     print(f"seed {seed}, {len(tasks)} cases, record {path}", file=sys.stderr)
     code = 0
@@ -137,7 +153,7 @@ def run() -> list[Row]:
     seed = record.newest()
     if seed is None:
         return [Row("hidden effects found", "not run yet: python benchmarks/blind.py")]
-    tasks = chosen(seed, CASES, BUILDINGS)
+    tasks = chosen(seed, CASES, BUILDINGS, shared=SHARED)
     path = record.path_of(seed)
     lines = work.finished(path, tasks, "diagnosis")
     rows = table.figures(lines, _times(path, measure=False))

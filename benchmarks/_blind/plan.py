@@ -35,8 +35,9 @@ INVISIBLE = (
 )  # fmt: skip
 """Faults that the parameters of the base laws absorb without a trace: no method can report them."""
 
-KINDS = ("none", "effect", "outside", "fault", "pair", "structure")
-"""What `--only` takes; "structure" is the building, whose cases have a plan of their own."""
+KINDS = ("none", "effect", "outside", "fault", "pair", "structure", "shared")
+"""What `--only` takes; "structure" is the building, "shared" an effect of `SITES` in a damper on a
+bench. The cases of these two have plans of their own."""
 
 BUILDINGS = ("structure_10N", "structure_2kN")
 SITES = ("base_friction", "duffing", "storey_softening", "end_stop")
@@ -93,6 +94,8 @@ def make_plan(seed: int, cases: int, only: str = "") -> list[Task]:
         raise ValueError(f"kind {only!r}: there are {', '.join(KINDS)}")
     if only == "structure":
         return make_structure_plan(seed, cases)
+    if only == "shared":
+        return make_shared_plan(seed, cases)
     tasks: list[Task] = []
     for task in _endless(seed):
         if not only or task.kind == only:
@@ -115,6 +118,24 @@ def make_structure_plan(seed: int, cases: int) -> list[Task]:
         what = next(hidden[late])
         case = int(rng.integers(2**31))
         tasks.append(Task("structure", noise=0.01, seed=case, reconstructed=late, **what))
+    return tasks
+
+
+def make_shared_plan(seed: int, cases: int) -> list[Task]:
+    """Return the first `cases` tasks with an effect of a building's layer in a damper on a bench.
+
+    At 15 and 40 %. A longer plan begins with the shorter one; it draws nothing from the others.
+    """
+    rng = np.random.default_rng([seed, 27])
+    able = _shuffled([name for name in SITES if _able(name)], rng)
+    beds = _shuffled([(rig, law) for rig in RIGS for law in LAWS], rng)
+    tasks = []
+    for turn in range(cases):
+        name, (rig, law) = str(next(able)), next(beds)
+        own = [form.name for form in forms(name, _bed(rig, law))]
+        form = own[int(rng.integers(len(own)))]
+        strength, case = STRENGTHS[turn % 2], int(rng.integers(2**31))
+        tasks.append(Task("shared", name, form, strength, 0.01, rig, law, case))
     return tasks
 
 
@@ -171,7 +192,7 @@ def _shuffled(things: list[Any], rng: np.random.Generator) -> Iterator[Any]:
 def _single(kind: str, names: tuple[str, ...], seed: int) -> Iterator[dict[str, Any]]:
     """Yield one hidden effect after the other; strengths, rigs, laws and forms rotate in each."""
     rng = np.random.default_rng([seed, 22, len(kind)])
-    able = [name for name in names if _able(name)]
+    able = [name for name in names if name not in SITES and _able(name)]
     each = {name: _variants(name, rng) for name in able}
     for name in _shuffled(able, rng):
         yield next(each[name])
@@ -234,7 +255,7 @@ def _pairs(seed: int) -> Iterator[dict[str, Any]]:
     turn = 0
     while True:
         rig, law = next(beds)
-        able = [name for name in LIBRARY if forms(name, _bed(rig, law))]
+        able = [n for n in LIBRARY if n not in SITES and forms(n, _bed(rig, law))]
         names = tuple(str(name) for name in rng.choice(able, 2, replace=False))
         if not compatible(names):
             continue

@@ -26,8 +26,9 @@ FAMILY = ("presliding", "mount_compliance", "backlash")
 """Effects that count as one where the row says so."""
 
 TWINS = {"gas_spring", "duffing"}
-"""Effects that add up to one force where it is reconstructed. (The other such rivals, f_c beside
-`base_friction` and a mass of the base beside `fluid_inertia`, are no effects: words name them.)"""
+"""Effects that add up to one force where it is reconstructed, as do an effect of the layer and the
+same one of the damper. (The other such rivals, f_c beside `base_friction` and a mass of the base
+beside `fluid_inertia`, are no effects: words name them.)"""
 
 RESOLVED = 3.0
 """Standard deviations from which on the data tell two effects apart (see `inseparable`)."""
@@ -171,8 +172,13 @@ def names_in_building(line: Line) -> bool:
     if not in_class(line) or not line["task"].get("reconstructed"):
         return False
     resolved = said.get("resolved", {})
-    rivals = [r for r in said["effects"] if not ({r, true} <= TWINS or {r, true} <= set(FAMILY))]
+    own = [r for r in said["effects"] if r.partition("@")[0] != true]
+    rivals = [r for r in own if not (_adds_up(r, true) or {r, true} <= set(FAMILY))]
     return all(r == true or resolved.get(r, RESOLVED) < RESOLVED for r in rivals)
+
+
+def _adds_up(one: str, other: str) -> bool:
+    return {one.partition("@")[0], other} <= TWINS
 
 
 def tells_twin(line: Line) -> bool:

@@ -83,9 +83,9 @@ def of_kind(lines: Iterable[Line], kind: str, noise: float) -> list[Line]:
 
 def figures(lines: list[Line], times: dict[str, float] | None = None) -> list[Figure]:
     """Return the rows of the table at 1 % noise, then the same by parts, then at 3 %."""
-    bench = [line for line in lines if line["task"]["kind"] != "structure"]
+    bench = [line for line in lines if line["task"]["kind"] not in ("structure", "shared")]
     rows = main_rows(bench, 0.01, "main") + parameter_rows(bench, 0.01, "main")
-    rows += time_rows(bench, times or {}) + structure_rows(lines)
+    rows += time_rows(bench, times or {}) + shared_rows(lines) + structure_rows(lines)
     rows += part_rows(bench)
     if any(abs(line["task"]["noise"] - 0.03) < 1e-9 for line in bench):
         rows += main_rows(bench, 0.03, "3 % noise") + parameter_rows(bench, 0.03, "3 % noise")
@@ -220,6 +220,18 @@ def time_rows(lines: list[Line], times: dict[str, float]) -> list[Figure]:
             "one diagnosis inside a warm process, median, s", score.quantile(warm, 0.5), len(warm)
         ),
     ]
+
+
+def shared_rows(lines: list[Line]) -> list[Figure]:
+    """Return a row for each effect that a damper on a bench shares with an isolation layer."""
+    strong = binned(of_kind(lines, "shared", 0.01), "15 %", "40 %")
+    return [
+        share(
+            f"{name.replace('_', ' ')} on the bench right, 15 and 40 %",
+            count([x for x in strong if x["task"]["effect"] == name], score.names_effect), 95.0,
+        )
+        for name in dict.fromkeys(line["task"]["effect"] for line in strong)
+    ]  # fmt: skip
 
 
 def structure_rows(lines: list[Line]) -> list[Figure]:

@@ -33,8 +33,11 @@ def finished(path: Path, tasks: list[Task], part: str) -> list[dict[str, Any]]:
 
 
 def parts_of(task: Task) -> tuple[str, ...]:
-    """Return who is asked of a case: on buildings the package alone, for no peer takes one."""
-    return ("diagnosis",) if task.kind == "structure" else PARTS
+    """Return who is asked of a case: on buildings the package alone, for no peer takes one.
+
+    Nor has any peer a term for an end stop.
+    """
+    return ("diagnosis",) if task.kind in ("structure", "shared") else PARTS
 
 
 def do(part: str, task: Task, digest: str) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from ..data.model import StudyModel
 from ..errors import StudyError
 from ..fmu.build import build, plan
 from ..fmu.catalogue import component_of_law
-from ..identify.fit import Model, Problem, Run
+from ..identify.fit import Problem, Run
 from ..identify.instruments import true_motion
 from ..identify.prepare import prepare
 from ..physics.building import paper_building, read_building
@@ -87,22 +87,19 @@ def _one_run(study: Study) -> Measurement:
     return (runs.holdout or runs.train)[0]
 
 
-def _of_site(model: StudyModel, site: str) -> list[str]:
-    return [name for name in model.effects if EFFECTS[name].site == site]
-
-
-def _masses(model: StudyModel) -> list[str]:
+def _masses(damper: StudyModel) -> list[str]:
     """Return the parameters of the damper's effects that are a mass which moves with the rod."""
-    effects = _of_site(model, "damper")
-    return [f"{name}.{EFFECTS[name].mass}" for name in effects if EFFECTS[name].mass]
+    return [f"{name}.{EFFECTS[name].mass}" for name in damper.effects if EFFECTS[name].mass]
 
 
 def _damper(
     study: Study, model: StudyModel, measurement: Measurement, folder: Path, notes: list[str]
 ) -> Path:
     """Build the damper with the model's values as its defaults."""
-    effects = _of_site(model, "damper")
-    sensors = _of_site(model, "sensor")
+    bench = not study.settings.has_building
+    sensors = model.at("sensor", bench).effects
+    model = model.at("damper", bench)
+    effects = list(model.effects)
     if sensors:
         notes.append(
             f"{', '.join(sensors)} left out: an instrument's effect is not in the damper. The "
@@ -175,7 +172,8 @@ def _bench(
     if _drive(measurement) is not None:
         rows["drive"] = ("voltage", "V", run.V)
         wires["damper.voltage"] = "drive.value"
-    effects = [EFFECTS[name] for name in _of_site(model, "damper")]
+    damper = model.at("damper", bench=True)
+    effects = [EFFECTS[name] for name in damper.effects]
     if any("a" in effect.needs for effect in effects):
         rows["acceleration"] = ("acceleration", "m/s2", run.a)
         wires["damper.acceleration"] = "acceleration.value"
@@ -183,7 +181,7 @@ def _bench(
     for name, (title, unit, values) in rows.items():
         files.append(_signal_file(time, values, title, unit, folder / f"{name}.csv"))
         parts.append(_part(name, "SignalSource", {"kind": "csv", "file": files[-1].name}))
-    starts = _start_values(model, run)
+    starts = _start_values(damper, run)
     if "damper.voltage" not in wires:
         starts["voltage"] = 0.0
     parts.append(_part("damper", fmu.name, starts))
@@ -222,21 +220,27 @@ def _signal_file(
     return path
 
 
-def _start_values(model: StudyModel, run: Run) -> dict[str, float]:
+def _start_values(damper: StudyModel, run: Run) -> dict[str, float]:
     """Return the start values of states that begin with a signal of the run."""
     first = {"x": run.x[0], "v": run.v[0], "a": run.a[0], "V": run.V[0]}
-    states = dict(LAWS[model.base_law].starts)
-    for name in _of_site(model, "damper"):
+    states = dict(LAWS[damper.base_law].starts)
+    for name in damper.effects:
         states |= {f"{name}.{state}": signal for state, signal in EFFECTS[name].starts.items()}
     return {f"{name}_0": float(first[s]) for name, s in states.items() if s in first}
 
 
-def prediction(model: StudyModel, run: Run) -> Array:
-    """Return the force (n,) [N] that the damper of a model gives in a run, before instruments."""
-    fitted = as_model(model)
+def prediction(model: StudyModel, run: Run, bench: bool = True) -> Array:
+    """Return the force (n,) [N] that the damper of a model gives in a run, before instruments.
+
+    Parameters
+    ----------
+    model : the damper's law with the effects of all sites
+    run : its motion and voltage
+    bench : whether the model is of a damper on a bench
+    """
+    fitted, bare = as_model(model), as_model(model.at("damper", bench))
     v, a = true_motion(fitted.effects, fitted.values, run.v, run.a, run.dt)
-    bare = tuple(name for name in fitted.effects if EFFECTS[name].site == "damper")
-    return Problem([run]).predict(Model(fitted.law, bare, fitted.values), replace(run, v=v, a=a))
+    return Problem([run]).predict(bare, replace(run, v=v, a=a))
 
 
 # -- the building: ground motion of a run, the structure, the damper
@@ -261,15 +265,12 @@ def _structure(
     ground = measurement["ground_acceleration"]
     files.append(_signal_file(time, ground, "acceleration", "m/s2", folder / "ground.csv"))
     level = building.levels()[0]
-    own: dict[str, float | bool] = {f"{name}.on": True for name in _of_site(model, "structure")}
-    own |= {
-        name: value
-        for name, value in values.items()
-        if name.partition(".")[0] in _of_site(model, "structure")
-    }
+    layer = model.at("structure", bench=False)
+    own: dict[str, float | bool] = {f"{name}.on": True for name in layer.effects}
+    own |= {name: value for name, value in layer.values().items() if "." in name}
     damper: dict[str, float | bool] = {}
     mass = building.M[0][0]
-    for name in _masses(model):
+    for name in _masses(model.at("damper", bench=False)):
         moved = values.get(name, 0.0)
         if moved > 0.0:
             own["attached_mass"] = float(own.get("attached_mass", 0.0)) + moved

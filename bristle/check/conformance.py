@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import product
 from math import cos, inf, isfinite, pi, sin
 
 import numpy as np
@@ -31,12 +32,8 @@ class Check:
 def examine(effect: type[Effect]) -> list[Check]:
     """Return what is asked of an effect that is registered, and whether it holds."""
     asked: list[Callable[[type[Effect]], Check]] = [_says, _compiles]
-    if effect.site == "damper":
-        asked += [_rests, _matters, _bounds, _energy]
-    elif effect.site == "structure":
-        asked += [_building_rests, _building_bounds]
-    else:
-        asked += [_shows]
+    for site in effect.sites:
+        asked += _ASKED_AT[site]
     return [one(effect) for one in asked]
 
 
@@ -101,9 +98,10 @@ def _cycle(
 
 def _matters(effect: type[Effect]) -> Check:
     best = 0.0
-    for law in laws_joined(effect):
+    # A stop may not be met by the smaller motion.
+    for law, amplitude in product(laws_joined(effect), (0.01, 0.03)):
         rows = [
-            np.array(_cycle(law, on, {}, 0.01, 2.0, lambda t: 4.0 + 3.0 * sin(9.0 * t))[2])
+            np.array(_cycle(law, on, {}, amplitude, 2.0, lambda t: 4.0 + 3.0 * sin(9.0 * t))[2])
             for on in ([], [effect.name])
         ]
         change = float(np.sqrt(np.mean((rows[1] - rows[0]) ** 2) / np.mean(rows[0] ** 2)))
@@ -166,3 +164,11 @@ def _shows(effect: type[Effect]) -> Check:
         if not np.isfinite(shown(effect, own, signal, 0.002)).all():
             return Check("what it shows is finite at every bound", False, f"{values}")
     return Check("what it shows is finite at every bound", True)
+
+
+_ASKED_AT: dict[str, tuple[Callable[[type[Effect]], Check], ...]] = {
+    "damper": (_rests, _matters, _bounds, _energy),
+    "structure": (_building_rests, _building_bounds),
+    "sensor": (_shows,),
+}
+"""What is asked of an effect at each site."""

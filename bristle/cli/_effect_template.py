@@ -18,8 +18,9 @@ class {cls}(Effect):
     # The name in commands, scenarios and model.toml; that of this file too.
     name = "{name}"
 
-    # "damper": between rod and fluid. "structure": base and storeys. "sensor": an instrument.
-    site = "damper"
+    # "damper": between rod and fluid. "structure": base and storeys. "sensor": an instrument. An
+    # effect of both reads x, v, dt, energy, halt or stiffness: sites = ("damper", "structure").
+    sites = ("damper",)
 
     # The signals that the hooks below read from q. A damper offers x [m], v [m/s], a [m/s2] across
     # the fluid, V [V], dt [s], energy [J] dissipated so far; a structure x, v of the base, and

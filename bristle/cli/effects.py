@@ -41,6 +41,7 @@ def tell(effect: type[Effect]) -> dict[str, Any]:
     return {
         "name": effect.name,
         "site": effect.site,
+        "sites": list(effect.sites),
         "laws": list(laws_joined(effect)),
         "about": about,
         "text": text,
@@ -56,15 +57,19 @@ def tell(effect: type[Effect]) -> dict[str, Any]:
 
 def _print_one(found: dict[str, Any]) -> None:
     joins = f", joins {' and '.join(found['laws'])}" if found["laws"] else ""
-    print(f"{found['name']} ({found['site']}{joins}): {found['about']}\n")
+    print(f"{found['name']} ({', '.join(found['sites'])}{joins}): {found['about']}\n")
     print(found["text"])
     print(f"\nWhen it is missing: {found['expect']}.\nSource: {found['source']}.\n")
     print("\n".join(_own.parameter_lines(found, f"{found['name']}.")))
     if found["site"] == "sensor":
         print("\nIn a model that is held against measurements; never inside a damper.")
     else:
-        site, name = found["site"], found["name"]
-        print(f'\nIn a scenario, among the parameters of a {site}:  "{name}.on" = true')
+        places = " or a ".join(found["sites"])
+        print(f'\nIn a scenario, among the parameters of a {places}:  "{found["name"]}.on" = true')
+    if len(found["sites"]) > 1:
+        first, *others = found["sites"]
+        named = " or ".join(f"{found['name']}@{site}" for site in others)
+        print(f"In a building's model the name alone is that of the {first}; else {named}.")
 
 
 def _print_table(rows: list[dict[str, Any]]) -> None:
@@ -77,13 +82,13 @@ def _print_table(rows: list[dict[str, Any]]) -> None:
         for title in ("effect", "site, laws", "what it does", "when it is missing", "parameters"):
             table.add_column(title)
         for row in rows:
-            where = "\n".join([row["site"], *row["laws"]])
+            where = "\n".join([*row["sites"], *row["laws"]])
             about = f"{row['about']}\n({row['source']})".replace("[", r"\[")
             table.add_row(row["name"], where, about, row["expect"], "\n".join(_own.shortly(row)))
         Console().print(table)
     else:
         for row in rows:
-            where = ", ".join([row["site"], *row["laws"]])
+            where = ", ".join([*row["sites"], *row["laws"]])
             print(f"{row['name']} ({where}): {row['about']}")
             print(f"  when it is missing: {row['expect']}")
             print(f"  parameters: {', '.join(_own.shortly(row))}")

@@ -131,7 +131,7 @@ def _effects() -> Rows:
     from ..physics.effect import EFFECTS
 
     return [
-        {"name": name, "site": effect.site, "description": effect.first_line()}
+        {"name": name, "site": ", ".join(effect.sites), "description": effect.first_line()}
         for name, effect in sorted(EFFECTS.items())
     ]
 

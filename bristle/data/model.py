@@ -31,7 +31,7 @@ from typing import Any
 from ..errors import UnitError
 from ..findings import unknown, written
 from ..lines import KeyPath
-from ..physics.effect import EFFECTS, laws_joined
+from ..physics.effect import EFFECTS, exclude, laws_joined, plain_name
 from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..physics.user import waiting, why_left_out
@@ -168,9 +168,25 @@ class StudyModel:
         own = [(flat[name].std or 0.0, flat[name].unit, self.declared(name).unit) for name in names]
         return tuple(names), covariance_of(names, [convert(*one) for one in own], self.correlation)
 
+    def at(self, site: str, bench: bool) -> StudyModel:
+        """Return the model with the effects of one site alone, by their plain names.
+
+        Parameters
+        ----------
+        site : one of `physics.effect.SITES`
+        bench : whether the model is of a damper on a bench, whose effects are all the damper's
+        """
+        own = [name for name in self.effects if _site_of(name, bench) == site]
+        return replace(self, effects={plain_name(name): self.effects[name] for name in own})
+
     def with_effect(self, effect: str) -> StudyModel:
         """Return the model with one more effect, its parameters at their defaults."""
         return replace(self, effects={**self.effects, effect: _defaults("", effect)})
+
+
+def _site_of(name: str, bench: bool) -> str:
+    effect = EFFECTS[name]
+    return "damper" if bench and "damper" in effect.sites else effect.site
 
 
 def new_model(law: str = DEFAULT, effects: tuple[str, ...] = (), building: str = "") -> StudyModel:
@@ -390,7 +406,7 @@ def _effect(toml: Toml, name: str, table: Any, law: str, own_file: Path) -> dict
     if not isinstance(table, dict):
         toml.error(keys, f"is {written(table)}; a table is right.")
         return None
-    if EFFECTS[name].site == "damper" and not EFFECTS[name].joins(LAWS[law]):
+    if EFFECTS[name].sites == ("damper",) and not EFFECTS[name].joins(LAWS[law]):
         joins = ", ".join(laws_joined(EFFECTS[name]))
         toml.error(keys, f"{name} cannot join the law {law}; it joins {joins}.")
     toml.known(keys, table, ("parameters",))
@@ -400,8 +416,8 @@ def _effect(toml: Toml, name: str, table: Any, law: str, own_file: Path) -> dict
 
 def _exclusions(toml: Toml, effects: list[str]) -> None:
     for name in effects:
-        for other in EFFECTS[name].excludes:
-            if other in effects:
+        for other in effects:
+            if plain_name(other) in EFFECTS[name].excludes and exclude(name, other):
                 toml.error(("effects", name), f"{name} and {other} cannot be joined: drop one.")
 
 

@@ -40,7 +40,6 @@ from typing import Any, TypeVar
 from ..data.model import read_model
 from ..errors import BristleError, DesignError, StudyError
 from ..physics.building import paper_building, read_building
-from ..physics.effect import EFFECTS
 from ..physics.laws import DEFAULT_OF_DESIGN
 from .sliding import Damper
 from .task import Scheduling, Task
@@ -139,10 +138,9 @@ def damper_from_model(
         model = read_model(Path(path))
     except StudyError as error:
         raise DesignError(str(error)) from None
-    on = tuple(name for name in model.effects if EFFECTS[name].site == "damper")
-    own = {*model.parameters, *on}
-    values = {name: v for name, v in model.values().items() if name.partition(".")[0] in own}
-    return _located(lambda: Damper(model.law, values, on, v_max, known_to), str(path))
+    inside = model.at("damper", bench=not model.building)
+    on = tuple(inside.effects)
+    return _located(lambda: Damper(model.law, inside.values(), on, v_max, known_to), str(path))
 
 
 def _weights(table: Mapping[str, Any], where: str) -> Weights:

@@ -15,7 +15,7 @@ from ..identify.residuals import Expected, errors, residuals
 from ..identify.search import loss, losses, z_of, z_scale
 from ..identify.search_context import Search, is_rough, refine
 from ..identify.start_grid import Candidate, SearchContext, ranked_guesses
-from ..physics.effect import EFFECTS, effects_of
+from ..physics.effect import EFFECTS, effects_of, exclude
 from ..progress import Count
 
 Array = NDArray[np.float64]
@@ -94,22 +94,22 @@ def judge(
     )  # fmt: skip
 
 
-def joinable(base: Model, shown: Sequence[str] = SHOWN) -> list[str]:
-    """Return the effects that can join a model on a test bench, the slow ones first.
+def joinable(
+    base: Model, shown: Sequence[str] = SHOWN, problem: Problem | None = None
+) -> list[str]:
+    """Return the effects that can join a damper's model, the slow ones first.
 
-    `shown` are the channels whose instruments no redundancy of the channels has judged already.
+    Parameters
+    ----------
+    base : the model that they join
+    shown : the channels whose instruments no redundancy of the channels has judged already
+    problem : the damper's runs, which say what is offered; None for those of a test bench
     """
-    taken = set(base.effects)
-    for name in base.effects:
-        taken |= set(EFFECTS[name].excludes)
-    able = [
-        *effects_of("damper", base.law),
-        *(effect for effect in effects_of("sensor") if effect.shows in shown),
-    ]
+    instruments = [effect.name for effect in effects_of("sensor") if effect.shows in shown]
     names = [
-        effect.name
-        for effect in able
-        if effect.name not in taken and not set(effect.excludes) & set(base.effects)
+        name
+        for name in (*(problem or Problem([])).damper_effects(base.law), *instruments)
+        if name not in base.effects and not any(exclude(name, one) for one in base.effects)
     ]
     return sorted(names, key=lambda name: not EFFECTS[name].joint)
 
@@ -187,7 +187,7 @@ def try_all(
     """
     context = SearchContext(base, train)
     there = held_out.expectation(base)
-    names = joinable(base, shown)
+    names = joinable(base, shown, train)
     with ThreadPoolExecutor(cpu_count()) as pool:
         guesses = dict(
             zip(names, pool.map(lambda name: ranked_guesses(name, context), names), strict=True)

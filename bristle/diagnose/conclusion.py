@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..identify.rig import DAMPER
-from ..physics.effect import EFFECTS, effects_of
+from ..physics.effect import EFFECTS, effects_of, plain_name
 from . import verdict_text
 from .decision import Z
 from .faults import SensorFault, instruments_of
@@ -15,6 +15,7 @@ from .load_cell import FORCE_GAIN
 from .rule import BENCH
 from .verdict import Diagnosis
 
+ELSEWHERE = "{name} of the isolation layer and one of the damper add up to one force"
 NOT_DRIVEN = "Neither voltage nor current was recorded: a drive that changed would look like this."
 
 
@@ -130,8 +131,12 @@ def _site_of(effect: str, site: str) -> str:
 def lookalikes(effects: tuple[str, ...]) -> dict[str, str]:
     """Return what else would do the same to a reconstructed force as these effects, and why."""
     twins: dict[str, str] = {}
-    for name in effects:
-        for twin, why in (EFFECTS[name].lookalikes if name in EFFECTS else {}).items():
+    for name in (name for name in effects if name in EFFECTS):
+        effect, here = EFFECTS[name], plain_name(name)
+        own = {effect.key(site): ELSEWHERE.format(name=here) for site in effect.sites[1:]}
+        if effect.absorbed_by:  # in the damper it is what the law has, which its lookalikes name
+            own = {}
+        for twin, why in {**effect.lookalikes, **own}.items():
             if twin not in effects:
                 twins.setdefault(twin, why)
     return twins

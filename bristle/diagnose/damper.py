@@ -107,14 +107,14 @@ def left_by_filter(
 def _rare(
     before: Trial, trials: list[Trial], rule: DecisionRule = BENCH, site: DecisionRule = SITE
 ) -> Decision | None:
-    """Return the decision for an effect of the layer that acts in a few samples only, if any.
+    """Return the decision for an effect of the layer or a stop that acts in a few samples, if any.
 
     A stop that is met once or twice is seen in no resampling of blocks; its likelihood tells, where
     the model with it is adequate.
     """
     best = trials[0]
     name = best.effects[-1]
-    if EFFECTS[name].site != "structure" or best.z > site.clean:
+    if not (EFFECTS[name].site == "structure" or EFFECTS[name].contact) or best.z > site.clean:
         return None
     if 1.0 - best.z / before.z < rule.gain or not better(before, best, site):
         return None

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from ..compare.scale import rms
 from ..identify.fit import Model, Problem
+from ..identify.model import absorbed
 from ..identify.search_context import Expected, Search
 from ..identify.start_grid import initial_guesses
+from ..physics.effect import effects_of
 from .candidates import joinable
 from .rule import BENCH, DecisionRule
 
@@ -41,6 +43,8 @@ def untestable(
 ) -> list[str]:
     """Return the effects that these runs do not excite, or that refitting the model absorbs.
 
+    Those that a part of the law takes up whole, on whatever runs, are among them.
+
     Each effect is added at default size and scaled to `rule.typical`; what the sensitivities to the
     model's own parameters cannot take up must reach `visible`.
 
@@ -70,7 +74,8 @@ def untestable(
         left = rms(change - basis @ (basis.T @ change)) / size
         if raw < rule.silent or rule.typical * left / raw < visible:
             out.append(name)
-    return sorted(out)
+    taken_up = [e.name for e in effects_of("damper", model.law) if absorbed(e, model.law)]
+    return sorted({*out, *(name for name in taken_up if name not in model.effects)})
 
 
 def _change(name: str, model: Model, problem: Problem, expected: Expected, base: Array) -> Array:

@@ -194,7 +194,7 @@ def of_layer(model: Model, problem: Problem) -> list[str]:
     """Return the layer's effects that can join a damper's model: a reconstructed force has them."""
     if not (isinstance(problem, StructureProblem) and problem.reconstructed):
         return []
-    able = [effect.name for effect in effects_of("structure") if "force" in effect.hooks()]
+    able = [e.key("structure") for e in effects_of("structure") if "force" in e.hooks()]
     return [name for name in able if name not in model.effects]
 
 

@@ -67,7 +67,8 @@ def joinable_at(site: str, base: Model) -> list[str]:
     """Return the effects of the structure that can join a layer's or storey's model."""
     hook = "force" if site == "layer" else "spring"
     taken = set(base.effects).union(*(EFFECTS[name].excludes for name in base.effects))
-    return [e.name for e in effects_of("structure") if hook in e.hooks() and e.name not in taken]
+    able = [e.key("structure") for e in effects_of("structure") if hook in e.hooks()]
+    return [name for name in able if name not in taken]
 
 
 def try_effect(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..physics.effect import EFFECTS
+from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
 from ..physics.laws import LAWS, Law
 from ..physics.parameter import CHOICES, Parameter
 from .bench import Bench
@@ -132,6 +132,13 @@ class Problem:
         made.free_zero = True
         return made
 
+    def damper_effects(self, law: str) -> list[str]:
+        """Return the effects of the damper, by a model's names, that these runs may tell.
+
+        Not those that a part of the law takes up whole.
+        """
+        return [effect.name for effect in effects_of("damper", law) if not absorbed(effect, law)]
+
     def size(self, unit: str) -> float:
         """Return the typical size on this rig of a parameter of some unit, in SI."""
         if not self._sizes:
@@ -209,6 +216,26 @@ def sizes(runs: list[Run]) -> dict[str, float]:
 def _spread(parts: list[Array]) -> float:
     """Return a standard deviation that may be divided by."""
     return max(float(np.std(np.concatenate(parts))), 1e-12)
+
+
+def absorbed(effect: type[Effect], law: str) -> bool:
+    """Return whether a part of a damper's law takes up whole what an effect does beside it."""
+    return bool(effect.absorbed_by) and LAWS[law].has(effect.absorbed_by)
+
+
+def of_one_site(model: Model, effects: tuple[str, ...]) -> Model:
+    """Return a model with those of its effects that act at one site, by their plain names.
+
+    So the functions of a site name them.
+    """
+    if not any(AT in name for name in model.effects):
+        return replace(model, effects=effects)
+    values = {
+        plain_name(name): value
+        for name, value in model.values.items()
+        if "." not in name or name.partition(".")[0] in effects
+    }
+    return replace(model, effects=tuple(map(plain_name, effects)), values=values)
 
 
 def without(model: Model, names: tuple[str, ...]) -> Model:

@@ -15,7 +15,7 @@ from ..data.channels import DRIVE
 from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..physics.building import Building
-from ..physics.effect import EFFECTS
+from ..physics.effect import AT, EFFECTS, effects_of, plain_name
 from .assigned import corrected_for_delay, lateness, linear_storeys, unassigned
 from .model import Model, Problem
 from .prepare import prepare
@@ -115,9 +115,8 @@ class Rig:
         StudyError
             If an effect of the model acts at no site that these runs show.
         """
-        foreign = [name for name in model.effects if EFFECTS[name].site == "structure"]
-        if foreign and self.building is None:
-            raise StudyError(f"{', '.join(foreign)}: of a structure, and on a bench there is none.")
+        if self.building is None:
+            _refuse_on_bench(model)
         found = self.sites_for(model)
         lost = unassigned(model, list(found))
         if lost:
@@ -132,6 +131,26 @@ class Rig:
         for site in self.sites(model).values():
             for role in ROLES:
                 site.problem_of(role)
+
+
+def _refuse_on_bench(model: Model) -> None:
+    """Refuse effects that have no site on a bench, or are named as in a building."""
+    effects = {name: EFFECTS[name] for name in model.effects}
+    foreign = [name for name, effect in effects.items() if effect.sites == ("structure",)]
+    if foreign:
+        raise StudyError(f"{', '.join(foreign)}: of a structure, and on a bench there is none.")
+    sited = [name for name in effects if AT in name]
+    if sited:
+        raise StudyError(
+            f"{', '.join(sited)}: on a bench all is at the damper, and the plain name is right: "
+            f"{', '.join(map(plain_name, sited))}."
+        )
+    able = {effect.name for effect in effects_of(DAMPER, model.law)}
+    unfit = [
+        name for name, effect in effects.items() if DAMPER in effect.sites and name not in able
+    ]
+    if unfit:
+        raise StudyError(f"{', '.join(unfit)} cannot join the law {model.law}.")
 
 
 def bench_rig(

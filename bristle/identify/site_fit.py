@@ -40,15 +40,18 @@ def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, al
 
 def _fit_law(own: Model, site: Site, count: int, also: Values) -> Fit:
     """Return the damper's law fitted from several starts, and from the values in `also`."""
-    layer = [name for name in own.effects if EFFECTS[name].site == "structure"]
+    inside = isinstance(site.train, StructureProblem)
+    layer = [name for name in own.effects if inside and EFFECTS[name].site == "structure"]
     if not layer:
         found = identify(
             site.train, own.law, own.effects, count, values=own.values, fixed=own.fixed,
             limits=own.limits,
         )  # fmt: skip
+        late = [] if inside else [name for name in own.effects if EFFECTS[name].start_shares]
+        if late:  # whose defaults may be where the runs never come
+            found = min(found, _fit_grown(own, late, site), key=lambda one: one.cost)
     else:  # of a reconstructed force the layer's effects are a part
-        first = replace(own, effects=tuple(name for name in own.effects if name not in layer))
-        found = _fit_grown(at_site(first, site.name, (site.name,)), own, layer, site)
+        found = _fit_grown(own, layer, site)
     if also:
         known = {name: value for name, value in also.items() if _belongs(name, own)}
         values = {**found.model.values, **known}
@@ -58,12 +61,13 @@ def _fit_law(own: Model, site: Site, count: int, also: Values) -> Fit:
     return found
 
 
-def _fit_grown(bare: Model, own: Model, layer: list[str], site: Site) -> Fit:
-    """Return a law fitted without the layer's effects, which then join one by one."""
-    without = fit_damper(site.train, bare)
+def _fit_grown(own: Model, late: list[str], site: Site) -> Fit:
+    """Return a law fitted without some of its effects, which then join one by one."""
+    first = replace(own, effects=tuple(name for name in own.effects if name not in late))
+    without = fit_damper(site.train, at_site(first, site.name, (site.name,)))
     grown = without.model
-    for name in layer:
-        grown = joined(name, grown, _structure(site))
+    for name in late:
+        grown = joined(name, grown, site.train)
     whole = refine(replace(grown, effects=own.effects, fixed=own.fixed), site.train)
     return replace(fit(site.train, whole), starts=without.starts, agreed=without.agreed)
 
@@ -117,9 +121,9 @@ def _structure(site: Site) -> StructureProblem:
     return problem
 
 
-def joined(effect: str, base: Model, train: StructureProblem) -> Model:
-    """Return a model fitted with one more effect of the structure, the best of several starts."""
-    few = thinned(train)
+def joined(effect: str, base: Model, train: Problem) -> Model:
+    """Return a model fitted with one more effect, the best of several starts."""
+    few = thinned(train) if isinstance(train, StructureProblem) else train
     screening_noise = few.expectation(base)
     searched = [
         fit(few, model, expectation=screening_noise, max_evaluations=QUICK, with_std=False)

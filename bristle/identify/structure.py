@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
-from ..physics.effect import EFFECTS
+from ..physics.effect import EFFECTS, effects_of
 from ..physics.inputs import Inputs
 from ..physics.laws import DEFAULT, base_and_variant
 from .along import Along
-from .model import Model, Problem, Run
+from .model import Model, Problem, Run, absorbed, of_one_site
 from .response import Response, base_equilibrium, responses, shear
 
 Array = NDArray[np.float64]
@@ -82,6 +82,19 @@ class StructureProblem(Problem):
     def _made_of(self, runs: list[Run]) -> StructureProblem:
         return StructureProblem(runs, self.storey, self.reconstructed, self.damped)
 
+    def damper_effects(self, law: str) -> list[str]:
+        """Return the effects of the damper, by a model's names, that these runs may tell.
+
+        In a reconstructed force those that the isolation layer may have as well add up with the
+        layer's, so that the layer's alone are tried.
+        """
+        return [
+            effect.key("damper")
+            for effect in effects_of("damper", law)
+            if not absorbed(effect, law)
+            and not (self.reconstructed and "structure" in effect.sites)
+        ]
+
     def along(self, effects: tuple[str, ...]) -> Along:
         """Return what gives the forces of these effects along a motion, made at first use."""
         if effects not in self._along:
@@ -110,10 +123,11 @@ class StructureProblem(Problem):
             q = Inputs(x, v, a, seen.V, seen.dt, 0.0, 0.0, False)
             force: Array = law.hooks()["force"](q, (), law.at(model.values))
         else:
-            force = super().predict(replace(model, effects=damper), seen, draw)
+            force = super().predict(of_one_site(model, damper), seen, draw)
         if structure:
-            along = self.along(structure)
-            force = force + along.force(x, v, run.dt, stiffness, model.values)
+            own = of_one_site(model, structure)
+            along = self.along(own.effects)
+            force = force + along.force(x, v, run.dt, stiffness, own.values)
         return force if seen is run else force[run.keep]
 
 

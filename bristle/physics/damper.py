@@ -219,11 +219,14 @@ def setup_of(
     if len(series) > 1:
         raise PhysicsError("{} are series elements: one is right.".format(" and ".join(series)))
     on = [effect.name in effects for effect in SLOTS.effects]
+    signed = LAWS[law].has("sign") or any(
+        source.is_friction(effect) for effect in SLOTS.effects if effect.name in effects
+    )
     moving = moving_states(law, effects)
     kind = LAWS[law]
     return Setup(
         law_code(law), row(pack(law, values)), slots(on), slots(moving or [0]), len(moving),
-        advances(effects), len(kind.states) if kind.exact() else 0, kind.has("sign"),
+        advances(effects), len(kind.states) if kind.exact() else 0, signed,
         any(on) or not kind.exact() or bool(kind.felt),
     )  # fmt: skip
 

@@ -7,6 +7,7 @@ the motion, then the factors, then the forces, then what the states make of all 
 from __future__ import annotations
 
 from .codegen import Slots, switched, switched_laws
+from .effect import Effect
 from .law import Law
 from .tuples import FACTORS, law_state, law_values
 
@@ -14,6 +15,9 @@ _FACTORS = {"limit": " * yield_factor * slip_length", "viscous": " * viscous_fac
 _ALL_FACTORS = {name: name for name in FACTORS}  # variables of the generated source
 _NOW = "    x, v, a, V, dt, energy, halt, halts = now"
 _SETUP = "    law, p, on = setup.law, setup.p, setup.on"
+_MORE_THAN_ANY = "1e30"  # N, which no friction is: what would stop a motion that is prescribed
+_BY_SIGN = f"({_MORE_THAN_ANY} if v > 0.0 else -{_MORE_THAN_ANY} if v < 0.0 else 0.0)"
+_LEFT = f"halt - force if halts else {_BY_SIGN}"
 _ROD = ["    rod_x = x", "    rod_v = v"]
 
 
@@ -208,6 +212,7 @@ def evaluate_source(slots: Slots) -> str:
         "    q = record(Inputs, (x, v, a, V, dt, energy, halt, halts))",
         *switched_laws(slots, own),
         "    force = friction + rest",
+        *_contacts(slots, q),
         *switched(slots, "rate", "{dz}= {call}", **q),
         *switched(slots, "advance", "{z_next}= {call}", **q),
         *switched(slots, "reaction", "force = {call}; friction = 0.0", **q),
@@ -228,12 +233,30 @@ def _factors(slots: Slots, q: dict[str, str]) -> list[str]:
 
 
 def _added(slots: Slots, q: dict[str, str]) -> list[str]:
+    smooth = slots.only(lambda effect: not effect.contact)
     return [
         "    added = 0.0",
-        *switched(slots, "force", "added += {call}", **q),
+        *switched(smooth, "force", "added += {call}", **q),
         "    factor = 1.0",
         *switched(slots, "factor", "factor *= {call}", **q),
     ]
+
+
+def _contacts(slots: Slots, q: dict[str, str]) -> list[str]:
+    """Return the forces of contacts, which come last: friction carries what the others leave."""
+    lines: list[str] = []
+    for effect in slots.effects:
+        if effect.contact and "force" in effect.hooks():
+            only = slots.only(lambda one, wanted=effect: one is wanted)  # type: ignore[misc]
+            rubs = " friction += pushed;" if is_friction(effect) else ""
+            line = f"left = {_LEFT}; pushed = {{call}};{rubs} force += pushed"
+            lines += switched(only, "force", line, **{**q, "halt": "left"})
+    return lines
+
+
+def is_friction(effect: type[Effect]) -> bool:
+    """Return whether a contact can hold the motion, as dry friction does."""
+    return effect.contact and "halt" in effect.needs
 
 
 def net_force_source(slots: Slots) -> str:
@@ -278,6 +301,12 @@ def net_force_source(slots: Slots) -> str:
         "    direction = way",
         *switched(slots, "yield_force", "direction = {call}", **q),
         *_added(slots, q),
+        *switched(
+            slots.only(lambda effect: effect.contact),
+            "force",
+            "added += {call}",
+            **{**q, "halt": f"way * {_MORE_THAN_ANY}"},
+        ),
         "    q = record(Inputs, (x, v, a, V, dt, energy, 0.0, False))",
         *switched_laws(slots, own),
         "    pull = 0.0",

@@ -1,19 +1,28 @@
 """A physical effect: one class in one file, which registers itself and takes part everywhere.
 
-An effect joins a site (`damper`, `structure`, `sensor`) through hooks, pure functions of three
+An effect joins its sites (`damper`, `structure`, `sensor`) through hooks, pure functions of three
 named tuples: `q` the motion and whatever else the site offers (`Q`), `z` the effect's states and
 `p` its parameters. A hook uses `math`, arithmetic and `if`, never containers, so that one source
 runs in plain Python and under numba.
+
+Inside the functions of one site an effect goes by its name. Where a model has several sites, a
+building's, the plain name means the first of `Effect.sites`; `NAME@SITE` means another one. On a
+test bench, which has one site, the plain name does.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import new_class
 from typing import Any, Callable, ClassVar, NamedTuple
 
 from ..errors import PhysicsError
 from . import laws as _laws  # noqa: F401  (importing it registers the laws)
-from .effect_check import FIELDS, check_search, check_verdict
+from .effect_check import FIELDS, check_search, check_sites, check_verdict
+from .effect_names import AT as AT  # the rest of the package takes these from here
+from .effect_names import EFFECTS as EFFECTS
+from .effect_names import exclude as exclude
+from .effect_names import plain_name as plain_name
 from .field_check import check_fields
 from .law import LAWS, PARTS, Law, laws_of
 from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
@@ -53,6 +62,10 @@ ACTS_ON = {
 }
 """The part of a law that a hook acts on; the other hooks join any law."""
 
+SHARED_HOOKS = ("force", "rate", "advance")
+SHARED_SIGNALS = ("x", "v", "dt", "energy", "halt", "stiffness")
+"""What a damper and a structure both call and offer: an effect of both sites uses no other."""
+
 _ALL_LAWS_OF_ONCE = ("bingham", "lugre")
 """Effects named the laws that they join until laws had parts; those that name all join any."""
 
@@ -64,7 +77,8 @@ class Q(NamedTuple):
     which do not depend on time end where their signals do. `rod_x`, `rod_v` are the damper's motion
     before any `motion` hook. `force` is the force of this same evaluation (`rate`, `advance`),
     `halt` the force that would bring the motion to rest within the step (what a stuck contact
-    carries), `stiffness` the linear stiffness of the storey at hand (in `force`: of the isolation),
+    carries; to a contact in a damper whose motion is prescribed no force is enough), `stiffness`
+    the linear stiffness of the storey at hand (in `force`: of the isolation; in a damper 0),
     `storey` its number (1 above the base), `value` the signal that an instrument is to show.
     """
 
@@ -94,15 +108,14 @@ class Sizes(NamedTuple):
     force: float  # N
 
 
-EFFECTS: dict[str, type[Effect]] = {}
-
-
 class Effect:
     """Base of every physical effect; defining a subclass with a `name` registers it.
 
     Class data
     ----------
-    name, site
+    name, sites
+        Where it can be: of `SITES`, one or more. The first is the one that its plain name means in
+        a building. `site` is that one; a class that gives `site` alone is still read.
     needs
         Names of the signals in `q` that the hooks use.
     states, parameters, tables
@@ -123,9 +136,10 @@ class Effect:
     assumed
         Parameters that measurements hardly tell: no fit moves them.
     contact
-        Of a structure's effect: its `force` is dry friction, which carries what holds the base
-        (`q.halt`), or the push of a stop. It is found together with the motion, whatever its
-        stiffness, and held over a step; other forces are linear over it.
+        Its `force` is dry friction, which carries what holds the motion (`q.halt`), or the push of
+        a stop. In a structure it is found together with the motion, whatever its stiffness, and
+        held over a step; other forces are linear over it. In a damper it comes last, so that
+        friction carries what all other forces leave.
     shows
         Of a sensor's effect: the channel whose instrument it is, "force" or "velocity".
     late
@@ -178,6 +192,7 @@ class Effect:
 
     name: ClassVar[str] = ""
     site: ClassVar[str] = "damper"
+    sites: ClassVar[tuple[str, ...]] = ("damper",)
     laws: ClassVar[tuple[str, ...]] = ()
     acts_on: ClassVar[tuple[str, ...]] = ()
     kind: ClassVar[str] = ""
@@ -209,13 +224,15 @@ class Effect:
     faults: ClassVar[tuple[str, ...]] = ()
     offset: ClassVar[str] = ""
     mass: ClassVar[str] = ""
+    _elsewhere: ClassVar[dict[str, type[Effect]]]
     State: ClassVar[Any]
     Values: ClassVar[Any]
 
-    def __init_subclass__(cls, **kwargs: Any) -> None:
+    def __init_subclass__(cls, register: bool = True, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        if cls.name:
+        if cls.name and register:
             check_fields(cls, f"effect {cls.name!r} ({cls.__module__}.{cls.__qualname__})", FIELDS)
+            _take_sites(cls)
             cls.parameters = all_parameters(cls.parameters, cls.tables)
             cls.State = named("State", tuple(cls.states))
             cls.Values = named("Values", tuple(cls.fields()))
@@ -245,9 +262,36 @@ class Effect:
         )
 
     @classmethod
+    def at(cls, site: str) -> type[Effect]:
+        """Return the effect as it is at one of its sites, `site` and `sites` being that one alone.
+
+        Raises
+        ------
+        PhysicsError
+            If it has no such site.
+        """
+        if site not in cls.sites:
+            raise PhysicsError(f"{cls.name}: of {' and '.join(cls.sites)}, not of {site}.")
+        if cls.sites == (site,):
+            return cls
+        known: dict[str, type[Effect]] = cls.__dict__.get("_elsewhere") or {}
+        if site not in known:
+            own = {"site": site, "sites": (site,), "__doc__": cls.__doc__}
+            own["__module__"] = cls.__module__
+            apart = {"register": False}
+            known[site] = new_class(cls.__name__, (cls,), apart, lambda names: names.update(own))
+            cls._elsewhere = known
+        return known[site]
+
+    @classmethod
+    def key(cls, site: str) -> str:
+        """Return how a model of several sites names the effect at this one: NAME or NAME@SITE."""
+        return cls.name if site == cls.site else cls.name + AT + site
+
+    @classmethod
     def joins(cls, law: type[Law]) -> bool:
         """Return whether the effect can join a law: it has the parts, and not the effect in it."""
-        if cls.site != law.site:
+        if law.site not in cls.sites:
             return False
         if cls.laws and law.name not in cls.laws and not set(cls.laws) >= set(_ALL_LAWS_OF_ONCE):
             return False
@@ -264,11 +308,24 @@ class Effect:
         return (cls.__doc__ or "").strip().splitlines()[0]
 
 
+def _take_sites(effect: type[Effect]) -> None:
+    """Let `sites` and `site` say the same, whichever of them a class gives."""
+    own = vars(effect)
+    if "sites" not in own and "site" in own:
+        effect.sites = (effect.site,)
+    elif isinstance(effect.sites, tuple) and effect.sites:
+        if own.get("site", effect.sites[0]) != effect.sites[0]:
+            raise PhysicsError(
+                f"effect {effect.name!r}: site = {effect.site!r} and sites = {effect.sites}; sites "
+                "alone is right."
+            )
+        effect.site = effect.sites[0]
+
+
 def _check(effect: type[Effect]) -> None:
     """Refuse an effect whose class data could not work, when it is defined."""
     where = f"effect {effect.name!r} ({effect.__module__}.{effect.__qualname__})"
-    if effect.site not in SITES:
-        raise PhysicsError(f"{where}: site {effect.site!r} is none of {SITES}.")
+    check_sites(effect, where, SITES, (SHARED_HOOKS, SHARED_SIGNALS))
     if not effect.name.isidentifier():
         raise PhysicsError(f"{where}: a name is one word of letters, digits and _.")
     unknown = [need for need in effect.needs if need not in Q._fields]
@@ -314,12 +371,12 @@ def effects_of(site: str, law: str = "") -> tuple[type[Effect], ...]:
     return tuple(
         effect
         for _, effect in sorted(EFFECTS.items())
-        if effect.site == site and (not law or effect.joins(LAWS[law]))
+        if site in effect.sites and (not law or effect.joins(LAWS[law]))
     )
 
 
 def laws_joined(effect: type[Effect]) -> tuple[str, ...]:
-    """Return the names of the laws that an effect of a damper can join; none for other sites."""
+    """Return the names of the laws that an effect can join in a damper; none for other sites."""
     return tuple(law.name for law in laws_of("damper") if effect.joins(law))
 
 

@@ -29,7 +29,7 @@ FIELDS = {
     **dict.fromkeys(("name", "site", "kind", "shows", "source", "expect"), TEXT),
     **dict.fromkeys(("family", "absorbed_by", "offset", "mass"), TEXT),
     **dict.fromkeys(("laws", "acts_on", "needs", "bristles", "assumed", "joint", "late"), TEXTS),
-    **dict.fromkeys(("excludes", "start_ties", "mimics", "faults"), TEXTS),
+    **dict.fromkeys(("sites", "excludes", "start_ties", "mimics", "faults"), TEXTS),
     **dict.fromkeys(("contact", "passive", "zero_at_rest"), SWITCH),
     **dict.fromkeys(("states", "starts", "lookalikes"), TEXT_BY_NAME),
     **dict.fromkeys(("start_grid", "start_limits"), ANY_BY_NAME),
@@ -38,6 +38,38 @@ FIELDS = {
     "start_shares": GRIDS,
 }
 """The class data of an effect, and of which kind each is."""
+
+
+def check_sites(
+    effect: type[Effect], where: str, known: tuple[str, ...],
+    shared: tuple[tuple[str, ...], tuple[str, ...]],
+) -> None:  # fmt: skip
+    """Refuse sites that there are not, and what an effect of several cannot use at all of them.
+
+    Parameters
+    ----------
+    effect, where : the class, and how a message begins
+    known : the sites that there are
+    shared : the hooks and the signals that a damper and a structure both have
+    """
+    if not (isinstance(effect.sites, tuple) and effect.sites):
+        raise PhysicsError(f"{where}: sites = {effect.sites!r}; a tuple of {known} is right.")
+    for site in effect.sites:
+        if site not in known:
+            raise PhysicsError(f"{where}: site {site!r} is none of {known}.")
+    if len(effect.sites) == 1:
+        return
+    if len(set(effect.sites)) < len(effect.sites) or "sensor" in effect.sites:
+        raise PhysicsError(f'{where}: sites = {effect.sites}; each once, and "sensor" alone.')
+    for what, used, both in (
+        ("defines", tuple(effect.hooks()), shared[0]),
+        ("needs", effect.needs, shared[1]),
+    ):
+        wrong = [one for one in used if one not in both]
+        if wrong:
+            raise PhysicsError(
+                f"{where}: {what} {wrong}, which not all of its sites have; {list(both)} they do."
+            )
 
 
 def check_search(effect: type[Effect], where: str) -> None:

@@ -11,7 +11,7 @@ from ..data.model import StudyModel
 from ..diagnose import Diagnosis, diagnose, diagnose_rig
 from ..diagnose.faults import SensorFault
 from ..errors import StudyError
-from ..physics.effect import EFFECTS, laws_joined
+from ..physics.effect import AT, EFFECTS, exclude, laws_joined
 from ..physics.laws import DEFAULT, LAWS
 from ..progress import tell, telling
 from .history import Step
@@ -110,8 +110,10 @@ def add_effects(
     tell("reading the runs")
     study.usable_effects()  # raises where one of the study's own waits for consent
     model = present = study.model()
+    bench = not study.settings.has_building
+    names = tuple(_as_named_here(name, bench) for name in names)
     for name in names:
-        _refuse(model, name)
+        _refuse(model, name, bench)
         model = model.with_effect(name)
     known = set(model.flat())
     start = {k: v for k, v in found.values.items() if k in known} if found is not None else {}
@@ -128,7 +130,22 @@ def add_effects(
     return Added(tuple(names), replace(identified, step=step), step)
 
 
-def _refuse(model: StudyModel, name: str) -> None:
+def _as_named_here(name: str, bench: bool) -> str:
+    """Return the name that a study's model gives an effect: its site is told where it must be.
+
+    NAME@SITE is an effect at another site than the one that its plain name means.
+    """
+    own, at, site = name.partition(AT)
+    if not at or own not in EFFECTS or site not in EFFECTS[own].sites:
+        return name
+    if not bench:
+        return EFFECTS[own].key(site)
+    if site == "structure":
+        raise StudyError(f"{name}: a test bench has no structure; {own} is that of the damper.")
+    return own
+
+
+def _refuse(model: StudyModel, name: str, bench: bool) -> None:
     from ..findings import unknown
 
     if name not in EFFECTS:
@@ -136,12 +153,15 @@ def _refuse(model: StudyModel, name: str) -> None:
     effect = EFFECTS[name]
     if name in model.effects:
         raise StudyError(f"{name} is in the model already.")
-    if effect.site == "damper" and not effect.joins(LAWS[model.base_law]):
+    if bench and effect.sites == ("structure",):
+        raise StudyError(f"{name} acts in a structure, and on a test bench there is none.")
+    at_damper = "damper" in effect.sites if bench else effect.site == "damper"
+    if at_damper and not effect.joins(LAWS[model.base_law]):
         raise StudyError(
             f"{name} cannot join the law {model.law}; it joins {', '.join(laws_joined(effect))}."
         )
     for other in model.effects:
-        if other in effect.excludes or name in EFFECTS[other].excludes:
+        if exclude(name, other):
             raise StudyError(f"{name} and {other} cannot be joined: undo the other one first.")
 
 

@@ -165,6 +165,20 @@ def test_ports_are_those_of_the_stock_damper_and_defaults_are_baked(
     assert loaded.step == pytest.approx(5e-4)
 
 
+def test_a_dampers_own_stop_and_friction_are_in_the_fmu(bench: Study) -> None:
+    chosen(
+        bench, "end_stop", "base_friction", end_stop__clearance=0.006, end_stop__k=2e4,
+        base_friction__limit=0.4, base_friction__x_s=5e-4,
+    )  # fmt: skip
+    assert "end_stop" in (bench.folder / "model.toml").read_text()
+    found = export_study(bench)
+    run = prepare(bench.runs().holdout[0])
+    expected = prediction(bench.model(), run)
+    plain = Bench("lugre", []).force(run.x, run.v, run.a, run.V, run.dt, bench.model().values())
+    assert rms(expected - plain) > 0.2 * rms(plain)
+    assert rms(alone(found.fmu, run, {}) - expected) < AGREEMENT * rms(expected)
+
+
 def test_an_effect_of_ones_own_is_in_the_fmu(bench: Study) -> None:
     (bench.effects_folder / "own_spring.py").write_text(OWN, encoding="utf-8")
     study = Study(bench.folder)
@@ -201,13 +215,21 @@ def test_on_a_building_the_fluids_mass_is_attached(tmp_path: Path) -> None:
     study = Study.create(
         tmp_path / "rig", sorted(tmp_path.glob("*.csv")), rig="structure", building=building
     )
-    chosen(study, "fluid_inertia", "duffing", fluid_inertia__m_f=0.4, duffing__k_3=2e6)
+    chosen(
+        study, "fluid_inertia", "duffing", "end_stop", "end_stop@damper", fluid_inertia__m_f=0.4,
+        duffing__k_3=2e6, end_stop__clearance=0.04, **{"end_stop@damper__clearance": 0.03},
+    )  # fmt: skip
     found = export_study(study)
     assert any("attached_mass" in note for note in found.notes)
     parts = {part.name: part for part in load_scenario(found.scenario).components}
     assert parts["structure"].parameters["attached_mass"] == 0.4
     assert parts["structure"].parameters["duffing.k_3"] == 2e6
+    assert parts["structure"].parameters["end_stop.clearance"] == 0.04
     assert parts["damper"].parameters["fluid_inertia.m_f"] == 0.0
+    inside = read_description(found.fmu, any_platform=True).variables
+    assert inside["end_stop.on"].start is True
+    assert inside["end_stop.clearance"].start == 0.03
+    assert inside["duffing.on"].start is False
     frame = bristle.run(found.scenario)
     assert np.isfinite(frame["damper.force"]).all()
     assert frame["structure.base_displacement"].abs().max() > 1e-4

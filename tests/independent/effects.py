@@ -529,24 +529,30 @@ def _(s, rng, rig, size):
 
 
 def _bumper(rng: np.random.Generator, rig: Rig, size: Size) -> tuple[float, float]:
-    gap = rng.uniform(0.4, 0.65) * size["travel"]
+    # A damper's motion is prescribed: its stops are met late in the stroke.
+    gap = rng.uniform(*((0.4, 0.65) if rig.building else (0.55, 0.8))) * size["travel"]
     return gap, size["travel"] - gap
 
 
-@form("end_stop", "kelvin", beds=BUILDING)
+@form("end_stop", "kelvin")
 def _(s, rng, rig, size):
     """Spring and dashpot behind a gap, never pulling (Anagnostopoulos 1988, EESD 16)."""
-    gap, _deep = _bumper(rng, rig, size)
-    assert rig.building is not None
+    gap, deep = _bumper(rng, rig, size)
+    if rig.building is None:
+        k = 20.0 * s * rig.force / deep
+        return {"es_kind": 1, "es_gap": gap, "es_k": k, "es_c": 0.1 * k * deep / rig.speed}
     k = 30.0 * s * _isolator(rig)
     damping = 2.0 * 0.1 * np.sqrt(k * sum(rig.building["masses"]))
     return {"es_kind": 1, "es_gap": gap, "es_k": k, "es_c": damping}
 
 
-@form("end_stop", "hunt_crossley", beds=BUILDING)
+@form("end_stop", "hunt_crossley")
 def _(s, rng, rig, size):
     """K d^1.5 (1 + chi d') behind a gap. Hunt & Crossley (1975); Muthukumar & DesRoches (2006)."""
     gap, deep = _bumper(rng, rig, size)
+    if rig.building is None:
+        k = 20.0 * s * rig.force / deep**1.5
+        return {"es_kind": 2, "es_gap": gap, "es_k": k, "es_c": 0.3 / rig.speed}
     k = 30.0 * s * _isolator(rig) / np.sqrt(0.3 * deep)
     return {"es_kind": 2, "es_gap": gap, "es_k": k, "es_c": 0.3 / rig.speed}
 

@@ -146,7 +146,8 @@ class Strength:
     ) -> None:
         self.rig, self.plan, self.form, self.shape, self.size = rig, plan, one, shape, size
         self.measure = measure
-        self.force = "force_from_response" if one.effect in ON_BUILDING else "force"
+        on_building = rig.building is not None and one.effect in ON_BUILDING
+        self.force = "force_from_response" if on_building else "force"
         self.search: Array | None = None
         self.tried: dict[float, float] = {}
 
@@ -372,9 +373,18 @@ def _plan(
     rig: Rig, rng: np.random.Generator, duration: float | None
 ) -> tuple[list[ex.Experiment], dict[str, float]]:
     if rig.building is None:
-        return ex.bench_plan(rig, rng, duration or 12.0), {}
+        plan = ex.bench_plan(rig, rng, duration or 12.0)
+        return plan, {"travel": _common_travel(plan)}
     plan = _settle_ground(rig, ex.structure_plan(rig, rng, duration or 20.0), rng)
     return plan, _response_size(rig, plan)
+
+
+def _common_travel(plan: list[ex.Experiment]) -> float:
+    """How far the rod goes in the training runs and in those held out, m."""
+    most = {"train": 0.0, "holdout": 0.0}
+    for run in plan:
+        most[run.role] = max(most[run.role], float(np.max(np.abs(run.motion[0]))))
+    return min(most.values())
 
 
 def _kind(effect: str, names: list[str]) -> str:
@@ -430,7 +440,7 @@ def _shares(
 ) -> dict[str, Any]:
     """What the refit of the base law to the noise-free training runs leaves."""
     force = "force"
-    if any(f["effect"] in ON_BUILDING for f in found):
+    if rig.building is not None and any(f["effect"] in ON_BUILDING for f in found):
         force = "force_from_response"
     shown = [fault.after_noise(fault.before_noise(r)) if fault else r for r in clean]
     train = [r for r, run in zip(shown, plan, strict=True) if run.role == "train"]

@@ -256,9 +256,25 @@ def _fluid(p, x, w, d, e, z, hot, age):
 
 
 @njit(cache=True)
+def _stop(p, x, v):
+    """Push of a buffer behind a gap to either side."""
+    dent = abs(x) - p.es_gap
+    if dent <= 0.0:
+        return 0.0
+    side = copysign(1.0, x)
+    if p.es_kind == 1:
+        push = p.es_k * dent + p.es_c * side * v
+    else:
+        push = p.es_k * dent**1.5 * (1.0 + p.es_c * side * v)
+    return side * max(push, 0.0)
+
+
+@njit(cache=True)
 def _beside(p, x, w):
     """Forces inside the damper's body, beside the fluid."""
     f = 0.0
+    if p.building == 0 and p.es_kind > 0:
+        f += _stop(p, x, w)
     if p.gas_kind == 1:
         f += p.gas_k * x + p.gas_f
     elif p.gas_kind == 2:
@@ -459,14 +475,8 @@ def _layer(p, x, v):
         f += p.du_k * (p.du_x * sinh(x / p.du_x) - x)
     elif p.du_kind == 3:
         f += p.du_k * x * (x / p.du_x) ** 4
-    dent = abs(x) - p.es_gap
-    if p.es_kind > 0 and dent > 0.0:
-        side = copysign(1.0, x)
-        if p.es_kind == 1:
-            push = p.es_k * dent + p.es_c * side * v
-        else:
-            push = p.es_k * dent**1.5 * (1.0 + p.es_c * side * v)
-        f += side * max(push, 0.0)
+    if p.es_kind > 0:
+        f += _stop(p, x, v)
     return f
 
 

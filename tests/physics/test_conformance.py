@@ -28,7 +28,7 @@ LIBRARY = {
     "damper": (
         "stribeck", "flattening", "presliding", "gas_spring", "coil_lag", "remanence",
         "saturation", "temperature", "backlash", "mount_compliance", "quadratic_damping",
-        "fluid_inertia", "asymmetry",
+        "fluid_inertia", "asymmetry", "base_friction", "duffing", "end_stop",
     ),
     "structure": ("base_friction", "duffing", "storey_softening", "end_stop"),
     "sensor": ("delay", "velocity_sensor"),
@@ -38,11 +38,11 @@ ALL = [EFFECTS[name] for name in sorted(EFFECTS)]
 each_effect = pytest.mark.parametrize("effect", ALL, ids=lambda e: e.name)
 each_damper_effect = pytest.mark.parametrize(
     ("effect", "law"),
-    [(e, law) for e in ALL if e.site == "damper" for law in laws_joined(e)],
+    [(e, law) for e in ALL if "damper" in e.sites for law in laws_joined(e)],
     ids=lambda value: getattr(value, "name", value),
 )
 each_structure_effect = pytest.mark.parametrize(
-    "effect", [e for e in ALL if e.site == "structure"], ids=lambda e: e.name
+    "effect", [e for e in ALL if "structure" in e.sites], ids=lambda e: e.name
 )
 
 
@@ -97,9 +97,10 @@ def test_it_stands_in_a_file_of_its_name(effect: type[Effect]) -> None:
 
 @each_effect
 def test_site_and_laws_are_known(effect: type[Effect]) -> None:
-    assert effect.site in SITES
+    assert set(effect.sites) <= set(SITES)
+    assert effect.site == effect.sites[0]
     assert set(laws_joined(effect)) <= set(LAWS)
-    assert bool(laws_joined(effect)) == (effect.site == "damper")
+    assert bool(laws_joined(effect)) == ("damper" in effect.sites)
     assert effect.name not in effect.excludes
 
 
@@ -294,15 +295,17 @@ def test_switched_off_it_leaves_no_trace(effect: type[Effect], law: str) -> None
 
 @each_damper_effect
 def test_switched_on_it_matters(effect: type[Effect], law: str) -> None:
-    motion, times = sine(0.01, 2.0), 0.002 * np.arange(300)
+    times, changes = 0.002 * np.arange(300), []
 
     def voltage(t: float) -> float:
         return 4.0 + 3.0 * np.sin(9.0 * t)
 
-    plain = Bench(law).play(motion, voltage, times)
-    seen = Bench(law, {}, [effect.name]).play(motion, voltage, times)
-    rms = float(np.sqrt(np.mean((seen - plain) ** 2)) / np.sqrt(np.mean(plain**2)))
-    assert rms > 0.01
+    for amplitude in (0.01, 0.03):  # a stop may not be met by the smaller one
+        motion = sine(amplitude, 2.0)
+        plain = Bench(law).play(motion, voltage, times)
+        seen = Bench(law, {}, [effect.name]).play(motion, voltage, times)
+        changes.append(np.sqrt(np.mean((seen - plain) ** 2)) / np.sqrt(np.mean(plain**2)))
+    assert max(changes) > 0.01
 
 
 # -- in a scenario

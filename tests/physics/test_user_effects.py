@@ -108,7 +108,7 @@ BAD = [
     ({FORCE: "return p.f_s * q.colour"}, "q has no colour", FORCE),
     ({'name = "seal"': 'name = "stribeck"'}, "the name is taken by", "class Seal"),
     ({'name = "seal"': 'name = "other"'}, 'name = "seal" is right', "class Seal"),
-    ({'site = "damper"': 'site = "roof"'}, "site 'roof'", "class Seal"),
+    ({'sites = ("damper",)': 'sites = ("roof",)'}, "site 'roof'", "class Seal"),
     ({'"N"': '"Nm2"'}, "Nm2", "class Seal"),
     ({'"f_s"': '"on"', "p.f_s": "p.on"}, "cannot be named", "class Seal"),
     ({"class Seal(Effect)": "class Seal"}, "0 effects", ""),

@@ -14,7 +14,7 @@ class Asymmetry(Effect):
     """
 
     name = "asymmetry"
-    site = "damper"
+    sites = ("damper",)
     needs = ("v",)
     passive = True
     zero_at_rest = True

@@ -13,7 +13,7 @@ class Backlash(Effect):
     """
 
     name = "backlash"
-    site = "damper"
+    sites = ("damper",)
     kind = "series element"
     needs = ("rod_x", "rod_v", "force")
     passive = True

@@ -16,7 +16,7 @@ class BaseFriction(Effect):
     """
 
     name = "base_friction"
-    site = "structure"
+    sites = ("structure", "damper")
     needs = ("v", "dt", "halt")
     passive = True
     zero_at_rest = True

@@ -16,7 +16,7 @@ class CoilLag(Effect):
     """
 
     name = "coil_lag"
-    site = "damper"
+    sites = ("damper",)
     kind = "lag"
     needs = ("V", "dt")
     passive = True

@@ -18,7 +18,7 @@ class Delay(Effect):
     """
 
     name = "delay"
-    site = "sensor"
+    sites = ("sensor",)
     shows = "force"
     late = ("time", "filtered")
     needs = ("value", "dt")

@@ -16,7 +16,7 @@ class Duffing(Effect):
     """
 
     name = "duffing"
-    site = "structure"
+    sites = ("structure", "damper")
     needs = ("x", "stiffness")
     passive = True
     zero_at_rest = True

@@ -15,7 +15,7 @@ class EndStop(Effect):
     """
 
     name = "end_stop"
-    site = "structure"
+    sites = ("structure", "damper")
     needs = ("x", "v")
     passive = True
     zero_at_rest = True

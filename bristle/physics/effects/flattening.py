@@ -16,7 +16,7 @@ class Flattening(Effect):
     """
 
     name = "flattening"
-    site = "damper"
+    sites = ("damper",)
     needs = ("v",)
     passive = True
     zero_at_rest = True

@@ -25,7 +25,7 @@ class FluidInertia(Effect):
     """
 
     name = "fluid_inertia"
-    site = "damper"
+    sites = ("damper",)
     kind = "inertia"
     needs = ("v", "a", "dt")
     passive = True

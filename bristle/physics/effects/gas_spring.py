@@ -14,7 +14,7 @@ class GasSpring(Effect):
     """
 
     name = "gas_spring"
-    site = "damper"
+    sites = ("damper",)
     kind = "spring"
     needs = ("x",)
     passive = True

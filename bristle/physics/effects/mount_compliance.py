@@ -16,7 +16,7 @@ class MountCompliance(Effect):
     """
 
     name = "mount_compliance"
-    site = "damper"
+    sites = ("damper",)
     kind = "series element"
     needs = ("rod_x", "rod_v", "force")
     passive = True

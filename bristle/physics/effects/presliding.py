@@ -15,7 +15,7 @@ class Presliding(Effect):
     """
 
     name = "presliding"
-    site = "damper"
+    sites = ("damper",)
     needs = ("v", "dt")
     passive = True
     zero_at_rest = True

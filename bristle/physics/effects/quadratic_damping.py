@@ -15,7 +15,7 @@ class QuadraticDamping(Effect):
     """
 
     name = "quadratic_damping"
-    site = "damper"
+    sites = ("damper",)
     needs = ("v",)
     passive = True
     zero_at_rest = True

@@ -19,7 +19,7 @@ class Remanence(Effect):
     """
 
     name = "remanence"
-    site = "damper"
+    sites = ("damper",)
     needs = ("V",)
     passive = True
     zero_at_rest = True

@@ -12,7 +12,7 @@ class Saturation(Effect):
     """
 
     name = "saturation"
-    site = "damper"
+    sites = ("damper",)
     needs = ("V",)
     passive = True
     zero_at_rest = True

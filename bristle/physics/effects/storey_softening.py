@@ -14,7 +14,7 @@ class StoreySoftening(Effect):
     """
 
     name = "storey_softening"
-    site = "structure"
+    sites = ("structure",)
     needs = ("drift", "drift_rate", "dt", "stiffness", "storey")
     passive = True
     zero_at_rest = True

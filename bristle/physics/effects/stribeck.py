@@ -17,7 +17,7 @@ class Stribeck(Effect):
     """
 
     name = "stribeck"
-    site = "damper"
+    sites = ("damper",)
     needs = ("v",)
     passive = True
     zero_at_rest = True

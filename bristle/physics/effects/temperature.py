@@ -26,7 +26,7 @@ class Temperature(Effect):
     """
 
     name = "temperature"
-    site = "damper"
+    sites = ("damper",)
     needs = ("v", "force", "dt")
     passive = True
     zero_at_rest = True

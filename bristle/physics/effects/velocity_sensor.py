@@ -16,7 +16,7 @@ class VelocitySensor(Effect):
     """
 
     name = "velocity_sensor"
-    site = "sensor"
+    sites = ("sensor",)
     shows = "velocity"
     needs = ("value", "dt")
     passive = False
