@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from ..control.controller import Controller, read_controller
 from .file import damper_from_model, read_task, task_from_data
-from .result import Result
+from .result import DesignResult
 from .sliding import Damper
 from .task import Scheduling, Task
 from .weights import LqgWeights, Weight, Weights
@@ -19,8 +19,8 @@ from .weights import LqgWeights, Weight, Weights
 __all__ = [
     "Controller",
     "Damper",
+    "DesignResult",
     "LqgWeights",
-    "Result",
     "Scheduling",
     "Task",
     "Weight",
@@ -33,7 +33,7 @@ __all__ = [
 ]
 
 
-def design(task: Task) -> Result:
+def design(task: Task) -> DesignResult:
     """Return the verified controller of a task.
 
     Raises

@@ -20,7 +20,7 @@ _DIGITS = 12
 
 
 @dataclass(frozen=True)
-class Result:
+class DesignResult:
     """A verified controller.
 
     Attributes

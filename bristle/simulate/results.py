@@ -182,7 +182,7 @@ def write_parquet(frame: pd.DataFrame, path: Path) -> None:
         raise cannot_write(path, error, 0) from error
 
 
-def read_results(path: str | Path) -> pd.DataFrame:
+def load_results(path: str | Path) -> pd.DataFrame:
     """Return the results in a CSV or Parquet file that a run wrote.
 
     Parameters

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..design.margins import grid_rows
-from ..design.responses import responses
 from ..draw.style import BLUE, GREY, INK, Page, look, ramp
+from .margins import grid_rows
+from .responses import responses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..design.result import Result
+    from .result import DesignResult
 
 _PANELS = (
     ("Weighted loop: largest singular value [1]", "open_loop", "closed_loop", ""),
@@ -24,12 +24,12 @@ _PANELS = (
 )  # fmt: skip
 
 
-def draw_design(result: Result, path: Path) -> None:
+def draw_design(result: DesignResult, path: Path) -> None:
     """Draw a design's singular values with its weights into a file.
 
     Parameters
     ----------
-    result : Result
+    result : DesignResult
         Of kind "hinf" or "lpv"; of a table, the rows at the grid's speeds are drawn.
     path : Path
         Its suffix is the format: png, svg, pdf.
@@ -65,7 +65,7 @@ def draw_design(result: Result, path: Path) -> None:
     page.save(path, dpi=150)
 
 
-def _omega(result: Result) -> Any:
+def _omega(result: DesignResult) -> Any:
     """Return frequencies [rad/s] a decade beyond the building's on either side."""
     from ..physics.building import frequencies
 

@@ -13,7 +13,7 @@ from ..identify.table import low_pass
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..study.identified import Identified
+    from .identified import Identified
 
 _MEASURED, _PREDICTED = "#666666", "#D55E00"  # Okabe & Ito (2008), and a grey
 _RUNS = 3

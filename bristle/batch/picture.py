@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from ..batch import Ensemble
-    from ..batch.plan import Output
+    from .execute import Ensemble
+    from .plan import Output
 
 MOST_OUTPUTS = 6
 MOST_NAMES = 8
