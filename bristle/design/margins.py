@@ -7,14 +7,16 @@ margin from a norm.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .norms import hinf_norm
 from .plant import Plant, StateSpace
-from .result import DesignResult
+
+if TYPE_CHECKING:
+    from .result import DesignResult
 
 Array = NDArray[np.float64]
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DesignError
 from .norms import gains
 from .plant import Plant, StateSpace
-from .result import DesignResult
+
+if TYPE_CHECKING:
+    from .result import DesignResult
 
 Array = NDArray[np.float64]
 

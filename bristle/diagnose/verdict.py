@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,15 +19,43 @@ from .faults import SensorFault, instruments_of
 from .finding import Finding
 from .load_cell import FORCE_GAIN
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The verdict on a rig's model, and what it rests on.
+    """The verdict on a rig's model; `bristle.diagnose` returns it, and a notebook shows it.
 
-    `kind`, `effects`, ... as in verdict.json; `findings` what each site shows, the damper's last;
-    `sites` the site of each effect, empty on a bench, which has one; `force` "measured" or
-    "reconstructed" in a building, "" on a bench; `noise` that of each channel, as far as it was
-    asked for, in SI.
+    Attributes
+    ----------
+    kind : str
+        As in verdict.json: "none", "effect", "ambiguous", "unknown" or "insufficient".
+    effects : tuple of str
+        The effects that are missing; of "ambiguous" one of them is.
+    words : str
+        The verdict in sentences.
+    findings : mapping of Finding
+        What each site shows, the damper's last.
+    sensors : tuple of SensorFault
+        Faults that the channels show of each other.
+    untestable : tuple of str
+        Effects that the runs do not excite, or that the model takes up.
+    coordinate : str
+        Along which an unknown residual is organised.
+    sites : mapping of str
+        The site of each effect, empty on a bench, which has one.
+    force : str
+        "measured" or "reconstructed" in a building, "" on a bench.
+    noise : mapping of float
+        Noise of each channel, as far as it was asked for, in SI.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> verdict = bristle.Diagnosis("none", (), "No effect is missing.")
+    >>> verdict.kind, verdict.effects
+    ('none', ())
     """
 
     kind: str
@@ -119,6 +147,17 @@ class Diagnosis:
     @property
     def _damper(self) -> Finding | None:
         return self.findings.get(DAMPER)
+
+    def plot(self) -> Figure:
+        """Return the figure of the verdict: what each effect that was tried leaves of the error."""
+        from .picture import draw_diagnosis
+
+        return draw_diagnosis(self).figure
+
+    def _repr_html_(self) -> str:
+        from .notebook import diagnosis_html
+
+        return diagnosis_html(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""
