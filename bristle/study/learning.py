@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ..data.model import StudyModel
-from ..diagnose import Diagnosis, diagnose, diagnose_rig
+from ..diagnose import Diagnosis, diagnose_rig
 from ..diagnose.faults import SensorFault
-from ..errors import StudyError
-from ..physics.effect import EFFECTS, laws_joined
-from ..physics.laws import DEFAULT, LAWS
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified
+from .joining import refuse_effect
 from .rig import building_of
-from .study import Study, split_in_time
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .study import Study
 
 Say = Callable[[str], None]
 
@@ -109,7 +103,7 @@ def add_effects(
     """
     model = present = study.model()
     for name in names:
-        _refuse(model, name)
+        refuse_effect(model, name)
         model = model.with_effect(name)
     known = set(model.flat())
     start = {k: v for k, v in found.values.items() if k in known} if found is not None else {}
@@ -124,23 +118,6 @@ def add_effects(
         "add " + ", ".join(names), why, identified.model, identified.before, identified.after
     )
     return Added(tuple(names), replace(identified, step=step), step)
-
-
-def _refuse(model: StudyModel, name: str) -> None:
-    from ..findings import unknown
-
-    if name not in EFFECTS:
-        raise StudyError(unknown("effect", name, sorted(EFFECTS)))
-    effect = EFFECTS[name]
-    if name in model.effects:
-        raise StudyError(f"{name} is in the model already.")
-    if effect.site == "damper" and not effect.joins(LAWS[model.base_law]):
-        raise StudyError(
-            f"{name} cannot join the law {model.law}; it joins {', '.join(laws_joined(effect))}."
-        )
-    for other in model.effects:
-        if other in effect.excludes or name in EFFECTS[other].excludes:
-            raise StudyError(f"{name} and {other} cannot be joined: undo the other one first.")
 
 
 @dataclass(frozen=True)
@@ -194,38 +171,3 @@ def learn(
             return Learned(found, tuple(steps))
         say("adding " + " and ".join(found.effects))
         stepped(add_effects(study, found.effects, found=found).step)
-
-
-def diagnose_frames(
-    frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame],
-    law: str = DEFAULT,
-    *,
-    effects: tuple[str, ...] = (),
-    holdout: Mapping[str, pd.DataFrame] | list[pd.DataFrame] | None = None,
-) -> Diagnosis:
-    """Return what a damper's model misses, from pandas frames.
-
-    Parameters
-    ----------
-    frames, holdout : as `identify_frames` takes them; without `holdout` a single run is split in
-        time, and of several the last third is held out
-    law, effects : names of the damper's law and of the effects that the model has already
-
-    Raises
-    ------
-    RecordError, StudyError
-        As `identify_frames`.
-    """
-    from .identification import measurements_of_frames
-
-    train = measurements_of_frames(frames, "frame")
-    held_out = measurements_of_frames(holdout, "held out") if holdout else []
-    if not train:
-        raise StudyError("no frame is given; one run or more is right.")
-    if not held_out and len(train) == 1:
-        runs = split_in_time(train)
-        train, held_out = runs.train, runs.holdout
-    elif not held_out:
-        count = max(1, len(train) // 3)
-        train, held_out = train[:-count], train[-count:]
-    return diagnose(train, held_out, law=law, effects=effects)
