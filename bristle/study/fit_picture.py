@@ -42,6 +42,7 @@ def draw_identified(found: Identified) -> Page:
             panels = [page.figure.add_subplot(grid[row, column]) for column in range(3)]
             _row(panels, problem, found.at.model, run, found.cutoff)
             panels[0].set_title(f"{run.name} ({role})")
+            panels[0].set_ylabel(f"force [{_scale(run)[0]}]")
     return page
 
 
@@ -50,14 +51,22 @@ def _headings(found: Identified) -> tuple[str, str]:
     share = found.after.get("share_holdout", found.after["share_train"])
     low = f" below {found.cutoff:g} Hz" if found.cutoff else ""
     law = " + ".join([found.model.law, *found.model.effects])
+    site = found.at.site
+    what = site.quantity[:1].upper() + site.quantity[1:]
+    worst = " at the worst site" if site.shown else ""
     return (
-        f"{law}: error {percent(share)} of the force, z = {short_z(z)}",
-        f"Force measured and predicted{low}. z is error / noise; a true model has 1.",
+        f"{law}: error {percent(share)} of the force, z = {short_z(z)}{worst}",
+        f"{what}, measured and predicted{low}. z is error / noise; a true model has 1.",
     )
 
 
+def _scale(run: Run) -> tuple[str, float]:
+    """Return the unit that a run's force is shown in, and the factor to it from N."""
+    return ("kN", 1e-3) if np.ptp(run.force) > _KILO else ("N", 1.0)
+
+
 def _row(panels: list[Axes], problem: Problem, model: Model, run: Run, cutoff: float) -> None:
-    unit, factor = ("kN", 1e-3) if np.ptp(run.force) > _KILO else ("N", 1.0)
+    _, factor = _scale(run)
     measured = factor * low_pass(run.force, run.dt, cutoff)
     predicted = factor * low_pass(problem.predict(model, run), run.dt, cutoff)
     every = max(1, len(measured) // _SHOWN)
@@ -66,7 +75,6 @@ def _row(panels: list[Axes], problem: Problem, model: Model, run: Run, cutoff: f
         panel.plot(along[::every], measured[::every], color=INK, linewidth=1.3, alpha=0.75)
         panel.plot(along[::every], predicted[::every], color=BLUE, linewidth=0.8)
         panel.set_xlabel(label)
-    panels[0].set_ylabel(f"force [{unit}]")
     time = np.arange(len(measured)) * run.dt
     part = slice(0, min(len(time), int(3.0 / run.dt) + 1))
     panels[2].plot(time[part], measured[part], color=INK, label="measured", linewidth=1.6)

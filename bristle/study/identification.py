@@ -147,11 +147,21 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
     before = errors_of(site_models(rig, as_model(task.present or model)), task.cutoff)
     after = errors_of(models, task.cutoff)
     task.show(3)
-    at = models.get(DAMPER) or next(iter(models.values()))
+    at = models.get(DAMPER) or _worst(models)
     rows = _table(at, task) if task.table else []
     task.show(4)
     notes += [*fits.notes(), *_by_site(models), *_weighing(rows, model, after), *rig.notes]
     return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
+
+
+def _worst(models: SiteModels) -> SiteModel:
+    """Return the site where the model errs the most, on held-out runs if there are any."""
+
+    def z(at: SiteModel) -> float:
+        held_out = at.site.holdout
+        return robust_z(at.site.train if held_out is None else held_out, at.model)
+
+    return max(models.values(), key=z)
 
 
 def _table(at: SiteModel, task: FitTask) -> list[LawError]:

@@ -143,6 +143,7 @@ def test_a_building_needs_no_study(tmp_path):
     of_study = bristle.identify(study)
     found = bristle.identify(runs, "bingham", holdout=held_out, building=house)
     assert found.after == pytest.approx(of_study.after, rel=1e-6)
+    assert found.at.site.name == "layer"  # the picture is of what errs the most
     compared = bristle.compare(held_out, found, train=runs, building=house)
     assert compared.site == bristle.compare(study).site == "layer"
     verdict = bristle.diagnose(runs, found, holdout=held_out, building=house)
