@@ -1,30 +1,114 @@
 """bristle: base-isolated buildings with MR dampers, as FMUs and as models that learn.
 
-`bristle.run("scenario.toml")` returns a pandas frame with units; heavy modules are imported
-on first use, so that `import bristle` stays light.
+    import bristle
+
+    results = bristle.run("el_centro_lugre_passive")    # a scenario: rows of all outputs
+    found = bristle.identify("lab/*.csv", "lugre")      # a damper's parameters from measurements
+    verdict = bristle.diagnose("lab/*.csv", found)      # the effects that its model misses
+
+`dir(bristle)` lists what is public. Each name is imported on first use, so that `import bristle`
+takes hundredths of a second.
 """
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from .batch.execute import Ensemble as Ensemble
     from .batch.execute import ensemble as ensemble
+    from .compare.comparison import Comparison as Comparison
+    from .data.measurement import Measurement as Measurement
+    from .design import design as design
+    from .design.result import DesignResult as DesignResult
+    from .diagnose.verdict import Diagnosis as Diagnosis
+    from .errors import BristleError as BristleError
+    from .physics.effect import Effect as Effect
+    from .physics.law import Law as Law
+    from .physics.parameter import Parameter as Parameter
+    from .simulate.frame import Results as Results
+    from .simulate.results import load_results as load_results
     from .simulate.run import run as run
+    from .study.identified import Identified as Identified
+    from .study.public import compare as compare
+    from .study.public import diagnose as diagnose
+    from .study.public import identify as identify
+    from .study.study import Study as Study
 
-_LAZY = {"ensemble": "batch.execute", "run": "simulate.run"}
+_LAZY = {
+    "BristleError": "errors",
+    "Comparison": "compare.comparison",
+    "DesignResult": "design.result",
+    "Diagnosis": "diagnose.verdict",
+    "Effect": "physics.effect",
+    "Ensemble": "batch.execute",
+    "Identified": "study.identified",
+    "Law": "physics.law",
+    "Measurement": "data.measurement",
+    "Parameter": "physics.parameter",
+    "Results": "simulate.frame",
+    "Study": "study.study",
+    "compare": "study.public",
+    "design": "design",
+    "diagnose": "study.public",
+    "ensemble": "batch.execute",
+    "identify": "study.public",
+    "load_results": "simulate.results",
+    "run": "simulate.run",
+}
+"""The public names, and the modules that they are in."""
 
-__all__ = ["__version__", "ensemble", "run"]
+__all__ = [
+    "BristleError",
+    "Comparison",
+    "DesignResult",
+    "Diagnosis",
+    "Effect",
+    "Ensemble",
+    "Identified",
+    "Law",
+    "Measurement",
+    "Parameter",
+    "Results",
+    "Study",
+    "__version__",
+    "compare",
+    "design",
+    "diagnose",
+    "ensemble",
+    "identify",
+    "load_results",
+    "run",
+]
 
 
-def __getattr__(name: str) -> object:
-    if name in _LAZY:
-        return getattr(import_module(f".{_LAZY[name]}", __name__), name)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+class _Package(ModuleType):
+    """The package as a module whose public functions no subpackage of the same name hides.
+
+    Importing bristle.identify makes Python set it as the attribute `identify` of bristle, and the
+    function of that name would be gone. The subpackage is found in sys.modules all the same.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if name not in _LAZY or not isinstance(value, ModuleType):
+            super().__setattr__(name, value)
+
+
+if not TYPE_CHECKING:  # a type checker is to see a name that there is not
+
+    def __getattr__(name: str) -> object:
+        if name in _LAZY:
+            return getattr(import_module(f".{_LAZY[name]}", __name__), name)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)
+
+
+sys.modules[__name__].__class__ = _Package

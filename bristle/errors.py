@@ -11,6 +11,20 @@ class BristleError(Exception):
     The text says where, what, and what would be right; it is printed as it is, without a
     traceback. `exit_code` is what the command line returns: 2 for wrong input, 1 for a run
     that failed on its way.
+
+    Attributes
+    ----------
+    exit_code : int
+        2 or 1.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> try:
+    ...     bristle.run("no_damperr")
+    ... except bristle.BristleError as error:
+    ...     print(error.exit_code, "Did you mean" in str(error))
+    2 True
     """
 
     exit_code = 2

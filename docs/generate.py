@@ -1,4 +1,4 @@
-"""Pages of components and effects, made from the code.
+"""Pages of components, effects and the API, made from the code.
 
 As a hook of mkdocs it hands the pages over in memory; `python docs/generate.py FOLDER` writes them
 as files.
@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from pictures import picture
+from reference import api_page
 
 from bristle.cli.effects import tell
 from bristle.fmu import catalogue
@@ -34,7 +35,8 @@ SECTIONS = ("components", "effects")
 
 def pages() -> dict[str, str]:
     """Return every generated page by its path below docs/."""
-    made = {"components/index.md": _component_index(), "effects/index.md": _effect_index()}
+    made = {"api.md": api_page()}
+    made |= {"components/index.md": _component_index(), "effects/index.md": _effect_index()}
     for name in catalogue.component_names():
         made[f"components/{name}.md"] = component_page(name)
     for name in sorted(EFFECTS):

@@ -21,7 +21,7 @@ def figures() -> None:
     import bristle
     from bristle.paper.comparison.make import make as comparison
     from bristle.paper.figures import make, paper_figures
-    from bristle.report.figures import run_figure
+    from bristle.simulate.picture import run_figure
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

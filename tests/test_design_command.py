@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from bristle.cli import main
 from bristle.control.controller import read_controller
-from bristle.design import Result, Task, design
+from bristle.design import DesignResult, Task, design
 from bristle.design.margins import facts_of, grid_rows, margins
+from bristle.design.picture import draw_design
 from bristle.design.plant import Plant, StateSpace
 from bristle.fmu.build import plan
-from bristle.report.singular import draw_design
 
 IMPROPER = "[weights]\ncommand = { numerator = [1, 2, 3], denominator = [1, 4] }"
 ROLLING_OFF = "[weights]\ncommand = { gain = 2.0, corner = 50.0 }"
@@ -235,11 +235,11 @@ def frozen() -> Path:
 
 
 @pytest.fixture(scope="module")
-def hinf() -> Result:
+def hinf() -> DesignResult:
     return design(Task("hinf"))
 
 
-def test_margins_are_those_of_python_control(hinf: Result) -> None:
+def test_margins_are_those_of_python_control(hinf: DesignResult) -> None:
     plant, K = hinf.plants[0], hinf.bank.at(0)
     loop = -1 * control.ss(plant.A, plant.B2, plant.C2, plant.D22) * control.ss(*K)
     with warnings.catch_warnings():
@@ -252,7 +252,7 @@ def test_margins_are_those_of_python_control(hinf: Result) -> None:
 
 
 @pytest.mark.parametrize("side", ["gain_up", "phase"])
-def test_a_loop_at_its_margin_is_at_the_edge_of_stability(hinf: Result, side: str) -> None:
+def test_a_loop_at_its_margin_is_at_the_edge_of_stability(hinf: DesignResult, side: str) -> None:
     plant, K = hinf.plants[0], hinf.bank.at(0)
     found = margins(plant, K)
     if side == "gain_up":
@@ -269,7 +269,7 @@ def growth(plant: Plant, K: StateSpace) -> float:
     return float(poles.real.max())
 
 
-def test_a_controller_that_does_nothing_has_every_margin(hinf: Result) -> None:
+def test_a_controller_that_does_nothing_has_every_margin(hinf: DesignResult) -> None:
     plant, K = hinf.plants[0], hinf.bank.at(0)
     found = margins(plant, K._replace(C=0.0 * K.C))
     assert found.modulus == pytest.approx(1.0, rel=1e-5)
@@ -279,7 +279,7 @@ def test_a_controller_that_does_nothing_has_every_margin(hinf: Result) -> None:
     assert grid_rows(hinf) == [0]
 
 
-def test_the_same_design_is_drawn_to_the_same_bytes(hinf: Result, tmp_path: Path) -> None:
+def test_the_same_design_is_drawn_to_the_same_bytes(hinf: DesignResult, tmp_path: Path) -> None:
     for name in ("one.png", "two.png"):
         draw_design(hinf, tmp_path / name)
     assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import EnsembleError, RunError
+from ..findings import written
 from ..progress import Progress
 from .file import read_ensemble
 from .plan import Outcome, Plan
@@ -20,6 +21,7 @@ from .worker import prepare
 
 if TYPE_CHECKING:
     import pandas as pd
+    from matplotlib.figure import Figure
 
 
 class EnsembleInterrupted(KeyboardInterrupt):
@@ -42,6 +44,13 @@ class Ensemble:
         How many runs were there already.
     wall_time : float
         [s], of this start.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> found = bristle.ensemble("el_centro_damper_and_building", runs=2, workers=1)
+    >>> len(found.runs), found.failures
+    (2, [])
     """
 
     plan: Plan
@@ -50,6 +59,25 @@ class Ensemble:
     failures: list[Failure]
     continued: int
     wall_time: float
+
+    def plot(self) -> Figure:
+        """Return the figure: how each output is spread, and what moves it.
+
+        Raises
+        ------
+        RunError
+            If fewer than two runs are done.
+        """
+        from .picture import draw_ensemble
+
+        if (self.runs["status"] == "done").sum() < 2:
+            raise RunError("an ensemble is drawn from two runs on that are done.")
+        return draw_ensemble(self).figure
+
+    def _repr_html_(self) -> str:
+        from .notebook import ensemble_html
+
+        return ensemble_html(self)
 
 
 def ensemble(
@@ -87,6 +115,11 @@ def ensemble(
     progress : bool
         Show a progress bar, on a terminal only.
 
+    Returns
+    -------
+    Ensemble
+        `runs`, `quantiles` and `failures`.
+
     Raises
     ------
     EnsembleError, ScenarioError
@@ -98,10 +131,15 @@ def ensemble(
 
     Examples
     --------
-    >>> found = ensemble("el_centro_damper_and_building", runs=50)  # doctest: +SKIP
-    >>> found.quantiles.loc["peak structure.floor2_acceleration_absolute", "50 %"]  # doctest: +SKIP
+    >>> import bristle
+    >>> found = bristle.ensemble("el_centro_damper_and_building", runs=3, workers=1)
+    >>> peak = found.quantiles.loc["peak structure.floor2_acceleration_absolute"]
+    >>> peak["unit"], int(peak["done"])
+    ('m/s2', 3)
+    >>> figure = found.plot()  # a notebook shows `found` itself: table and picture
     """
     began = time.perf_counter()
+    _refuse_types(file, runs=runs, workers=workers)
     plan = read_ensemble(file, runs)
     if workers is not None and workers < 1:
         raise EnsembleError(f"--workers {workers}: 1 or more is right.")
@@ -125,6 +163,17 @@ def ensemble(
     seconds = time.perf_counter() - began
     outcomes = [o for run, o in table.outcomes.items() if run < plan.runs]
     return Ensemble(plan, frame, quantiles(plan, frame), failures(outcomes), continued, seconds)
+
+
+def _refuse_types(file: object, **numbers: object) -> None:
+    """Refuse arguments of ensemble of a type that it does not take."""
+    if not isinstance(file, str | Path):
+        raise EnsembleError(
+            f"ensemble takes a file or the name of a stock ensemble, not {written(file)}."
+        )
+    for name, value in numbers.items():
+        if value is not None and (isinstance(value, bool) or not isinstance(value, int)):
+            raise EnsembleError(f"{name} is {written(value)}; a whole number from 1 is right.")
 
 
 def _go(

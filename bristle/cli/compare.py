@@ -89,8 +89,8 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _of_study(arguments: argparse.Namespace) -> int:
+    from ..compare.picture import draw_comparison
     from ..draw.style import png
-    from ..report.residuals import draw_comparison
     from ..study.comparison import compare_study
     from ..study.study import Study
 
@@ -117,7 +117,7 @@ def _of_study(arguments: argparse.Namespace) -> int:
 
 def _of_fmu(arguments: argparse.Namespace) -> int:
     from ..bridge.fmu import compare_fmu
-    from ..report.residuals import draw_comparison
+    from ..compare.picture import draw_comparison
     from ..study.new import parse_channel
 
     found: FmuComparison = compare_fmu(
@@ -177,7 +177,7 @@ def _print(comparison: Comparison) -> None:
     """Print the sentences, then the error per run, along coordinates and in bands."""
     import textwrap
 
-    from ..report.tables import comparison_tables
+    from ..compare.tables import comparison_tables
 
     for sentence in comparison.sentences:
         print(textwrap.fill(sentence, 96) if sys.stdout.isatty() else sentence)

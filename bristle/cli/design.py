@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ..findings import command
 
 if TYPE_CHECKING:
-    from ..design import Result
+    from ..design import DesignResult
 
 HELP = "design a controller, and say what it is worth"
 
@@ -59,7 +59,7 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _answer(result: Result) -> dict[str, Any]:
+def _answer(result: DesignResult) -> dict[str, Any]:
     from ..design.margins import facts_of
 
     c = result.controller
@@ -70,7 +70,7 @@ def _answer(result: Result) -> dict[str, Any]:
     return answer
 
 
-def _write(result: Result, out: Path) -> list[Path]:
+def _write(result: DesignResult, out: Path) -> list[Path]:
     """Write controller file and picture beside the target and rename them into place."""
     from ..errors import DesignError
 
@@ -79,7 +79,7 @@ def _write(result: Result, out: Path) -> list[Path]:
             made = [Path(folder) / out.name]
             result.controller.save(made[0])
             if result.plants:
-                from ..report.singular import draw_design
+                from ..design.picture import draw_design
 
                 made.append(made[0].with_suffix(".png"))
                 draw_design(result, made[-1])

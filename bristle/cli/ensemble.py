@@ -83,7 +83,7 @@ def _write(found: Ensemble, folder: Path, figure: bool) -> dict[str, Path]:
             f"{files['quantiles']}: cannot be written: {error.strerror or error}."
         ) from error
     if figure and (found.runs["status"] == "done").sum() > 1:
-        from ..report.ensemble import ensemble_figure
+        from ..batch.picture import ensemble_figure
 
         files["figure"] = folder / "figure.png"
         ensemble_figure(found, files["figure"])

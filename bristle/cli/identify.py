@@ -56,7 +56,7 @@ def main(arguments: argparse.Namespace) -> int:
 
         return _building.main(arguments)
     from ..progress import Progress
-    from ..report.fit_picture import identify_png
+    from ..study.fit_picture import identify_png
     from ..study.identification import STAGES, identify_study
     from ..study.study import Study
 

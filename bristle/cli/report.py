@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Write the report; print where it is."""
     from ..data.files import write_whole
-    from ..report.staircase import Staircase
     from ..report.study_page import gather, render
+    from ..study.staircase import Staircase
     from ..study.study import Study
 
     study = Study(arguments.folder)

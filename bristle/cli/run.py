@@ -69,7 +69,7 @@ def main(arguments: argparse.Namespace) -> int:
         code = 1 if isinstance(error, IncompleteRunError) else 130
     written = {"results": folder / f"results.{output.format}", "log": folder / "log"}
     if not arguments.no_figure and code != 130:  # whoever presses Ctrl-C waits for nothing more
-        from ..report.figures import run_figure
+        from ..simulate.picture import run_figure
 
         try:
             run_figure(frame, folder / "figure.png")
@@ -90,7 +90,7 @@ def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> 
     import json
     from dataclasses import asdict
 
-    from ..report.summary import summarise
+    from ..simulate.summary import summarise
 
     answer = {
         "complete": frame.attrs["complete"],
@@ -111,7 +111,7 @@ def _print_plain(frame: pd.DataFrame, written: dict[str, Path]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from ..report.summary import summarise
+    from ..simulate.summary import summarise
 
     made = frame.attrs["made"]
     first, last = frame.index[0], frame.index[-1]

@@ -201,8 +201,8 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _auto(arguments: argparse.Namespace) -> int:
-    from ..report.staircase import staircase
     from ..study.learning import learn
+    from ..study.staircase import staircase
     from ..study.study import Study
     from .diagnose import text
 

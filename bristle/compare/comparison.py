@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,20 +27,51 @@ from .prediction import RunPrediction, run_predictions
 from .regimes import Regime, regimes
 from .sentences import sentences
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A prediction held against measured runs.
+    """A prediction held against measured runs; `bristle.compare` returns it, a notebook shows it.
 
-    `runs` the error of each, `total` over all; `z_interval` the 95 % interval of the total z;
-    `patterns` where the residual lives, the most telling coordinate first; `second` the most
-    telling one of what is left after that, None where chance explains the rest; `spectrum` the
-    residual's against the noise's; `regimes` classes of speed and voltage; `predictions` the runs
-    themselves; `sentences` what an engineer would say; `seen` whether the runs were those of the
-    fit, None where nobody knows; `sites` the errors of a building's sites, the worst first, of
-    which this is the comparison of one, `site`.
+    Attributes
+    ----------
+    quantity, unit : str
+        What is compared: "force", "N".
+    runs : tuple of RunError
+        The error of each run; `total` over all.
+    z_interval : tuple of float
+        The 95 % interval of the total z, which is error / noise.
+    patterns : tuple of ResidualPattern
+        On which coordinate the residual depends, the most telling first; `second` is that of what
+        is left after the first, None where chance explains the rest.
+    spectrum : Spectrum
+        The residual's against the noise's.
+    regimes : tuple of Regime
+        z in classes of speed and voltage.
+    predictions : tuple of RunPrediction
+        The runs themselves, measured and predicted.
+    sentences : tuple of str
+        What an engineer would say.
+    seen : bool or None
+        Whether the runs were those of the fit, None where nobody knows.
+    sites : tuple of SiteError
+        The errors of a building's sites, the worst first, of which this is the comparison of one,
+        `site`.
+
+    Examples
+    --------
+    >>> import bristle, numpy as np
+    >>> t = np.arange(0.0, 8.0, 0.004)  # s
+    >>> v = 72e-3 * np.cos(9.0 * t)  # m/s
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.05, t.size)
+    >>> run = {"time": t, "velocity": v, "force": 5.0 * np.sign(v) + 90.0 * v + noise}  # s, m/s, N
+    >>> comparison = bristle.compare(run, "bingham_standard")  # at its defaults
+    >>> comparison.right, comparison.z > 2.0
+    (False, True)
     """
 
     quantity: str
@@ -84,6 +115,23 @@ class Comparison:
         """The run with the largest z."""
         name = max(self.runs, key=lambda run: run.z).name
         return next(one for one in self.predictions if one.name == name)
+
+    def plot(self, title: str = "") -> Figure:
+        """Return the figure: the worst stretch, loops, the error along coordinates, its spectrum.
+
+        Parameters
+        ----------
+        title : str
+            Above the panels; by default the finding in one line.
+        """
+        from .picture import draw_comparison
+
+        return draw_comparison(self, title).figure
+
+    def _repr_html_(self) -> str:
+        from .notebook import comparison_html
+
+        return comparison_html(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison as JSON has it, without the samples."""

@@ -26,6 +26,9 @@ class RigComparer:
         "holdout" or "train".
     present : Model
         The model that the site is chosen by.
+    seen : bool or None
+        Whether models were fitted to these runs, as they are to those of "train"; None where nobody
+        knows.
 
     Raises
     ------
@@ -33,9 +36,9 @@ class RigComparer:
         If an effect of the model acts at no site, or a run cannot be held against a model.
     """
 
-    def __init__(self, rig: Rig, role: str, present: Model) -> None:
+    def __init__(self, rig: Rig, role: str, present: Model, *, seen: bool | None = False) -> None:
         self.rig, self.role = rig, role
-        self.seen = role == "train"
+        self.seen = seen if seen is None else seen or role == "train"
         self._last: tuple[Model, SiteModels] | None = None
         self.site = self._chosen(present)
 

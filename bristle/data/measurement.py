@@ -33,10 +33,32 @@ _ABSURD = 1e15  # in any SI unit; some recorders write 1e30 where a value is mis
 class Measurement:
     """One piece of one run.
 
-    `time` (n,) s, evenly spaced; `channels` name to (n,) in the SI `units`; `measured` (n,) False
-    where a sample was missing and is interpolated, `lost` by channel (n,) True where that one alone
-    says nothing, such as beyond the end of its range; `noise` the standard deviation of each
-    channel in SI, `noise_facts` how it was found (None where it was given); `notes` what was done.
+    Attributes
+    ----------
+    time : (n,) array
+        [s], evenly spaced.
+    channels : dict of (n,) arrays
+        By name, in SI; `units` holds the units.
+    measured : (n,) array of bool
+        False where a sample was missing and is interpolated.
+    lost : mapping of (n,) arrays of bool
+        By channel: True where that one alone says nothing, such as beyond the end of its range.
+    noise : dict of float
+        Standard deviation of each channel in SI; `noise_facts` how it was found, None where given.
+    notes : tuple of str
+        What was done.
+
+    Examples
+    --------
+    >>> import bristle, numpy as np, pathlib, tempfile
+    >>> folder, t = pathlib.Path(tempfile.mkdtemp()), np.arange(0.0, 4.0, 0.004)
+    >>> rows = np.column_stack([t, 72.0 * np.cos(9.0 * t), 5.0 * np.sin(9.0 * t)])
+    >>> np.savetxt(
+    ...     folder / "run.csv", rows, delimiter=",", header="time [s],v [mm/s],F [N]", comments=""
+    ... )
+    >>> run = bristle.Study.create(folder / "my_rig", [folder / "run.csv"]).read()[0]
+    >>> run.units["velocity"], round(float(run["velocity"].max()), 3)
+    ('m/s', 0.072)
     """
 
     name: str

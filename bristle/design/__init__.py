@@ -10,10 +10,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
 from ..control.controller import Controller, read_controller
-from .file import damper_from_model, read_task, task_from_data
+from ..errors import DesignError
+from ..findings import written
+from .file import SCHEMA, damper_from_model, read_task, task_from_data
 from .plausible import implausible
-from .result import Result
+from .result import DesignResult
 from .sliding import Damper
 from .task import Scheduling, Task
 from .weights import LqgWeights, Weight, Weights
@@ -21,8 +27,8 @@ from .weights import LqgWeights, Weight, Weights
 __all__ = [
     "Controller",
     "Damper",
+    "DesignResult",
     "LqgWeights",
-    "Result",
     "Scheduling",
     "Task",
     "Weight",
@@ -36,16 +42,51 @@ __all__ = [
 ]
 
 
-def design(task: Task) -> Result:
-    """Return the verified controller of a task.
+def design(task: Task | str | Path | Mapping[str, Any]) -> DesignResult:
+    """Design a controller, and verify it.
+
+    Parameters
+    ----------
+    task : Task, path or mapping
+        A checked task, a design file, or the content of one; its paths are then relative to the
+        current folder, and `schema` may be left out.
+
+    Returns
+    -------
+    DesignResult
+        `controller.save(path)` writes the controller file; `facts` holds gamma, the closed-loop
+        norms computed anew, and the poles.
 
     Raises
     ------
     DesignError
-        If there is none that could be used: with the numbers, and what would help.
+        If the task is wrong, or there is no controller that could be used: with the numbers, and
+        what would help.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> result = bristle.design({"kind": "lqg"})  # for the paper's building
+    >>> result.controller.n, result.facts["sampled_loop_modulus"] < 1.0
+    (6, True)
+    >>> figure = result.plot()
     """
     from .hinf import design_hinf
     from .lpv import design_lpv
     from .lqg import design_lqg
 
-    return {"hinf": design_hinf, "lpv": design_lpv, "lqg": design_lqg}[task.kind](task)
+    chosen = _task(task)
+    return {"hinf": design_hinf, "lpv": design_lpv, "lqg": design_lqg}[chosen.kind](chosen)
+
+
+def _task(given: object) -> Task:
+    if isinstance(given, Task):
+        return given
+    if isinstance(given, str | Path):
+        return read_task(given)
+    if isinstance(given, Mapping):
+        return task_from_data({"schema": SCHEMA, **given}, Path())
+    raise DesignError(
+        f"design takes a task, a design file or its content, not {written(given)}: "
+        'design({"kind": "hinf"}).'
+    )

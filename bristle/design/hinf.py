@@ -9,7 +9,7 @@ import numpy as np
 from . import lmi, table, verify
 from .norms import hinf_norm, least_gamma
 from .plant import Plant, Units, balancing, generalized
-from .result import Result, packed, pole_list
+from .result import DesignResult, packed, pole_list
 from .sliding import stiffness
 from .task import Task
 
@@ -28,7 +28,7 @@ def units_for(plant: Plant, gamma: float) -> Units:
     )
 
 
-def design_hinf(task: Task) -> Result:
+def design_hinf(task: Task) -> DesignResult:
     """Return a verified H-infinity controller from the floor acceleration to the damper's force.
 
     Parameters
@@ -38,7 +38,7 @@ def design_hinf(task: Task) -> Result:
 
     Returns
     -------
-    Result
+    DesignResult
         `facts` hold `gamma` (proved), `least_gamma` (no controller does better), `norm` (closed
         loop, computed anew), `open_loop_norm`, `poles` ...
 
@@ -77,4 +77,4 @@ def design_hinf(task: Task) -> Result:
             **facts,
         },
     )
-    return Result(task, controller, still, [plant], bank, solution)
+    return DesignResult(task, controller, still, [plant], bank, solution)

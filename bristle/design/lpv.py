@@ -17,7 +17,7 @@ from . import lmi, table, verify
 from .hinf import units_for
 from .norms import hinf_norm, least_gamma
 from .plant import Plant, States, Units, balancing, family
-from .result import Result, packed, pole_list
+from .result import DesignResult, packed, pole_list
 from .sliding import coefficients, stiffness
 from .task import Task
 
@@ -79,7 +79,7 @@ def gammas(task: Task, variants: Iterable[tuple[str, float]]) -> list[dict[str, 
     return rows
 
 
-def design_lpv(task: Task) -> Result:
+def design_lpv(task: Task) -> DesignResult:
     """Return a verified LPV controller, tabulated over the speed.
 
     Parameters
@@ -89,7 +89,7 @@ def design_lpv(task: Task) -> Result:
 
     Returns
     -------
-    Result
+    DesignResult
         `facts` hold `gamma`, proved at the grid points; `norms` of the closed loops with the speed
         held there, `row_norms` between; `largest_eigenvalue` of the LMI over the table's rows, and
         the `share_proved` of them where it is not above 0: elsewhere the bound is not proved.
@@ -129,7 +129,7 @@ def design_lpv(task: Task) -> Result:
     discrete = table.sampled(bank, h)
     facts["sampled_loop_modulus"] = verify.check_sampled_loop(at_rows, discrete, speeds, h)
     facts["poles"] = [pole_list(poles) for poles in grid_bank.poles]
-    return Result(task, packed(task, discrete, facts), speeds, at_rows, bank, solution)
+    return DesignResult(task, packed(task, discrete, facts), speeds, at_rows, bank, solution)
 
 
 def _norms(

@@ -11,12 +11,12 @@ import numpy as np
 from ..errors import DesignError
 from . import table, verify
 from .plant import Plant, structure
-from .result import Result, packed, pole_list
+from .result import DesignResult, packed, pole_list
 from .sliding import stiffness
 from .task import Task
 
 
-def design_lqg(task: Task) -> Result:
+def design_lqg(task: Task) -> DesignResult:
     """Return a verified LQG controller from floor acceleration and damper force to a force.
 
     x' = A x + B_f f + L (y - C x - D f),   u = -K x
@@ -70,4 +70,4 @@ def design_lqg(task: Task) -> Result:
             **facts,
         },
     )
-    return Result(task, controller, still, [], bank, None)
+    return DesignResult(task, controller, still, [], bank, None)

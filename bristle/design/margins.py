@@ -7,14 +7,16 @@ margin from a norm.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .norms import hinf_norm
 from .plant import Plant, StateSpace
-from .result import Result
+
+if TYPE_CHECKING:
+    from .result import DesignResult
 
 Array = NDArray[np.float64]
 
@@ -37,7 +39,7 @@ class Margins(NamedTuple):
     phase: float | None
 
 
-def grid_rows(result: Result) -> list[int]:
+def grid_rows(result: DesignResult) -> list[int]:
     """Return the rows of the table nearest to the design's grid speeds; [0] without a table."""
     if len(result.speeds) == 1:
         return [0]
@@ -71,7 +73,7 @@ def margins(plant: Plant, K: StateSpace) -> Margins:
     return Margins(1.0 / hinf_norm(sensitivity), up, down, _phase(L))
 
 
-def facts_of(result: Result) -> dict[str, Any]:
+def facts_of(result: DesignResult) -> dict[str, Any]:
     """Return the least margins over the grid's speeds, for a report.
 
     Returns

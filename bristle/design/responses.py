@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DesignError
 from .norms import gains
 from .plant import Plant, StateSpace
-from .result import Result
+
+if TYPE_CHECKING:
+    from .result import DesignResult
 
 Array = NDArray[np.float64]
 
 
-def responses(result: Result, omega: Array, row: int = 0) -> dict[str, Array]:
+def responses(result: DesignResult, omega: Array, row: int = 0) -> dict[str, Array]:
     """Return gains at `omega` (k,) [rad/s] with the speed held at one row of the table.
 
     Parameters
     ----------
-    result : Result
+    result : DesignResult
         Of kind "hinf" or "lpv".
     omega : (k,) array
         Frequencies [rad/s].

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,16 @@ from .plant import Plant
 from .table import Bank
 from .task import Task
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 Array = NDArray[np.float64]
 
 _DIGITS = 12
 
 
 @dataclass(frozen=True)
-class Result:
+class DesignResult:
     """A verified controller.
 
     Attributes
@@ -36,6 +39,13 @@ class Result:
         The controllers at these speeds, continuous.
     solution : Solution or None
         The matrices that prove gamma, in normalised, balanced states.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> result = bristle.design({"kind": "lqg", "sample_period": 0.001})
+    >>> result.controller.sample_period, result.task.kind
+    (0.001, 'lqg')
     """
 
     task: Task
@@ -49,6 +59,17 @@ class Result:
     def facts(self) -> dict[str, Any]:
         """The design's numbers: gamma, norms, poles ..."""
         return self.controller.facts
+
+    def plot(self) -> Figure:
+        """Return the figure: singular values of the loop and its weights; of LQG its poles."""
+        from .picture import draw_result
+
+        return draw_result(self).figure
+
+    def _repr_html_(self) -> str:
+        from .notebook import design_html
+
+        return design_html(self)
 
 
 def packed(task: Task, discrete: Bank, facts: dict[str, Any]) -> Controller:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,15 +25,45 @@ OF_WORST = (
 )  # fmt: skip
 """What verdict.json tells of the worst site beside the list of all."""
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The verdict on a rig's model, and what it rests on.
+    """The verdict on a rig's model; `bristle.diagnose` returns it, and a notebook shows it.
 
-    `kind`, `effects`, ... as in verdict.json; `reasons` sentences; `findings` what each site shows,
-    the damper's last; `sites` the site of each effect; `alternatives` what is no effect and would
-    look like one of them; `force` "measured" or "reconstructed"; `noise` that of each channel, in
-    SI.
+    Attributes
+    ----------
+    kind : str
+        As in verdict.json: "none", "effect", "ambiguous", "unknown" or "insufficient".
+    effects : tuple of str
+        The effects that are missing; of "ambiguous" one of them is.
+    reasons : tuple of str
+        Why, in sentences.
+    findings : mapping of Finding
+        What each site shows, the damper's last.
+    sensors : tuple of SensorFault
+        Faults that the channels show of each other.
+    untestable : tuple of str
+        Effects that the runs do not excite, or that the model takes up.
+    coordinate : str
+        What an unknown residual depends on.
+    sites : mapping of str
+        The site of each effect.
+    alternatives : tuple of str
+        What is no effect and would look like one of them.
+    force : str
+        "measured" or "reconstructed".
+    noise : mapping of float
+        Noise of each channel, as far as it was asked for, in SI.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> verdict = bristle.Diagnosis("none", (), ("On held-out runs z = 1.02.",))
+    >>> verdict.kind, verdict.effects
+    ('none', ())
     """
 
     kind: str
@@ -136,6 +166,17 @@ class Diagnosis:
     @property
     def _damper(self) -> Finding | None:
         return self.findings.get(DAMPER)
+
+    def plot(self) -> Figure:
+        """Return the figure of the verdict: what each effect that was tried leaves of the error."""
+        from .picture import draw_diagnosis
+
+        return draw_diagnosis(self).figure
+
+    def _repr_html_(self) -> str:
+        from .notebook import diagnosis_html
+
+        return diagnosis_html(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the content of verdict.json."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import textwrap
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import not_usable
 from ..quantity import short_z as short_z
+from .look import GREY as GREY
+from .look import INK as INK
+from .look import look as look
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,7 +24,7 @@ FORMATS = ("png", "svg", "pdf")
 BLUE, VERMILION, GREEN, PURPLE = "#0072B2", "#D55E00", "#009E73", "#CC79A7"
 FLOOR = "#d9efe6"
 """The band of z that noise explains."""
-INK, GREY, PALE = "#222222", "#666666", "#b8b8b8"
+PALE = "#b8b8b8"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 
 MINUS, TIMES = "\u2212", "\u00d7"
@@ -34,52 +35,6 @@ MARGIN = 0.16
 RECONSTRUCTED = (
     "Damper parameters are reconstructed, not those of the paper's tables: see docs, Physics."
 )
-
-_STYLE: dict[str, Any] = {
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "font.size": 9,
-    "text.color": INK,
-    "text.parse_math": False,  # titles and names are a user's; a $ in them is a $
-    "axes.labelcolor": GREY,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": GREY,
-    "axes.linewidth": 0.7,
-    "axes.grid": True,
-    "grid.color": "#ececec",
-    "grid.linewidth": 0.7,
-    "axes.axisbelow": True,
-    "axes.titlelocation": "left",
-    "axes.titlesize": 10,
-    "axes.titlepad": 7,
-    "lines.linewidth": 1.3,
-    "lines.solid_capstyle": "round",
-    "xtick.color": GREY,
-    "ytick.color": GREY,
-    "xtick.major.width": 0.7,
-    "ytick.major.width": 0.7,
-    "legend.frameon": False,
-    "agg.path.chunksize": 10000,
-    "svg.fonttype": "none",
-    "svg.hashsalt": "bristle",
-}
-
-
-@contextmanager
-def look() -> Iterator[None]:
-    """Apply the style within a `with` block; settings of the user stay as they are."""
-    from matplotlib import rc_context, rcParamsDefault
-
-    settings: dict[Any, Any] = {k: v for k, v in rcParamsDefault.items() if not _of_backend(k)}
-    settings.update(_STYLE)
-    with rc_context(settings):
-        yield
-
-
-def _of_backend(key: str) -> bool:
-    # Those of interactive backends, and those that matplotlib warns of when they are set.
-    return key.startswith(("backend", "toolbar", "webagg", "interactive", "animation", "keymap"))
 
 
 def ramp(count: int) -> list[Any]:
@@ -104,7 +59,7 @@ class Page:
     def __init__(
         self, width: float, height: float, title: str, subtitle: str = "", note: str = ""
     ) -> None:
-        from matplotlib.figure import Figure
+        from .figure import Picture
 
         parts = [
             (_broken(title, width, 9.2), {"fontsize": 12.5, "fontweight": "bold"}, 0.235),
@@ -114,11 +69,11 @@ class Page:
         foot = _broken(note, width, 17.0)
         self.foot = MARGIN + (0.13 * (foot.count("\n") + 1) if foot else 0.0)
         self.width, self.height = width, height + self.head + self.foot
-        self.figure: Figure = Figure(figsize=(self.width, self.height))
+        self.figure: Figure = Picture(figsize=(self.width, self.height))
         top = self.height - MARGIN * 0.7
-        for text, look, line in parts:
+        for text, font, line in parts:
             if text:
-                self._text(text, top, va="top", **look)
+                self._text(text, top, va="top", **font)
                 top -= (text.count("\n") + 1) * line
         if foot:
             self._text(foot, 0.6 * MARGIN, va="bottom", fontsize=7, color=GREY)
@@ -187,15 +142,11 @@ class Page:
             raise not_usable(f"{path}: cannot be written: {error.strerror or error}.") from error
 
 
-def png(page: Page, dpi: int = 160) -> bytes:
-    """Return a page as the bytes of a PNG; the same drawing gives the same bytes."""
-    import io
+def png(drawn: Page | Figure, dpi: int = 160) -> bytes:
+    """Return a page or figure as the bytes of a PNG; the same drawing gives the same bytes."""
+    from .figure import as_png
 
-    file = io.BytesIO()
-    with look(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing from font")
-        page.figure.savefig(file, format="png", dpi=dpi)
-    return file.getvalue()
+    return as_png(drawn.figure, dpi)  # a figure's `figure` is itself
 
 
 def _broken(text: str, width: float, per_inch: float) -> str:

@@ -111,6 +111,8 @@ class Sizes(NamedTuple):
 class Effect:
     """Base of every physical effect; defining a subclass with a `name` registers it.
 
+    It then takes part everywhere: in runs, identification, diagnosis and FMUs.
+
     Class data
     ----------
     name, sites
@@ -188,6 +190,29 @@ class Effect:
     mass
         The parameter [kg] of a mass that moves with the rod; beside a building's model it is part
         of the moving mass.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> class CubicSpring(bristle.Effect):
+    ...     '''A spring in the damper that stiffens with its displacement.'''
+    ...
+    ...     name = "cubic_spring"
+    ...     site = "damper"
+    ...     needs = ("x",)
+    ...     passive = True
+    ...     zero_at_rest = True
+    ...     expect = "force grows with the third power of displacement"
+    ...     source = "Kovacic & Brennan (2011), The Duffing Equation"
+    ...     parameters = {
+    ...         "k": bristle.Parameter(1e6, "N/m3", (0.0, 1e9), "force per displacement cubed")
+    ...     }
+    ...
+    ...     @staticmethod
+    ...     def force(q, z, p):
+    ...         return p.k * q.x**3
+    >>> CubicSpring.parameters["k"].unit
+    'N/m3'
     """
 
     name: ClassVar[str] = ""

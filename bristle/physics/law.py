@@ -123,6 +123,23 @@ class Law:
         in q.V the mean of the step. A law that has states and none of it moves by `rate`.
     force
         Of a building's part: its force [N], at arrays as well.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> class Dashpot(bristle.Law):
+    ...     '''A damper that is viscous alone, whatever its voltage.'''
+    ...
+    ...     name = "dashpot"
+    ...     parameters = {"c": bristle.Parameter(100.0, "N.s/m", (0.0, 1e6), "damping")}
+    ...     parts = ("viscous",)
+    ...     source = "Newton (1687), Principia"
+    ...
+    ...     @staticmethod
+    ...     def viscous(q, z, p):
+    ...         return p.c * q.v
+    >>> Dashpot.linear()
+    ('c',)
     """
 
     name: ClassVar[str] = ""

@@ -13,7 +13,25 @@ CHOICES = ("exponent", "mass", "which")
 
 
 class Parameter(NamedTuple):
-    """A number of a law or effect: default value, SI unit, bounds of what is physical, meaning."""
+    """A number of a law or effect.
+
+    Attributes
+    ----------
+    value : float
+        Default value.
+    unit : str
+        SI unit, "1" without one.
+    bounds : tuple of float
+        Least and largest value that is physical.
+    text : str
+        What it is, in a few words.
+
+    Examples
+    --------
+    >>> import bristle
+    >>> bristle.Parameter(300.0, "N/m", (0.0, 1e5), "stiffness of the spring").unit
+    'N/m'
+    """
 
     value: float
     unit: str

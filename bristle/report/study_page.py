@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..compare.names import site_name
+from ..compare.picture import headline
+from ..draw import html
 from ..draw.style import percent
 from ..errors import BristleError
 from ..quantity import quantity, short_z
-from . import html
+from ..study.staircase import HistoryStep, history_steps
 from .reproduce import commands
-from .residuals import headline
-from .staircase import HistoryStep, history_steps
 from .study_tables import data_table, data_words, parameter_table, run_errors
 from .study_verdict import untold_section, verdict_section
 
@@ -166,9 +166,9 @@ def _where(content: Content) -> str:
     now = content.now
     if now is None:
         return html.section("Where the model stands", html.paragraphs(content.trouble))
+    from ..compare.tables import pattern_table
     from ..draw.style import png
     from .study_pictures import error_page
-    from .tables import pattern_table
 
     _, header, rows = pattern_table(now)
     along = "the two coordinates that it depends on most"
@@ -199,9 +199,9 @@ def _sites(content: Content) -> list[str]:
     now = content.now
     if now is None or not now.sites:
         return []
+    from ..compare.site_pictures import sites_page
+    from ..compare.tables import site_table
     from ..draw.style import png
-    from .site_pictures import sites_page
-    from .tables import site_table
 
     _, header, rows = site_table(now)
     rings = f" Rings: without {content.added}." if content.before else ""
@@ -231,7 +231,7 @@ def _history(content: Content) -> str:
     picture = ""
     if with_z:
         from ..draw.style import png
-        from .study_pictures import staircase_page
+        from ..study.staircase_picture import staircase_page
 
         fall = " → ".join(_or_dash(one.z) for one in with_z)
         # Their forces are low-passed, and those of the rest of the page are not: z tells it all.

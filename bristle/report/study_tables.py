@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..compare.tables import run_table
 from ..draw.style import MINUS, TIMES, percent
 from ..quantity import plain, quantity
-from .tables import run_table
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison

@@ -19,9 +19,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import RunError, not_usable
+from ..findings import written
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from .frame import Results
 
 _KIND = "# bristle results"
 _DTYPES = {"Real": "float64", "Integer": "int64", "Enumeration": "int64", "Boolean": "bool"}
@@ -58,15 +61,17 @@ class Table:
     values: dict[str, Array]
 
 
-def to_frame(table: Table, made: Mapping[str, Any], complete: bool = True) -> pd.DataFrame:
-    """Return a table as a pandas frame.
+def to_frame(table: Table, made: Mapping[str, Any], complete: bool = True) -> Results:
+    """Return a table as a pandas frame that draws itself.
 
     Its index is the time [s]; `attrs["units"]` maps columns (and "time") to units,
     `attrs["made"]` says how the results were made, `attrs["complete"]` whether the run ended.
     """
     import pandas as pd
 
-    frame = pd.DataFrame(table.values, index=pd.Index(table.time, name="time"))
+    from .frame import Results
+
+    frame = Results(table.values, index=pd.Index(table.time, name="time"))
     units = {"time": "s"} | {c.name: c.unit for c in table.columns if c.unit}
     frame.attrs.update(units=units, made=dict(made), complete=complete)
     return frame
@@ -182,7 +187,7 @@ def write_parquet(frame: pd.DataFrame, path: Path) -> None:
         raise cannot_write(path, error, 0) from error
 
 
-def read_results(path: str | Path) -> pd.DataFrame:
+def load_results(path: str | Path) -> Results:
     """Return the results in a CSV or Parquet file that a run wrote.
 
     Parameters
@@ -192,15 +197,30 @@ def read_results(path: str | Path) -> pd.DataFrame:
 
     Returns
     -------
-    DataFrame
-        As the run returned it. `attrs["complete"]` is False if the run did not come to its end;
-        the rows until then are there.
+    Results
+        The pandas frame that the run returned. `attrs["complete"]` is False if the run did not come
+        to its end; the rows until then are there.
 
     Raises
     ------
     RunError
         There is no such file, or it is not one that a run wrote.
+
+    Examples
+    --------
+    >>> import bristle, tempfile
+    >>> folder = tempfile.mkdtemp()
+    >>> results = bristle.run(
+    ...     "bench_sine_bingham", {"run.stop": 0.5}, out=folder
+    ... )
+    >>> bristle.load_results(folder).equals(results)
+    True
     """
+    if not isinstance(path, str | Path):
+        raise not_usable(
+            f"load_results takes a file or a folder, not {written(path)}: "
+            'load_results("results/el_centro_lugre_passive").'
+        )
     path = Path(path)
     if path.is_dir():
         found = [path / name for name in ("results.csv", "results.parquet")]
@@ -256,7 +276,7 @@ def _lines(table: Table) -> bytes:
     return sink.getvalue()
 
 
-def _read_csv(path: Path) -> pd.DataFrame:
+def _read_csv(path: Path) -> Results:
     import pyarrow as pa
     from pyarrow.csv import ConvertOptions, ReadOptions, read_csv
 
@@ -291,7 +311,7 @@ def _read_csv(path: Path) -> pd.DataFrame:
     return to_frame(Table(values.pop("time"), columns, values), made, complete)
 
 
-def _read_parquet(path: Path) -> pd.DataFrame:
+def _read_parquet(path: Path) -> Results:
     import pyarrow.parquet as pq
 
     read = pq.read_table(path)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import RunError, not_usable
+from ..findings import written
 from ..fmu.description import Description, read_description
 from ..interrupt import Interrupt
 from ..scenario.scenario import Scenario, fmu_parameters, load_scenario, worded
@@ -20,8 +21,7 @@ from .results import Table, to_frame
 from .rows import make_columns, times
 
 if TYPE_CHECKING:
-    import pandas as pd
-
+    from .frame import Results
     from .master import Master
     from .session import Message
 
@@ -35,7 +35,7 @@ BLOCK = 0.1
 class IncompleteRunError(RunError):
     """A run that failed on its way; `frame` holds the rows before."""
 
-    def __init__(self, text: str, frame: pd.DataFrame) -> None:
+    def __init__(self, text: str, frame: Results) -> None:
         super().__init__(text)
         self.frame = frame
 
@@ -43,7 +43,7 @@ class IncompleteRunError(RunError):
 class RunInterrupted(KeyboardInterrupt):
     """A run that Ctrl-C has stopped between two steps; `frame` holds the rows before."""
 
-    def __init__(self, text: str, frame: pd.DataFrame) -> None:
+    def __init__(self, text: str, frame: Results) -> None:
         super().__init__(text)
         self.frame = frame
 
@@ -56,7 +56,7 @@ def run(
     out: str | Path | None = None,
     format: str = "csv",
     progress: bool = False,
-) -> pd.DataFrame:
+) -> Results:
     """Run a scenario and return every output at every step.
 
     Parameters
@@ -76,10 +76,10 @@ def run(
 
     Returns
     -------
-    DataFrame
-        Columns "damper.force", index "time" [s], row k at t_k, t = 0 included.
+    Results
+        A pandas frame: columns "damper.force", index "time" [s], row k at t_k, t = 0 included.
         `attrs["units"]` maps columns to units, `attrs["made"]` says how the results were made,
-        `attrs["complete"]` is True.
+        `attrs["complete"]` is True. `plot()` returns its figure; a notebook shows it.
 
     Raises
     ------
@@ -93,10 +93,29 @@ def run(
 
     Examples
     --------
-    >>> frame = run("half_sine_pulse.toml", {"voltage.level": 8.0})  # doctest: +SKIP
-    >>> frame["damper.force"].abs().max(), frame.attrs["units"]["damper.force"]  # doctest: +SKIP
+    >>> import bristle
+    >>> results = bristle.run("bench_sine_bingham", {"run.stop": 0.5})
+    >>> round(float(results["damper.force"].abs().max()), 1), results.attrs["units"]["damper.force"]
+    (5.9, 'N')
     """
+    _refuse_types(scenario, overrides, out)
     return execute(scenario, overrides, engine, Output(_folder(out), format), progress)
+
+
+def _refuse_types(scenario: object, overrides: object, out: object) -> None:
+    """Refuse arguments of run of a type that it does not take: exit code 2."""
+    if not isinstance(scenario, str | Path | Scenario):
+        raise not_usable(
+            f"run: the scenario is {written(scenario)}; a file, the name of a stock scenario or a "
+            "loaded Scenario is right."
+        )
+    if overrides is not None and not isinstance(overrides, Mapping):
+        raise not_usable(
+            f'run: overrides is {written(overrides)}; a mapping such as {{"damper.f_c": 2.0}} is '
+            "right."
+        )
+    if out is not None and not isinstance(out, str | Path):
+        raise not_usable(f"run: out is {written(out)}; a folder is right.")
 
 
 def execute(
@@ -106,7 +125,7 @@ def execute(
     output: Output,
     progress: bool,
     end_process: bool = False,
-) -> pd.DataFrame:
+) -> Results:
     """Run a scenario as `run` does, into an output that is closed afterwards.
 
     Parameters
@@ -162,7 +181,7 @@ class _Job:
             "scenario": scenario_text(scenario),
         }
 
-    def solve(self) -> pd.DataFrame:
+    def solve(self) -> Results:
         """Solve the scenario with the compiled laws."""
         from .coupled import StoppedError, simulate
 
@@ -179,7 +198,7 @@ class _Job:
         self._begin(table)
         return self._end(table, stopped, interrupted=False)
 
-    def step(self, progress: bool, end_process: bool) -> pd.DataFrame:
+    def step(self, progress: bool, end_process: bool) -> Results:
         """Step the scenario's FMUs; keep what there is, whatever happens."""
         paths, descriptions = self._fmus()
         folder = self.scenario.file.parent
@@ -229,7 +248,7 @@ class _Job:
         for line in remarks(self.scenario):
             self.output.log(line)
 
-    def _end(self, table: Table, stopped: RunError | None, interrupted: bool) -> pd.DataFrame:
+    def _end(self, table: Table, stopped: RunError | None, interrupted: bool) -> Results:
         if stopped:
             self.output.log(f"error: {stopped}")
         frame = self._finish(table, complete=not (stopped or interrupted))
@@ -243,7 +262,7 @@ class _Job:
             raise IncompleteRunError(f"{stopped}\n  {kept}", frame) from stopped
         raise RunInterrupted(f"interrupted. {kept}", frame)
 
-    def _finish(self, table: Table, complete: bool) -> pd.DataFrame:
+    def _finish(self, table: Table, complete: bool) -> Results:
         self.made["wall_time"] = round(time.perf_counter() - self.began, 3)
         for column in table.columns:
             if column.name.endswith(".stroke_ratio"):

@@ -14,10 +14,10 @@ from ..data.model import StudyModel, new_model
 from ..errors import StudyError
 from ..identify.fit import Fit, Model
 from ..identify.residuals import robust_z
-from ..identify.rig import DAMPER, Rig, bench_rig
+from ..identify.rig import DAMPER, Rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
 from ..identify.table import LawError, error_table
-from ..physics.laws import DEFAULT, base_and_variant, law_names
+from ..physics.laws import base_and_variant, law_names
 from ..quantity import plain
 from ..units import convert
 from .identified import Identified
@@ -25,7 +25,7 @@ from .rig import rig_of
 from .study import Runs, Study
 
 if TYPE_CHECKING:
-    import pandas as pd
+    pass
 
 Show = Callable[[int], None]
 
@@ -117,12 +117,25 @@ def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified
     left_out = tuple(f"Left out: {why}" for why in study.usable_effects())
     model = _with_choices(model, task.begin)
     runs = study.runs()
-    found = _identify(rig_of(study, model, runs), runs, model, task)
+    found = identify_on_rig(rig_of(study, model, runs), runs, model, task)
     return replace(found, notes=(*found.notes, *left_out))
 
 
-def _identify(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
-    """Identify a model on a rig: fit it at all sites, then judge it there."""
+def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+    """Identify a model on a rig: fit it at all sites, then judge it there.
+
+    Parameters
+    ----------
+    rig : its sites with their runs
+    runs : the measurements that the rig was made of, with what weakens their split
+    model : where the fit begins
+    task : how it is to be identified
+
+    Raises
+    ------
+    StudyError, RecordError
+        As `identify_study`.
+    """
     start = as_model(model)
     rig.prepare(start)
     notes = [*runs.notes, *_doubts([run for run in runs.all if run.has("force")])]
@@ -135,11 +148,21 @@ def _identify(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identif
     before = errors_of(site_models(rig, as_model(task.present or model)), task.cutoff)
     after = errors_of(models, task.cutoff)
     task.show(3)
-    at = models.get(DAMPER) or next(iter(models.values()))
+    at = models.get(DAMPER) or _worst(models)
     rows = _table(at, task) if task.table else []
     task.show(4)
     notes += [*fits.notes(), *_by_site(models), *_weighing(rows, model, after), *rig.notes]
     return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
+
+
+def _worst(models: SiteModels) -> SiteModel:
+    """Return the site where the model errs the most, on held-out runs if there are any."""
+
+    def z(at: SiteModel) -> float:
+        held_out = at.site.holdout
+        return robust_z(at.site.train if held_out is None else held_out, at.model)
+
+    return max(models.values(), key=z)
 
 
 def _table(at: SiteModel, task: FitTask) -> list[LawError]:
@@ -177,67 +200,6 @@ def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
     """Return the model with the choices of a form, such as a storey's number, that were found."""
     chosen = {n: v for n, v in begin.items() if n.endswith(".which") and n in model.flat()}
     return model.with_values(chosen, origin="assumed") if chosen else model
-
-
-def identify_frames(
-    frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame],
-    law: str = DEFAULT,
-    *,
-    effects: tuple[str, ...] = (),
-    holdout: Mapping[str, pd.DataFrame] | list[pd.DataFrame] | None = None,
-    cutoff: float = 18.0,
-    starts: int = 4,
-    table: bool = False,
-) -> Identified:
-    """Identify a damper from pandas frames.
-
-    Parameters
-    ----------
-    frames : one frame per run, with columns named by channel: `time`, `displacement`, `velocity`,
-        `voltage` or `current`, `force`, in SI, or in the unit that a title gives: `force [kN]`
-    law, effects : names of the damper's law and of the effects that are on
-    holdout : runs to judge on; None splits a single run in time, and else judges on the training
-        runs alone
-    cutoff, starts, table : as `identify_study` takes them
-
-    Raises
-    ------
-    RecordError, StudyError
-        As `identify_study`.
-    """
-    train = measurements_of_frames(frames, "frame")
-    held_out = measurements_of_frames(holdout, "held out") if holdout else []
-    if not train:
-        raise StudyError("no frame is given; one run or more is right.")
-    model = _of_law(new_model(law, effects) if law in law_names() else new_model(), law)
-    notes = () if held_out else ("No run is held out: errors are those of the fit itself.",)
-    runs = Runs(train, held_out, notes)
-    return _identify(bench_rig(train, held_out), runs, model, FitTask(cutoff, starts, table))
-
-
-def measurements_of_frames(
-    frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame], stem: str
-) -> list[Measurement]:
-    """Return the measurements in frames whose columns are named by channel."""
-    from ..data.channels import ChannelSpec, channel_unit, is_channel
-    from ..data.measurement import measurements_of_frame
-
-    named = (
-        dict(frames)
-        if isinstance(frames, Mapping)
-        else {f"{stem} {number}": frame for number, frame in enumerate(frames, 1)}
-    )
-    found = []
-    for name, frame in named.items():
-        plain = [str(column) for column in frame.columns]
-        channels: dict[str, ChannelSpec] = {}
-        for title in plain:
-            channel = title.split("[")[0].strip()
-            if is_channel(channel):
-                given = "[" in title or channel in frame.attrs.get("units", {})
-                channels[channel] = ChannelSpec(title, "" if given else channel_unit(channel))
-        found += measurements_of_frame(frame, name, channels or None)
-    return found
 
 
 def _of_law(model: StudyModel, law: str | None) -> StudyModel:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..data.model import StudyModel
 from ..identify.fit import Fit, Problem
@@ -11,15 +11,44 @@ from ..identify.rig_fit import SiteModel
 from ..identify.table import LawError
 from .history import Step
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 @dataclass(frozen=True)
 class Identified:
-    """What an identification found.
+    """What an identification found; `bristle.identify` returns it, and a notebook shows it.
 
-    `fit` in SI; `model` the study's model with the values; `table` the errors of the laws after
-    the low-pass at `cutoff` [Hz]; `before`, `after` errors of the two models; `notes` what to
-    know; `step` the history's new step, None where nothing was written; `at` the site that a
-    picture shows, with the part of the model that predicts its runs.
+    Attributes
+    ----------
+    model : StudyModel
+        The model with the values found; `model.values()` are those in SI.
+    fit : Fit
+        Values and standard deviations in SI.
+    before, after : dict of float
+        Errors of the two models: z, RMS [N] and its share of the force, on training and held-out
+        runs.
+    cutoff : float
+        Low-pass [Hz] of these errors.
+    table : list of LawError
+        Errors of the laws, where they were compared.
+    notes : tuple of str
+        What to know.
+    step : Step or None
+        The history's new step, None where nothing was written.
+    at : SiteModel
+        The site that a picture shows, with the part of the model that predicts its runs.
+
+    Examples
+    --------
+    >>> import bristle, numpy as np
+    >>> t = np.arange(0.0, 8.0, 0.004)  # s
+    >>> v = 72e-3 * np.cos(9.0 * t)  # m/s
+    >>> noise = np.random.default_rng(1).normal(0.0, 0.05, t.size)
+    >>> run = {"time": t, "velocity": v, "force": 5.0 * np.sign(v) + 90.0 * v + noise}  # s, m/s, N
+    >>> found = bristle.identify(run, "bingham_standard")
+    >>> found.model.law, found.unidentified
+    ('bingham_standard', ('f_v', 'c_v'))
     """
 
     fit: Fit
@@ -46,6 +75,17 @@ class Identified:
     def unidentified(self) -> tuple[str, ...]:
         """Names of the parameters that the data cannot tell."""
         return self.fit.unidentified
+
+    def plot(self) -> Figure:
+        """Return the figure: force measured and predicted over velocity, displacement and time."""
+        from .fit_picture import draw_identified
+
+        return draw_identified(self).figure
+
+    def _repr_html_(self) -> str:
+        from .notebook import identified_html
+
+        return identified_html(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ..data.model import StudyModel
-from ..diagnose import Diagnosis, diagnose, diagnose_rig
+from ..diagnose import Diagnosis, diagnose_rig
 from ..diagnose.faults import SensorFault
-from ..errors import StudyError
-from ..physics.effect import AT, EFFECTS, exclude, laws_joined
-from ..physics.laws import DEFAULT, LAWS
 from ..progress import tell, telling
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified
+from .joining import as_named_here, refuse_effect
 from .rig import building_of
-from .study import Study, split_in_time
-
-if TYPE_CHECKING:
-    import pandas as pd
+from .study import Study
 
 Say = Callable[[str], None]
 
@@ -111,9 +105,9 @@ def add_effects(
     study.usable_effects()  # raises where one of the study's own waits for consent
     model = present = study.model()
     bench = not study.settings.has_building
-    names = tuple(_as_named_here(name, bench) for name in names)
+    names = tuple(as_named_here(name, bench) for name in names)
     for name in names:
-        _refuse(model, name, bench)
+        refuse_effect(model, name, bench)
         model = model.with_effect(name)
     known = set(model.flat())
     start = {k: v for k, v in found.values.items() if k in known} if found is not None else {}
@@ -128,41 +122,6 @@ def add_effects(
         "add " + ", ".join(names), why, identified.model, identified.before, identified.after
     )
     return Added(tuple(names), replace(identified, step=step), step)
-
-
-def _as_named_here(name: str, bench: bool) -> str:
-    """Return the name that a study's model gives an effect: its site is told where it must be.
-
-    NAME@SITE is an effect at another site than the one that its plain name means.
-    """
-    own, at, site = name.partition(AT)
-    if not at or own not in EFFECTS or site not in EFFECTS[own].sites:
-        return name
-    if not bench:
-        return EFFECTS[own].key(site)
-    if site == "structure":
-        raise StudyError(f"{name}: a test bench has no structure; {own} is that of the damper.")
-    return own
-
-
-def _refuse(model: StudyModel, name: str, bench: bool) -> None:
-    from ..findings import unknown
-
-    if name not in EFFECTS:
-        raise StudyError(unknown("effect", name, sorted(EFFECTS)))
-    effect = EFFECTS[name]
-    if name in model.effects:
-        raise StudyError(f"{name} is in the model already.")
-    if bench and effect.sites == ("structure",):
-        raise StudyError(f"{name} acts in a structure, and on a test bench there is none.")
-    at_damper = "damper" in effect.sites if bench else effect.site == "damper"
-    if at_damper and not effect.joins(LAWS[model.base_law]):
-        raise StudyError(
-            f"{name} cannot join the law {model.law}; it joins {', '.join(laws_joined(effect))}."
-        )
-    for other in model.effects:
-        if exclude(name, other):
-            raise StudyError(f"{name} and {other} cannot be joined: undo the other one first.")
 
 
 @dataclass(frozen=True)
@@ -214,38 +173,3 @@ def learn(study: Study, *, say: Say = tell, on_step: Callable[[], None] | None =
             return Learned(found, tuple(steps))
         say("adding " + " and ".join(found.effects))
         stepped(add_effects(study, found.effects, found=found).step)
-
-
-def diagnose_frames(
-    frames: Mapping[str, pd.DataFrame] | list[pd.DataFrame],
-    law: str = DEFAULT,
-    *,
-    effects: tuple[str, ...] = (),
-    holdout: Mapping[str, pd.DataFrame] | list[pd.DataFrame] | None = None,
-) -> Diagnosis:
-    """Return what a damper's model misses, from pandas frames.
-
-    Parameters
-    ----------
-    frames, holdout : as `identify_frames` takes them; without `holdout` a single run is split in
-        time, and of several the last third is held out
-    law, effects : names of the damper's law and of the effects that the model has already
-
-    Raises
-    ------
-    RecordError, StudyError
-        As `identify_frames`.
-    """
-    from .identification import measurements_of_frames
-
-    train = measurements_of_frames(frames, "frame")
-    held_out = measurements_of_frames(holdout, "held out") if holdout else []
-    if not train:
-        raise StudyError("no frame is given; one run or more is right.")
-    if not held_out and len(train) == 1:
-        runs = split_in_time(train)
-        train, held_out = runs.train, runs.holdout
-    elif not held_out:
-        count = max(1, len(train) // 3)
-        train, held_out = train[:-count], train[-count:]
-    return diagnose(train, held_out, law=law, effects=effects)

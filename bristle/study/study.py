@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from filelock import FileLock, Timeout
@@ -17,7 +17,7 @@ from ..data.files import read_json, write_json, write_whole
 from ..data.measurement import Measurement, read_measurements
 from ..data.model import StudyModel, model_text, read_model
 from ..errors import StudyError
-from ..findings import command
+from ..findings import command, written
 from ..identify.prepare import SHORTEST
 from ..physics.user import Loaded, waiting
 from ..trust import load
@@ -25,8 +25,12 @@ from .history import History, Step
 from .new import make_folder
 from .settings import ROLES, Settings, read_settings
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 OF_MODEL = ("identify.png", "compare.png", "report.html")
 """Reports that show a model: they are set aside when another becomes the present one."""
+
 PATIENCE = 10.0
 """Seconds to wait for another process that writes in the same study."""
 SPLIT = 0.7
@@ -51,7 +55,7 @@ class Runs:
 
 
 class Study:
-    """A study's folder.
+    """A study: a folder with measurements, a model, its history and verdict.
 
     Reading needs no lock. What is written is written whole, under a lock, and refused when another
     process has changed the model since this one has read it.
@@ -69,9 +73,27 @@ class Study:
     ------
     StudyError
         If there is no study, or its study.toml is wrong: with every mistake and its line.
+
+    Examples
+    --------
+    >>> import bristle, numpy as np, pathlib, tempfile
+    >>> folder = pathlib.Path(tempfile.mkdtemp())
+    >>> t = np.arange(0.0, 8.0, 0.004)
+    >>> v = 72e-3 * np.cos(9.0 * t)
+    >>> columns = {"time [s]": t, "v [mm/s]": 1e3 * v, "F [N]": 5.0 * np.sign(v) + 90.0 * v}
+    >>> np.savetxt(
+    ...     folder / "run.csv", np.column_stack(list(columns.values())), delimiter=",",
+    ...     header=",".join(columns), comments="",
+    ... )
+    >>> study = bristle.Study.create(folder / "my_rig", [folder / "run.csv"], law="bingham")
+    >>> study.model().law, [step.what for step in study.steps()]
+    ('bingham', ['begin with bingham'])
+    >>> figure = study.plot()  # the run; after an identification how the error fell
     """
 
     def __init__(self, folder: Path | str, *, trust: bool = False) -> None:
+        if not isinstance(folder, str | Path):
+            raise StudyError(f"a study is a folder, not {written(folder)}.")
         self.folder = Path(folder)
         if not (self.folder / "study.toml").is_file():
             raise StudyError(
@@ -180,8 +202,8 @@ class Study:
                 f'{self.folder / "study.toml"}: no run has role = "{lacking}". Give it to some: a '
                 "model is judged on runs that it was not fitted to."
             )
-        _refuse_twins(train, holdout)
-        twins = _twins_within(train) + _twins_within(holdout)
+        refuse_twins(train, holdout)
+        twins = twins_within(train) + twins_within(holdout)
         return Runs(train, holdout, (*idle, *twins))
 
     def model(self, *, to_show: bool = False) -> StudyModel:
@@ -306,6 +328,23 @@ class Study:
                 kept.mkdir(exist_ok=True)
                 old.replace(kept / name)
 
+    def plot(self) -> Figure:
+        """Return the figure: the error of each model of the history, or the first run before any.
+
+        Raises
+        ------
+        RecordError
+            If nothing was identified, and the run cannot be read.
+        """
+        from .notebook import study_page
+
+        return study_page(self).figure
+
+    def _repr_html_(self) -> str:
+        from .notebook import study_html
+
+        return study_html(self)
+
     @contextmanager
     def writing(self, patience: float = PATIENCE) -> Iterator[None]:
         """Hold the study's lock; other processes that write wait `patience` s, then give up."""
@@ -399,7 +438,8 @@ def split_in_time(pieces: list[Measurement]) -> Runs:
     return Runs(train, [replace(one) for one in holdout], (note,))
 
 
-def _refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
+def refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
+    """Refuse runs that are held out and for training, too; StudyError names both."""
     first = {one.digest(): one.name for one in train}
     for one in holdout:
         if one.digest() in first:
@@ -409,7 +449,8 @@ def _refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
             )
 
 
-def _twins_within(runs: list[Measurement]) -> list[str]:
+def twins_within(runs: list[Measurement]) -> list[str]:
+    """Return the sentences that tell which runs are one and the same."""
     first: dict[str, str] = {}
     notes = []
     for one in runs:

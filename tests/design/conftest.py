@@ -6,23 +6,23 @@ from pathlib import Path
 
 import pytest
 
-from bristle.design import Result, Task, design
+from bristle.design import DesignResult, Task, design
 
 
 @pytest.fixture(scope="session")
-def hinf() -> Result:
+def hinf() -> DesignResult:
     """Return the H-infinity design of the paper's building."""
     return design(Task("hinf"))
 
 
 @pytest.fixture(scope="session")
-def lpv() -> Result:
+def lpv() -> DesignResult:
     """Return the LPV design with constant X and Y."""
     return design(Task("lpv"))
 
 
 @pytest.fixture(scope="session")
-def lqg() -> Result:
+def lqg() -> DesignResult:
     """Return the LQG design."""
     return design(Task("lqg"))
 

@@ -21,7 +21,7 @@ from loop import (
 )
 
 from bristle.control.controller import Controller, read_controller
-from bristle.design import Result
+from bristle.design import DesignResult
 
 EL_CENTRO, SYLMAR = "el_centro_1940_ns", "northridge_1994_sylmar_360"
 NEWHALL = "northridge_1994_newhall_360_peer_rsn1044.csv"
@@ -90,7 +90,7 @@ def tolerance(case: str) -> float:
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize(("record", "intensity"), ACCELERATION)
 def test_acceleration_of_designs_made_on_the_spot(
-    record: str, intensity: float, case: str, hinf: Result, lpv: Result
+    record: str, intensity: float, case: str, hinf: DesignResult, lpv: DesignResult
 ) -> None:
     published = ACCELERATION[record, intensity].split()[CASES.index(case)]
     peak, rms = map(float, published.split("/"))
@@ -100,7 +100,9 @@ def test_acceleration_of_designs_made_on_the_spot(
 
 
 @pytest.mark.parametrize(("record", "intensity"), OTHERS)
-def test_drift_force_and_voltage(record: str, intensity: float, hinf: Result, lpv: Result) -> None:
+def test_drift_force_and_voltage(
+    record: str, intensity: float, hinf: DesignResult, lpv: DesignResult
+) -> None:
     for case, (drift, force, voltage) in OTHERS[record, intensity].items():
         found = outcome(case, ground(record, intensity), hinf.controller, lpv.controller)
         for value, published, rounding in (
@@ -127,8 +129,8 @@ def test_half_sine(
     case: str,
     small: tuple[float, float],
     large: tuple[float, float],
-    hinf: Result,
-    lpv: Result,
+    hinf: DesignResult,
+    lpv: DesignResult,
 ) -> None:
     for amplitude, (peak, rms) in ((1.0, small), (4.0, large)):
         found = outcome(case, half_sine(amplitude), hinf.controller, lpv.controller)
@@ -147,7 +149,7 @@ def test_frozen_controllers_give_the_table(frozen: Path) -> None:
             assert found.rms == pytest.approx(rms, rel=tolerance(case)), case
 
 
-def test_lpv_is_lowest_on_el_centro_and_newhall(hinf: Result, lpv: Result) -> None:
+def test_lpv_is_lowest_on_el_centro_and_newhall(hinf: DesignResult, lpv: DesignResult) -> None:
     for record, intensity in ACCELERATION:
         if record == SYLMAR or (record == NEWHALL and not (DATA / NEWHALL).exists()):
             continue
@@ -159,7 +161,7 @@ def test_lpv_is_lowest_on_el_centro_and_newhall(hinf: Result, lpv: Result) -> No
         assert scheduled < min(clipped, inverse), (record, intensity)
 
 
-def test_on_sylmar_the_inverse_is_lowest(hinf: Result, lpv: Result) -> None:
+def test_on_sylmar_the_inverse_is_lowest(hinf: DesignResult, lpv: DesignResult) -> None:
     for intensity in (0.3, 0.7):
         a_g = ground(SYLMAR, intensity)
         clipped, inverse, scheduled = (
@@ -169,12 +171,12 @@ def test_on_sylmar_the_inverse_is_lowest(hinf: Result, lpv: Result) -> None:
         assert inverse < scheduled < clipped
 
 
-def test_anti_windup_lowers_the_peak_at_newhall(lpv: Result) -> None:
+def test_anti_windup_lowers_the_peak_at_newhall(lpv: DesignResult) -> None:
     a_g = ground(NEWHALL, 0.7)
     assert run(LPV, a_g, lpv.controller, rate=200.0).peak < 0.9 * run(LPV, a_g, lpv.controller).peak
 
 
-def test_lugre_inverse_beats_the_bingham_inverse_on_el_centro(hinf: Result) -> None:
+def test_lugre_inverse_beats_the_bingham_inverse_on_el_centro(hinf: DesignResult) -> None:
     for intensity in (0.4, 0.6):
         a_g = ground(EL_CENTRO, intensity)
         lugre, bingham = (run(law, a_g, hinf.controller) for law in (INVERSE, BINGHAM_INVERSE))
@@ -182,7 +184,7 @@ def test_lugre_inverse_beats_the_bingham_inverse_on_el_centro(hinf: Result) -> N
         assert lugre.rms < bingham.rms
 
 
-def test_lqg_switch_does_as_well_as_the_hinf_switch_on_el_centro(lqg: Result) -> None:
+def test_lqg_switch_does_as_well_as_the_hinf_switch_on_el_centro(lqg: DesignResult) -> None:
     for intensity in (0.4, 0.6, 0.8):
         a_g = ground(EL_CENTRO, intensity)
         switched = run(LQG, a_g, lqg.controller)

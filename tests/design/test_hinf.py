@@ -10,7 +10,17 @@ import pytest
 from scipy import linalg
 
 from bristle.control.controller import parse_controller
-from bristle.design import Damper, LqgWeights, Result, Task, Weight, Weights, design, lmi, verify
+from bristle.design import (
+    Damper,
+    DesignResult,
+    LqgWeights,
+    Task,
+    Weight,
+    Weights,
+    design,
+    lmi,
+    verify,
+)
 from bristle.design.norms import hinf_norm
 from bristle.design.plant import Plant, balancing, generalized, structure
 from bristle.design.responses import responses
@@ -36,7 +46,7 @@ def test_gamma_of_the_inequalities(balanced: Plant, tau: float, gamma: float) ->
 @pytest.mark.parametrize(
     ("tau", "gamma", "norm"), [(1.5, 5.2899, 5.2533), (2.0, 6.0124, 5.7210), (3.0, 7.9817, 6.3619)]
 )
-def test_gamma_and_norm(tau: float, gamma: float, norm: float, hinf: Result) -> None:
+def test_gamma_and_norm(tau: float, gamma: float, norm: float, hinf: DesignResult) -> None:
     facts = hinf.facts if tau == 2.0 else design(Task("hinf", tau=tau)).facts
     assert facts["gamma"] == pytest.approx(gamma, rel=1e-3)
     assert facts["norm"] == pytest.approx(norm, rel=1e-3)
@@ -44,7 +54,7 @@ def test_gamma_and_norm(tau: float, gamma: float, norm: float, hinf: Result) -> 
     assert facts["open_loop_norm"] == pytest.approx(62.5639, rel=1e-5)
 
 
-def test_controller_of_the_reference_design(hinf: Result) -> None:
+def test_controller_of_the_reference_design(hinf: DesignResult) -> None:
     K = hinf.bank.at(0)
     published = {0.0: 3.096, 13.195: -0.329 - 1.593j, 34.43: 0.009 + 0.227j}
     for omega, value in published.items():
@@ -56,7 +66,7 @@ def test_controller_of_the_reference_design(hinf: Result) -> None:
         assert abs(pole - other) < 0.02 * abs(other)
 
 
-def test_the_closed_loop_norm_is_that_of_its_frequency_response(hinf: Result) -> None:
+def test_the_closed_loop_norm_is_that_of_its_frequency_response(hinf: DesignResult) -> None:
     omega = np.geomspace(0.1, 1e3, 20_000)
     found = responses(hinf, omega)
     assert found["closed_loop"].max() == pytest.approx(hinf.facts["norm"], rel=1e-4)
@@ -66,7 +76,7 @@ def test_the_closed_loop_norm_is_that_of_its_frequency_response(hinf: Result) ->
     assert found["acceleration_closed"].max() < 0.2 * found["acceleration_open"].max()
 
 
-def test_discretisation_is_exact(hinf: Result) -> None:
+def test_discretisation_is_exact(hinf: DesignResult) -> None:
     K, W, c = hinf.bank.at(0), hinf.bank.W[0], hinf.controller
     n, h = c.n, c.sample_period
     rng = np.random.default_rng(3)
@@ -82,7 +92,7 @@ def test_discretisation_is_exact(hinf: Result) -> None:
     assert np.array(c.C) == pytest.approx(K.C[0], rel=1e-11)
 
 
-def test_anti_windup_moves_the_command_by_what_it_is_fed(hinf: Result) -> None:
+def test_anti_windup_moves_the_command_by_what_it_is_fed(hinf: DesignResult) -> None:
     assert (hinf.bank.C @ hinf.bank.W)[0, 0, 0] == pytest.approx(1.0, rel=1e-9)
 
 
@@ -91,7 +101,7 @@ def test_a_bank_with_a_silent_controller_is_sampled() -> None:
     assert sampled(silent, 0.1).A[0, 0, 0] == pytest.approx(np.exp(-0.1))
 
 
-def test_a_design_comes_back_from_its_file(hinf: Result) -> None:
+def test_a_design_comes_back_from_its_file(hinf: DesignResult) -> None:
     assert parse_controller(hinf.controller.text()) == hinf.controller
     hinf.controller.check_building(paper_building())
     assert hinf.controller.design["tau"] == 2.0
@@ -237,7 +247,7 @@ def test_a_solution_that_does_not_hold_is_sought_again_with_a_margin(
     assert type(caught.value) is DesignError
 
 
-def test_an_unstable_loop_is_refused(hinf: Result) -> None:
+def test_an_unstable_loop_is_refused(hinf: DesignResult) -> None:
     turned = hinf.bank._replace(C=-20.0 * hinf.bank.C)
     with pytest.raises(DesignError, match="closed loop is unstable"):
         verify.closed_loop_norms(hinf.plants, turned, STILL)
@@ -245,7 +255,7 @@ def test_an_unstable_loop_is_refused(hinf: Result) -> None:
         verify.check_sampled_loop(hinf.plants, sampled(turned, 0.002), STILL, 0.002)
 
 
-def test_lqg_is_the_optimal_regulator(lqg: Result) -> None:
+def test_lqg_is_the_optimal_regulator(lqg: DesignResult) -> None:
     s, w = structure(paper_building()), LqgWeights()
     push, y = s.B[:, :1], s.C[:1]
     drift = s.C[1:2]
@@ -261,7 +271,7 @@ def test_lqg_is_the_optimal_regulator(lqg: Result) -> None:
     assert lqg.bank.W[0] == pytest.approx(push)
 
 
-def test_lqg_estimates_the_state_from_acceleration_and_force(lqg: Result) -> None:
+def test_lqg_estimates_the_state_from_acceleration_and_force(lqg: DesignResult) -> None:
     s, c = structure(paper_building()), lqg.controller
     h, n = c.sample_period, c.n
     exact = linalg.expm(np.block([[s.A, s.B[:, :1]], [np.zeros((1, 7))]]) * h)
@@ -290,6 +300,6 @@ def test_lqg_weights_that_cannot_be_are_refused(wrong: dict[str, float], message
         LqgWeights(**wrong)
 
 
-def test_lqg_has_no_weighted_loop_to_show(lqg: Result) -> None:
+def test_lqg_has_no_weighted_loop_to_show(lqg: DesignResult) -> None:
     with pytest.raises(DesignError, match="LQG"):
         responses(lqg, np.ones(1))

@@ -9,7 +9,7 @@ import pytest
 from scipy import linalg
 
 from bristle.control.controller import Controller
-from bristle.design import Damper, Result, Scheduling, Task, design, lmi
+from bristle.design import Damper, DesignResult, Scheduling, Task, design, lmi
 from bristle.design.lpv import _frame, gammas, plants_at
 from bristle.design.responses import responses
 from bristle.design.table import reconstruct
@@ -42,7 +42,7 @@ def test_a_finer_grid() -> None:
     assert gammas(task, [("none", 1.0)])[0]["gamma"] == pytest.approx(8.695, rel=1e-3)
 
 
-def test_reference_design(lpv: Result) -> None:
+def test_reference_design(lpv: DesignResult) -> None:
     facts = lpv.facts
     assert facts["gamma"] == pytest.approx(8.6910, rel=1e-3)
     # Matrices of a solver are not unique; published norms are one solver's.
@@ -54,7 +54,7 @@ def test_reference_design(lpv: Result) -> None:
     assert facts["sampled_loop_modulus"] < 1.0
 
 
-def test_the_bound_is_proved_at_the_grid_and_not_all_between(lpv: Result) -> None:
+def test_the_bound_is_proved_at_the_grid_and_not_all_between(lpv: DesignResult) -> None:
     solution = lpv.solution
     assert solution is not None
     grid = np.array(lpv.task.scheduling.grid)
@@ -68,7 +68,7 @@ def test_the_bound_is_proved_at_the_grid_and_not_all_between(lpv: Result) -> Non
     assert 0.5 < lpv.facts["share_proved"] < 1.0
 
 
-def test_closed_loop_dissipates_at_the_grid(lpv: Result) -> None:
+def test_closed_loop_dissipates_at_the_grid(lpv: DesignResult) -> None:
     """The matrices X, Y of the solution make a Lyapunov function of the reconstructed loop."""
     solution = lpv.solution
     assert solution is not None
@@ -102,7 +102,7 @@ def test_closed_loop_dissipates_at_the_grid(lpv: Result) -> None:
 
 
 @pytest.mark.parametrize("varies", ["X", "Y"])
-def test_a_varying_pair_gives_a_controller_without_the_rate(varies: str, lpv: Result) -> None:
+def test_a_varying_pair_gives_a_controller_without_the_rate(varies: str, lpv: DesignResult) -> None:
     result = design(Task("lpv", scheduling=Scheduling(varies=varies, rows=61)))
     facts = result.facts
     assert facts["gamma"] < lpv.facts["gamma"]
@@ -119,7 +119,7 @@ def row_matrices(c: Controller, row: int) -> tuple[np.ndarray, np.ndarray, np.nd
 
 
 @pytest.mark.parametrize("row", [0, 7, 160, 600])
-def test_each_row_is_its_controller_sampled_exactly(lpv: Result, row: int) -> None:
+def test_each_row_is_its_controller_sampled_exactly(lpv: DesignResult, row: int) -> None:
     c, K = lpv.controller, lpv.bank.at(row)
     assert lpv.speeds[row] == pytest.approx(row * 0.0005)
     A, B, W, C = row_matrices(c, row)
@@ -131,13 +131,13 @@ def test_each_row_is_its_controller_sampled_exactly(lpv: Result, row: int) -> No
     assert pytest.approx(K.C[0], rel=1e-10) == C
 
 
-def test_rows_change_little_from_one_to_the_next(lpv: Result) -> None:
+def test_rows_change_little_from_one_to_the_next(lpv: DesignResult) -> None:
     A = np.array(lpv.controller.A).reshape(601, 8, 8)
     steps = np.abs(np.diff(A, axis=0)).max(axis=(1, 2))
     assert steps.max() < 0.02
 
 
-def test_responses_at_a_row(lpv: Result) -> None:
+def test_responses_at_a_row(lpv: DesignResult) -> None:
     omega = np.geomspace(1.0, 300.0, 4000)
     found = responses(lpv, omega, row=600)
     assert found["closed_loop"].max() == pytest.approx(lpv.facts["norms"][-1], rel=1e-3)

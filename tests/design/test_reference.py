@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bristle.control.controller import Controller, read_controller
-from bristle.design import Result, Task
+from bristle.design import DesignResult, Task
 from bristle.errors import DesignError
 from bristle.paper import reference
 from bristle.physics.building import paper_building
@@ -21,7 +21,7 @@ from bristle.physics.building import paper_building
 def test_frozen_controllers_are_of_the_reference_task(
     kind: str, frozen: Path, request: pytest.FixtureRequest
 ) -> None:
-    here: Result = request.getfixturevalue(kind)
+    here: DesignResult = request.getfixturevalue(kind)
     controller = read_controller(frozen / f"{kind}.json")
     controller.check_building(paper_building())
     assert controller.design == Task(kind, title=reference.TITLE).data()
@@ -43,7 +43,7 @@ def gain(c: Controller, row: int) -> complex:
 
 def test_the_command_writes_what_it_says(
     tmp_path: Path,
-    hinf: Result,
+    hinf: DesignResult,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
@@ -65,7 +65,7 @@ def test_the_command_answers_2_where_it_cannot_write(
 def test_a_failing_design_answers_2(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    def fail(task: Task) -> Result:
+    def fail(task: Task) -> DesignResult:
         raise DesignError("no controller")
 
     monkeypatch.setattr(reference, "design", fail)

@@ -13,7 +13,7 @@ from bristle.fmu.catalogue import component_of_law
 from bristle.physics.laws import laws_of
 from bristle.scenario.scenario import load_scenario
 from bristle.simulate.coupled import simulate
-from bristle.simulate.results import read_results
+from bristle.simulate.results import load_results
 from bristle.simulate.run import IncompleteRunError
 
 BUILDINGS = {
@@ -161,7 +161,7 @@ def test_a_blow_up_names_component_and_time_and_keeps_the_rows(
     assert frame.index[-1] == 0.1
     assert np.isfinite(frame.to_numpy()).all()
     np.testing.assert_array_equal(frame.to_numpy(), whole.to_numpy())
-    kept = read_results(tmp_path / "out" / "results.csv")
+    kept = load_results(tmp_path / "out" / "results.csv")
     assert (len(kept), kept.attrs["complete"]) == (len(frame), False)
     assert "error: damper at t = 0.102 s" in (tmp_path / "out" / "log").read_text()
 

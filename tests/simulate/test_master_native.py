@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import bristle
-from bristle.simulate.results import read_results
+from bristle.simulate.results import load_results
 from bristle.simulate.run import IncompleteRunError, run
 
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
@@ -129,7 +129,7 @@ def test_abort_leaves_a_readable_file(native: Path, tmp_path: Path) -> None:
     process = started(scenario(native, tmp_path, ABORT, at=4e4, stop=1e5), tmp_path / "out")
     process.communicate(timeout=60)
     assert process.returncode == -signal.SIGABRT
-    frame = read_results(tmp_path / "out")
+    frame = load_results(tmp_path / "out")
     assert frame.attrs["complete"] is False
     assert frame["one.y"].to_numpy() == pytest.approx(np.arange(len(frame)))
 
@@ -145,4 +145,4 @@ def test_ctrl_c_ends_a_hanging_native_fmu(native: Path, tmp_path: Path) -> None:
     _, errors = process.communicate(timeout=20)
     assert process.returncode == 130, errors
     assert "a component does not end its step. Rows up to t = 0.5 s are kept" in errors
-    assert len(read_results(tmp_path / "out")) == 6
+    assert len(load_results(tmp_path / "out")) == 6

@@ -18,7 +18,7 @@ from bristle.simulate.results import (
     CsvWriter,
     Table,
     from_frame,
-    read_results,
+    load_results,
     to_frame,
     write_csv,
     write_parquet,
@@ -56,7 +56,7 @@ def test_read_gives_back_what_was_written_to_the_last_bit(
     frame: pd.DataFrame, tmp_path: Path, write: Any, name: str
 ) -> None:
     write(frame, tmp_path / name)
-    read = read_results(tmp_path / name)
+    read = load_results(tmp_path / name)
     pd.testing.assert_frame_equal(read, frame, check_exact=True)
     assert np.signbit(read["damper.force"].iloc[1])
     assert read.attrs == frame.attrs
@@ -65,7 +65,7 @@ def test_read_gives_back_what_was_written_to_the_last_bit(
 
 def test_folder_is_read_by_its_results(frame: pd.DataFrame, tmp_path: Path) -> None:
     write_parquet(frame, tmp_path / "results.parquet")
-    assert read_results(tmp_path).equals(frame)
+    assert load_results(tmp_path).equals(frame)
 
 
 def test_csv_opens_with_pandas_and_shows_units(frame: pd.DataFrame, tmp_path: Path) -> None:
@@ -95,13 +95,13 @@ def test_csv_that_grows_is_readable_at_any_moment(frame: pd.DataFrame, tmp_path:
     path = tmp_path / "results.csv"
     writer = CsvWriter(path, part(table, 0, 2), MADE)
     for first in (2, 4, 6, 8):
-        read = read_results(path)
+        read = load_results(path)
         assert read.attrs["complete"] is False
         assert read.equals(frame.iloc[:first])
         writer.write(part(table, first, min(first + 2, 9)))
     writer.finish(True, 1.25)
     writer.close()
-    assert read_results(path).attrs == frame.attrs
+    assert load_results(path).attrs == frame.attrs
 
 
 def part(table: Table, first: int, last: int) -> Table:
@@ -116,7 +116,7 @@ def test_line_that_was_cut_short_is_left_out(
     path = tmp_path / "results.csv"
     CsvWriter(path, from_frame(frame), MADE).close()
     path.write_bytes(path.read_bytes()[:-lost])
-    read = read_results(path)
+    read = load_results(path)
     assert read.attrs["complete"] is False
     assert 0 < len(read) < len(frame)
     assert read.equals(frame.iloc[: len(read)])
@@ -130,7 +130,7 @@ def test_other_files_are_refused(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "results.csv"
     path.write_bytes(content)
     with pytest.raises(RunError, match=r"results\.csv: not a file that bristle wrote") as caught:
-        read_results(path)
+        load_results(path)
     assert caught.value.exit_code == 2
 
 
@@ -139,12 +139,12 @@ def test_damaged_parquet_is_refused(frame: pd.DataFrame, tmp_path: Path) -> None
     write_parquet(frame, path)
     path.write_bytes(path.read_bytes()[:-20])
     with pytest.raises(RunError, match="not a file that bristle wrote"):
-        read_results(path)
+        load_results(path)
 
 
 def test_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"nowhere\.csv: cannot be read: No such file"):
-        read_results(tmp_path / "nowhere.csv")
+        load_results(tmp_path / "nowhere.csv")
 
 
 @pytest.mark.parametrize("write", [write_csv, write_parquet])
@@ -189,7 +189,7 @@ def test_disk_that_fills_on_the_way_keeps_whole_lines(frame: pd.DataFrame, tmp_p
         writer.write(part(table, 3, 9))
     assert caught.value.exit_code == 1
     writer.close()
-    read = read_results(path)
+    read = load_results(path)
     assert read.attrs["complete"] is False
     assert read.equals(frame.iloc[:3])
 

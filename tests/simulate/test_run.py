@@ -22,7 +22,7 @@ import bristle
 from bristle.errors import RunError
 from bristle.scenario.scenario import load_scenario, stock_scenarios
 from bristle.scenario.text import scenario_text
-from bristle.simulate.results import read_results
+from bristle.simulate.results import load_results
 from bristle.simulate.run import RunInterrupted, run
 
 PACKAGE = Path(bristle.__file__).resolve().parent.parent
@@ -82,7 +82,7 @@ def test_folder_holds_results_figure_and_log_and_nothing_else(fine: Path, tmp_pa
     assert "RMS over 0 to 1 s" in done.stdout
     for name in ("results.csv", "figure.png", "log"):
         assert f"results/toys/{name}" in done.stdout
-    frame = read_results(folder)
+    frame = load_results(folder)
     assert frame.attrs["complete"] is True
     assert frame.equals(run(fine))
 
@@ -91,7 +91,7 @@ def test_older_files_of_the_folder_are_replaced(fine: Path, tmp_path: Path) -> N
     command(fine, "--out", "out", "--no-figure", cwd=tmp_path)
     command(fine, "--out", "out", "--no-figure", "--format", "parquet", cwd=tmp_path)
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["log", "results.parquet"]
-    assert read_results(tmp_path / "out").equals(run(fine))
+    assert load_results(tmp_path / "out").equals(run(fine))
 
 
 def test_a_run_with_another_value_has_a_title_and_a_folder_of_its_own(
@@ -100,8 +100,8 @@ def test_a_run_with_another_value_has_a_title_and_a_folder_of_its_own(
     command(fine, "--no-figure", cwd=tmp_path)
     done = command(fine, "--no-figure", "--set", "sum.gain=3", cwd=tmp_path)
     plain, changed = (tmp_path / "results" / name for name in ("toys", "toys_sum.gain=3"))
-    assert read_results(plain).equals(run(fine))
-    frame = read_results(changed)
+    assert load_results(plain).equals(run(fine))
+    frame = load_results(changed)
     assert frame.equals(run(fine, {"sum.gain": 3}))
     assert "gain = 3" in frame.attrs["made"]["title"]
     assert frame.attrs["made"]["title"] in done.stdout.replace("\n", " ")
@@ -160,7 +160,7 @@ def test_nothing_is_written_from_python_without_out(
 
 def test_results_say_how_they_were_made(fine: Path, tmp_path: Path) -> None:
     frame = run(fine, {"sum.gain": 3.0}, out=tmp_path / "out")
-    made = read_results(tmp_path / "out").attrs["made"]
+    made = load_results(tmp_path / "out").attrs["made"]
     assert made == frame.attrs["made"]
     assert made["overrides"] == {"sum.gain": 3.0}
     assert (made["step"], made["algorithm"], made["engine"]) == (0.1, "gauss-seidel", "fmu")
@@ -263,7 +263,7 @@ def test_file_that_cannot_be_replaced_is_named(
     assert f"out/{name}: cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
     if name == "log":  # found when the run is over: nothing of it is lost
-        assert read_results(tmp_path / "out").equals(run(fine))
+        assert load_results(tmp_path / "out").equals(run(fine))
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write")
@@ -286,7 +286,7 @@ def test_unknown_choices_are_refused(fine: Path, wrong: dict[str, str]) -> None:
 
 def left(tmp_path: Path) -> pd.DataFrame:
     """Return what a run left, after checking that it says so and that its rows are right."""
-    frame = read_results(tmp_path / "results" / "toys")
+    frame = load_results(tmp_path / "results" / "toys")
     assert frame.attrs["complete"] is False
     assert frame["ramp.value"].to_numpy() == pytest.approx(np.arange(len(frame)) / 10)
     return frame

@@ -15,7 +15,8 @@ from bristle.cli import main
 from bristle.errors import RecordError, StudyError
 from bristle.identify.bench import Bench
 from bristle.study.create import create_study
-from bristle.study.identification import identify_frames, identify_study
+from bristle.study.identification import identify_study
+from bristle.study.public import identify
 from bristle.study.study import Study
 
 DT, N = 0.004, 2000
@@ -72,7 +73,7 @@ def test_rigs_of_all_sizes(law, force, speed, length):
     for seed in (1, 2, 3):
         frame, values = bench_frame(seed, force, speed, length, law=law)
         frames.append(frame)
-    found = identify_frames(frames[:2], law, holdout=frames[2:])
+    found = identify(frames[:2], law, holdout=frames[2:])
     assert found.unidentified == ()
     for name, value in values.items():
         assert found.fit.model.values[name] == pytest.approx(
@@ -86,7 +87,7 @@ def test_rigs_of_all_sizes(law, force, speed, length):
 @pytest.mark.parametrize("left_out", ["displacement", "velocity"])
 def test_either_channel_of_the_motion_will_do(left_out):
     frames = [bench_frame(seed, law="lugre")[0].drop(columns=left_out) for seed in (1, 2)]
-    found = identify_frames(frames, "lugre")
+    found = identify(frames, "lugre")
     # From displacement alone the velocity is many times less certain; the intervals say so.
     value, std = found.fit.model.values["sigma_2"], found.fit.std["sigma_2"]
     assert abs(value - 100.0) < 4.0 * std
@@ -95,7 +96,7 @@ def test_either_channel_of_the_motion_will_do(left_out):
 
 def test_current_stands_in_for_the_voltage():
     frame, values = bench_frame(1)
-    found = identify_frames([frame.rename(columns={"voltage": "current"})], "bingham")
+    found = identify([frame.rename(columns={"voltage": "current"})], "bingham")
     assert found.fit.model.values["f_v"] == pytest.approx(values["f_v"], rel=0.02)
 
 
@@ -104,7 +105,7 @@ def test_a_steady_voltage_leaves_its_parameters_unidentified_at_zero(volts):
     frame, values = bench_frame(1, volts=4.0 if volts is None else volts)
     if volts is None:
         frame = frame.drop(columns="voltage")
-    found = identify_frames([frame], "bingham")
+    found = identify([frame], "bingham")
     assert set(found.unidentified) == {"f_v", "c_v"}
     assert found.model.values()["f_v"] == 0.0
     assert found.model.parameters["f_v"].std is None
@@ -183,16 +184,16 @@ def test_json_and_a_dry_run_that_writes_nothing(tmp_path, capsys):
 )
 def test_data_that_carry_no_identification_are_refused(change, error, text):
     with pytest.raises(error, match=text):
-        identify_frames([change(bench_frame(1)[0])], "bingham")
+        identify([change(bench_frame(1)[0])], "bingham")
 
 
 def test_missing_samples_have_no_say():
     frame, values = bench_frame(1)
-    clean = identify_frames([frame], "bingham")
+    clean = identify([frame], "bingham")
     holed = frame.copy()
     for start in range(50, N - 50, 97):
         holed.loc[start : start + 2, ["force", "velocity"]] = np.nan
-    found = identify_frames([holed], "bingham")
+    found = identify([holed], "bingham")
     for name in values:
         assert found.fit.model.values[name] == pytest.approx(
             clean.fit.model.values[name], abs=4.0 * clean.fit.std[name]

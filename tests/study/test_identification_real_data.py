@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bristle.study.identification import identify_frames
+from bristle.study.public import identify
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"  # ../shared/data
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the reference data are not there")
@@ -39,8 +39,8 @@ def test_crank_driven_damper_needs_a_spring_beside_its_law():
     """Its force carries about 130 N of preload: no law of a damper alone has that."""
     train = crank("ident_*_ensaio1_*.csv", "ident_*_[AB]_[157].csv")
     held = crank("valid_*_[17].csv")
-    plain = identify_frames(train, "lugre", holdout=held)
-    spring = identify_frames(train, "lugre", effects=("gas_spring",), holdout=held)
+    plain = identify(train, "lugre", holdout=held)
+    spring = identify(train, "lugre", effects=("gas_spring",), holdout=held)
     assert spring.fit.model.values["gas_spring.preload"] == pytest.approx(130.0, abs=25.0)
     assert spring.after["share_holdout"] < 0.22 < 0.35 < plain.after["share_holdout"]
     # Its README: mean dissipative force 85-108 N at 0 V, 653-794 N at 3.212 V (loop area over
@@ -70,6 +70,6 @@ def test_velocity_force_set_beats_a_law_without_hysteresis():
     frame = pd.DataFrame(
         {"time": raw.time_s, "velocity": 1e-2 * raw.velocity_cm_s, "force": -raw.force_N}
     )
-    found = identify_frames([frame.iloc[:2000]], "lugre", holdout=[frame.iloc[2000:3499]])
+    found = identify([frame.iloc[:2000]], "lugre", holdout=[frame.iloc[2000:3499]])
     assert set(found.unidentified) >= {"sigma_0", "sigma_b"}
     assert fit_percent(found) > 45.3

@@ -10,11 +10,12 @@ import pytest
 
 from bristle.cli import main
 from bristle.diagnose import Diagnosis
-from bristle.errors import StudyError
+from bristle.errors import RecordError, StudyError
 from bristle.study import learning
 from bristle.study.create import create_study
 from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects, diagnose_frames, diagnose_study, learn
+from bristle.study.learning import add_effects, diagnose_study, learn
+from bristle.study.public import diagnose
 from bristle.study.study import Study
 from tests.independent.generate import make_case
 
@@ -186,12 +187,13 @@ def test_frames_are_diagnosed_without_a_study():
         if run["name"] in ("train_1", "train_2", "holdout_1")
     }
     held = {"holdout_1": frames.pop("holdout_1")}
-    found = diagnose_frames(frames, "bingham", holdout=held)
+    found = diagnose(frames, "bingham", holdout=held)
     assert (found.kind, found.effects) == ("effect", ("gas_spring",))
-    again = diagnose_frames([*frames.values(), *held.values()], "bingham")  # the last third is held
+    first, second = frames.values()
+    again = diagnose([first, *held.values(), second], "bingham")  # every third run is held out
     assert again.after.z == pytest.approx(found.after.z)
 
 
 def test_no_frame_is_no_diagnosis():
-    with pytest.raises(StudyError, match="one run or more"):
-        diagnose_frames([])
+    with pytest.raises(RecordError, match="one run or more"):
+        diagnose([])

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.axes import Axes
 
-    from ..batch import Ensemble
-    from ..batch.plan import Output
+    from .execute import Ensemble
+    from .plan import Output
 
 MOST_OUTPUTS = 6
 MOST_NAMES = 8
@@ -36,13 +36,16 @@ def ensemble_figure(found: Ensemble, path: str | Path) -> None:
     RunError
         If the file cannot be written or its ending is no format.
     """
-    with look():
-        page = draw_ensemble(found)
-        page.save(Path(path), dpi=_DPI)
+    draw_ensemble(found).save(Path(path), dpi=_DPI)
 
 
 def draw_ensemble(found: Ensemble) -> Page:
     """Return the figure, drawn and not yet written."""
+    with look():
+        return _page(found)
+
+
+def _page(found: Ensemble) -> Page:
     done = found.runs[found.runs["status"] == "done"]
     outputs = found.plan.outputs[:MOST_OUTPUTS]
     numbers = varying_numbers(found.plan, done)

@@ -6,8 +6,8 @@ from io import StringIO
 
 from rich.console import Console
 
-from bristle.report.staircase import staircase
 from bristle.study import Step
+from bristle.study.staircase import staircase
 
 STEPS = [
     Step(0, "begin with lugre", "made"),

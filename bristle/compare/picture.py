@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..compare.names import name_of
 from ..draw.style import Page, look
 from ..quantity import plain
+from .names import name_of
 from .panels import (
     draw_error,
     draw_history,
@@ -19,8 +19,8 @@ from .panels import (
 from .site_pictures import draw_sites, sites_height
 
 if TYPE_CHECKING:
-    from ..compare.comparison import Comparison
-    from ..compare.patterns import ResidualPattern
+    from .comparison import Comparison
+    from .patterns import ResidualPattern
 
 _HISTORY, _PANELS = 3.1, 3.2
 """Heights of the history with its error, and of a row of two panels [in]."""

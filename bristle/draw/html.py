@@ -7,9 +7,37 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
 
-__all__ = ["CSS", "escape", "figure", "items", "page", "paragraphs", "section", "table", "tiles"]
+__all__ = [
+    "CSS",
+    "escape",
+    "figure",
+    "fragment",
+    "items",
+    "page",
+    "paragraphs",
+    "section",
+    "table",
+    "tiles",
+]
 
 CSS = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+
+_NOTEBOOK = (
+    ".bristle p { max-width: 46rem; margin: .3rem 0; } "
+    ".bristle th, .bristle td { text-align: left; } "
+    ".bristle th.n, .bristle td.n { text-align: right; } "
+    ".bristle tr.strong td { font-weight: 600; } "
+    ".bristle figure { margin: .6rem 0; } .bristle img { max-width: 100%; }"
+)
+
+
+def fragment(title: str, *parts: str) -> str:
+    """Return what a notebook shows of a result; parts are HTML, empty ones are left out."""
+    inner = "\n".join(part for part in parts if part)
+    return (
+        f'<div class="bristle">\n<style>{_NOTEBOOK}</style>\n'
+        f"<p><strong>{escape(title)}</strong></p>\n{inner}\n</div>"
+    )
 
 
 def page(title: str, body: Iterable[str], foot: str) -> str:

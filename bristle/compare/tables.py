@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..compare.names import name_of, site_name
-from ..compare.sentences import FAINT, begin
 from ..draw.style import percent
 from ..quantity import plain, scale, short_z
+from .names import name_of, site_name
+from .sentences import FAINT, begin
 
 if TYPE_CHECKING:
-    from ..compare.comparison import Comparison
-    from ..compare.errors import RunError, SiteError
-    from ..compare.patterns import ResidualPattern
+    from .comparison import Comparison
+    from .errors import RunError, SiteError
+    from .patterns import ResidualPattern
 
 Table = tuple[str, list[str], list[list[str]]]
 

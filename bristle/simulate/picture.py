@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import GridSpec
 
 _TOP = re.compile(r"(?P<component>.*)\.floor(?P<floor>\d+)_acceleration_absolute")
-_SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (1.0, "")}
+SHOWN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s"), "m/s2": (1.0, "m/s²"), "1": (1.0, "")}
+"""Units in SI, with the factor to those that are shown."""
 _MOTIONS = ("displacement", "velocity")
 _MOST_HISTORIES = 5
 _MOST_OTHERS = 12
@@ -263,7 +264,7 @@ class _Run:
     def _shown(self, name: str) -> tuple[Array, str]:
         """Return an output as it is shown, and its unit ("" without one)."""
         unit = self.frame.attrs.get("units", {}).get(name) or ""
-        factor, shown = _SHOWN.get(unit, (1.0, unit))
+        factor, shown = SHOWN.get(unit, (1.0, unit))
         return self.frame[name].to_numpy() * factor, shown
 
 

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..design.margins import grid_rows
-from ..design.responses import responses
-from ..draw.style import BLUE, GREY, INK, Page, look, ramp
+from ..draw.style import BLUE, GREY, INK, Page, look, ramp, zero_lines
+from .margins import grid_rows
+from .responses import responses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..design.result import Result
+    from .result import DesignResult
 
 _PANELS = (
     ("Weighted loop: largest singular value [1]", "open_loop", "closed_loop", ""),
@@ -24,12 +24,12 @@ _PANELS = (
 )  # fmt: skip
 
 
-def draw_design(result: Result, path: Path) -> None:
+def draw_design(result: DesignResult, path: Path) -> None:
     """Draw a design's singular values with its weights into a file.
 
     Parameters
     ----------
-    result : Result
+    result : DesignResult
         Of kind "hinf" or "lpv"; of a table, the rows at the grid's speeds are drawn.
     path : Path
         Its suffix is the format: png, svg, pdf.
@@ -41,19 +41,34 @@ def draw_design(result: Result, path: Path) -> None:
     RunError
         If the file cannot be written.
     """
-    gamma = result.facts["gamma"]
+    _loops(result).save(path, dpi=150)
+
+
+def draw_result(result: DesignResult) -> Page:
+    """Return the figure of a design: its loops and weights, or the poles of one without."""
+    return _loops(result) if result.plants else _poles(result)
+
+
+def headline(result: DesignResult) -> str:
+    """Return a design in one line."""
+    title = result.task.title or f"A design ({result.task.kind})"
+    if not result.plants:
+        return title
     norm = result.facts.get("norm", result.facts.get("largest_norm"))
+    return f"{title}: closed-loop norm {norm:.4g}, gamma {result.facts['gamma']:.4g}"
+
+
+def _loops(result: DesignResult) -> Page:
     rows = grid_rows(result)
     shown = [responses(result, _omega(result), k) for k in rows]
     colours = ramp(len(rows)) if len(rows) > 1 else [BLUE]
-    title = f"{result.task.title or 'A design'}: closed-loop norm {norm:.4g}, gamma {gamma:.4g}"
     subtitle = (
         "Solid: closed loop. Dashed: without control. Dotted: gamma over the weight, which the "
         "closed loop stays below."
     )
     if len(rows) > 1:
         subtitle += " One curve per speed of the grid, which is held; dark: slow."
-    page = Page(10.5, 3.6, title, subtitle)
+    page = Page(10.5, 3.6, headline(result), subtitle)
     with look():
         grid = page.grid(1, 3, left=0.5)
         for i, (heading, without, closed, bound) in enumerate(_PANELS):
@@ -61,11 +76,26 @@ def draw_design(result: Result, path: Path) -> None:
             axes.set_title(heading.format(result.controller.command_unit))
             _panel(axes, _omega(result), shown, colours, (without, closed, bound))
             if not bound:
-                axes.axhline(gamma, color=INK, linestyle=":", linewidth=1.0)
-    page.save(path, dpi=150)
+                axes.axhline(result.facts["gamma"], color=INK, linestyle=":", linewidth=1.0)
+    return page
 
 
-def _omega(result: Result) -> Any:
+def _poles(result: DesignResult) -> Page:
+    """Return the poles of an LQG design, which has no weighted loop to show."""
+    subtitle = "Rings: the building with the regulator. Crosses: the controller."
+    page = Page(6.4, 3.8, headline(result), subtitle)
+    with look():
+        axes = page.figure.add_subplot(page.grid(1, 1, left=0.75, top=0.15)[0, 0])
+        zero_lines(axes)
+        for key, mark, colour in (("regulator_poles", "o", GREY), ("poles", "x", BLUE)):
+            real, imaginary = np.array(result.facts[key]).T
+            axes.plot(real, imaginary, mark, color=colour, mfc="none", ms=6.0, mew=1.4)
+        axes.set_xlabel("real part [1/s]")
+        axes.set_ylabel("imaginary part [rad/s]")
+    return page
+
+
+def _omega(result: DesignResult) -> Any:
     """Return frequencies [rad/s] a decade beyond the building's on either side."""
     from ..physics.building import frequencies
 

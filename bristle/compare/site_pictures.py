@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..compare.errors import CLOSE
-from ..compare.names import name_of, site_name
-from ..compare.sentences import FAINT
 from ..draw.style import BLUE, FLOOR, GREY, INK, VERMILION, Page, look, short_z
+from .errors import CLOSE
+from .names import name_of, site_name
+from .sentences import FAINT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..compare.comparison import Comparison
-    from ..compare.errors import SiteError
+    from .comparison import Comparison
+    from .errors import SiteError
 
 _TICKS = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 1000.0)
 

@@ -12,7 +12,7 @@ from ..quantity import plain, quantity, short_z
 if TYPE_CHECKING:
     from rich.text import Text
 
-    from ..study.history import Step
+    from .history import Step
 
 WIDTH = 40
 """Characters of the longest bar."""

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..compare.coordinates import SHOWN
-from ..compare.names import name_of
 from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
+from .coordinates import SHOWN
+from .names import name_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from ..compare.comparison import Comparison
-    from ..compare.patterns import ResidualPattern
-    from ..compare.prediction import RunPrediction
+    from .comparison import Comparison
+    from .patterns import ResidualPattern
+    from .prediction import RunPrediction
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,38 @@
+"""What a notebook shows of an ensemble."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..draw import html
+from ..draw.figure import DPI
+from ..draw.style import png
+from .picture import draw_ensemble
+
+if TYPE_CHECKING:
+    from .execute import Ensemble
+
+
+def ensemble_html(found: Ensemble) -> str:
+    """Return an ensemble as HTML: quantiles in a table, failures, and its picture."""
+    done = int((found.runs["status"] == "done").sum())
+    columns = [str(name) for name in found.quantiles.columns]
+    rows = [
+        [str(name), *(_cell(value) for value in row)]
+        for name, row in zip(found.quantiles.index, found.quantiles.to_numpy(), strict=True)
+    ]
+    failures = [f"{one.count} failed: {one.reason}" for one in found.failures]
+    picture = ""
+    if done > 1:
+        picture = html.figure(png(draw_ensemble(found), DPI), found.plan.title)
+    return html.fragment(
+        found.plan.title,
+        html.paragraphs(f"{done} of {found.plan.runs} runs are done."),
+        html.table(["output", *columns], rows, range(2, len(columns) + 1)),
+        html.items(failures),
+        picture,
+    )
+
+
+def _cell(value: object) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,98 @@
+"""What a notebook shows of an identification and of a study."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..draw import html
+from ..draw.figure import DPI
+from ..draw.style import Page, percent, png, short_z
+from ..errors import RecordError
+from .fit_picture import draw_identified
+from .staircase import history_steps
+from .staircase_picture import staircase_page
+
+if TYPE_CHECKING:
+    from .identified import Identified
+    from .study import Study
+
+_HELD = ("exponent", "mass", "which")
+
+
+def identified_html(found: Identified) -> str:
+    """Return an identification as HTML: parameters with intervals, errors, and its picture."""
+    title = " + ".join([found.model.law, *found.model.effects])
+    rows = [
+        [
+            str(row["name"]), f"{row['value']:.5g}",
+            row["how"] if row["interval95"] is None else f"± {row['interval95']:.2g}",
+            "" if row["unit"] == "1" else str(row["unit"]),
+        ]
+        for row in found.parameters()
+        if not (row["how"] == "held" and row["name"].endswith(_HELD))
+    ]  # fmt: skip
+    low = f", below {found.cutoff:g} Hz" if found.cutoff else ""
+    errors = [
+        [
+            words, short_z(found.after[f"z_{role}"]), f"{found.after[f'rms_{role}']:.3g}",
+            percent(found.after[f"share_{role}"]),
+        ]
+        for role, words in (("train", "training"), ("holdout", "held out"))
+        if f"z_{role}" in found.after
+    ]  # fmt: skip
+    header = ["runs", "error / noise (z)", f"RMS error [N]{low}", "of the force"]
+    return html.fragment(
+        title,
+        html.table(["parameter", "value", "95 % interval", "unit"], rows, numbers=(1, 2)),
+        html.table(header, errors, numbers=(1, 2, 3)),
+        html.items(found.notes),
+        html.figure(png(draw_identified(found), DPI), f"{title}: force measured and predicted"),
+    )
+
+
+def study_page(study: Study) -> Page:
+    """Return the figure of a study: how the error fell, or its first run before any fit.
+
+    Raises
+    ------
+    RecordError, StudyError
+        If nothing was identified, and the runs cannot be read.
+    """
+    steps = history_steps(study.steps())
+    if any(step.z is not None for step in steps):
+        return staircase_page(steps)
+    from .run_picture import draw_run
+
+    runs = study.read()
+    if not runs:
+        raise RecordError(f"{study.folder}: there is no run to draw.")
+    return draw_run(runs[0])
+
+
+def study_html(study: Study) -> str:
+    """Return a study as HTML: its history in a table, and its picture."""
+    settings, steps = study.settings, study.steps()
+    rows = [
+        [
+            str(step.number), step.what, _or_dash(one.z), _or_dash(one.z_train),
+            "-" if one.rms is None else f"{one.rms:.3g}",
+        ]
+        for step, one in zip(steps, history_steps(steps), strict=True)
+    ]  # fmt: skip
+    held_out = len(study.files("holdout"))
+    verdict = study.verdict()
+    return html.fragment(
+        settings.title,
+        html.paragraphs(
+            f"{study.folder}: {len(settings.runs)} runs, {held_out} of them held out.",
+            f"Verdict: {verdict.get('words')}" if verdict else "",
+        ),
+        html.table(
+            ["step", "what", "z, held out", "z, training", "RMS error [N]"], rows, (2, 3, 4)
+        ),
+        html.figure(png(study_page(study), DPI), settings.title),
+    )
+
+
+def _or_dash(z: float | None) -> str:
+    return "-" if z is None else short_z(z)
