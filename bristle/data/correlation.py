@@ -108,7 +108,7 @@ def read_correlation(
         f"rows has to be the lower triangle for {len(names)} parameters: row i has i numbers of "
         "-1 to 1, the last one 1."
     )
-    if not _is_triangle(rows, len(names)):
+    if not isinstance(rows, list) or not _is_triangle(rows, len(names)):
         toml.error((*keys, "rows"), right)
         return None
     found = Correlation(tuple(map(str, names)), tuple(tuple(map(float, row)) for row in rows))

@@ -150,7 +150,7 @@ def fit(
     best = scaled.at(found.theta)
     if not with_std:
         return Fit(best, {}, found.cost, (), found.sweeps)
-    return _with_intervals(Fit(best, {}, found.cost, sweeps=found.sweeps), scaled, found.theta)
+    return _with_intervals(Fit(best, {}, found.cost, evaluations=found.sweeps), scaled, found.theta)
 
 
 def _with_intervals(found: Fit, scaled: Scaled, theta: Array) -> Fit:

@@ -51,7 +51,7 @@ def errors(problem: Problem, model: Model, expected: Expected) -> list[Array]:
 def has_offset(model: Model) -> bool:
     """Return whether an effect of a model has a constant force of its own that a fit moves."""
     return any(
-        EFFECTS[name].offset and f"{name}.{EFFECTS[name].offset}" not in model.held
+        EFFECTS[name].offset and f"{name}.{EFFECTS[name].offset}" not in model.fixed
         for name in model.effects
     )
 

@@ -159,7 +159,7 @@ def _with(
 
 
 def _at(
-    law: type[Law], hook: str, q: Inputs, z: Any, values: dict[str, float], signal: str,
+    law: type[Law], hook: str, q: Any, z: Any, values: dict[str, float], signal: str,
     value: float,
 ) -> tuple[float, ...]:  # fmt: skip
     return _call(law, hook, q._replace(**{signal: value}), z, values)

@@ -365,11 +365,11 @@ def _a(word: str) -> str:
 def _only_one(module: ModuleType, path: Path, tree: ast.Module, kind: _Kind) -> Any:
     """Return the one effect or law of a module, whose name is the file's."""
     word, base = kind.dialect.word, kind.dialect.base
-    found = [
+    found: list[Any] = [
         value
         for value in vars(module).values()
         if isinstance(value, type) and issubclass(value, kind.base) and value is not kind.base
-        if value.__module__ == module.__name__ and value.name
+        if value.__module__ == module.__name__ and getattr(value, "name", "")
     ]
     lines = [node.lineno for node in tree.body if isinstance(node, ast.ClassDef)]
     if len(found) != 1:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from ..data.channels import channel_unit, is_channel
 from ..diagnose.verdict_text import HEADINGS, Verdict, about, sentences, separating, untestable
+from ..draw import html
 from ..findings import command
 from ..physics.effect import EFFECTS
-from . import html
 from .study_tables import in_lab_unit, ranking_table
 
 _TONES = {"none": "green", "effect": "blue", "ambiguous": "purple", "unknown": "red"}

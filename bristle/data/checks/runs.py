@@ -256,7 +256,7 @@ def _exchange(
         judged = [one for one in holdout if one is not run] + [goes]
         reach = [max(map(value, kept)) for _, value, _, _ in checks]
         return max(
-            value(one) / known
+            float(value(one) / known)
             for (_, value, _, _), known in zip(checks, reach, strict=True)
             for one in judged
             if known > 0.0
