@@ -66,7 +66,9 @@ class BenchRuns:
         """Return the verdict, which is the damper's finding with the instruments that show."""
         opened, found = self._opened, findings[DAMPER]
         assert opened is not None
-        faults = (*opened.faults, *found.sensors)
+        renewed = {(one.channel, one.fault) for one in found.sensors}
+        first = [one for one in opened.faults if (one.channel, one.fault) not in renewed]
+        faults = (*first, *found.sensors)
         made = Diagnosis(
             found.kind, found.effects, of_damper(found, faults), findings,
             sensors=faults, untestable=found.untestable, coordinate=found.coordinate,

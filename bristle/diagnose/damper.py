@@ -14,7 +14,6 @@ from ..physics.effect import EFFECTS
 from .candidates import Trial, judge
 from .decision import Decision, decide
 from .experiments import separating
-from .faults import SensorFault
 from .finding import Finding, of_decision
 from .inconsistent_runs import groups, inconsistent_runs
 from .limits import detectable, untestable
@@ -22,7 +21,7 @@ from .opening import Opening, Progress, Trials, silent
 from .remaining_residual import remaining_residual
 from .rule import BENCH, SITE, DecisionRule
 from .sites import better, equals
-from .zero import free_zero, zero_fault
+from .zero import free_zero, renewed_zero, zero_fault
 
 
 def look_at_damper(opened: Opening, say: Progress = silent, rule: DecisionRule = BENCH) -> Finding:
@@ -36,7 +35,7 @@ def look_at_damper(opened: Opening, say: Progress = silent, rule: DecisionRule =
     if inside and max(before.z, before.train) <= rule.quiet:
         return of_decision(decide(before, [], lambda _first: [], rule=rule), before)
     made, decision = _decided(opened, say, rule)
-    sensors: tuple[SensorFault, ...] = ()
+    sensors = renewed_zero(opened, decision)
     freed = free_zero(opened, decision)
     if freed is not None:
         say("the zero of the force is fitted along with every effect")
