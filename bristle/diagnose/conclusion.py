@@ -44,8 +44,10 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     about : what else is known of the runs
     """
     reconstructed = about.force == "reconstructed"
-    sensors = (*about.sensors, *_of_load_cell(findings))
-    sensors += tuple(fault for found in findings.values() for fault in found.sensors)
+    renewed = [fault for found in findings.values() for fault in found.sensors]
+    again = {(one.channel, one.fault) for one in renewed}
+    first = [one for one in about.sensors if (one.channel, one.fault) not in again]
+    sensors = (*first, *_of_load_cell(findings), *renewed)
     parts = [replace(f, kind="none", effects=()) if _is_gain(f) else f for f in findings.values()]
     named: list[str] = []
     rivals: list[str] = []

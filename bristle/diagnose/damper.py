@@ -12,12 +12,11 @@ from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
 from .candidates import Trial, judge
 from .decision import Decision, Z, as_noise, decide, gained
-from .faults import SensorFault
 from .finding import Finding, of_decision
 from .opening import Opening, Progress, Trials, silent
 from .rule import BENCH, SITE, DecisionRule
 from .sites import better, equals
-from .zero import free_zero, zero_fault
+from .zero import free_zero, renewed_zero, zero_fault
 
 
 def look_at_damper(opened: Opening, say: Progress = silent) -> tuple[Finding, Opening]:
@@ -31,7 +30,7 @@ def look_at_damper(opened: Opening, say: Progress = silent) -> tuple[Finding, Op
     if not opened.scope.rank_all and max(before.z, before.train) <= rule.quiet:
         return of_decision(as_noise(before, ()), before), opened
     made, decision = _decided(opened, say)
-    sensors: tuple[SensorFault, ...] = ()
+    sensors = renewed_zero(opened, decision)
     freed = free_zero(opened, decision)
     if freed is not None:
         say("the zero of the force is fitted along with every effect")

@@ -132,6 +132,9 @@ def opening(
     if shown is not None:
         faults.append(shown.fault)
         problem, held_out, before = shown.train, shown.held_out, shown.trial
+        if shown.fault.fault == "bias":  # found without the effects that are tried next
+            problem, held_out = problem.with_free_zero(), held_out.with_free_zero()
+            before = judge(before.model, problem, held_out)
     redundant = any(
         run.has("displacement", "velocity") and not derived_velocity(run) for run in train
     )

@@ -40,7 +40,8 @@ def free_zero(opened: Opening, decision: Decision, rule: DecisionRule = SENSOR) 
         one says more than a zero would.
     """
     problem = opened.problem
-    if decision.kind in ("none", "insufficient") or _reconstructed(problem):
+    known = problem.free_zero or _reconstructed(problem)
+    if known or decision.kind in ("none", "insufficient"):
         return None
     if has_offset(opened.before.model) or not _significant(problem, opened.before.model, rule):
         return None
@@ -62,7 +63,23 @@ def zero_fault(
         return None
     if not _significant(problem, model, rule):
         return None
-    zero, std = zero_of(problem, model)
+    return _fault(*zero_of(problem, model), decision)
+
+
+def renewed_zero(opened: Opening, decision: Decision) -> tuple[SensorFault, ...]:
+    """Return the zero that was found before any effect as it is beside what was decided.
+
+    Nothing where there was none, or where an effect has a constant force of its own.
+    """
+    first = [one for one in opened.faults if (one.channel, one.fault) == ("force", "bias")]
+    model = decision.best.model
+    if not first or not opened.problem.free_zero or has_offset(model):
+        return ()
+    more, std = zero_of(opened.problem, model)
+    return (_fault(first[0].value + more, std, decision),)
+
+
+def _fault(zero: float, std: float, decision: Decision) -> SensorFault:
     beside = f" beside {' and '.join(decision.effects)}" if decision.kind == "effect" else ""
     return SensorFault(
         "force", "bias", zero, std,

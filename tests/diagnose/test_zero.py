@@ -11,8 +11,9 @@ from test_model_based_faults import problems
 from bristle.diagnose import damper as of_damper
 from bristle.diagnose.candidates import judge
 from bristle.diagnose.decision import Decision
+from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.opening import Opening
-from bristle.diagnose.zero import free_zero, zero_fault
+from bristle.diagnose.zero import free_zero, renewed_zero, zero_fault
 from bristle.identify.fit import Model, identify
 from bristle.identify.residuals import errors, has_offset, robust_z, zero_of
 
@@ -110,6 +111,22 @@ def test_without_an_offset_nothing_is_tried_again():
     model = identify(train, "bingham", starts=2).model
     opening = Opening(judge(model, train, held_out), train, held_out, (), {}, ("force",))
     assert free_zero(opening, of("unknown", opening)) is None
+
+
+def test_a_zero_that_was_found_first_is_renewed_beside_an_effect():
+    opening = opened(**HIDDEN)
+    first = SensorFault("force", "bias", OFFSET - 0.05, 0.001, "Force shows 0.55 N.")
+    train, held_out = (
+        problem.of([replace(r, force=r.force - first.value) for r in problem.runs]).with_free_zero()
+        for problem in (opening.problem, opening.held_out)
+    )
+    freed = replace(opening, problem=train, held_out=held_out, faults=(first,))
+    assert free_zero(freed, of("unknown", freed)) is None, "it is free already"
+    alone = of("effect", freed, fitted(freed, ("stribeck",)))
+    (fault,) = renewed_zero(freed, alone)
+    assert fault.value == pytest.approx(OFFSET, abs=max(4.0 * fault.std, 0.01))
+    assert renewed_zero(opening, alone) == ()
+    assert renewed_zero(freed, of("effect", freed, fitted(freed, ("gas_spring",)))) == ()
 
 
 @pytest.mark.slow

@@ -101,9 +101,11 @@ def test_coil_lag_delays_the_force_and_nothing_else() -> None:
 # -- remanence
 
 
-def remanent_loop(width: float, dt: float = 0.002) -> dict[str, list[tuple[float, float]]]:
+def remanent_loop(
+    width: float, dt: float = 0.002, turn: float = 1.0
+) -> dict[str, list[tuple[float, float]]]:
     """Return (V, force) while the voltage rises from 0 to 8 V and while it falls, at 0.1 m/s."""
-    bench = Bench("bingham", on("remanence", width=width), ["remanence"])
+    bench = Bench("bingham", on("remanence", width=width, turn=turn), ["remanence"])
     bench.last = (0.0, 0.1, 0.0)
     branches: dict[str, list[tuple[float, float]]] = {"up": [], "down": []}
     for branch, voltages in (
@@ -136,6 +138,21 @@ def test_remanence_follows_a_voltage_before_time_goes_on() -> None:
     model = DamperModel("bingham", on("remanence", width=0.5), ["remanence"])
     force = model.force(0.0, 0.1, 0.0, 6.0, inf, 0.0, 0.0, False)
     assert force == pytest.approx(force_at("bingham", v=0.1, V=5.5), rel=1e-12)
+
+
+def test_remanence_turns_as_a_play_or_jumps_as_a_relay() -> None:
+    relay, play = remanent_loop(0.5, turn=0.02), remanent_loop(0.5)
+
+    def felt(V: float) -> float:
+        return force_at("bingham", v=0.1, V=V)
+
+    assert relay["down"][0][1] == pytest.approx(felt(7.5), rel=1e-9), "both have risen to 8 V"
+    # A tenth of a volt later the relay is on the other branch, the play has not moved.
+    assert relay["down"][1] == (pytest.approx(7.9), pytest.approx(felt(8.4), rel=1e-9))
+    assert play["down"][1] == (pytest.approx(7.9), pytest.approx(felt(7.5), rel=1e-9))
+    half = remanent_loop(0.5, turn=0.5)["down"]
+    assert half[3][1] == pytest.approx(felt(7.7 + 0.5 - (0.5 - 0.3) / 0.5), rel=1e-9)
+    assert half[8][1] == pytest.approx(felt(7.2 + 0.5), rel=1e-9)
 
 
 def test_remanence_without_width_is_none() -> None:
