@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ..identify.rig import DAMPER
-from ..physics.effect import EFFECTS, effects_of, plain_name
+from ..physics.effect import EFFECTS, Effect, effects_of, plain_name
 from . import verdict_text
 from .decision import Z
 from .faults import SensorFault, instruments_of
@@ -134,14 +134,18 @@ def lookalikes(effects: tuple[str, ...]) -> dict[str, str]:
     """Return what else would do the same to a reconstructed force as these effects, and why."""
     twins: dict[str, str] = {}
     for name in (name for name in effects if name in EFFECTS):
-        effect, here = EFFECTS[name], plain_name(name)
-        own = {effect.key(site): ELSEWHERE.format(name=here) for site in effect.sites[1:]}
-        if effect.absorbed_by:  # in the damper it is what the law has, which its lookalikes name
-            own = {}
+        effect, why = EFFECTS[name], ELSEWHERE.format(name=plain_name(name))
+        own = {effect.key(site): why for site in effect.sites[1:] if not _has_twin(effect, site)}
         for twin, why in {**effect.lookalikes, **own}.items():
             if twin not in effects:
                 twins.setdefault(twin, why)
     return twins
+
+
+def _has_twin(effect: type[Effect], site: str) -> bool:
+    """Return whether an effect's lookalikes, or a part of the law, are what it would be there."""
+    others = [EFFECTS[twin] for twin in effect.lookalikes if twin in EFFECTS]
+    return bool(effect.absorbed_by) or any(site in other.sites for other in others)
 
 
 def _is_gain(finding: Finding) -> bool:
