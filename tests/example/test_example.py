@@ -83,7 +83,7 @@ def test_a_sine_of_the_yield_force_alone_has_the_area_four_f_x() -> None:
 
 @pytest.mark.parametrize("name", [one for one in HIDDEN if "bench" in HIDDEN[one].rigs])
 @pytest.mark.parametrize("law", sorted(CENTRE))
-def test_whatever_is_hidden_on_a_bench_changes_the_force_by_5_to_60_percent(
+def test_whatever_is_hidden_on_a_bench_changes_the_force_and_does_not_swamp_it(
     name: str, law: str
 ) -> None:
     hidden = Damper(law, CENTRE[law], secret(name))
@@ -91,7 +91,7 @@ def test_whatever_is_hidden_on_a_bench_changes_the_force_by_5_to_60_percent(
     runs = [bench.perform(one, motion(), STEPPED, SCALES) for one in (hidden, bare)]
     assert np.all(np.isfinite(runs[0]["force"]))
     if name != "temperature":  # it needs longer than this run to warm up
-        assert 0.05 < bench.share(runs[:1], runs[1:]) < 0.6
+        assert 0.05 < bench.share(runs[:1], runs[1:]) < 0.9
 
 
 def test_a_gas_spring_adds_its_own_force_and_nothing_else() -> None:
