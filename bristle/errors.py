@@ -54,6 +54,24 @@ class StudyError(BristleError):
     """A study's folder or one of its files that cannot be read, or must not be changed."""
 
 
+class TrustError(BristleError):
+    """Code that came with a file and that this machine's user has not consented to.
+
+    `path` is the file, `text` the code that would run, "" where consent cannot be kept, `why`.
+    """
+
+    def __init__(self, path, text="", why=""):  # type: ignore[no-untyped-def]
+        self.path = path
+        self.text = text
+        said = (
+            f"consent cannot be kept: {why}"
+            if why
+            else "this file's code has not run here before. Read it, then consent with --trust"
+        )
+        ways = "in Python `with bristle.trust.granted():`, in CI BRISTLE_TRUST=1"
+        super().__init__(f"{path}: {said} ({ways}).")
+
+
 def not_usable(text: str) -> RunError:
     """Return a RunError for what is wrong before a run starts: exit code 2."""
     error = RunError(text)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shlex
+import sys
 from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from typing import Literal, NamedTuple
@@ -128,3 +130,18 @@ def number(value: object) -> float | str:
     except OverflowError:
         return f"is {written(value)}"
     return result if math.isfinite(result) else f"is {result}, not a finite number"
+
+
+def command(*words: object) -> str:
+    """Return a `bristle` command as a shell reads it: what holds a space is quoted.
+
+    Parameters
+    ----------
+    *words : what follows `bristle`: texts and paths
+    """
+    texts = ["bristle", *(str(word) for word in words)]
+    if sys.platform != "win32":
+        return shlex.join(texts)
+    from subprocess import list2cmdline
+
+    return list2cmdline(texts)

@@ -7,15 +7,19 @@ that hangs never gets to the end of its step: then a thread ends the process in 
 
 from __future__ import annotations
 
+import os
 import signal
 import socket
+import sys
 import threading
 from collections.abc import Callable
 from types import FrameType, TracebackType
 from typing import Any, Self
 
-PATIENCE = 3.0
+PATIENCE = 1.5
 """Seconds that a component may take to finish its step after Ctrl-C."""
+HURRY = 1.5
+"""Seconds that a command may take to end after Ctrl-C."""
 
 
 class Interrupt:
@@ -41,7 +45,7 @@ class Interrupt:
             before = signal.signal(signal.SIGINT, self._ask)
             self._restore.append(lambda: signal.signal(signal.SIGINT, before))
             if self._on_hang is not None:
-                self._watch(self._on_hang)
+                self._restore.append(_watch(self._on_hang, PATIENCE))
         return self
 
     def __exit__(
@@ -56,26 +60,67 @@ class Interrupt:
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self.asked = True
 
-    def _watch(self, on_hang: Callable[[], None]) -> None:
-        """Start a thread that the C part of signal handling wakes, whatever the main one does."""
-        ours, theirs = socket.socketpair()
-        theirs.setblocking(False)
-        before = signal.set_wakeup_fd(theirs.fileno(), warn_on_full_buffer=False)
-        left = threading.Event()
 
-        def wait() -> None:
-            while received := ours.recv(1):
-                if received[0] == signal.SIGINT and not left.wait(PATIENCE):
-                    on_hang()
+class Hurry:
+    """A context that ends the process when Ctrl-C is not answered within `HURRY`.
 
-        watcher = threading.Thread(target=wait, name="bristle-interrupt", daemon=True)
-        watcher.start()
+    Ctrl-C raises KeyboardInterrupt between two lines of Python, and compiled code has none: a
+    kernel or a solver at work would keep the user waiting. What is written is written whole, so
+    nothing is lost by ending. The exit code is 130.
+    """
 
-        def restore() -> None:
-            signal.set_wakeup_fd(before)
-            left.set()
-            theirs.close()
-            watcher.join()
-            ours.close()
+    def __enter__(self) -> Self:
+        self._restore: Callable[[], None] | None = None
+        if threading.current_thread() is threading.main_thread():
+            self._restore = _watch(_end_process, HURRY)
+        return self
 
-        self._restore.append(restore)
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._restore is not None:
+            self._restore()
+
+
+def _end_process() -> None:
+    """End this process and its workers at once, with the exit code of an interrupted one."""
+    if "multiprocessing" in sys.modules:  # else there are none, and importing it takes time
+        import multiprocessing
+
+        for child in multiprocessing.active_children():
+            child.kill()
+    os.write(2, b"interrupted\n")
+    os._exit(130)
+
+
+def _watch(on_hang: Callable[[], None], patience: float) -> Callable[[], None]:
+    """Start a thread that the C part of signal handling wakes, whatever the main one does.
+
+    Returns what ends the thread; `on_hang` is called when that comes later than `patience` s after
+    Ctrl-C.
+    """
+    ours, theirs = socket.socketpair()
+    theirs.setblocking(False)
+    before = signal.set_wakeup_fd(theirs.fileno(), warn_on_full_buffer=False)
+    left = threading.Event()
+
+    def wait() -> None:
+        while received := ours.recv(1):
+            if received[0] == signal.SIGINT and not left.wait(patience):
+                on_hang()
+
+    watcher = threading.Thread(target=wait, name="bristle-interrupt", daemon=True)
+    watcher.start()
+
+    def restore() -> None:
+        signal.set_wakeup_fd(before)
+        left.set()
+        theirs.shutdown(socket.SHUT_WR)  # forked processes may hold its end open
+        theirs.close()
+        watcher.join()
+        ours.close()
+
+    return restore

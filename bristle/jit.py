@@ -22,6 +22,7 @@ import numpy as np
 from numba.core import types
 from numba.extending import intrinsic
 
+from .progress import tell
 from .resources import cache_folder
 
 # Python's arrays outlive every call, so compiled code need not count references to them.
@@ -74,6 +75,8 @@ def compiled(
         Whether the function makes arrays of its own; its callees make none.
     """
     folder = _folder(function) if keep else None
+    if folder is None or not any(folder.iterdir()):
+        tell("compiling the laws, once")
     options = {**_OPTIONS, "_nrt": allocates}
     with _FOLDER:
         before = numba.config.CACHE_DIR

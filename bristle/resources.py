@@ -39,6 +39,19 @@ def cache_folder() -> Path:
     return user_cache_path("bristle", appauthor=False)
 
 
+def state_folder() -> Path:
+    """Return where what must outlive the cache is kept, `$BRISTLE_STATE` where that is set.
+
+    Consent to code, and tracebacks; it may not exist yet.
+    """
+    chosen = os.environ.get("BRISTLE_STATE")
+    if chosen:
+        return Path(chosen).expanduser().absolute()
+    from platformdirs import user_state_path
+
+    return user_state_path("bristle", appauthor=False)
+
+
 def fmus_folder() -> Path:
     """Return where built FMUs are kept: fmus/ of a checkout, else the cache."""
     checkout = root()

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import settings
 from toys import Maker, build_toys
 
+from bristle import trust
 from bristle.physics.user import unload_effects
 
 _STATUS = pytest.StashKey[int]()
@@ -43,6 +44,20 @@ def library() -> Iterator[None]:
     """Leave the library of effects as it came, whatever a test has loaded."""
     yield
     unload_effects()
+
+
+@pytest.fixture(autouse=True, scope="session")
+def consent(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """Consent to the effects that tests write, and keep what a user keeps in a folder of theirs."""
+    before = {name: os.environ.get(name) for name in (trust.VARIABLE, "BRISTLE_STATE")}
+    os.environ[trust.VARIABLE] = "1"
+    os.environ["BRISTLE_STATE"] = str(tmp_path_factory.mktemp("state"))
+    yield
+    for name, value in before.items():
+        if value is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = value
 
 
 @pytest.fixture(scope="session")

@@ -21,7 +21,7 @@ BASE = (
     {"errors", "resources", "interrupt", "progress"},
     {"units", "lines"},
     {"physics", "findings"},
-    {"control", "data", "jit"},
+    {"control", "data", "jit", "trust"},
     {"component"},
     {"draw", "check"},
 )

@@ -12,10 +12,11 @@ import importlib
 import os
 import pkgutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import NoReturn
 
-from ..errors import BristleError
+from ..errors import BristleError, TrustError
 
 _NAMES = {"list_": "list"}
 
@@ -35,6 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
         module = importlib.import_module(f"{__name__}.{found.name}")
         name = _NAMES.get(found.name, found.name)
         sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
+        sub.add_argument("--quiet", action="store_true", help="do not tell what is being done")
         sub.add_argument("--debug", action="store_true", help="show the traceback of an error")
         module.add_arguments(sub)
         sub.set_defaults(main=module.main)
@@ -42,10 +44,16 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command; return its exit code (0, 1, 2 or 130) and never a traceback."""
+    """Run one command; return its exit code (0, 1, 2 or 130) and never a traceback.
+
+    The traceback of an error that nobody foresaw is kept in a file, which the one line names.
+    """
     arguments = build_parser().parse_args(argv)
+    from ..interrupt import Hurry
+
     try:
-        return int(arguments.main(arguments))
+        with Hurry(), _progress(arguments):
+            return _with_consent(arguments)
     except BristleError as error:
         if arguments.debug:
             raise
@@ -59,6 +67,42 @@ def main(argv: Sequence[str] | None = None) -> int:
             raise
         print("interrupted", file=sys.stderr)
         return 130
+    except Exception as error:
+        if arguments.debug:
+            raise
+        from . import _failure
+
+        print(_failure.line(error, arguments.command), file=sys.stderr)
+        return 1
+
+
+@contextmanager
+def _progress(arguments: argparse.Namespace) -> Iterator[None]:
+    """Tell on stderr what is being done, unless nobody wants to know."""
+    from ..progress import Line, telling
+
+    if arguments.quiet or getattr(arguments, "json", False):
+        yield
+        return
+    with Line() as line, telling(line.say):
+        yield
+
+
+def _with_consent(arguments: argparse.Namespace) -> int:
+    """Run a command; ask, on a terminal, about code that has not run here, and run it again."""
+    if getattr(arguments, "trust", False):
+        from ..trust import granted
+
+        with granted():
+            return int(arguments.main(arguments))
+    while True:
+        try:
+            return int(arguments.main(arguments))
+        except TrustError as error:
+            from . import _consent
+
+            if not _consent.given(error):
+                raise
 
 
 def run_and_exit() -> NoReturn:

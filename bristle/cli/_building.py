@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..findings import command
+
 if TYPE_CHECKING:
     from ..study.building import IdentifiedBuilding
 
@@ -60,8 +62,8 @@ def text(found: IdentifiedBuilding) -> str:
     if found.file is not None:
         lines += [
             "",
-            f"Building: {found.file} , now the model's. As an FMU:  bristle build Structure --from "
-            f"{found.file}",
+            f"Building: {found.file} , now the model's. As an FMU:  "
+            f"{command('build', 'Structure', '--from', found.file)}",
         ]
     return "\n".join(lines)
 

@@ -7,6 +7,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..findings import command
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..study.learning import Added
 
@@ -18,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument("effects", nargs="+", metavar="EFFECT", help="names; see bristle effects")
     parser.add_argument("--why", default="", help="the reason, for the history")
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
@@ -56,5 +60,5 @@ def text(added: Added, folder: Path) -> str:
             interval = f"+- {half:.2g}" if half is not None else row["how"]
             lines.append(f"  {row['name']:28} {row['value']:>12.5g} {row['unit']:10} {interval}")
     if "z_holdout" in after and after["z_holdout"] >= before["z_holdout"]:
-        lines += ["", "The error on runs not seen did not fall:  bristle undo " + str(folder)]
-    return "\n".join([*lines, "", f"Next:  bristle diagnose {folder}"])
+        lines += ["", "The error on runs not seen did not fall:  " + command("undo", folder)]
+    return "\n".join([*lines, "", f"Next:  {command('diagnose', folder)}"])

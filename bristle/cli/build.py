@@ -7,6 +7,9 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..findings import command
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..fmu.build import Plan
     from ..fmu.description import Description
@@ -51,6 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="where NAME.fmu goes, in place of an older one; else the current folder",
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
@@ -114,5 +118,5 @@ def _print(target: Path, description: Description, fresh: bool) -> None:
         ports = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in description.of(causality)]
         if ports:
             print(f"  {causality}s: {', '.join(ports)}")
-    print(f"  {len(description.of('parameter'))} parameters: bristle list ports {target}")
+    print(f"  {len(description.of('parameter'))} parameters:  {command('list', 'ports', target)}")
     print(f'In a scenario: fmu = "{target.name}", a path relative to the scenario\'s file.')

@@ -6,6 +6,8 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..scenario.scenario import Finding
 
@@ -27,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="take a value in place of the file's, e.g. --set damper.f_c=2",
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     parser.add_argument(
         "--schema", action="store_true", help="print the JSON schema of scenario files"

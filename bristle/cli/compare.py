@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..bridge.fmu import FmuComparison
     from ..compare.comparison import Comparison
@@ -60,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="with --fmu: limit of the run in s",
     )
     parser.add_argument("--out", type=Path, metavar="FILE", help="where the picture goes")
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 

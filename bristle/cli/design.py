@@ -7,6 +7,8 @@ import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..findings import command
+
 if TYPE_CHECKING:
     from ..design import Result
 
@@ -99,7 +101,8 @@ def _print(answer: dict[str, Any], out: Path) -> None:
         print("  margins at the measurement: " + _margins(answer["margins"]))
     for path in answer["files"]:
         print(f"  {path}")
-    print(f"Bake it in: bristle build {_COMPONENTS[answer['kind']].split()[0]} --controller {out}")
+    component = _COMPONENTS[answer["kind"]].split()[0]
+    print(f"Bake it in:  {command('build', component, '--controller', out)}")
 
 
 def _print_table(facts: dict[str, Any]) -> None:

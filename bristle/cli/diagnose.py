@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from ..findings import command
+from ._consent import add_trust
 
 if TYPE_CHECKING:
     from ..diagnose import Diagnosis
@@ -20,6 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--dry-run", action="store_true", help="show the verdict; leave verdict.json as it is"
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print verdict.json")
 
 
@@ -29,19 +32,12 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    found = diagnose_study(study, write=not arguments.dry_run, say=speaker(arguments.json))
+    found = diagnose_study(study, write=not arguments.dry_run)
     if arguments.json:
         print(json.dumps(verdict_of(study, found), indent=2, ensure_ascii=False))
     else:
         print(text(found, arguments.folder))
     return 0
-
-
-def speaker(quiet: bool):  # type: ignore[no-untyped-def]
-    """Return what tells the stages on a terminal, and nothing in a pipe."""
-    if quiet or not sys.stderr.isatty():
-        return lambda _text: None
-    return lambda text: print(f"\033[2K{text} ...", end="\r", file=sys.stderr, flush=True)
 
 
 SHORT = "  (short search: it gains too little, as the others do)"
@@ -88,12 +84,12 @@ def text(found: Diagnosis, folder: Path) -> str:
 
 def _next(found: Diagnosis, folder: Path) -> list[str]:
     if found.kind in ("effect", "class"):
-        names = " ".join(found.effects) if found.kind == "effect" else found.effects[0]
-        return ["", f"Next:  bristle add {folder} {names}"]
+        names = found.effects if found.kind == "effect" else found.effects[:1]
+        return ["", f"Next:  {command('add', folder, *names)}"]
     if found.kind == "unknown":
         return [
             "",
-            f"Next:  bristle compare {folder} , which shows where the residual is;  bristle "
+            f"Next:  {command('compare', folder)} , which shows where the residual is;  bristle "
             "effects new NAME  begins an effect of your own.",
         ]
-    return ["", f"Next:  bristle report {folder}"]
+    return ["", f"Next:  {command('report', folder)}"]

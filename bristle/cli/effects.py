@@ -10,6 +10,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..physics.effect import Effect
 
@@ -25,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("target", nargs="?", metavar="NAME_OR_FILE", help=text)
     text = "a study whose own effects count too; with new: the study that the file is for"
     parser.add_argument("--study", type=Path, metavar="FOLDER", help=text)
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
 
@@ -42,6 +45,8 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.target:
         raise PhysicsError(f'"{arguments.name} {arguments.target}": one name, or new, check.')
     left_out = _read_own(arguments.study)
+    if arguments.name in left_out:
+        _refuse_untrusted(arguments.study / "effects" / f"{arguments.name}.py")
     if arguments.name:
         found: Any = tell(_find(arguments.name, EFFECTS, left_out))
     else:
@@ -64,17 +69,27 @@ def _read_own(study: Path | None) -> dict[str, str]:
     if study is None:
         return {}
     from ..errors import PhysicsError
-    from ..physics.user import load_effects
+    from ..trust import load_effects
 
     if not study.is_dir():
         raise PhysicsError(f"--study {study}: there is no such folder.")
     return {one.name: one.error for one in load_effects(study / "effects") if one.error}
 
 
+def _refuse_untrusted(file: Path) -> None:
+    """Raise where the effect that is asked for waits for consent."""
+    from ..physics.user import waiting
+
+    if untrusted := waiting(file):
+        raise untrusted
+
+
 def _new(arguments: argparse.Namespace) -> int:
     """Write the file of a new effect, which works as it is."""
     from ..errors import PhysicsError
+    from ..findings import command
     from ..physics.effect import EFFECTS
+    from ..trust import remember_made
     from ._effect_template import template
 
     name = arguments.target
@@ -95,24 +110,29 @@ def _new(arguments: argparse.Namespace) -> int:
         file.write_text(template(name), encoding="utf-8")
     except OSError as error:
         raise PhysicsError(f"{file}: cannot be written ({error.strerror or error}).") from None
+    remember_made(file, template(name))
     if arguments.json:
         import json
 
         print(json.dumps({"file": str(file.absolute()), "effect": name}))
     else:
         print(
-            f"{file}: an effect that works as it is. Change it, then:  bristle effects check {file}"
+            f"{file}: an effect that works as it is. Change it, then:  "
+            f"{command('effects', 'check', file)}"
         )
     return 0
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    """Ask of an effect what is asked of the library's; 2 where something does not hold."""
+    """Ask of an effect what is asked of the library's; 2 where something does not hold.
+
+    Of a file that `bristle effects new` made here, checking it is consent to what it holds now.
+    """
     from ..check.conformance import examine
-    from ..physics.user import load_effect
+    from ..trust import is_made_here, load_effect
 
     file = Path(arguments.target)
-    effect = load_effect(file)
+    effect = load_effect(file, trust=is_made_here(file))
     checks = examine(effect)
     good = all(check.holds for check in checks)
     if arguments.json:

@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..batch.execute import Ensemble
 
@@ -32,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fresh", action="store_true", help="start anew, whatever is there")
     parser.add_argument("--retry", action="store_true", help="run again what failed")
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 

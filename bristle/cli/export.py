@@ -5,6 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ..findings import command
+from ._consent import add_trust
+
 HELP = "write a study's model as an FMU and a scenario that uses it"
 
 
@@ -14,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="where to write; else export/ in the study"
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
@@ -36,7 +40,7 @@ def main(arguments: argparse.Namespace) -> int:
         print(json.dumps(answer, indent=2))
         return 0
     print(f"{found.fmu}: the model's damper, its values baked in.")
-    print(f"{found.scenario}: plays {found.run} on it. Run it:  bristle run {found.scenario}")
+    print(f"{found.scenario}: plays {found.run} on it. Run it:  {command('run', found.scenario)}")
     for note in found.notes:
         print(f"{note[:1].upper()}{note[1:]}")
     return 0

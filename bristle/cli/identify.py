@@ -6,6 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..findings import command
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..study.identified import Identified
 
@@ -41,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="of a building's study: the building alone, its stiffnesses, frequencies and damping "
         "ratios from its response, as a building file",
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
@@ -153,7 +157,7 @@ def _laws(found: Identified, folder: Path) -> list[str]:
     if mine in own and own[best] < BETTER * own[mine]:
         lines.append(
             f"  {best} errs {1.0 - own[best] / own[mine]:.0%} less than the model's law, {mine}. "
-            f"To change it:  bristle identify {folder} --law {best}"
+            f"To change it:  {command('identify', folder, '--law', best)}"
         )
     return [*lines, "  Each law fitted by least squares of the low-passed force, without effects."]
 
@@ -162,7 +166,8 @@ def _next(found: Identified, folder: Path) -> list[str]:
     z = max(found.after.get("z_holdout", 0.0), found.after["z_train"])
     if z > 1.15:
         return [
-            f"The error is {z:.3g} times what noise explains. Next: where it lives,  bristle "
-            f"compare {folder} ; what is missing,  bristle diagnose {folder}"
+            f"The error is {z:.3g} times what noise explains. Next: where it is,  "
+            f"{command('compare', folder)} ; what is missing,  {command('diagnose', folder)}"
         ]
-    return [f"Noise explains the error. Next:  bristle diagnose {folder} , which says what it saw."]
+    then = command("diagnose", folder)
+    return [f"Noise explains the error. Next:  {then} , which says what it saw."]

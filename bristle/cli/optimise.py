@@ -6,6 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..batch.passive import Passive
 
@@ -63,6 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where passive.csv and passive.png go; else results/optimise/",
     )
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 

@@ -6,6 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from ._consent import add_trust
+
 HELP = "one HTML file of a study: verdict, history, loops, parameters, data"
 
 
@@ -15,6 +17,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help="where it goes; else FOLDER/reports/report.html"
     )
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 

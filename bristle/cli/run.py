@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -39,6 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--format", choices=("csv", "parquet"), default="csv", help="of the results"
     )
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 

@@ -1,4 +1,4 @@
-"""Studies of measurements: make one from files, look at the data before any model."""
+"""Studies of measurements: make one from files, check the data before any model."""
 
 from __future__ import annotations
 
@@ -8,24 +8,28 @@ from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._consent import add_trust
+
 if TYPE_CHECKING:
     from ..study.create import Created
 
-HELP = "studies of measurements: new, first-look, auto"
+HELP = "studies of measurements: new, check, auto"
+
+_OLD = "first-look"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study`."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     _add_new(commands.add_parser("new", help="make a study's folder from measurement files"))
-    look = commands.add_parser("first-look", help="what the data show before any model")
-    look.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    look.add_argument("--json", action="store_true", help="print the findings as JSON")
-    look.set_defaults(act=_first_look)
+    _add_check(commands.add_parser("check", help="check the data, before any model"))
+    # The name until 0.1; here for one release.
+    _add_check(commands.add_parser(_OLD, description="The old name of `study check`."))
     auto = commands.add_parser(
         "auto", help="identify, diagnose, add, until nothing that the library knows is missing"
     )
     auto.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    add_trust(auto)
     auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
 
@@ -33,6 +37,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Run one action on studies."""
     return int(arguments.act(arguments))
+
+
+def _add_check(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument("--json", action="store_true", help="print the findings as JSON")
+    parser.set_defaults(act=_check)
 
 
 def _add_new(parser: argparse.ArgumentParser) -> None:
@@ -143,6 +153,8 @@ def _print_json(created: Created) -> None:
 
 
 def _print_new(created: Created) -> None:
+    from ..findings import command
+
     folder = created.study.folder
     print(
         f"{folder}: a study of {len(created.study.settings.runs)} run(s). The columns are taken as:"
@@ -157,30 +169,33 @@ def _print_new(created: Created) -> None:
         print(f"Not used: {', '.join(created.unused)}.")
     for note in created.notes:
         print(f"{note[:1].upper()}{note[1:]}.")
-    print(f"Wrong? Change it in {folder / 'study.toml'}. Then:  bristle study first-look {folder}")
+    then = command("study", "check", folder)
+    print(f"Wrong? Change it in {folder / 'study.toml'}. Then:  {then}")
 
 
-def _first_look(arguments: argparse.Namespace) -> int:
-    from ..draw.data_check import first_look_png
+def _check(arguments: argparse.Namespace) -> int:
+    from ..draw.data_check import data_check_png
     from ..progress import Progress
-    from ..study.first_look import damper_level, first_look
+    from ..study.data_check import check_data, damper_level
     from ..study.study import Study
 
+    if arguments.action == _OLD:
+        print("`bristle study first-look` is now `bristle study check`.", file=sys.stderr)
     study = Study(arguments.folder)
     total = len(study.settings.runs)
-    with Progress("looking at the runs", total, not arguments.json) as progress:
-        look = first_look(study, progress.show)
-    level = damper_level(list(look.runs)) if study.settings.has_building else ""
-    picture = study.write_report("first_look.png", first_look_png(list(look.runs), level))
+    with Progress("checking the data", total, not arguments.json) as progress:
+        found = check_data(study, progress.show)
+    level = damper_level(list(found.runs)) if study.settings.has_building else ""
+    picture = study.write_report("data_check.png", data_check_png(list(found.runs), level))
     if arguments.json:
         import json
 
-        answer = {**look.as_dict(), "picture": str(picture.absolute())}
+        answer = {**found.as_dict(), "picture": str(picture.absolute())}
         print(json.dumps(answer, indent=2, ensure_ascii=False))
     else:
-        print(look.text())
+        print(found.text())
         print(f"\nPicture: {picture}")
-        if not look.ok:
+        if not found.ok:
             print("Mend the above before a model is fitted.", file=sys.stderr)
     return 0
 
@@ -189,7 +204,7 @@ def _auto(arguments: argparse.Namespace) -> int:
     from ..report.staircase import staircase
     from ..study.learning import learn
     from ..study.study import Study
-    from .diagnose import speaker, text
+    from .diagnose import text
 
     study = Study(arguments.folder)
     quiet = arguments.json or not sys.stdout.isatty()
@@ -202,7 +217,7 @@ def _auto(arguments: argparse.Namespace) -> int:
         print(f"\n{staircase(steps)}\n", flush=True)
         shown.append(len(steps))
 
-    learned = learn(study, say=speaker(arguments.json), on_step=show)
+    learned = learn(study, on_step=show)
     if arguments.json:
         import json
 

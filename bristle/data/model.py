@@ -26,8 +26,8 @@ from ..lines import KeyPath
 from ..physics.effect import EFFECTS, laws_joined
 from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..physics.parameter import CHOICES, Parameter, fields_of
-from ..physics.user import why_left_out
-from ..units import convert
+from ..physics.user import waiting, why_left_out
+from ..units import canonical, convert
 from .files import Toml, write_whole
 
 ORIGINS = ("reconstructed", "measured", "assumed", "identified")
@@ -53,13 +53,15 @@ class StudyModel:
     """The content of a model.toml; all parameters of the law and its effects are there.
 
     `parameters` of the law by name; `effects` name to parameters; `building` the file of the
-    structure, relative to the study, "" on a bench.
+    structure, relative to the study, "" on a bench; `only_shown` the effects whose code must not
+    run yet: the model can be shown, not used.
     """
 
     law: str
     parameters: dict[str, Value]
     effects: dict[str, dict[str, Value]] = field(default_factory=dict)
     building: str = ""
+    only_shown: tuple[str, ...] = ()
 
     @property
     def base_law(self) -> str:
@@ -85,8 +87,14 @@ class StudyModel:
         return [name for name, value in self.flat().items() if value.free]
 
     def declared(self, name: str) -> Parameter:
-        """Return the declaration of a parameter: default, SI unit, bounds, text."""
+        """Return the declaration of a parameter: default, SI unit, bounds, text.
+
+        Of an effect that is only shown the file tells what there is.
+        """
         effect, _, own = name.rpartition(".")
+        if effect in self.only_shown:
+            value = self.effects[effect][own]
+            return Parameter(value.value, value.unit, (value.low, value.high), "")
         return EFFECTS[effect].parameters[own] if effect else _declared(self.law)[name]
 
     def with_values(
@@ -127,15 +135,25 @@ def new_model(law: str = DEFAULT, effects: tuple[str, ...] = (), building: str =
     return model
 
 
-def read_model(path: Path, study: Path | None = None) -> StudyModel:
+def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) -> StudyModel:
     """Return the model in a model.toml; what is missing takes the law's values, free.
 
-    A building's file is looked for in the folder `study`, else beside the model.
+    Parameters
+    ----------
+    path : path
+        The file.
+    study : path, optional
+        The folder where its building and its own effects are; else that of the file.
+    to_show : bool
+        Whether the model is only to be shown: then an effect whose code must not run yet is there
+        with the values of the file.
 
     Raises
     ------
     StudyError
         With every mistake of the file and its line.
+    TrustError
+        If the model has an effect whose code must not run yet.
     """
     toml = Toml(path)
     data = toml.data
@@ -147,17 +165,26 @@ def read_model(path: Path, study: Path | None = None) -> StudyModel:
         toml.check()
     parameters = _values(toml, ("parameters",), toml.table((), data, "parameters"), law)
     effects: dict[str, dict[str, Value]] = {}
+    only_shown = []
+    beside = study or path.parent
     for name, table in toml.table((), data, "effects").items():
-        found = _effect(toml, name, table, base_and_variant(law)[0].name)
+        own = beside / "effects" / f"{name}.py"
+        untrusted = waiting(own) if name not in EFFECTS else None
+        if untrusted and not to_show:
+            raise untrusted
+        if untrusted:
+            effects[name] = _as_written(toml, name, table)
+            only_shown.append(name)
+            continue
+        found = _effect(toml, name, table, base_and_variant(law)[0].name, own)
         if found is not None:
             effects[name] = found
-    _exclusions(toml, list(effects))
+    _exclusions(toml, [name for name in effects if name not in only_shown])
     building = toml.text((), data, "building")
-    beside = study or path.parent
     if building and not (beside / building).is_file():
         toml.error(("building",), f"there is no file {beside / building}.")
     toml.check()
-    return StudyModel(law, parameters, effects, building)
+    return StudyModel(law, parameters, effects, building, tuple(only_shown))
 
 
 def write_model(path: Path, model: StudyModel) -> None:
@@ -278,10 +305,33 @@ def _defaults(law: str, effect: str = "") -> dict[str, Value]:
     }
 
 
-def _effect(toml: Toml, name: str, table: Any, law: str) -> dict[str, Value] | None:
+def _as_written(toml: Toml, name: str, table: Any) -> dict[str, Value]:
+    """Return the values of an effect as the file has them, without knowing the effect."""
+    keys: KeyPath = ("effects", name, "parameters")
+    given = table.get("parameters") if isinstance(table, dict) else None
+    out = {}
+    for own, entry in (given if isinstance(given, dict) else {}).items():
+        if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
+            continue  # a table of values, or what only the effect can judge
+        try:
+            unit = canonical(toml.text((*keys, own), entry, "unit") or "1")
+        except UnitError as error:
+            toml.error((*keys, own, "unit"), f"{own}: {error}")
+            continue
+        low, high, std = (toml.number((*keys, own), entry, key) for key in ("low", "high", "std"))
+        value = float(entry["value"])
+        out[own] = Value(
+            value, unit, value if low is None else low, value if high is None else high,
+            entry.get("free", True) is True, std,
+            toml.text((*keys, own), entry, "origin", "assumed"),
+        )  # fmt: skip
+    return out
+
+
+def _effect(toml: Toml, name: str, table: Any, law: str, own_file: Path) -> dict[str, Value] | None:
     keys = ("effects", name)
     if name not in EFFECTS:
-        why = why_left_out(toml.path.parent / "effects" / f"{name}.py")
+        why = why_left_out(own_file)
         toml.error(keys, why or unknown("effect", name, sorted(EFFECTS)))
         return None
     if not isinstance(table, dict):

@@ -16,6 +16,7 @@ from ..identify.search import loss, losses, z_of, z_scale
 from ..identify.search_context import Search, is_rough, refine
 from ..identify.start_grid import Candidate, SearchContext, ranked_guesses
 from ..physics.effect import EFFECTS, effects_of
+from ..progress import Count
 
 Array = NDArray[np.float64]
 
@@ -197,15 +198,26 @@ def try_all(
             best = sorted(names, key=lambda name: guesses[name][0].cost)[:most]
             names = [name for name in names if name in best]
         fewer = most is not None
-        found = list(
-            pool.map(lambda name: short_search(name, context, guesses[name], fewer), names)
-        )
+        ends: dict[str, float] = {}
+        count = Count("effect", len(names))
+
+        def look(name: str) -> Candidate:
+            end = short_search(name, context, guesses[name], fewer)
+            ends[name] = end.cost
+            count.done(name, f"best so far {min(dict(ends), key=lambda one: ends[one])}")
+            return end
+
+        found = list(pool.map(look, names))
         gained = max(context.cost - one.cost for one in found)
         least = max(PROMISING * gained, WORTH * context.cost)
 
+        refined = Count("refining effect", sum(context.cost - one.cost >= least for one in found))
+
         def finish(one: Candidate) -> Trial:
             if context.cost - one.cost >= least:
-                return judge(refine(one.model, train, LONG), train, held_out)
+                trial = judge(refine(one.model, train, LONG), train, held_out)
+                refined.done(one.model.effects[-1])
+                return trial
             return judge(one.model, train, held_out, (context.expected, there))
 
         trials = list(pool.map(finish, found))

@@ -1,4 +1,4 @@
-"""The picture of a first look: channels over time, force over velocity and displacement."""
+"""The picture of the data check: channels over time, force over velocity and displacement."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SHOWN = 4000  # samples per line: more are not seen
 _ROWS = 8
 
 
-def first_look_png(runs: list[Measurement], level: str = "") -> bytes:
+def data_check_png(runs: list[Measurement], level: str = "") -> bytes:
     """Return a PNG: the channels of the longest run, and force over motion in all runs."""
     from matplotlib.figure import Figure
 

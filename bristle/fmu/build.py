@@ -26,6 +26,7 @@ from uuid import UUID, uuid5
 
 from ..errors import BuildError
 from ..resources import fmus_folder
+from ..trust import require
 from . import catalogue
 from .slave import BAKED
 
@@ -277,9 +278,11 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
     for inner in (package, package / "fmu"):
         (inner / "__init__.py").write_text("", encoding="utf-8")
     for path in what.effects:
-        _copy_renamed(path, package / "physics" / "effects" / path.name, package.name)
+        text = path.read_text(encoding="utf-8-sig")
+        require(path, text)  # pythonfmu runs it
+        _write_renamed(text, package / "physics" / "effects" / path.name, package.name)
     script = folder / f"{what.component.stem}_{digest}.py"
-    _copy_renamed(what.component, script, package.name)
+    _write_renamed(what.component.read_text(encoding="utf-8"), script, package.name)
     (folder / BAKED).write_text(
         json.dumps({**what.baked, "guid": guid}, sort_keys=True), encoding="utf-8"
     )
@@ -304,9 +307,8 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
             del sys.modules[module]
 
 
-def _copy_renamed(source: Path, target: Path, package: str) -> None:
-    """Copy a Python file; what it imports from bristle it imports from the bundled package."""
-    text = source.read_text(encoding="utf-8")
+def _write_renamed(text: str, target: Path, package: str) -> None:
+    """Write a Python file; what it imports from bristle it imports from the bundled package."""
     text = re.sub(r"^(\s*)from bristle\.", rf"\1from {package}.", text, flags=re.MULTILINE)
     target.write_text(text, encoding="utf-8")
 

@@ -128,7 +128,7 @@ def instantiate(
     BuildError, DesignError, PhysicsError
         If there is no such component; if a file is wrong.
     """
-    from ..physics.user import load_effect
+    from ..trust import load_effect
 
     baked: dict[str, Any] = {"building": read_building_data(building)} if building else {}
     kind = component_class(source(name))

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
+from ..progress import counted, tell
 from .model import (
     Model,
     Problem,
@@ -292,10 +293,11 @@ def identify(
     expected = problem.expectation(trials[0])
     fits = [
         fit(problem, one, expectation=expected, max_evaluations=12, with_std=False)
-        for one in trials
+        for one in counted(trials, f"fitting {law}: start")
     ]
     best = min(fits, key=lambda one: one.cost)
     agreed = sum(one.cost <= best.cost * (1.0 + _ALIKE) for one in fits)
+    tell(f"fitting {law}: intervals")
     best = fit(problem, best.model, expectation=problem.expectation(best.model), with_std=False)
     best = multistart_refit(problem, best.model)
     return replace(

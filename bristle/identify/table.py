@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordError
 from ..physics.laws import base_and_variant, law_names
+from ..progress import Count
 from .model import Model, Problem, Run, steady, without
 from .search import descend
 from .starts import start_models
@@ -116,7 +117,14 @@ def error_table(
     laws = law_names() if laws is None else laws
     train.bench(Model(base_and_variant(laws[0])[0].name))  # compiled before threads ask for it
     with ThreadPoolExecutor(cpu_count()) as pool:
-        return list(pool.map(lambda law: _law_error(train, holdout, cutoff, law, starts), laws))
+        count = Count("law of the table", len(laws))
+
+        def error(law: str) -> LawError:
+            found = _law_error(train, holdout, cutoff, law, starts)
+            count.done(law)
+            return found
+
+        return list(pool.map(error, laws))
 
 
 def _law_error(

@@ -2,8 +2,9 @@
 
 A hook must be a pure function of `q`, `z`, `p`, for it runs in FMUs, under numba and inside fits.
 So a file is read before it runs: what it may name is listed here, and a clock, a file or chance is
-not in the list. What cannot be read from the text (a value that is not finite, a jump) is found by
-calling the hooks.
+not in the list. That keeps hooks pure; against harm stands consent (`bristle.trust`), which is
+asked for before any text runs. What cannot be read from the text (a value that is not finite, a
+jump) is found by calling the hooks.
 """
 
 from __future__ import annotations
@@ -11,14 +12,16 @@ from __future__ import annotations
 import ast
 import hashlib
 import math
+import re
 import sys
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
 from .. import units
-from ..errors import PhysicsError, UnitError
+from ..errors import PhysicsError, TrustError, UnitError
 from . import damper, structure
 from .effect import EFFECTS, HOOKS, Effect, Q
 from .probe import FlawError, probe
@@ -63,6 +66,24 @@ class Loaded:
 
 
 _known: dict[Path, tuple[str, Loaded]] = {}  # by file: digest of its text, and what came of it
+_waiting: dict[Path, TrustError] = {}  # by file: why its code may not run yet
+
+
+def _nobody(path: Path, text: str) -> None:
+    """Refuse: nobody was asked whether a text may run."""
+    raise TrustError(path, text)
+
+
+_require: Callable[[Path, str], None] = _nobody
+
+
+def ask_before_running(require: Callable[[Path, str], None]) -> None:
+    """Set what is called with file and text before any code of a user runs.
+
+    It raises TrustError where the code must not run; until it is set, none does.
+    """
+    global _require
+    _require = require
 
 
 def load_effects(folder: Path) -> list[Loaded]:
@@ -92,12 +113,16 @@ def load_effect(path: Path) -> type[Effect]:
     ------
     PhysicsError
         If there is no such file or it is not right: with file and line.
+    TrustError
+        If its code must not run yet.
     """
     if not path.is_file():
         raise PhysicsError(f"{path}: there is no such file with an effect.")
     loaded, new = _load(path.resolve(), path)
     if new:
         _regenerate()
+    if path.resolve() in _waiting:
+        raise _waiting[path.resolve()]
     if loaded.effect is None:
         raise PhysicsError(loaded.error)
     return loaded.effect
@@ -115,6 +140,11 @@ def why_left_out(path: Path) -> str:
     return known[1].error if known else ""
 
 
+def waiting(path: Path) -> TrustError | None:
+    """Return why a file's code may not run yet; None where it may, or was never read."""
+    return _waiting.get(path.resolve())
+
+
 def leave_out(effect: type[Effect], why: str) -> None:
     """Take an effect of a user's out of the library, for a reason that was found later."""
     for path, (digest, loaded) in list(_known.items()):
@@ -126,6 +156,7 @@ def leave_out(effect: type[Effect], why: str) -> None:
 
 def unload_effects() -> None:
     """Take every effect of a user's out of the library: it is as it came."""
+    _waiting.clear()
     gone = [_forget(path) for path in list(_known)]
     if any(gone):
         _regenerate()
@@ -147,7 +178,10 @@ def _forget(path: Path) -> bool:
 
 def _load(path: Path, shown: Path) -> tuple[Loaded, bool]:
     """Return what a file gives, and whether the library has changed."""
+    _waiting.pop(path, None)
     try:
+        if not path.is_file():  # a folder, or a pipe, which would be read for ever
+            raise OSError("it is no file")
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         return Loaded(shown, None, f"{shown}: cannot be read ({error})."), False
@@ -158,6 +192,11 @@ def _load(path: Path, shown: Path) -> tuple[Loaded, bool]:
         if effect is None or EFFECTS.get(effect.name) is effect:
             return known[1], False
     changed = path in _known and _forget(path)
+    try:
+        _require(shown, text)
+    except TrustError as error:
+        _waiting[path] = error
+        return Loaded(shown, None, str(error)), changed
     try:
         effect = _made(text, path, shown)
     except FlawError as flaw:
@@ -177,6 +216,7 @@ def _made(text: str, path: Path, shown: Path) -> type[Effect]:
         raise FlawError(f"this is no Python: {error.msg}.", error.lineno or 0) from None
     except ValueError as error:  # a null byte
         raise FlawError(f"this is no Python: {error}.") from None
+    _refuse_coding(text)
     _read(tree)
     other = EFFECTS.get(path.stem)
     if other is not None and other.own:  # of another folder: the one that is read last stays
@@ -202,6 +242,14 @@ def _made(text: str, path: Path, shown: Path) -> type[Effect]:
         raise FlawError(_said(error), _line(error, path)) from None
     effect.own = True
     return effect
+
+
+def _refuse_coding(text: str) -> None:
+    """Refuse a text that Python would read in another coding than it was shown in."""
+    for number, line in enumerate(text.splitlines()[:2], 1):
+        named = re.match(r"[ \t\f]*#.*?coding[:=][ \t]*([-\w.]+)", line)
+        if named and named[1].lower().replace("_", "-") not in ("utf-8", "utf8"):
+            raise FlawError(f"coding {named[1]}; utf-8 is right.", number)
 
 
 def _said(error: Exception) -> str:

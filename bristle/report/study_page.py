@@ -12,6 +12,7 @@ from ..compare.names import site_name
 from ..draw.style import percent, short_z
 from ..errors import BristleError
 from . import html
+from .reproduce import commands
 from .residuals import headline
 from .staircase import HistoryStep, history_steps
 from .study_tables import data_table, data_words, parameter_table, ranking_table, run_errors
@@ -64,12 +65,13 @@ def gather(study: Study) -> Content:
     from ..study.comparison import comparer
     from ..study.identification import as_model
 
-    model, steps = study.model(), tuple(study.steps())
+    model, steps = study.model(to_show=True), tuple(study.steps())
     runs = study.runs()
     now = before = None
     trouble, added = "", ""
     found = history_steps(steps)
     try:
+        study.model()  # raises where the code of an effect waits for consent
         against = comparer(study)
         now = against.compare(as_model(model))
         for step in reversed(steps):
@@ -351,12 +353,6 @@ def _reproduce(content: Content) -> str:
     import scipy
 
     study = content.study
-    name = study.name
-    commands = [f"bristle study first-look {name}", f"bristle identify {name}"]
-    for step in content.steps:
-        if step.what.startswith("add "):
-            commands.append(f"bristle {step.what.replace('add ', f'add {name} ', 1)}")
-    commands += [f"bristle compare {name}", f"bristle diagnose {name}", f"bristle report {name}"]
     rows = [
         [run.file, hashlib.sha256((study.folder / run.file).read_bytes()).hexdigest()[:16]]
         for run in study.settings.runs
@@ -370,9 +366,9 @@ def _reproduce(content: Content) -> str:
         "How to reproduce",
         html.paragraphs(
             "The study's folder holds the data, the model and every step of its history. From the "
-            "folder above it:"
+            "folder above it, these commands make it again beside it:"
         ),
-        "<pre>" + html.escape("\n".join(commands)) + "</pre>",
+        "<pre>" + html.escape("\n".join(commands(study))) + "</pre>",
         html.table(["file", "SHA-256, first 16 digits"], [*rows, ["model.toml", model]]),
         html.paragraphs(f"Made with {versions}.", kind="soft"),
     )

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..compare.names import name_of
 from ..data.channels import PLAIN
+from ..findings import command
 from ..physics.effect import EFFECTS
 from .study_tables import in_lab_unit, number, share
 
@@ -32,7 +33,7 @@ def words(verdict: Verdict | None, name: str) -> list[str]:
     if not verdict:
         return [
             "No diagnosis has been made of the present model.",
-            f"bristle diagnose {name} tells what it misses, and how sure that is.",
+            f"{command('diagnose', name)} tells what it misses, and how sure that is.",
         ]
     out = [_first(verdict)]
     if verdict.get("kind") in ("effect", "class"):

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import BristleError, PhysicsError
+from ..errors import BristleError, PhysicsError, TrustError
 from ..findings import Findings, number, unknown, written
 from ..lines import KeyPath
 from .document import COMPONENT_KEYS, MADE_FROM, Document, flatten
@@ -316,6 +316,8 @@ def _choose_fmu(
         elif all(getattr(part, key) or key not in settings for key in MADE_FROM):
             own = (part.effects,) if part.effects else ()
             part.description = library.describe(value, part.building, part.controller, *own)
+    except TrustError:
+        raise  # no mistake of the file, and it is asked about
     except BristleError as error:
         given = [key for key in MADE_FROM if getattr(part, key)]
         if part.effects and isinstance(error, PhysicsError) and not given:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import PhysicsError, RecordError
-from ..findings import Findings, number, unknown, written
+from ..findings import Findings, command, number, unknown, written
 from ..fmu.description import Value, Variable
 from ..physics.record import read_two_column
 from ..physics.signals import read_steps
@@ -41,7 +41,7 @@ def check_parameter(
     variable = part.variables.get(name)
     if variable is None:
         settable = [v.name for v in part.variables.values() if v.causality == "parameter"]
-        more = f"bristle list ports {part.fmu}"
+        more = command("list", "ports", part.fmu)
         findings.error(
             place, f"[components.{part.name}]: {unknown('parameter', name, settable, more)}"
         )

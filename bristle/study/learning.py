@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ from ..diagnose.faults import SensorFault
 from ..errors import StudyError
 from ..physics.effect import EFFECTS, laws_joined
 from ..physics.laws import DEFAULT, LAWS
+from ..progress import tell, telling
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified
@@ -27,11 +29,7 @@ MOST_EFFECTS = 4
 """Effects that `learn` adds at the most: a model that asks for more is the wrong model."""
 
 
-def _silent(text: str) -> None:
-    """Say nothing."""
-
-
-def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> Diagnosis:
+def diagnose_study(study: Study, *, write: bool = True, say: Say = tell) -> Diagnosis:
     """Return what the present model of a study is missing; write verdict.json.
 
     Parameters
@@ -48,10 +46,12 @@ def diagnose_study(study: Study, *, write: bool = True, say: Say = _silent) -> D
     for why in study.usable_effects():
         say(f"left out: {why}")
     model, runs = study.model(), study.runs()
-    found = diagnose_rig(
-        runs.train, runs.holdout, as_model(model), building_of(study, model),
-        identified=any(value.origin == "identified" for value in model.flat().values()), say=say,
-    )  # fmt: skip
+    known = any(value.origin == "identified" for value in model.flat().values())
+    with telling(say) if say is not tell else nullcontext():
+        found = diagnose_rig(
+            runs.train, runs.holdout, as_model(model), building_of(study, model),
+            identified=known, say=say,
+        )  # fmt: skip
     found = replace(found, sensors=(*found.sensors, *_turned(study)))
     if write:
         study.write_verdict(verdict_of(study, found))
@@ -107,6 +107,8 @@ def add_effects(
     StudyError
         If an effect is not known, is there already, or cannot join the model.
     """
+    tell("reading the runs")
+    study.usable_effects()  # raises where one of the study's own waits for consent
     model = present = study.model()
     for name in names:
         _refuse(model, name)
@@ -164,9 +166,7 @@ class Learned:
         }  # fmt: skip
 
 
-def learn(
-    study: Study, *, say: Say = _silent, on_step: Callable[[], None] | None = None
-) -> Learned:
+def learn(study: Study, *, say: Say = tell, on_step: Callable[[], None] | None = None) -> Learned:
     """Identify, diagnose and add until the verdict is none, class, unknown or insufficient.
 
     What was done is in the history already when this is interrupted: calling it again goes on.

@@ -16,12 +16,16 @@ from ..data.files import read_json, write_json, write_whole
 from ..data.measurement import Measurement, read_measurements
 from ..data.model import StudyModel, model_text, read_model
 from ..errors import StudyError
+from ..findings import command
 from ..identify.prepare import SHORTEST
-from ..physics.user import Loaded, load_effects
+from ..physics.user import Loaded, waiting
+from ..trust import load_effects
 from .history import History, Step
 from .new import make_folder
 from .settings import ROLES, Settings, read_settings
 
+OF_MODEL = ("identify.png", "compare.png", "report.html")
+"""Reports that show a model: they are set aside when another becomes the present one."""
 PATIENCE = 10.0
 """Seconds to wait for another process that writes in the same study."""
 SPLIT = 0.7
@@ -55,6 +59,10 @@ class Study:
     ----------
     folder : path
         The folder that holds study.toml.
+    trust : bool
+        Whether to consent to the code in its effects/, which is remembered. Without it, what has
+        not run here before does not run: data, history, verdict and report can be read all the
+        same.
 
     Raises
     ------
@@ -62,17 +70,17 @@ class Study:
         If there is no study, or its study.toml is wrong: with every mistake and its line.
     """
 
-    def __init__(self, folder: Path | str) -> None:
+    def __init__(self, folder: Path | str, *, trust: bool = False) -> None:
         self.folder = Path(folder)
         if not (self.folder / "study.toml").is_file():
             raise StudyError(
-                f"{self.folder}: no study: there is no study.toml. Make one with  bristle study "
-                f"new {self.folder.name or 'NAME'} --data 'lab/*.csv'"
+                f"{self.folder}: no study: there is no study.toml. Make one with  "
+                f"{command('study', 'new', self.folder.name or 'NAME', '--data', 'lab/*.csv')}"
             )
         self.history = History(self.folder)
         self._lock = FileLock(self.folder / ".lock")
         self._complete_unfinished()
-        self.own_effects = load_effects(self.effects_folder)
+        self.own_effects = load_effects(self.effects_folder, trust=trust)
         self.settings: Settings = read_settings(self.folder / "study.toml")
         self._seen = self._state()
 
@@ -80,9 +88,9 @@ class Study:
     """The files of effects/, each with its effect or why it is left out."""
 
     @classmethod
-    def open(cls, folder: Path | str) -> Study:
+    def open(cls, folder: Path | str, *, trust: bool = False) -> Study:
         """Return the study in a folder; the same as `Study(folder)`."""
-        return cls(folder)
+        return cls(folder, trust=trust)
 
     @classmethod
     def create(cls, folder: Path | str, files: Sequence[Path | str], **choices: Any) -> Study:
@@ -105,10 +113,19 @@ class Study:
 
         Call it before a fit or a diagnosis: an effect that cannot be compiled would take all others
         along.
+
+        Raises
+        ------
+        TrustError
+            If the code of one must not run yet.
         """
         from ..check.user_effects import usable
 
-        self.own_effects = usable(load_effects(self.effects_folder))
+        found = load_effects(self.effects_folder)
+        for one in found:
+            if untrusted := waiting(one.path):
+                raise untrusted
+        self.own_effects = usable(found)
         return [one.error for one in self.own_effects if one.error]
 
     @property
@@ -157,9 +174,23 @@ class Study:
         twins = _twins_within(train) + _twins_within(holdout)
         return Runs(train, holdout, (*idle, *twins))
 
-    def model(self) -> StudyModel:
-        """Return the present model; StudyError with every mistake of model.toml."""
-        model = read_model(self.folder / "model.toml")
+    def model(self, *, to_show: bool = False) -> StudyModel:
+        """Return the present model.
+
+        Parameters
+        ----------
+        to_show : bool
+            Whether the model is only to be shown: then an effect whose code must not run yet is
+            there with the values of the file.
+
+        Raises
+        ------
+        StudyError
+            With every mistake of model.toml.
+        TrustError
+            If the model has an effect whose code must not run yet.
+        """
+        model = read_model(self.folder / "model.toml", to_show=to_show)
         self._seen = self._state()
         return model
 
@@ -200,6 +231,7 @@ class Study:
                 numbers[-1] + 1 if numbers else 0, what, why, {**(before or {})}, {**(after or {})}
             )
             self.history.add(step, model_text(model, self.folder / "model.toml"))
+            self._set_aside(step.number - 1)
             self._seen = self._state()
         return step
 
@@ -214,6 +246,7 @@ class Study:
         with self.writing():
             self.history.keep_edit()
             step = self.history.undo()
+            self._set_aside(step.number)
             self._seen = self._state()
         return step
 
@@ -234,6 +267,15 @@ class Study:
         with self.writing():
             write_whole(path, content)
         return path
+
+    def _set_aside(self, number: int) -> None:
+        """Put the reports of a step's model into a folder of that step."""
+        for name in OF_MODEL:
+            old = self.reports_folder / name
+            if old.is_file():
+                kept = self.reports_folder / f"step_{max(number, 0):03d}"
+                kept.mkdir(exist_ok=True)
+                old.replace(kept / name)
 
     @contextmanager
     def writing(self, patience: float = PATIENCE) -> Iterator[None]:

@@ -14,7 +14,7 @@ from bristle.data.guess import guess_channels, left_out
 from bristle.data.measurement import read_measurements
 from bristle.data.read import read_table
 from bristle.study import create_study
-from bristle.study.first_look import first_look
+from bristle.study.data_check import check_data
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data"  # ../shared/data
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="the reference data are not there")
@@ -45,7 +45,7 @@ def test_crank_driven_damper(path: Path) -> None:
 
 def test_crank_driven_damper_as_a_study(tmp_path: Path) -> None:
     files = sorted((DATA / "mr_damper_utfpr").glob("*.csv"))[::6]
-    look = first_look(create_study(tmp_path / "rig", files).study)
+    look = check_data(create_study(tmp_path / "rig", files).study)
     kinds = {finding.kind for finding in look.findings}
     assert look.ok, look.text()
     # Its README: velocity is a numerical derivative, force carries about 130 N, one voltage a run.
@@ -63,7 +63,7 @@ def test_velocity_to_force_set_is_turned_in_sign(tmp_path: Path) -> None:
     (run,) = read_measurements([path])
     assert len(run.time) == 3499
     assert np.corrcoef(run["velocity"], run["force"])[0, 1] == pytest.approx(0.81, abs=0.01)
-    look = first_look(create_study(tmp_path / "rig", [path]).study)
+    look = check_data(create_study(tmp_path / "rig", [path]).study)
     assert look.ok
 
 

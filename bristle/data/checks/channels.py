@@ -24,7 +24,7 @@ _COLOURS = {
 }
 
 
-def look_at_channels(run: Measurement, velocity: Array | None) -> Iterator[Finding]:
+def check_channels(run: Measurement, velocity: Array | None) -> Iterator[Finding]:
     """Yield what is found in each channel of a run.
 
     Parameters

@@ -1,4 +1,4 @@
-"""What a first look finds: in a sentence with numbers, and what to do about it."""
+"""What the data check finds: in a sentence with numbers, and what to do about it."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def velocity_of_run(run: Measurement, level: str = "") -> Array | None:
     return None
 
 
-def look_at_motion(run: Measurement, level: str = "") -> Iterator[Finding]:
+def check_motion(run: Measurement, level: str = "") -> Iterator[Finding]:
     """Yield what is found between displacement, velocity and acceleration of a level."""
     before = f"{level}_" if level else ""
     x, v = f"{before}displacement", f"{before}velocity"
@@ -74,7 +74,7 @@ def _acceleration(run: Measurement, before: str, x: str, v: str) -> Iterator[Fin
     yield from _related(run, f"d({x})/dt", a, found)
 
 
-def look_at_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
+def check_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
     """Yield what the power of the force says of its sign."""
     force = run["force"]
     if np.ptp(force) == 0.0 or np.ptp(velocity) == 0.0:

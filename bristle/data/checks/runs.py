@@ -108,7 +108,7 @@ def cycles(velocity: Array) -> float:
     return 0.5 * float(np.count_nonzero(np.diff(signs)))
 
 
-def look_at_runs(
+def check_runs(
     train: list[Measurement], holdout: list[Measurement], level: str = ""
 ) -> tuple[list[Finding], list[Excitation]]:
     """Return what is found in all runs together, and what each of them excites."""

@@ -1,4 +1,4 @@
-"""A first look: each fault planted in a clean bench run is found, and nothing in the clean one."""
+"""The data check: a fault planted in a clean bench run is found, and nothing in the clean one."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made import Columns, bench_run, write
+from made import Columns, bench_run, write, write_runs
 
 from bristle.cli import main
 from bristle.data.checks.clipping import clipped_share
 from bristle.data.checks.finding import Finding
 from bristle.data.checks.runs import cycles, drive_levels
 from bristle.study import Study, create_study
-from bristle.study.first_look import FirstLook, first_look
+from bristle.study.data_check import DataCheck, check_data
 
 Spoil = Callable[[Columns], None]
 
 
-def look_at(tmp_path: Path, spoil: Spoil | None = None, runs: int = 3) -> FirstLook:
+def look_at(tmp_path: Path, spoil: Spoil | None = None, runs: int = 3) -> DataCheck:
     files = []
     for k in range(1, runs + 1):
         data = bench_run(k, 4.0)
         if spoil:
             spoil(data)
         files.append(write(tmp_path / f"run_{k}.csv", data))
-    return first_look(create_study(tmp_path / "rig", files).study)
+    return check_data(create_study(tmp_path / "rig", files).study)
 
 
-def found(look: FirstLook, kind: str) -> list[Finding]:
+def found(look: DataCheck, kind: str) -> list[Finding]:
     return [finding for finding in look.findings if finding.kind == kind]
 
 
@@ -143,7 +143,7 @@ def test_wrong_sign_in_study_toml_is_found(tmp_path: Path) -> None:
     path = tmp_path / "rig" / "study.toml"
     head, force = path.read_text(encoding="utf-8").split("[channels.force]")
     path.write_text(f"{head}[channels.force]{force.replace('sign = 1', 'sign = -1')}")
-    look = first_look(Study(tmp_path / "rig"))
+    look = check_data(Study(tmp_path / "rig"))
     assert not look.ok
     assert found(look, "sign")[0].level == "error"
 
@@ -155,7 +155,7 @@ def test_held_out_run_beyond_the_training_is_found(tmp_path: Path) -> None:
         if k == 2:  # the second of three is held out
             data["U [V]"] = 2.0 * data["U [V]"]
         files.append(write(tmp_path / f"run_{k}.csv", data))
-    look = first_look(create_study(tmp_path / "rig", files).study)
+    look = check_data(create_study(tmp_path / "rig", files).study)
     assert [(f.run, f.channel) for f in found(look, "beyond")] == [("run_2", "voltage")]
 
 
@@ -166,7 +166,7 @@ def test_run_of_another_rig_is_found(tmp_path: Path) -> None:
         if k == 4:
             data["F [N]"] = 5.0 * data["F [N]"]
         files.append(write(tmp_path / f"run_{k}.csv", data))
-    look = first_look(create_study(tmp_path / "rig", files).study)
+    look = check_data(create_study(tmp_path / "rig", files).study)
     assert [finding.run for finding in found(look, "two rigs")] == ["run_4"]
 
 
@@ -175,7 +175,7 @@ def test_too_few_cycles_are_no_measurement(tmp_path: Path) -> None:
     x = 1e3 * 0.01 * np.sin(3.0 * t)
     force = 5.0 * np.cos(3.0 * t)
     file = write(tmp_path / "run.csv", {"t [s]": t, "x [mm]": x, "F [N]": force})
-    look = first_look(create_study(tmp_path / "rig", [file]).study)
+    look = check_data(create_study(tmp_path / "rig", [file]).study)
     assert found(look, "short")[0].level == "error"
     assert found(look, "split")[0].level == "warning"
 
@@ -220,11 +220,11 @@ def test_commands_print_and_draw(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "force" in text
     assert "it resists the motion" in text
     assert "Held out: run_2.csv" in text
-    assert main(["study", "first-look", rig]) == 0
+    assert main(["study", "check", rig]) == 0
     assert "noise" in capsys.readouterr().out
-    picture = tmp_path / "rig" / "reports" / "first_look.png"
+    picture = tmp_path / "rig" / "reports" / "data_check.png"
     assert picture.read_bytes().startswith(b"\x89PNG")
-    assert main(["study", "first-look", rig, "--json"]) == 0
+    assert main(["study", "check", rig, "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert answer["ok"] is True
     assert answer["picture"] == str(picture)
@@ -253,7 +253,7 @@ def test_undo_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Non
         (["study", "new", "rig", "--data", "nothing/*.csv"], "no file matches"),
         (["study", "new", "rig", "--data", __file__, "--law", "lugree"], '--law "lugree"'),
         (["study", "new", "rig", "--data", __file__, "--channel", "force"], "CHANNEL=COLUMN@UNIT"),
-        (["study", "first-look", "nowhere"], "no study"),
+        (["study", "check", "nowhere"], "no study"),
         (["undo", "nowhere"], "no study"),
     ],
 )
@@ -270,3 +270,18 @@ def test_wrong_commands_exit_2_and_leave_nothing(
     assert told in error
     assert "Traceback" not in error
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_old_names_work_for_one_release(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    create_study(tmp_path / "rig", write_runs(tmp_path / "lab", seconds=2.0))
+    assert main(["study", "check", str(tmp_path / "rig")]) == 0
+    told = capsys.readouterr()
+    assert main(["study", "first-look", str(tmp_path / "rig")]) == 0
+    old = capsys.readouterr()
+    assert old.out == told.out
+    assert "`bristle study check`" in old.err
+    with pytest.warns(DeprecationWarning, match="data_check"):
+        from bristle.study.first_look import first_look
+    assert first_look is check_data

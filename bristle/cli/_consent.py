@@ -1,0 +1,42 @@
+"""Asks on a terminal whether code that came with a file may run; shows it first."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from ..errors import TrustError
+
+
+def add_trust(parser: argparse.ArgumentParser) -> None:
+    """Add --trust to a command that may run effects of somebody's own."""
+    text = "consent to the code of effects that came with a study or scenario; it is remembered"
+    parser.add_argument("--trust", action="store_true", help=text)
+
+
+def given(error: TrustError) -> bool:
+    """Return whether the user consents to a text that is shown, and remember that.
+
+    Nobody is asked where the input or the messages are no terminal.
+    """
+    if not error.text or not (sys.stdin.isatty() and sys.stderr.isatty()):
+        return False
+    from ..trust import remember
+
+    print(f"{error.path} has not run on this machine before:\n", file=sys.stderr)
+    for line in plain(error.text).splitlines():
+        print(f"    {line}", file=sys.stderr)
+    print("\nIt runs with your rights. Run it, and remember that? [y/N] ", end="", file=sys.stderr)
+    sys.stderr.flush()
+    if sys.stdin.readline().strip().lower() not in ("y", "yes"):
+        return False
+    remember(error.path, error.text)
+    return True
+
+
+def plain(text: str) -> str:
+    """Return a text in which nothing hides: what moves the cursor or turns writing is spelled."""
+    return "".join(
+        one if one in "\n\t" or one.isprintable() else one.encode("unicode_escape").decode()
+        for one in text
+    )

@@ -1,0 +1,81 @@
+"""The commands that make a study again: from its files, step by step, to its report."""
+
+from __future__ import annotations
+
+import shlex
+from typing import TYPE_CHECKING
+
+from ..data.model import read_model
+from ..findings import command
+
+if TYPE_CHECKING:
+    from ..data.channels import ChannelSpec
+    from ..study.history import Step
+    from ..study.study import Study
+
+AGAIN = "_again"
+"""What the name of the study that is made anew ends with."""
+
+
+def commands(study: Study) -> list[str]:
+    """Return the lines of a shell that make a study again beside it, from the folder above.
+
+    What the history did by hand is copied; everything else is computed anew.
+    """
+    old = study.name
+    new = old + AGAIN
+    lines = [_new(study, old, new), _copy(f"{old}/study.toml", f"{new}/study.toml")]
+    for file in sorted(study.effects_folder.glob("*.py")):
+        lines.append(_copy(f"{old}/effects/{file.name}", f"{new}/effects/{file.name}"))
+    lines.append(command("study", "check", new))
+    law = ""
+    for step in study.steps():
+        lines += _step(step, old, new, law)
+        law = _law(study, step)
+    return [*lines, *(command(word, new) for word in ("compare", "diagnose", "report"))]
+
+
+def _new(study: Study, old: str, new: str) -> str:
+    """Return the command that makes the study; its channels are given, not guessed again."""
+    settings, first = study.settings, study.history.model_file(0)
+    words = ["study", "new", new, "--data", *(f"{old}/{run.file}" for run in settings.runs)]
+    if settings.rig != "bench":
+        words += ["--rig", settings.rig]
+    if first.is_file():
+        model = read_model(first, study.folder, to_show=True)
+        words += ["--law", model.law]
+        if model.building:
+            words += ["--building", f"{old}/{model.building}"]
+    for name, spec in settings.channels.items():
+        words += _channel(name, spec)
+    return command(*words)
+
+
+def _channel(name: str, spec: ChannelSpec) -> list[str]:
+    if spec.step is not None:
+        return ["--step", f"{spec.step:g}"]
+    unit = f"@{spec.unit}" if spec.unit else ""
+    return ["--channel", f"{name}={'-' if spec.sign < 0 else ''}{spec.column}{unit}"]
+
+
+def _step(step: Step, old: str, new: str, law: str) -> list[str]:
+    """Return what makes a step of the history again; nothing for the first model."""
+    verb, _, rest = step.what.partition(" ")
+    if verb == "begin":
+        return []
+    if verb == "add":
+        return [command("add", new, *rest.split(", "))]
+    if step.what == "identify the building":
+        return [command("identify", new, "--structure")]
+    if verb == "identify":
+        other = rest.split(" + ")[0]
+        return [command("identify", new, *(["--law", other] if other != law else []))]
+    return [_copy(f"{old}/history/{step.number:03d}/model.toml", f"{new}/model.toml")]
+
+
+def _law(study: Study, step: Step) -> str:
+    return read_model(study.history.model_file(step.number), study.folder, to_show=True).law
+
+
+def _copy(source: str, target: str) -> str:
+    return shlex.join(["cp", source, target])

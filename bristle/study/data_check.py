@@ -1,0 +1,187 @@
+"""The data check: what to mend in a study's measurements before any model, what cannot be told."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..data.checks.channels import check_channels
+from ..data.checks.finding import Finding, grouped, sentence
+from ..data.checks.motion import check_force, check_motion, velocity_of_run
+from ..data.checks.runs import Excitation, check_runs
+from ..data.measurement import Measurement
+from ..data.relation import band
+from .study import Study
+
+_HEADINGS = {"error": "To mend", "warning": "To know", "note": "Noted"}
+
+
+@dataclass(frozen=True)
+class DataCheck:
+    """What is found, worst first, and what each run excites."""
+
+    findings: tuple[Finding, ...]
+    excitations: tuple[Excitation, ...]
+    runs: tuple[Measurement, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing must be mended first."""
+        return all(finding.level != "error" for finding in self.findings)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return all of it as JSON has it."""
+        return {
+            "ok": self.ok,
+            "findings": [finding.as_dict() for finding in self.findings],
+            "runs": [
+                {
+                    **asdict(excitation),
+                    "rate": run.sampling.rate,
+                    "samples": len(run.time),
+                    "noise": run.noise,
+                    "noise_colour": {
+                        channel: facts.colour if facts else "given"
+                        for channel, facts in run.noise_facts.items()
+                    },
+                    "ranges": {
+                        channel: [float(values.min()), float(values.max())]
+                        for channel, values in run.channels.items()
+                    },
+                }
+                for run, excitation in zip(self.runs, self.excitations, strict=True)
+            ],
+        }
+
+    def text(self) -> str:
+        """Return the channels in a table, then the findings, runs that share one joined."""
+        lines = _table(self.runs)
+        last = ""
+        for finding, runs in grouped(self.findings):
+            if finding.kind == "noise" and finding.level == "note":
+                continue  # in the table
+            if finding.level != last:
+                last = finding.level
+                lines += ["", f"{_HEADINGS[last]}:"]
+            lines.append(f"  - {sentence(finding, runs)}")
+            if finding.do:
+                lines.append(f"    {finding.do}")
+        return "\n".join(lines)
+
+
+def _table(runs: tuple[Measurement, ...]) -> list[str]:
+    """Return one line per channel: unit, range over all runs, noise in the middle one."""
+    lines = [f"{'channel':28} {'unit':6} {'lowest':>11} {'highest':>11} {'noise':>9} {'of RMS':>8}"]
+    for channel in dict.fromkeys(channel for run in runs for channel in run.channels):
+        there = [run for run in runs if channel in run.channels]
+        low = min(float(run[channel].min()) for run in there)
+        high = max(float(run[channel].max()) for run in there)
+        noise = float(np.median([run.noise.get(channel, 0.0) for run in there]))
+        rms = float(np.median([np.std(run[channel]) for run in there]))
+        share = f"{100.0 * noise / rms:8.2g}" if rms > 0.0 else f"{'':>8}"
+        colours = [facts.colour for run in there if (facts := run.noise_facts.get(channel))]
+        colour = max(set(colours), key=colours.count) if colours else "given"
+        lines.append(
+            f"{channel:28} {there[0].units[channel]:6} {low:11.4g} {high:11.4g} {noise:9.2g} "
+            f"{share} % {colour}"
+        )
+    return lines
+
+
+def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataCheck:
+    """Check all measurements of a study.
+
+    Parameters
+    ----------
+    study : Study
+    show : callable, optional
+        Is told how many runs are done.
+
+    Raises
+    ------
+    RecordError, StudyError
+        If a file cannot be read, or runs cannot be told apart.
+    """
+    runs = study.runs()
+    level = ""
+    if study.settings.has_building:
+        level = damper_level(runs.all)
+    findings = [Finding("split", "warning", note) for note in runs.notes]
+    for done, run in enumerate(runs.all, 1):
+        findings += _check_run(run, level)
+        if show:
+            show(done)
+    together, excitations = check_runs(runs.train, runs.holdout, level)
+    findings += together
+    if study.settings.has_building:
+        findings += _unmeasured(runs.all)
+    findings = [_milder(finding, runs.all) for finding in findings]
+    ordered = [finding for level in _HEADINGS for finding in findings if finding.level == level]
+    return DataCheck(tuple(ordered), tuple(excitations), tuple(runs.all))
+
+
+def damper_level(runs: list[Measurement]) -> str:
+    """Return the level that the damper acts on: the base, else floor 1."""
+    based = any(name.startswith("base_") for run in runs for name in run.channels)
+    return "base" if based else "floor1"
+
+
+def _check_run(run: Measurement, level: str) -> list[Finding]:
+    velocity = velocity_of_run(run, level)
+    findings = [*check_channels(run, velocity), *check_motion(run, level)]
+    for other in _other_levels(run, level):
+        findings += check_motion(run, other)
+    if "force" in run.channels and velocity is not None:
+        findings += check_force(run, velocity)
+    filled = float(np.mean(~run.measured))
+    if filled > 0.05:
+        text = f"{100 * filled:.2g} % of the samples were missing and are filled."
+        findings.append(
+            Finding("filled", "warning", text, "Record at a steady rate.", run.name, value=filled)
+        )
+    if velocity is not None and np.ptp(velocity) > 0.0:
+        top = band(velocity, run.step)
+        if top > 0.2 / run.step:
+            text = (
+                f"motion reaches {top / 1.5:.3g} Hz at {run.sampling.rate:.4g} samples per second: "
+                "fewer than ten per period."
+            )
+            findings.append(
+                Finding("rate", "warning", text, "Sample faster.", run.name, value=top * run.step)
+            )
+    return findings
+
+
+def _milder(finding: Finding, runs: list[Measurement]) -> Finding:
+    """Return a channel's standing still as a warning where it moves in other runs."""
+    moves = any(np.ptp(run.channels.get(finding.channel, np.zeros(1))) > 0.0 for run in runs)
+    if finding.kind == "still" and moves:
+        return replace(finding, level="warning", do="Leave it out, unless it is meant to rest.")
+    return finding
+
+
+def _other_levels(run: Measurement, level: str) -> list[str]:
+    if not level:
+        return []
+    names = [name.rpartition("_displacement")[0] for name in run.channels]
+    return [name for name in names if name and name != level]
+
+
+def _unmeasured(runs: list[Measurement]) -> list[Finding]:
+    findings = []
+    there = set.intersection(*(set(run.channels) for run in runs))
+    if "ground_acceleration" not in there:
+        text = "the ground's acceleration was not measured: the structure's response has no input."
+        do = "Name its column in [channels.ground_acceleration]."
+        findings.append(Finding("ground", "error", text, do))
+    if "force" not in there:
+        text = (
+            "the damper's force was not measured: it is reconstructed from the equilibrium of the "
+            "base, and base_friction, a duffing spring and the base's mass cannot be told from it."
+        )
+        do = "Put a load cell between damper and base."
+        findings.append(Finding("force", "warning", text, do))
+    return findings

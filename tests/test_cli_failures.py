@@ -1,0 +1,178 @@
+"""What the command line does when something goes wrong that nobody foresaw, and on Ctrl-C."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from study.made import write_runs
+
+from bristle.cli import main
+from bristle.study import create_study
+from bristle.study.study import Study
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Path:
+    return create_study(tmp_path / "rig", write_runs(tmp_path / "lab", seconds=2.0)).study.folder
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """Return the digests of a folder's files, locks aside."""
+    return {
+        str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and path.name != ".lock"
+    }
+
+
+def test_an_error_that_nobody_foresaw_is_one_line_with_a_file(
+    rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("BRISTLE_STATE", str(tmp_path / "state"))
+
+    def broken(study: Study, role: str | None = None) -> None:
+        raise ZeroDivisionError("float\ndivision by zero")
+
+    monkeypatch.setattr(Study, "read", broken)
+    before = digests(rig)
+    assert main(["diagnose", str(rig)]) == 1
+    told = capsys.readouterr()
+    assert told.out == ""
+    (line,) = told.err.splitlines()
+    assert "bristle diagnose" in line
+    assert "ZeroDivisionError: float division by zero" in line
+    file = Path(line.rpartition(": ")[2])
+    assert file.parent == tmp_path / "state" / "errors"
+    kept = file.read_text(encoding="utf-8")
+    assert "Traceback (most recent call last)" in kept
+    assert "in broken" in kept
+    assert digests(rig) == before
+    with pytest.raises(ZeroDivisionError):
+        main(["diagnose", str(rig), "--debug"])
+
+
+def test_a_failure_between_two_writes_leaves_the_study_whole(
+    rig: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from bristle.study import history
+
+    study = Study(rig)
+    study.add_step("add stribeck", "to see", study.model().with_effect("stribeck"))
+    before = {k: v for k, v in digests(rig).items() if not k.startswith("history/.")}
+
+    def full(path: Path, data: object) -> None:
+        raise RuntimeError("no such thing")
+
+    monkeypatch.setattr(history, "write_json", full)
+    assert main(["undo", str(rig)]) == 1
+    monkeypatch.undo()
+    assert "RuntimeError: no such thing" in capsys.readouterr().err
+    again = Study(rig)
+    assert [step.what for step in again.steps()][-1] == "add stribeck"
+    assert {k: v for k, v in digests(rig).items() if not k.startswith("history/.")} == before
+    assert main(["undo", str(rig)]) == 0
+
+
+def test_where_no_folder_can_be_written_the_line_says_so(
+    rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("BRISTLE_STATE", str(tmp_path / "file"))
+    monkeypatch.setattr("tempfile.gettempdir", lambda: str(tmp_path / "file"))
+    monkeypatch.setattr(Study, "undo", lambda self: 1 // 0)
+    assert main(["undo", str(rig)]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--debug shows it" in line
+
+
+def test_only_the_last_tracebacks_are_kept(
+    rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BRISTLE_STATE", str(tmp_path / "state"))
+    folder = tmp_path / "state" / "errors"
+    folder.mkdir(parents=True)
+    for number in range(30):
+        (folder / f"20200101-0000{number:02d}-1.txt").touch()
+    monkeypatch.setattr(Study, "undo", lambda self: 1 // 0)
+    assert main(["undo", str(rig)]) == 1
+    assert len(list(folder.glob("*.txt"))) == 20
+
+
+KERNEL = """
+        from bristle.jit import compiled
+
+        def spin(n):
+            total = 0.0
+            for i in range(n):
+                total += 1.0 / (1.0 + total * i)
+            return total
+
+        kernel = compiled(spin, keep=False)
+        kernel(10)
+        print("in", flush=True)
+        kernel(10**13)
+"""
+STUCK = {
+    "compiled code": KERNEL,
+    "compiled code, with other processes": """
+        import multiprocessing, time
+        for _ in range(2):
+            multiprocessing.get_context("fork").Process(target=time.sleep, args=(60,)).start()
+    """
+    + KERNEL,
+    "python": """
+        print("in", flush=True)
+        while True:
+            pass
+    """,
+}
+
+
+def alive(group: int) -> list[str]:
+    """Return the processes of a group that have not ended."""
+    command = ["ps", "-A", "-o", "pgid=,stat="]
+    rows = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
+    return [row for row in rows if row.split()[0] == str(group) and "Z" not in row.split()[1]]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C cannot be sent to one process")
+@pytest.mark.parametrize("what", STUCK)
+def test_ctrl_c_is_answered_within_two_seconds(what: str, tmp_path: Path) -> None:
+    body = "\n".join(f"    {line}" for line in STUCK[what].splitlines())
+    code = f"""
+import bristle.cli.undo as command
+from bristle.cli import main
+
+def work(arguments):
+    if True:
+{body}
+
+command.main = work
+raise SystemExit(main(["undo", "rig"]))
+"""
+    file = tmp_path / "stuck.py"
+    file.write_text(code)
+    child = subprocess.Popen(
+        [sys.executable, str(file)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        start_new_session=True,
+    )  # fmt: skip
+    assert child.stdout is not None
+    assert child.stdout.readline() == "in\n"
+    time.sleep(0.2)
+    began = time.perf_counter()
+    os.kill(child.pid, signal.SIGINT)
+    _, told = child.communicate(timeout=60)
+    assert time.perf_counter() - began < 2.0 + 1.0  # a busy machine takes its time
+    assert child.returncode == 130
+    assert told.strip().splitlines() == ["interrupted"]
+    deadline = time.monotonic() + 5.0
+    while alive(child.pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert not alive(child.pid)
