@@ -24,6 +24,22 @@ STILL = 1e-8
 Values = Mapping[str, float]
 
 
+NAMES = {
+    "bingham": {"f_c": "Y_0", "f_v": "Y_1", "c_0": "D_0", "c_v": "D_1", "v_n": "w_n"},
+    "lugre": {"sigma_2": "D_0", "sigma_b": "D_1", "v_n": "w_n", "sigma_1": "c"},
+}
+"""The library's names of values that are the same in both."""
+
+
+def in_library_names(law: str, values: Values) -> dict[str, float]:
+    """Return the values of a damper under the names, and in the form, that the library gives."""
+    same = {name: values[own] for name, own in NAMES[law].items()}
+    if law == "bingham":
+        return same
+    bent = {"sigma_a": values["Y_0"], "sigma_0": values["Y_1"], "a_0": 1.0}
+    return {name: value / values["l"] for name, value in bent.items()} | same
+
+
 @dataclass
 class Damper:
     """A damper with what is hidden in it; states are a plain list in the order of `states`.

@@ -39,6 +39,16 @@ class Hidden:
     outside: bool = False
 
 
+UNITS = {
+    "gas_k": "N/m", "gas_length": "m", "gas_power": "1", "orifice": "N (s/m)^1.75",
+    "orifice_power": "1", "valve_ratio": "1", "valve_speed": "m/s", "creep_rise": "1",
+    "creep_speed": "m/s", "thinning": "s/m", "heat_capacity": "J", "heat_tau": "s",
+    "fluid_mass": "kg", "mount_k": "N/m", "mount_c": "N.s/m", "mount_mass": "kg", "coil_tau": "s",
+    "field_limit": "V", "spring_5": "N/m5", "rub": "N", "crack_drift": "m", "stop_gap": "m",
+    "stop_k": "N/m", "bore_loss": "1", "bore_length": "m", "ripple": "N", "ripple_length": "m",
+}  # fmt: skip
+"""Units of everything that `draw` of a hidden effect gives."""
+
 BENCH, TOWER, BOTH = ("bench",), ("building",), ("bench", "building")
 
 
@@ -92,7 +102,7 @@ def _field(rng: np.random.Generator, _s: Scales) -> Values:
 
 
 def _hardening(rng: np.random.Generator, s: Scales) -> Values:
-    at_stroke = rng.uniform(0.35, 0.5) * s.force  # N, at 0.6 of the stroke
+    at_stroke = rng.uniform(1.0, 1.4) * s.force  # N, at 0.6 of the stroke
     return {"spring_5": at_stroke / (0.6 * s.stroke) ** 5}
 
 

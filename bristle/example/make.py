@@ -17,8 +17,8 @@ from ..study.create import create_study
 from ..study.study import Study
 from . import bench, tower
 from .bench import Signals
-from .damper import Damper
-from .hidden import Hidden, Scales, Values, choose
+from .damper import Damper, in_library_names
+from .hidden import UNITS, Hidden, Scales, Values, choose
 from .sealed import seal
 
 Array = NDArray[np.float64]
@@ -90,7 +90,8 @@ def make_bench(folder: Path | str, choice: Choice) -> Study:
     runs = [bench.perform(damper, motion, volts, scales) for _, motion, volts in plan]
     plain = [bench.perform(bare, motion, volts, scales) for _, motion, volts in plan]
     answer = _answer("bench", law, choice, hidden) | {
-        "values": secret, "base": values, "share": bench.share(runs, plain),
+        "values": _with_units(secret), "base": in_library_names(law, values),
+        "share": bench.share(runs, plain),
     }  # fmt: skip
     shown = _recorded(dict(zip([name for name, *_ in plan], runs, strict=True)), choice, noise)
     return _written(Path(folder), shown, answer, DESCRIBED["bench"], "A damper on a bench")
@@ -122,7 +123,9 @@ def make_building(folder: Path | str, choice: Choice, *, load_cell: bool = True)
     runs = {name: rig.perform(ground, volts) for name, ground, volts in plan}
     if not load_cell:
         runs = {name: _without(run, "force") for name, run in runs.items()}
-    answer = _answer("building", law, choice, hidden) | {"values": secret, "base": values}
+    answer = _answer("building", law, choice, hidden) | {
+        "values": _with_units(secret), "base": in_library_names(law, values),
+    }  # fmt: skip
     shown = _recorded(runs, choice, noise)
     text = DESCRIBED["building"] if load_cell else DESCRIBED["building"].replace(CELL, NO_CELL)
     return _written(
@@ -179,6 +182,10 @@ def _answer(rig: str, law: str, choice: Choice, hidden: list[Hidden]) -> dict[st
         "outside": [one.name for one in hidden if one.outside],
         "about": {one.name: one.about for one in hidden},
     }
+
+
+def _with_units(values: Values) -> dict[str, tuple[float, str]]:
+    return {name: (value, UNITS[name]) for name, value in values.items()}
 
 
 def _recorded(

@@ -24,8 +24,9 @@ def seal(folder: Path, answer: Mapping[str, Any]) -> None:
     folder : Path
         The study.
     answer : mapping
-        `rig`, `law`, `noise`, `seed`, `hidden` (names), `about` (name to words), `values` (SI),
-        `base` (the law's own values), `share`, where it is known, [1].
+        `rig`, `law`, `noise`, `seed`, `hidden` (names), `about` (name to words), `values`
+        (name to value in SI and unit), `base` (the law's values by the library's names, SI),
+        `share`, where it is known, [1].
     """
     code = base64.b64encode(json.dumps(answer).encode()).decode()
     (folder / FILE).parent.mkdir(exist_ok=True)
@@ -70,11 +71,14 @@ def told(answer: Mapping[str, Any], found: tuple[str, ...], kind: str) -> str:
     hidden = answer["hidden"]
     lines = [f"Hidden: {' and '.join(hidden) or 'nothing'}."]
     lines += [f"  {name}: {about}" for name, about in answer["about"].items()]
-    lines += [f"    {name:14} {value:.4g}" for name, value in answer["values"].items()]
+    lines += [
+        f"    {name:14} {value:.4g} {'' if unit == '1' else unit}".rstrip()
+        for name, (value, unit) in answer["values"].items()
+    ]
     if answer.get("share"):
         lines.append(f"  It changes the force by {100 * answer['share']:.0f} % of its RMS.")
-    lines.append(f"The law is {answer['law']}:")
-    lines += [f"    {name:14} {value:.4g}" for name, value in answer["base"].items()]
+    base = ", ".join(f"{name} = {value:.4g}" for name, value in answer["base"].items())
+    lines += [f"The law is {answer['law']}, in SI units:", f"    {base}"]
     said = " and ".join(found) or "no effect"
     verdict = f'verdict "{kind}"' if kind else "no verdict yet"
     lines += ["", f"Your study: {said}; {verdict}."]

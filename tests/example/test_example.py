@@ -13,11 +13,12 @@ import pytest
 from bristle.cli import main
 from bristle.errors import StudyError
 from bristle.example import bench, excitation, make, tower
-from bristle.example.damper import Damper
-from bristle.example.hidden import HIDDEN, Scales, able, choose
+from bristle.example.damper import Damper, in_library_names
+from bristle.example.hidden import HIDDEN, UNITS, Scales, able, choose
 from bristle.example.make import CENTRE, Choice, make_bench
 from bristle.example.sealed import FILE, seal, unseal
 from bristle.physics.effect import EFFECTS
+from bristle.physics.laws import LAWS
 from tests.test_imports import ROOT, imported
 
 SCALES = Scales(10.0, 0.18, 0.02, 0.02, drift=5e-3)
@@ -147,6 +148,20 @@ def test_half_the_tolerance_changes_the_response_by_far_less_than_its_noise() ->
     for name in ("force", "base_acceleration_absolute"):
         change = np.sqrt(np.mean((rough[name] - fine[name]) ** 2))
         assert change < 1e-3 * np.sqrt(np.mean(fine[name] ** 2))
+
+
+@pytest.mark.parametrize("name", list(HIDDEN))
+def test_every_hidden_value_has_a_unit(name: str) -> None:
+    assert set(secret(name)) <= set(UNITS)
+
+
+@pytest.mark.parametrize("law", sorted(CENTRE))
+def test_the_revealed_values_are_those_of_the_library_for_the_same_force(law: str) -> None:
+    told = in_library_names(law, CENTRE[law])
+    model = LAWS[law]
+    assert set(told) == {name for name in model.parameters if name != "exponent"}
+    defaults = {name: model.parameters[name].value for name in told}
+    assert told == pytest.approx(defaults)  # an example's table is that of the library's damper
 
 
 def test_a_seed_draws_one_that_the_rig_can_have() -> None:
