@@ -1,4 +1,4 @@
-"""Pages of components, effects and the API, made from the code.
+"""Pages of components, effects, laws, commands and the API, made from the code.
 
 As a hook of mkdocs it hands the pages over in memory; `python docs/generate.py FOLDER` writes them
 as files.
@@ -15,14 +15,16 @@ from typing import TYPE_CHECKING, Any
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
+from commands import command_page
 from pictures import picture
 from reference import api_page
+from tables import table as _table
 
 from bristle.cli.effects import tell
 from bristle.fmu import catalogue
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
-from bristle.physics.laws import LAWS
+from bristle.physics.laws import DEFAULT, LAWS, Law, law_names, laws_of
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -30,7 +32,7 @@ if TYPE_CHECKING:
 
     from bristle.fmu.description import Description, Variable
 
-SECTIONS = ("components", "effects")
+SECTIONS = ("components", "effects", "laws")
 
 
 def pages() -> dict[str, str]:
@@ -41,6 +43,10 @@ def pages() -> dict[str, str]:
         made[f"components/{name}.md"] = component_page(name)
     for name in sorted(EFFECTS):
         made[f"effects/{name}.md"] = effect_page(name)
+    made["laws/index.md"] = _law_index()
+    for law in laws_of("damper"):
+        made[f"laws/{law.name}.md"] = law_page(law)
+    made["cli.md"] = command_page()
     return made
 
 
@@ -99,6 +105,45 @@ def effect_page(name: str) -> str:
     parts += ["## Source", f"{told['source']}."]
     parts += _use_of(name, effect.site, told)
     return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def law_page(law: type[Law]) -> str:
+    """Return the page of a damper's law: formula, parameters, the effects that join it, source."""
+    parts = [f"# {law.name}", _formula(law.__doc__ or "")]
+    rows = [
+        [f"`{key}`", f"{p.value:g}", _unit(p.unit), _span(*p.bounds), p.text]
+        for key, p in law.parameters.items()
+    ]
+    parts += ["## Parameters", _table(["name", "value", "unit", "bounds", "meaning"], rows)]
+    if law.states:
+        states = ", ".join(f"`{key}` [{unit}]" for key, unit in law.states.items())
+        parts.append(f"State: {states}.")
+    if law.variants:
+        names = ", ".join(f"`{law.name}_{suffix}`" for suffix in law.variants)
+        parts.append(f"Variants: {names}.")
+    joining = [name for name in sorted(EFFECTS) if law.name in tell(EFFECTS[name])["laws"]]
+    links = ", ".join(f"[{name}](../effects/{name}.md)" for name in joining)
+    parts += ["## Effects that join it", f"{links}."]
+    parts += ["## Source", f"{law.source}."]
+    parts += ["## Use it", f"In a study: `bristle identify STUDY --law {law.name}`."]
+    return "\n\n".join(parts) + "\n"
+
+
+def _law_index() -> str:
+    rows = [
+        [
+            f"[{law.name}]({law.name}.md)",
+            (law.__doc__ or "").strip().splitlines()[0].split(": f")[0],
+        ]
+        for law in laws_of("damper")
+    ]
+    variants = ", ".join(f"`{name}`" for name in law_names() if name not in LAWS)
+    return (
+        "# Laws\n\nThe base models of a damper, each in one file. Effects join them. "
+        f"A study begins with `{DEFAULT}` unless you say another one.\n\n"
+        + _table(["law", "what it is"], rows)
+        + f"\n\nVariants: {variants}.\n"
+    )
 
 
 def _use_of(name: str, site: str, told: dict[str, Any]) -> list[str]:
@@ -226,13 +271,6 @@ def _span(low: float | None, high: float | None) -> str:
     return "" if low is None or high is None else f"{low:g} to {high:g}"
 
 
-def _table(titles: list[str], rows: list[list[str]]) -> str:
-    """Return a Markdown table."""
-    lines = [titles, ["---"] * len(titles), *rows]
-    cells = [[cell.replace("|", "\\|") for cell in row] for row in lines]
-    return "\n".join("| " + " | ".join(row) + " |" for row in cells)
-
-
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the generated pages (a hook of mkdocs)."""
     from mkdocs.structure.files import File
@@ -247,13 +285,18 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Fill the sections of the generated pages in the navigation (a hook of mkdocs)."""
-    made = pages()
-    for entry in config.nav or []:
-        for title, target in list(entry.items()):
-            section = str(target).rstrip("/")
-            if section in SECTIONS:
-                entry[title] = [path for path in made if path.startswith(f"{section}/")]
+    _fill(config.nav or [], list(pages()))
     return config
+
+
+def _fill(entries: list[dict[str, Any]], made: list[str]) -> None:
+    """Put the generated pages of a section in its place, at any depth of the navigation."""
+    for entry in entries:
+        for title, target in list(entry.items()):
+            if isinstance(target, list):
+                _fill(target, made)
+            elif (section := str(target).rstrip("/")) in SECTIONS:
+                entry[title] = [path for path in made if path.startswith(f"{section}/")]
 
 
 if __name__ == "__main__":

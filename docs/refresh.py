@@ -9,6 +9,7 @@ import sys
 import tempfile
 from pathlib import Path
 
+import first_picture
 import snippets
 
 ROOT = snippets.ROOT
@@ -25,6 +26,7 @@ def figures() -> None:
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        first_picture.main(folder / "hidden_effect.png")
         run_figure(bristle.run("el_centro_lugre_passive"), folder / "el_centro_lugre_passive.png")
         for figure in paper_figures():
             make(figure, folder)

@@ -218,7 +218,7 @@ def _call(
         env=environment,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=900,
         check=False,
     )
     # Tables are padded to their width; pages need no blanks at the ends of lines.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import importlib.util
 import re
 import subprocess
@@ -16,6 +17,7 @@ from bristle.cli import build_parser
 from bristle.fmu import catalogue
 from bristle.paper.figures import paper_figures
 from bristle.physics.effect import EFFECTS
+from bristle.physics.laws import laws_of
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -127,6 +129,48 @@ def test_every_effect_has_a_page_with_text_parameters_and_source() -> None:
         assert body in text
         for parameter, about in effect.parameters.items():
             assert f"| `{name}.{parameter}` | {about.value:g} |" in text
+
+
+def test_every_command_has_a_section_with_all_its_options() -> None:
+    text = generate.pages()["cli.md"]
+    commands = next(a for a in build_parser()._actions if a.dest == "command").choices
+    assert commands is not None
+    for name, parser in commands.items():
+        _, found, section = text.partition(f"\n## bristle {name}\n")
+        assert found, name
+        section = section.partition("\n## ")[0]
+        for action in parser._actions:
+            option = next((one for one in action.option_strings if one.startswith("--")), "")
+            if option and action.help != argparse.SUPPRESS and option != "--help":
+                assert option in section or f"`{option}`" in text[:400], f"{name} {option}"
+
+
+def test_every_law_has_a_page_with_its_parameters_and_source() -> None:
+    pages = generate.pages()
+    for law in laws_of("damper"):
+        text = pages[f"laws/{law.name}.md"]
+        assert law.source in text
+        assert all(f"| `{name}` |" in text for name in law.parameters)
+
+
+def test_tutorials_need_nothing_of_a_checkout() -> None:
+    tutorials = sorted(DOCS.glob("tutorial_*.md"))
+    assert len(tutorials) >= 3
+    for page in [*tutorials, DOCS / "first_study.md", DOCS / "own_effect.md"]:
+        for block in snippets.blocks(page.read_text(encoding="utf-8")):
+            if block.language == "console":
+                assert "tests" not in block.body
+                assert "python " not in block.body
+
+
+def test_the_first_pages_begin_with_the_picture_and_the_commands_that_make_it() -> None:
+    picture = load("first_picture")
+    command = " && ".join(f"bristle {one}" for one in picture.COMMANDS)
+    for page in (ROOT / "README.md", DOCS / "index.md"):
+        beginning = page.read_text(encoding="utf-8")[:1500]
+        assert "figures/hidden_effect.png" in beginning
+        assert command in beginning
+    assert (DOCS / "figures" / "hidden_effect.png").is_file()
 
 
 def test_tables_of_generated_pages_are_whole() -> None:

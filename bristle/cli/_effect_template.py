@@ -19,7 +19,7 @@ class {cls}(Effect):
     name = "{name}"
 
     # "damper": between rod and fluid. "structure": base and storeys. "sensor": an instrument. With
-    # sites = ("damper", "structure") it is of both: it then reads x, v, dt, energy, halt, stiffness.
+    # sites = ("damper", "structure") it is of both: it reads x, v, dt, energy, halt, stiffness.
     sites = ("damper",)
 
     # The signals that the hooks below read from q. A damper offers x [m], v [m/s], a [m/s2] across

@@ -12,8 +12,8 @@ from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS, law_names
 
 PACKAGE = Path(__file__).resolve().parents[2] / "bristle"
-EXEMPT = ("physics", "paper")
-"""Where laws and effects are at home, and where a published model is rebuilt by name."""
+EXEMPT = ("physics", "paper", "example")
+"""Where laws and effects are at home, where a published model is rebuilt, where one is hidden."""
 
 KINDS = {
     "effects": set(EFFECTS),

@@ -1,0 +1,138 @@
+"""Make a study of a rig with something hidden in it, to try the commands on."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+HELP = "studies to try things on: measurements of a rig with a hidden effect"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle example`."""
+    commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    shown = commands.add_parser("list", help="what can be hidden in which rig")
+    shown.add_argument("--json", action="store_true", help="print as JSON")
+    shown.set_defaults(act=_list)
+    bench = commands.add_parser("bench", help="an MR damper on a test bench")
+    _add_choices(bench)
+    bench.set_defaults(act=_bench)
+    building = commands.add_parser("building", help="a base-isolated building on a shake table")
+    _add_choices(building)
+    building.add_argument(
+        "--no-load-cell", action="store_true", help="leave the damper's force out of the files"
+    )
+    building.set_defaults(act=_building)
+    reveal = commands.add_parser("reveal", help="what was hidden, beside what the study found")
+    reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
+    reveal.add_argument("--json", action="store_true", help="print the answer as JSON")
+    reveal.set_defaults(act=_reveal)
+
+
+def _add_choices(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study's folder to make")
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="hide this, see bristle example list; give it twice for two; else the seed draws one",
+    )
+    parser.add_argument("--none", action="store_true", help="hide nothing")
+    parser.add_argument(
+        "--outside", action="store_true", help="hide something that no effect of the library is"
+    )
+    parser.add_argument("--law", default="", help="law of the damper: bingham or lugre")
+    parser.add_argument(
+        "--noise", type=float, default=0.01, metavar="SHARE",
+        help="noise on every channel as a share of its RMS; 0.01 by default",
+    )  # fmt: skip
+    parser.add_argument("--seed", type=int, default=1, help="draws the rig; 1 by default")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Run one action on examples."""
+    return int(arguments.act(arguments))
+
+
+def _list(arguments: argparse.Namespace) -> int:
+    from ..example.hidden import HIDDEN
+
+    rows = [
+        {
+            "name": one.name, "rigs": list(one.rigs), "laws": list(one.laws),
+            "outside": one.outside, "about": one.about,
+        }
+        for one in HIDDEN.values()
+    ]  # fmt: skip
+    if arguments.json:
+        import json
+
+        print(json.dumps(rows, indent=2))
+        return 0
+    print(f"{'hidden effect':20} {'in':16} what it is")
+    for one in HIDDEN.values():
+        print(f"{one.name:20} {', '.join(one.rigs):16} {one.about}")
+        if one.laws:
+            print(f"{'':37} (laws {', '.join(one.laws)})")
+    outside = ", ".join(one.name for one in HIDDEN.values() if one.outside)
+    print(f"\nNo effect of the library: {outside}. Draw one of them with --outside.")
+    print("Make one:  bristle example bench my_rig")
+    return 0
+
+
+def _bench(arguments: argparse.Namespace) -> int:
+    from ..example.make import make_bench
+
+    make_bench(arguments.folder, _choice(arguments))
+    return _made(arguments.folder)
+
+
+def _building(arguments: argparse.Namespace) -> int:
+    from ..example.make import make_building
+
+    make_building(arguments.folder, _choice(arguments), load_cell=not arguments.no_load_cell)
+    return _made(arguments.folder)
+
+
+def _choice(arguments: argparse.Namespace):  # type: ignore[no-untyped-def]
+    from ..example.make import Choice
+
+    return Choice(
+        effects=tuple(arguments.effect),
+        law=arguments.law,
+        noise=arguments.noise,
+        seed=arguments.seed,
+        nothing=arguments.none,
+        outside=arguments.outside,
+    )
+
+
+def _made(folder: Path) -> int:
+    from ..example.sealed import FILE
+    from ..study.study import Study
+
+    runs = Study(folder).settings.runs
+    held = sum(run.role == "holdout" for run in runs)
+    print(f"{folder}: a study of {len(runs) - held} runs for training and {held} held out.")
+    print(f"What is hidden in it stands in {folder / FILE}.")
+    print(f"Next:  bristle study auto {folder}")
+    return 0
+
+
+def _reveal(arguments: argparse.Namespace) -> int:
+    from ..example.sealed import told, unseal
+    from ..study.study import Study
+
+    answer = unseal(arguments.folder)
+    study = Study(arguments.folder)
+    verdict = study.verdict() or {}
+    named = [*study.model().effects, *verdict.get("effects", [])]
+    found, kind = tuple(dict.fromkeys(named)), str(verdict.get("kind", ""))
+    if arguments.json:
+        import json
+
+        print(json.dumps(answer | {"found": list(found), "verdict": kind}, indent=2))
+    else:
+        print(told(answer, found, kind))
+    return 0

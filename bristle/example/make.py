@@ -1,0 +1,293 @@
+"""An example as a study: measurement files, a description, and the sealed answer."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.files import write_whole
+from ..errors import StudyError
+from ..study.create import create_study
+from ..study.study import Study
+from . import bench, tower
+from .bench import Signals
+from .damper import Damper, in_library_names
+from .hidden import UNITS, Hidden, Scales, Values, choose
+from .sealed import seal
+
+Array = NDArray[np.float64]
+
+CENTRE = {
+    "bingham": {"Y_0": 1.3, "Y_1": 0.83, "D_0": 100.0, "D_1": 20.0, "w_n": 0.02},
+    "lugre": {"Y_0": 1.3, "Y_1": 0.83, "D_0": 100.0, "D_1": 20.0, "w_n": 0.02, "l": 2e-3,
+              "c": 5.0},
+}  # fmt: skip
+"""Dampers of about 10 N: forces N, N/V; drags N s/m, N s/(m V); speed m/s; length m; N s/m."""
+FORCE, SPEED, STROKE = 10.0, 0.18, 0.02
+MASSES, STIFFNESSES = (1.97, 1.23, 1.23), (1057.0, 1366.0, 1366.0)
+SPREAD = 0.12
+"""Numbers of a rig lie up to this share off the table."""
+LARGEST_NOISE = 0.2
+LAYER = {"spring_5", "rub", "crack_drift", "stop_gap", "stop_k"}
+"""What is hidden in the building, not in its damper."""
+SHOWN_IN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What an example is to be like.
+
+    effects: what to hide, by name; drawn where empty. nothing: hide nothing. outside: hide what the
+    library does not have. noise: standard deviation on every channel as a share of its RMS [1].
+    """
+
+    effects: tuple[str, ...] = ()
+    law: str = ""
+    noise: float = 0.01
+    seed: int = 1
+    nothing: bool = False
+    outside: bool = False
+
+    def check(self) -> None:
+        """Refuse what contradicts itself or cannot be.
+
+        Raises
+        ------
+        StudyError
+            If two ways of choosing are given, or noise, seed or law cannot be.
+        """
+        if sum((bool(self.effects), self.nothing, self.outside)) > 1:
+            raise StudyError("--effect, --none and --outside exclude each other; give one.")
+        if not 0.0 <= self.noise <= LARGEST_NOISE:
+            raise StudyError(f"--noise {self.noise:g}: 0 to {LARGEST_NOISE:g} is plausible.")
+        if self.seed < 0:
+            raise StudyError(f"--seed {self.seed}: 0 or a positive whole number is right.")
+        if self.law and self.law not in CENTRE:
+            raise StudyError(f'--law "{self.law}"; an example has: {", ".join(CENTRE)}.')
+
+
+def make_bench(folder: Path | str, choice: Choice) -> Study:
+    """Make a study of a damper on a bench, with something hidden in it.
+
+    Raises
+    ------
+    StudyError
+        If the folder exists, or the choice cannot be.
+    """
+    _check(Path(folder), choice)
+    law = choice.law or "bingham"
+    draw, drawn, noise = _streams(choice.seed)
+    values, scales = _values(law, draw), Scales(FORCE, SPEED, STROKE, CENTRE[law]["w_n"])
+    hidden, secret = _secret("bench", law, choice, scales, drawn)
+    plan = bench.plan(scales, draw)
+    damper, bare = Damper(law, values, secret), Damper(law, values)
+    runs = [bench.perform(damper, motion, volts, scales) for _, motion, volts in plan]
+    plain = [bench.perform(bare, motion, volts, scales) for _, motion, volts in plan]
+    answer = _answer("bench", law, choice, hidden) | {
+        "values": _with_units(secret), "base": in_library_names(law, values),
+        "share": bench.share(runs, plain),
+    }  # fmt: skip
+    shown = _recorded(dict(zip([name for name, *_ in plan], runs, strict=True)), choice, noise)
+    return _written(Path(folder), shown, answer, DESCRIBED["bench"], "A damper on a bench")
+
+
+def make_building(folder: Path | str, choice: Choice, *, load_cell: bool = True) -> Study:
+    """Make a study of a building on a shake table, with something hidden in it.
+
+    `load_cell` False leaves the damper's force out of the files.
+
+    Raises
+    ------
+    StudyError
+        If the folder exists, or the choice cannot be.
+    """
+    _check(Path(folder), choice)
+    law = choice.law or "lugre"
+    draw, drawn, noise = _streams(choice.seed)
+    values = _values(law, draw)
+    frame = tower.frame(_spread(MASSES, draw), _spread(STIFFNESSES, draw))
+    # Storeys drift by about 3 mm where the base moves by half the stroke.
+    scales = Scales(FORCE, SPEED, STROKE, CENTRE[law]["w_n"], drift=5e-3)
+    hidden, secret = _secret("building", law, choice, scales, drawn)
+    layer = {name: value for name, value in secret.items() if name in LAYER}
+    inner = {name: value for name, value in secret.items() if name not in LAYER}
+    rig = tower.Tower(frame, Damper(law, values, inner, free=True), layer, scales)
+    plain = tower.Tower(frame, Damper(law, values, free=True), {}, scales)
+    plan = tower.plan(plain, draw)
+    runs = {name: rig.perform(ground, volts) for name, ground, volts in plan}
+    if not load_cell:
+        runs = {name: _without(run, "force") for name, run in runs.items()}
+    answer = _answer("building", law, choice, hidden) | {
+        "values": _with_units(secret), "base": in_library_names(law, values),
+    }  # fmt: skip
+    shown = _recorded(runs, choice, noise)
+    text = DESCRIBED["building"] if load_cell else DESCRIBED["building"].replace(CELL, NO_CELL)
+    return _written(
+        Path(folder), shown, answer, text, "A building on a shake table", _building_file(frame)
+    )
+
+
+def _check(folder: Path, choice: Choice) -> None:
+    """Refuse before the first equation is solved."""
+    choice.check()
+    if folder.exists():
+        raise StudyError(f"{folder} is there already; give another name.")
+
+
+def _without(run: Signals, channel: str) -> Signals:
+    return {name: x for name, x in run.items() if name != channel}
+
+
+def _streams(seed: int) -> list[np.random.Generator]:
+    """Return what draws the rig and its runs, what is hidden, and the noise."""
+    return [np.random.default_rng(one) for one in np.random.SeedSequence(seed).spawn(3)]
+
+
+def _spread(centre: tuple[float, ...], rng: np.random.Generator) -> Array:
+    return np.array(centre) * (1.0 + rng.uniform(-SPREAD, SPREAD, len(centre)))
+
+
+def _values(law: str, rng: np.random.Generator) -> Values:
+    table = CENTRE[law]
+    spread = _spread(tuple(table.values()), rng)
+    return dict(zip(table, spread.tolist(), strict=True))
+
+
+def _secret(
+    rig: str, law: str, choice: Choice, scales: Scales, rng: np.random.Generator
+) -> tuple[list[Hidden], Values]:
+    """Return what is hidden and all its values."""
+    if choice.nothing:
+        return [], {}
+    hidden = choose(rig, law, choice.effects, choice.outside, rng)
+    values: Values = {}
+    for one in hidden:
+        values |= one.draw(rng, scales)
+    return hidden, {name: float(value) for name, value in values.items()}
+
+
+def _answer(rig: str, law: str, choice: Choice, hidden: list[Hidden]) -> dict[str, Any]:
+    return {
+        "rig": rig,
+        "law": law,
+        "noise": choice.noise,
+        "seed": choice.seed,
+        "hidden": [one.name for one in hidden],
+        "outside": [one.name for one in hidden if one.outside],
+        "about": {one.name: one.about for one in hidden},
+    }
+
+
+def _with_units(values: Values) -> dict[str, tuple[float, str]]:
+    return {name: (value, UNITS[name]) for name, value in values.items()}
+
+
+def _recorded(
+    runs: dict[str, Signals], choice: Choice, rng: np.random.Generator
+) -> dict[str, Signals]:
+    """Return the runs with white noise on every channel but the time."""
+    first = next(iter(runs.values()))
+    spread = {
+        name: choice.noise * sqrt(np.mean([np.mean(run[name] ** 2) for run in runs.values()]))
+        for name in first
+        if name != "time"
+    }
+    return {
+        name: run
+        | {key: run[key] + s * rng.standard_normal(run[key].size) for key, s in spread.items()}
+        for name, run in runs.items()
+    }
+
+
+def _unit(channel: str) -> str:
+    """Return the SI unit of a channel."""
+    plain = {"time": "s", "voltage": "V", "force": "N"}
+    kinds = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "absolute": "m/s2"}
+    return plain.get(channel) or kinds[channel.rsplit("_", 1)[-1]]
+
+
+def _write_csv(path: Path, run: Signals) -> None:
+    """Write one run as the recorder of a laboratory would: millimetres and newtons."""
+    titles, columns = [], []
+    for name, x in run.items():
+        factor, unit = SHOWN_IN.get(_unit(name), (1.0, _unit(name)))
+        titles.append(f"{name} [{unit}]")
+        columns.append(factor * x)
+    np.savetxt(
+        path, np.stack(columns, axis=1), fmt="%.6g", delimiter=",", header=",".join(titles),
+        comments="",
+    )  # fmt: skip
+
+
+def _building_file(frame: tower.Frame) -> str:
+    """Return the building file: what the drawing says."""
+    return (
+        'schema = 1\nname = "tower"\nbase = "isolated"\n'
+        f"masses = {[round(m, 6) for m in frame.masses]}  # kg, base first\n"
+        f"stiffnesses = {[round(k, 4) for k in frame.stiffnesses]}  # N/m, below each mass\n"
+        f"rayleigh = {{ ratio = {tower.RATIO}, modes = [1, 3] }}\n"
+    )
+
+
+def _written(
+    folder: Path, runs: dict[str, Signals], answer: dict[str, Any], text: str, title: str,
+    building: str = "",
+) -> Study:  # fmt: skip
+    """Return the study that was made of the runs, with its description and the sealed answer."""
+    with tempfile.TemporaryDirectory(prefix="bristle_example_") as name:
+        place = Path(name)
+        for run, signals in runs.items():
+            _write_csv(place / f"{run}.csv", signals)
+        drawing = place / "building.toml"
+        if building:
+            drawing.write_text(building, encoding="utf-8")
+        files = [place / f"{run}.csv" for run in runs]
+        rig = {"rig": "structure", "building": drawing} if building else {"rig": "bench"}
+        study = create_study(folder, files, title=title, law=answer["law"], **rig).study
+    seal(folder, answer)
+    write_whole(folder / "README.md", text.format(name=folder.name, noise=100 * answer["noise"]))
+    return study
+
+
+CELL = "| force | N | load cell between damper and ground |\n"
+NO_CELL = "\nThe damper's force was not measured.\n"
+DESCRIBED = {
+    "bench": """# {name}: a damper on a bench
+
+A made example. A bench moved an MR damper of about 10 N and 20 mm stroke to either side, and a
+recorder took 500 samples per second with {noise:g} % noise on every channel.
+
+| channel | unit | instrument |
+|---|---|---|
+| displacement | mm | of the rod |
+| velocity | mm/s | of the rod |
+| voltage | V | commanded, 0 to 8 V |
+| force | N | load cell on the rod, positive when it resists motion along +x |
+
+Three runs are for training, two are held out. `sealed/answer.txt` names what is hidden in this
+damper, if anything; `bristle example reveal {name}` opens it.
+""",
+    "building": """# {name}: a base-isolated building on a shake table
+
+A made example. Two storeys stand on an isolated base, with an MR damper of about 10 N between
+ground and base. A recorder took 500 samples per second with {noise:g} % noise on every channel.
+`building.toml` holds masses, stiffnesses and damping ratios of the drawing.
+
+| channel | unit | instrument |
+|---|---|---|
+| ground_acceleration | m/s2 | of the table |
+| base, floor1, floor2: displacement, velocity | mm, mm/s | relative to the ground |
+| base, floor1, floor2: acceleration_absolute | m/s2 | accelerometers |
+| voltage | V | commanded, 0 to 8 V |
+| force | N | load cell between damper and ground |
+
+Three runs are for training, two are held out. `sealed/answer.txt` names what is hidden in this
+rig, if anything; `bristle example reveal {name}` opens it.
+""",
+}
