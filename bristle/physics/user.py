@@ -369,7 +369,7 @@ def _only_one(module: ModuleType, path: Path, tree: ast.Module, kind: _Kind) -> 
         value
         for value in vars(module).values()
         if isinstance(value, type) and issubclass(value, kind.base) and value is not kind.base
-        if value.__module__ == module.__name__ and getattr(value, "name", "")
+        if value.__module__ == module.__name__ and vars(value).get("name")
     ]
     lines = [node.lineno for node in tree.body if isinstance(node, ast.ClassDef)]
     if len(found) != 1:
