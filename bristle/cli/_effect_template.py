@@ -18,8 +18,8 @@ class {cls}(Effect):
     # The name in commands, scenarios and model.toml; that of this file too.
     name = "{name}"
 
-    # "damper": between rod and fluid. "structure": base and storeys. "sensor": an instrument. With
-    # sites = ("damper", "structure") it is of both: it reads x, v, dt, energy, halt, stiffness.
+    # "damper": between rod and fluid. "structure": base and storeys. "sensor": an instrument. An
+    # effect of two sites, ("damper", "structure"), reads x, v, dt, energy, halt, stiffness alone.
     sites = ("damper",)
 
     # The signals that the hooks below read from q. A damper offers x [m], v [m/s], a [m/s2] across
