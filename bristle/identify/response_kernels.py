@@ -38,7 +38,7 @@ def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no
     h1, h2 = dt, 0.5 * dt * dt
     unit = (dt**5 / 20.0, dt**4 / 8.0, dt**3 / 6.0, dt**3 / 3.0, dt**2 / 2.0, dt)
     m, P, column, L = np.zeros(3), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
-    _at_rest(y, r, have, dt, m, P, column)
+    _at_rest(y, r, have, dt, m, P, column)  # type: ignore[no-untyped-call]
     predicted, covs = np.zeros((n, 3)), np.zeros((n, 3, 3))
     gains, shares, sizes = np.zeros((n, 3, 3)), np.zeros((n, 3)), np.zeros((n, 3))
     total = 0.0
@@ -88,7 +88,7 @@ def smooth_level(y, r, have, dt, jerk, backward, state, cov):  # type: ignore[no
     if backward:
         for i in range(3):
             m[i] = 0.0
-        _smooth_back(
+        _smooth_back(  # type: ignore[no-untyped-call]
             predicted, covs, gains, shares, sizes, have, h1, h2, state, cov, m, column, L
         )  # fmt: skip
     return total
