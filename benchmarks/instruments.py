@@ -73,9 +73,8 @@ def main(given: list[str]) -> int:
             with _path().open("a", encoding="utf-8") as file:
                 file.write(json.dumps({"key": key, **answer}) + "\n")
             print("right" if answer["right"] else "wrong", key, answer["said"], file=sys.stderr)
-    from .__main__ import show
-
-    show(rows(done))
+    for row in rows(done):
+        print(f"{row.name}: {row.measured} (goal {row.goal})")
     return 0
 
 

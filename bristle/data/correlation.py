@@ -111,6 +111,7 @@ def read_correlation(
     if not isinstance(rows, list) or not _is_triangle(rows, len(names)):
         toml.error((*keys, "rows"), right)
         return None
+    assert isinstance(rows, list)
     found = Correlation(tuple(map(str, names)), tuple(tuple(map(float, row)) for row in rows))
     if names and (least := float(np.linalg.eigvalsh(found.matrix())[0])) < -_SLACK * len(names):
         toml.error(

@@ -168,7 +168,7 @@ def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
                 force=run.force[part], draws=run.draws[:, part], skip=0, keep=run.keep[part],
             )
         )  # fmt: skip
-    return problem.of(runs)
+    return problem.of([*runs])
 
 
 def storey_run(response: Response, building: Building, level: int) -> StructureRun:

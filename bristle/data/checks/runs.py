@@ -255,12 +255,13 @@ def _exchange(
         kept = [one for one in train if one is not goes] + [run]
         judged = [one for one in holdout if one is not run] + [goes]
         reach = [max(map(value, kept)) for _, value, _, _ in checks]
-        return max(
+        ratios = [
             float(value(one) / known)
             for (_, value, _, _), known in zip(checks, reach, strict=True)
             for one in judged
             if known > 0.0
-        )
+        ]
+        return max(ratios)
 
     goes = min(train, key=left)
     text = f'Exchange the roles in study.toml: {run.run} to "train", {goes.run} to "holdout"'
