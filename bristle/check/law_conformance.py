@@ -104,5 +104,4 @@ def _forces(law: type[Law], dt: float) -> list[float]:
 
 
 def _has_effects(law: type[Law]) -> Check:
-    names = [effect.name for effect in effects_of("damper", law.name)]
-    return Check("effects join it by its parts", bool(names), ", ".join(names))
+    return Check("effects join it by its parts", bool(effects_of("damper", law.name)))

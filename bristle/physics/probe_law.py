@@ -162,7 +162,8 @@ def _at(
     law: type[Law], hook: str, q: Any, z: Any, values: dict[str, float], signal: str,
     value: float,
 ) -> tuple[float, ...]:  # fmt: skip
-    return _call(law, hook, q._replace(**{signal: value}), z, values)
+    moved: dict[str, Any] = {signal: value}
+    return _call(law, hook, q._replace(**moved), z, values)
 
 
 def _forces(law: type[Law]) -> Iterator[str]:

@@ -365,9 +365,10 @@ def _a(word: str) -> str:
 def _only_one(module: ModuleType, path: Path, tree: ast.Module, kind: _Kind) -> Any:
     """Return the one effect or law of a module, whose name is the file's."""
     word, base = kind.dialect.word, kind.dialect.base
-    found: list[Any] = [
+    values: list[Any] = list(vars(module).values())
+    found = [
         value
-        for value in vars(module).values()
+        for value in values
         if isinstance(value, type) and issubclass(value, kind.base) and value is not kind.base
         if value.__module__ == module.__name__ and vars(value).get("name")
     ]
@@ -377,13 +378,14 @@ def _only_one(module: ModuleType, path: Path, tree: ast.Module, kind: _Kind) -> 
         raise FlawError(
             f"{len(found)} {word}s are defined; one class {base} with a name is right.", line
         )
-    if found[0].name != path.stem:
+    made: Any = found[0]
+    if made.name != path.stem:
         raise FlawError(
-            f'the {word} is named "{found[0].name}" and the file {path.name}; '
+            f'the {word} is named "{made.name}" and the file {path.name}; '
             f'name = "{path.stem}" is right.',
             lines[0],
         )
-    return found[0]
+    return made
 
 
 def _check(made: Any, tree: ast.Module, kind: _Kind) -> None:
