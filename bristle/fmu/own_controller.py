@@ -45,7 +45,17 @@ class Functions:
 
     @staticmethod
     def start(time: float, inputs: Any, c: Constants, state: Any, outputs: Any, work: Any) -> int:
-        """Take the first sample, with nothing remembered; arguments as in `component`."""
+        """Take the first sample, with nothing remembered.
+
+        Parameters
+        ----------
+        time : time of sample 0 [s]
+        inputs : (4,) those of `Measured`
+        c : Constants
+        state : (kept + 2,) what is remembered, and what `component.clock` keeps; filled
+        outputs : (3,) voltage [V], command before limits [V], velocity [m/s]; filled
+        work : (4,) room to work
+        """
         state[:] = [0.0] * c.kept + [time, 1.0]
         _sample(inputs, c, state, outputs)
         return 0
@@ -55,7 +65,17 @@ class Functions:
         clock: tuple[float, float, int], before: Any, now: Any, c: Constants, state: Any,
         new_state: Any, outputs: Any, work: Any,
     ) -> int:  # fmt: skip
-        """Take the samples that a step ends on or passes; arguments as in `component`."""
+        """Take the samples that a step ends on or passes.
+
+        Parameters
+        ----------
+        clock : time at the begin [s], length of the step [s], sweep (not used)
+        before, now : (4,) inputs at begin and end, as in `start`
+        c : Constants
+        state, new_state : one and the same sequence, as in `start`, moved on in place
+        outputs : (3,) as in `start`, filled where a sample is taken
+        work : (4,) room to work
+        """
         time, dt, _ = clock
         origin, coming = state[ORIGIN], state[COMING]
         last = last_sample(time + dt, c.period, origin)
@@ -70,7 +90,13 @@ class Functions:
 
     @staticmethod
     def output(time: float, inputs: Any, c: Constants, state: Any, outputs: Any, work: Any) -> int:
-        """Hold the outputs: none follows an input."""
+        """Hold the outputs: none follows an input.
+
+        Parameters
+        ----------
+        time, inputs, c, state, outputs, work
+            As in `start`; nothing is read or filled.
+        """
         return 0
 
 

@@ -98,6 +98,10 @@ class Scenario:
         """Number of communication steps."""
         return round(self.stop / self.step)
 
+    def remarks(self) -> list[str]:
+        """Return the warnings and notes of the check, a line each with its place."""
+        return [f"{found.level}: {worded(self.file.name, found)}" for found in self.findings]
+
     def component(self, name: str) -> Component:
         """Return the component of a name."""
         return next(component for component in self.components if component.name == name)

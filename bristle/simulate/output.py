@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
@@ -60,8 +60,8 @@ class Output:
         """The number of rows that are on disk."""
         return self._writer.rows if self._writer else 0
 
-    def begin(self, table: Table, made: Mapping[str, Any]) -> None:
-        """Write the first rows; from now on there is a file that can be read."""
+    def begin(self, table: Table, made: Mapping[str, Any], remarks: Iterable[str] = ()) -> None:
+        """Write the first rows and log remarks; from now on there is a file that can be read."""
         if self.folder is None:
             return
         for name in _OURS[:3]:
@@ -72,6 +72,8 @@ class Output:
                     raise cannot_write(self.folder / name, error, 0) from error
         if self.format == "csv":
             self._writer = CsvWriter(self.folder / "results.csv", table, made)
+        for line in remarks:
+            self.log(line)
 
     def write(self, table: Table) -> None:
         """Append rows to a CSV file; a Parquet file is written whole at the end."""

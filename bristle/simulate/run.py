@@ -14,7 +14,7 @@ from ..errors import RunError, not_usable
 from ..findings import written
 from ..fmu.description import Description, read_description
 from ..interrupt import Interrupt
-from ..scenario.scenario import Scenario, fmu_parameters, load_scenario, worded
+from ..scenario.scenario import Scenario, fmu_parameters, load_scenario
 from ..scenario.text import scenario_text
 from .output import Output
 from .results import Table, to_frame
@@ -144,7 +144,7 @@ def execute(
             scenario = scenario.file
         if not isinstance(scenario, Scenario):
             scenario = load_scenario(scenario, overrides)
-        for line in remarks(scenario):
+        for line in scenario.remarks():
             output.show(line)
         job = _Job(scenario, dict(overrides or {}), engine, output)
         if engine == "compiled":
@@ -152,11 +152,6 @@ def execute(
         return job.step(progress, end_process)
     finally:
         output.close()
-
-
-def remarks(scenario: Scenario) -> list[str]:
-    """Return the warnings and notes of a scenario's check, a line each with its place."""
-    return [f"{f.level}: {worded(scenario.file.name, f)}" for f in scenario.findings]
 
 
 class _Job:
@@ -195,7 +190,7 @@ class _Job:
         )
         time = times(0, len(values["time"]), self.scenario.step)
         table = Table(time, columns, {c.name: values[c.name].astype(c.dtype) for c in columns})
-        self._begin(table)
+        self.output.begin(table, self.made, self.scenario.remarks())
         return self._end(table, stopped, interrupted=False)
 
     def step(self, progress: bool, end_process: bool) -> Results:
@@ -226,7 +221,7 @@ class _Job:
             master.start()
         finally:
             if master.rows:
-                self._begin(master.table())
+                self.output.begin(master.table(), self.made, self.scenario.remarks())
         with Progress(self.scenario.title, master.steps, progress) as bar:
             count, due = 1, time.perf_counter() + FLUSH
             try:
@@ -242,11 +237,6 @@ class _Job:
             finally:
                 if self.output.written < master.rows:
                     self.output.write(master.table(self.output.written))
-
-    def _begin(self, table: Table) -> None:
-        self.output.begin(table, self.made)
-        for line in remarks(self.scenario):
-            self.output.log(line)
 
     def _end(self, table: Table, stopped: RunError | None, interrupted: bool) -> Results:
         if stopped:
