@@ -20,8 +20,12 @@ def _switch(value: Any) -> bool:
     return isinstance(value, bool)
 
 
+def _real(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
 def _number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value)
+    return _real(value) and isfinite(value)
 
 
 def _texts(value: Any) -> bool:
@@ -49,7 +53,7 @@ def _bounded(value: Any) -> bool:
 def _parameter(value: Any) -> bool:
     return (
         isinstance(value, Parameter)
-        and _number(value.value)
+        and _real(value.value)  # what is not finite lies outside its bounds, and is told so
         and _text(value.unit)
         and _bounded(value.bounds)
         and _text(value.text)
