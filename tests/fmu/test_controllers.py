@@ -173,7 +173,7 @@ def test_no_output_follows_an_input_but_at_the_start() -> None:
         ("Lpv", {"velocity": "guessed"}),
         ("Lpv", {"v_max": 0.0}),
         ("Lpv", {"sample_period": 0.001}),  # the design's matrices are those of 2 ms
-        ("HinfInverse", {"inverse": "dahl"}),
+        ("HinfInverse", {"inverse": "maxwell"}),
         ("HinfInverse", {"lugre.a_0": -1.0}),
         ("Skyhook", {"sample_period": 0.0}),
         ("Skyhook", {"kind": "sky"}),
