@@ -48,7 +48,7 @@ def text(found: IdentifiedBuilding) -> str:
             f"{plain(ratio, 4):>14}  {_interval(ratio, fit.std_damping_ratios[r])}"
         )
     if fit.unidentified:
-        lines += ["", f"These data cannot tell: {', '.join(fit.unidentified)}."]
+        lines += ["", f"The data do not identify: {', '.join(fit.unidentified)}."]
     lines += ["", f"  {'what equilibrium leaves, worst level':38} {'before':>18} {'after':>18}"]
     for role, name in (("train", "training runs"), ("holdout", "held-out runs")):
         cells = [

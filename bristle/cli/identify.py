@@ -13,7 +13,9 @@ from ._consent import add_trust
 if TYPE_CHECKING:
     from ..study.identified import Identified
 
-HELP = "fit a study's model: parameters with intervals, what the data cannot tell, errors of laws"
+HELP = (
+    "fit a study's model: parameters with intervals, what the data do not identify, errors of laws"
+)
 
 BETTER = 0.9
 """What part of the error another law must leave to be worth a word."""
@@ -92,7 +94,7 @@ def text(found: Identified, folder: Path) -> str:
     lines = [f"{title}, {found.fit.agreed} of {found.fit.starts} starts agree", ""]
     lines += _parameters(found)
     if found.unidentified:
-        lines += ["", f"These data cannot tell: {', '.join(found.unidentified)}."]
+        lines += ["", f"The data do not identify: {', '.join(found.unidentified)}."]
     lines += ["", *_errors(found)]
     if found.table:
         lines += ["", *_laws(found, folder)]

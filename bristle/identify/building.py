@@ -47,7 +47,7 @@ class StructureFit:
     """A building as identified.
 
     `stiffnesses` (n,) N/m below each level, `damping_ratios` (n,) [1] of each mode, `frequencies`
-    (n,) Hz, each with its standard deviation in `std_...`, infinite where the data cannot tell.
+    (n,) Hz, each with its standard deviation in `std_...`, infinite where the data do not tell it.
     `z` (n,) by level: RMS of what equilibrium leaves over the noise expected, `share` (n,) the same
     over the shear there; not a number where the damper's force is unknown.
     `building` carries the values; those in `unidentified` keep what was given.

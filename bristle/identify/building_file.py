@@ -61,7 +61,11 @@ def _with_intervals(key: str, unit: str, values: Sequence[float] | Array, std: A
     """Return the lines of a list, one value each, with half of its 95 % interval."""
     rows = [
         f"  {float(value)!r}, "
-        + (f"# +- {1.96 * s:.2g} {unit}" if np.isfinite(s) else "# as given: the data cannot tell")
+        + (
+            f"# +- {1.96 * s:.2g} {unit}"
+            if np.isfinite(s)
+            else "# as given: the data do not identify it"
+        )
         for value, s in zip(values, std, strict=True)
     ]
     return [f"{key} = [".removeprefix(" = "), *rows, "]"]

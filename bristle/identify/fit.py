@@ -65,7 +65,7 @@ class Fit:
     """What a fit found.
 
     `model` with the values; `std` by name; `cost` the mean robust loss per sample on the runs
-    fitted; `unidentified` names the parameters that the data cannot tell; `starts` how many starts
+    fitted; `unidentified` names the parameters that the data do not identify; `starts` how many
     were tried, `agreed` how many of them came to this end; `covariance` (p, p) that of the
     parameters in `std`, in its order [SI], None without.
     """
@@ -217,7 +217,7 @@ def _spread(values: list[float], about: float) -> float:
 
 
 def _intervals(scaled: Scaled, theta: Array) -> tuple[Array, tuple[str, ...]]:
-    """Return the covariance (p, p) [SI], and the names that the data cannot tell.
+    """Return the covariance (p, p) [SI], and the names that the data do not identify.
 
     Covariance A^-1 B A^-1 of an M-estimator (Huber 1981, Robust Statistics, ch. 7): A = J'J over
     the samples within the quadratic part of the loss, B the covariance of J' psi under the drawn

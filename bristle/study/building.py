@@ -114,7 +114,7 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
     )
     with study.writing():
         write_whole(path, building_text(fit, origin))
-    lost = f"; the data cannot tell {', '.join(fit.unidentified)}" if fit.unidentified else ""
+    lost = f"; the data do not identify {', '.join(fit.unidentified)}" if fit.unidentified else ""
     step = study.add_step(
         "identify the building", f"its response in {counted}{lost}",
         replace(model, building=path.name), before, after,

@@ -253,7 +253,7 @@ def as_model(model: StudyModel) -> Model:
 
 
 def _with_fit(model: StudyModel, fit: Fit) -> StudyModel:
-    """Return the study's model with the values found; what the data cannot tell has no interval."""
+    """Return the study's model with the values found; what is not identified has no interval."""
     flat = model.flat()
     identifiable = [name for name in fit.std if name not in fit.unidentified]
     found = model.with_values(
@@ -310,5 +310,5 @@ def _why(found: Identified) -> str:
     return (
         f"fit to {runs} training run{'s' * (runs != 1)}, judged on {held_out} held out; "
         f"{found.fit.agreed} of {found.fit.starts} starts agree"
-        + (f"; the data cannot tell {lost}" if lost else "")
+        + (f"; the data do not identify {lost}" if lost else "")
     )

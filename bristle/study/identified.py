@@ -73,7 +73,7 @@ class Identified:
 
     @property
     def unidentified(self) -> tuple[str, ...]:
-        """Names of the parameters that the data cannot tell."""
+        """Names of the parameters that the data do not identify."""
         return self.fit.unidentified
 
     def plot(self) -> Figure:

@@ -76,7 +76,7 @@ def identify(
     -------
     Identified
         `parameters()` lists values, units and 95 % intervals; `unidentified` names those that the
-        data cannot tell; `after` holds the errors; `model.values()` the values in SI.
+        data do not identify; `after` holds the errors; `model.values()` the values in SI.
 
     Raises
     ------
