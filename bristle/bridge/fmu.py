@@ -96,7 +96,8 @@ def compare_fmu(
     description = read_description(path)
     table = read_table(data)
     structural = any(
-        v.name.startswith(("ground_", "base_", "floor")) for v in description.variables.values()
+        v.causality in ("input", "output") and v.name.startswith(("ground_", "base_", "floor"))
+        for v in description.variables.values()
     )
     pieces, notes = signals_of(table, channels or {}, "structure" if structural else "bench")
     given = _typed(description, values or {})

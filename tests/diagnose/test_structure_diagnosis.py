@@ -252,7 +252,7 @@ def test_effects_of_the_damper_are_searched_only_where_one_could_matter(
     monkeypatch.setattr(opening, "try_all", search)
     none = StructureProblem([])
     inside = Opening(trial((), z, train), none, none, part=none, rule=INSIDE, scope=IN_BUILDING)
-    found = of_damper.look_at_damper(inside)
+    found, _ = of_damper.look_at_damper(inside)
     assert len(asked) == searched
     assert found.kind == "none"
     assert BENCH.quiet < 1.02, (
