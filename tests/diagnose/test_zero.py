@@ -54,7 +54,7 @@ def test_an_effect_with_a_constant_force_of_its_own_has_no_zero_besides():
     train, _ = problems()
     spring = Model("bingham", ("gas_spring",), {"gas_spring.preload": 0.0})
     assert has_offset(spring)
-    assert not has_offset(replace(spring, held=("gas_spring.preload",)))
+    assert not has_offset(replace(spring, fixed=("gas_spring.preload",)))
     free = train.with_free_zero()
     same = zip(
         errors(train, spring, train.expectation(spring)),

@@ -193,7 +193,7 @@ def test_a_fit_finds_a_curve(effect: type[Effect]) -> None:
     made = problem("bingham", ["sloped"], {**truth, "sloped.scale": 2.0})
     held = ("sloped.scale", "sloped.curve[2]")
     given = {"sloped.scale": 2.0, "sloped.curve[2]": 0.0}
-    found = identify(made, "bingham", ("sloped",), 2, values=given, held=held)
+    found = identify(made, "bingham", ("sloped",), 2, values=given, fixed=held)
     for name, value in truth.items():
         if name not in held:
             assert found.model.value(name) == pytest.approx(value, abs=5.0 * found.std[name])
