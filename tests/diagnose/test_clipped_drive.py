@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 from test_starts import LAW, recorded_rig
 
+from bristle.diagnose import opening
 from bristle.diagnose.corrected import corrected
 from bristle.diagnose.diagnosis import diagnose
 from bristle.diagnose.faults import SensorFault
@@ -24,7 +25,7 @@ def test_a_run_of_which_clipping_leaves_nothing_is_left_out():
 def test_no_run_left_is_a_verdict_of_insufficiency(monkeypatch):
     runs = recorded_rig((), {})
     cut = SensorFault("voltage", "clipping", 1.0, 0.0, "The voltage stands at its end.")
-    monkeypatch.setattr("bristle.diagnose.opening.sensor_faults", lambda _runs: [cut])
+    monkeypatch.setattr(opening, "sensor_faults", lambda _runs: [cut])
     every = [replace(run, channels={**run.channels, "voltage": np.ones(3000)}) for run in runs]
     found = diagnose(every[:2], every[2:], law="bingham", values=LAW)
     assert found.kind == "insufficient"
