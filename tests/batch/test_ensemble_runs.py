@@ -221,8 +221,10 @@ def _many(write: Write) -> Path:
 def _started(path: Path, out: Path) -> subprocess.Popen[str]:
     """Start an ensemble in a session of its own and wait for its first runs."""
     process = subprocess.Popen(
-        _command(path, out), cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
+        _command(path, out), cwd=ROOT, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        # A shell's background job ignores it, and so would all that it starts.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
     file, until = out / "runs.csv", time.monotonic() + 120.0
     while not file.exists() or file.read_bytes().count(b"\n") < 10:
         assert time.monotonic() < until
