@@ -130,7 +130,8 @@ def test_a_refusal_has_exit_code_2_one_message_and_no_file(
 def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from bristle.data.model import new_model, write_model
+    from bristle.data.model import new_model
+    from bristle.data.model_text import write_model
     from bristle.physics.building import read_building
 
     model = new_model("lugre").with_effect("gas_spring")
@@ -174,7 +175,8 @@ def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
 def test_a_study_model_that_is_wrong_is_one_message(
     edit: tuple[str, str], words: str, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from bristle.data.model import new_model, write_model
+    from bristle.data.model import new_model
+    from bristle.data.model_text import write_model
 
     write_model(here / "model.toml", new_model("lugre"))
     text = (here / "model.toml").read_text()

@@ -17,7 +17,7 @@ parameters = ["sigma_a", "gas_spring.k"]
 rows = [[1.0], [-0.42, 1.0]]
 
 `correlation` is how the errors of identified parameters go together (`data.correlation`); files
-without it open as before.
+without it open as before. `data.model_text` writes the file.
 """
 
 from __future__ import annotations
@@ -42,13 +42,12 @@ from .correlation import (
     correlation_of_covariance,
     covariance_of,
     read_correlation,
-    set_correlation,
 )
-from .files import Toml, write_whole
+from .files import Toml
 
 ORIGINS = ("reconstructed", "measured", "assumed", "identified")
 _KEYS = ("schema", "law", "building", "parameters", "effects", "correlation")
-_VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")
+VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")
 
 
 @dataclass(frozen=True)
@@ -253,96 +252,6 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     return replace(model, correlation=correlation)
 
 
-def write_model(path: Path, model: StudyModel) -> None:
-    """Write a model.toml; comments of the file that it replaces stay."""
-    write_whole(path, model_text(model, path))
-
-
-def model_text(model: StudyModel, beside: Path | None = None) -> str:
-    """Return a model as TOML, on top of an older file's comments where there is one."""
-    import tomlkit
-    from tomlkit.exceptions import TOMLKitError
-
-    document = tomlkit.document()
-    if beside is not None and beside.is_file():
-        try:
-            document = tomlkit.parse(beside.read_text(encoding="utf-8-sig"))
-        except (TOMLKitError, OSError, UnicodeDecodeError):
-            document = tomlkit.document()
-    document["schema"] = 1
-    document["law"] = model.law
-    _set_or_drop(document, "building", model.building)
-    for key in ("parameters", "effects"):
-        if key not in document:
-            document[key] = tomlkit.table(is_super_table=True)
-    _update(document["parameters"], _listed(model.parameters, _tables(model.law)), False)
-    effects = document["effects"]
-    for name in [name for name in effects if name not in model.effects]:
-        del effects[name]
-    for name, values in model.effects.items():
-        if name not in effects:
-            effects[name] = tomlkit.table()
-        if "parameters" not in effects[name]:
-            effects[name]["parameters"] = tomlkit.inline_table()
-        _update(effects[name]["parameters"], _listed(values, _tables("", name)), True)
-    if not model.effects:
-        del document["effects"]
-    set_correlation(document, model.correlation, model.uncertain())
-    return tomlkit.dumps(document)
-
-
-def _listed(
-    values: Mapping[str, Value], tables: Mapping[str, tuple[str, ...]]
-) -> dict[str, dict[str, Any] | list[dict[str, Any]]]:
-    """Return values as a file has them: those of a table as one list."""
-    inside = {name for names in tables.values() for name in names}
-    plain = {name: _as_toml(value) for name, value in values.items() if name not in inside}
-    rows = {
-        table: [_as_toml(values[name]) for name in names]
-        for table, names in tables.items()
-        if set(names) <= set(values)
-    }
-    return {**plain, **rows}
-
-
-def _update(
-    table: Any, wanted: Mapping[str, dict[str, Any] | list[dict[str, Any]]], inline: bool
-) -> None:
-    import tomlkit
-
-    for name in [name for name in table if name not in wanted]:
-        del table[name]
-    for name, content in wanted.items():
-        if isinstance(content, list):
-            if name not in table or table[name] != content:
-                table[name] = tomlkit.array()
-                for row in content:
-                    entry = tomlkit.inline_table()
-                    entry.update(row)
-                    table[name].append(entry)
-            continue
-        if name not in table:
-            table[name] = tomlkit.inline_table() if inline else tomlkit.table()
-        for key in _VALUE_KEYS:
-            _set_or_drop(table[name], key, content.get(key, ""))
-
-
-def _set_or_drop(table: Any, key: str, value: Any) -> None:
-    if value == "":
-        table.pop(key, None)
-    elif key not in table or table[key] != value:
-        table[key] = value
-
-
-def _as_toml(value: Value) -> dict[str, Any]:
-    found: dict[str, Any] = {"value": value.value, "unit": value.unit}
-    if value.std is not None and value.std == value.std and value.std != float("inf"):
-        found["std"] = value.std
-    return {**found, "low": value.low, "high": value.high, "free": value.free} | {
-        "origin": value.origin
-    }
-
-
 def _declared(law: str, effect: str = "") -> dict[str, Parameter]:
     """Return the declarations of an effect's parameters, or of a law's."""
     if effect:
@@ -354,7 +263,7 @@ def _declared(law: str, effect: str = "") -> dict[str, Parameter]:
     return declared
 
 
-def _tables(law: str, effect: str = "") -> dict[str, tuple[str, ...]]:
+def table_names(law: str, effect: str = "") -> dict[str, tuple[str, ...]]:
     """Return the tables of an effect, or of a law: name to the parameters that it lists."""
     owner = EFFECTS[effect] if effect else base_and_variant(law)[0]
     fields = fields_of(owner.parameters, owner.tables)
@@ -424,7 +333,7 @@ def _exclusions(toml: Toml, effects: list[str]) -> None:
 def _values(
     toml: Toml, keys: KeyPath, table: Mapping[str, Any], law: str, effect: str = ""
 ) -> dict[str, Value]:
-    declared, out, tables = _declared(law, effect), _defaults(law, effect), _tables(law, effect)
+    declared, out, tables = _declared(law, effect), _defaults(law, effect), table_names(law, effect)
     for name, own in table.items():
         if name in tables:
             out.update(_table(toml, (*keys, name), own, tables[name], declared, out))
@@ -456,7 +365,7 @@ def _table(
 def _value(
     toml: Toml, keys: KeyPath, table: Mapping[str, Any], declared: Parameter, default: Value
 ) -> Value:
-    toml.known(keys, table, _VALUE_KEYS)
+    toml.known(keys, table, VALUE_KEYS)
     name = str(keys[-1])
     unit = toml.text(keys, table, "unit", declared.unit) or "1"
     try:

@@ -10,6 +10,8 @@ building's, the plain name means the first of `Effect.sites`; `NAME@SITE` means 
 test bench, which has one site, the plain name does.
 """
 
+# Longer than 400 lines: the class data of an effect are described one by one.
+
 from __future__ import annotations
 
 from collections.abc import Mapping

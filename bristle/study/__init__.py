@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from ..data.model import StudyModel, Value, new_model, read_model, write_model
+from ..data.model import StudyModel, Value, new_model, read_model
+from ..data.model_text import write_model
 from ..errors import StudyError
 from .create import Created, create_study
 from .history import Step
+from .runs import Runs
 from .settings import RunFile, Settings
-from .study import Runs, Study
+from .study import Study
 
 __all__ = [
     "Created",

@@ -22,7 +22,8 @@ from ..quantity import plain
 from ..units import convert
 from .identified import Identified
 from .rig import rig_of
-from .study import Runs, Study
+from .runs import Runs
+from .study import Study
 
 if TYPE_CHECKING:
     pass

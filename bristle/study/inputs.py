@@ -25,7 +25,7 @@ from ..physics.laws import law_names
 from .identified import Identified
 from .joining import refuse_effect
 from .new import parse_channel
-from .study import Runs, refuse_twins, split_in_time, twins_within, usable
+from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,7 +12,8 @@ from pathlib import Path
 from ..data.channels import ChannelSpec, channel_unit
 from ..data.guess import Guess, guess_channels, left_out
 from ..data.measurement import measurements_of
-from ..data.model import model_text, new_model
+from ..data.model import new_model
+from ..data.model_text import model_text
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import BristleError, StudyError, UnitError

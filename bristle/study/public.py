@@ -32,8 +32,9 @@ from .inputs import (
     runs_of,
 )
 from .learning import diagnose_study
+from .runs import Runs
 from .settings import CUT_OFF, ROLES
-from .study import Runs, Study
+from .study import Study
 
 
 def identify(

@@ -8,7 +8,8 @@ from __future__ import annotations
 from ..data.model import StudyModel
 from ..identify.rig import Rig, bench_rig, building_rig
 from ..physics.building import Building, paper_building, read_building
-from .study import Runs, Study
+from .runs import Runs
+from .study import Study
 
 
 def rig_of(study: Study, model: StudyModel, runs: Runs) -> Rig:

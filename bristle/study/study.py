@@ -5,24 +5,24 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from filelock import FileLock, Timeout
 
 from .. import __version__
 from ..data.files import read_json, write_json, write_whole
 from ..data.measurement import Measurement, read_measurements
-from ..data.model import StudyModel, model_text, read_model
+from ..data.model import StudyModel, read_model
+from ..data.model_text import model_text
 from ..errors import StudyError
 from ..findings import command, written
-from ..identify.prepare import SHORTEST
 from ..physics.user import Loaded, waiting
 from ..trust import load
 from .history import History, Step
 from .new import make_folder
+from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
 from .settings import ROLES, Settings, read_settings
 
 if TYPE_CHECKING:
@@ -33,25 +33,6 @@ OF_MODEL = ("identify.png", "compare.png", "report.html")
 
 PATIENCE = 10.0
 """Seconds to wait for another process that writes in the same study."""
-SPLIT = 0.7
-"""Share of a single run that is for training; the rest is held out."""
-
-
-@dataclass(frozen=True)
-class Runs:
-    """The measurements of a study: those that a model is fitted to, and those held out.
-
-    `notes` says what weakens the split, in sentences.
-    """
-
-    train: list[Measurement]
-    holdout: list[Measurement]
-    notes: tuple[str, ...] = ()
-
-    @property
-    def all(self) -> list[Measurement]:
-        """Both, in order."""
-        return [*self.train, *self.holdout]
 
 
 class Study:
@@ -387,75 +368,3 @@ class Study:
                 f"{self.folder}: the model has been changed meanwhile ({what}{how}), so that this "
                 "result is not of the present one. Nothing is written; run this again."
             )
-
-
-def usable(pieces: list[Measurement]) -> tuple[list[Measurement], tuple[str, ...]]:
-    """Return the pieces that a model can be held against, and which ones are left out, and why.
-
-    Missing values cut a file into pieces, and one may be short or hold a rest only: that is no
-    reason to refuse the file. A file in one piece, or with no piece that is of use, stays whole,
-    to be refused by what needs more of it.
-    """
-    kept, left = [], []
-    for piece in pieces:
-        of_file = [one for one in pieces if one.source == piece.source]
-        reason = _idle(piece)
-        if not reason or len(of_file) == 1 or all(_idle(one) for one in of_file):
-            kept.append(piece)
-        else:
-            left.append(f"{piece.name} is left out: {reason}.")
-    return kept, tuple(left)
-
-
-def _idle(piece: Measurement) -> str:
-    """Return why nothing can be learnt from a piece of a run, "" where something can."""
-    if len(piece.time) < SHORTEST:
-        return f"it has {len(piece.time)} samples, and a fit needs {SHORTEST}"
-    for channel in ("force", "displacement", "velocity"):
-        if piece.has(channel) and float(np.ptp(piece[channel])) == 0.0:
-            return f"its {channel} does not change"
-    return ""
-
-
-def split_in_time(pieces: list[Measurement]) -> Runs:
-    """Return the first 70 % of a single run's samples for training, and the rest held out."""
-    total = sum(len(piece.time) for piece in pieces)
-    wanted, train, holdout = round(SPLIT * total), [], []
-    for piece in pieces:
-        size = len(piece.time)
-        if wanted >= size:
-            train.append(piece)
-        elif wanted <= 0:
-            holdout.append(piece)
-        else:
-            train.append(piece.part(0, wanted, f"{piece.name}, first {SPLIT:.0%}"))
-            holdout.append(piece.part(wanted, size, f"{piece.name}, last {1.0 - SPLIT:.0%}"))
-        wanted -= size
-    note = (
-        "There is one run. It is split in time, the last 30 % held out: weaker than a run of its "
-        "own, for motion, voltage and temperature there are much like those of the training part."
-    )
-    return Runs(train, [replace(one) for one in holdout], (note,))
-
-
-def refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
-    """Refuse runs that are held out and for training, too; StudyError names both."""
-    first = {one.digest(): one.name for one in train}
-    for one in holdout:
-        if one.digest() in first:
-            raise StudyError(
-                f"{one.name} is held out and is the same measurement as {first[one.digest()]}, "
-                "which is for training: it can judge nothing. Take another run, or remove one."
-            )
-
-
-def twins_within(runs: list[Measurement]) -> list[str]:
-    """Return the sentences that tell which runs are one and the same."""
-    first: dict[str, str] = {}
-    notes = []
-    for one in runs:
-        digest = one.digest()
-        if digest in first:
-            notes.append(f"{one.name} is the same measurement as {first[digest]}: it counts twice.")
-        first.setdefault(digest, one.name)
-    return notes

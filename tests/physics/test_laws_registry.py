@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from rigs import Bench, force_at
 
-from bristle.data.model import model_text, new_model, read_model
+from bristle.data.model import new_model, read_model
+from bristle.data.model_text import model_text
 from bristle.errors import PhysicsError
 from bristle.fmu import catalogue
 from bristle.fmu.controller import invertible

@@ -12,7 +12,8 @@ import pytest
 from rigs import force_at
 
 from bristle.check.conformance import examine
-from bristle.data.model import model_text, new_model, read_model
+from bristle.data.model import new_model, read_model
+from bristle.data.model_text import model_text
 from bristle.design.file import damper_from_model
 from bristle.errors import PhysicsError, StudyError
 from bristle.fmu import catalogue

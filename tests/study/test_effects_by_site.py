@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
-from bristle.data.model import new_model, read_model, write_model
+from bristle.data.model import new_model, read_model
+from bristle.data.model_text import write_model
 from bristle.design.file import damper_from_model as read_damper
 from bristle.diagnose.candidates import joinable
 from bristle.diagnose.limits import untestable

@@ -282,7 +282,7 @@ def test_json_that_is_none(tmp_path: Path) -> None:
 
 
 def test_a_piece_at_rest_or_too_short_is_left_out_and_said(tmp_path):
-    from bristle.study.study import usable
+    from bristle.study.runs import usable
 
     t = np.arange(6000) * 0.005
     moving = (t > 4.0) & (t < 29.0)
