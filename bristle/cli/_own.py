@@ -55,7 +55,15 @@ def main(
     arguments: argparse.Namespace, own: Own, tell: Callable[[Any], Told],
     print_one: Callable[[Told], None], print_table: Callable[[list[Told]], None],
 ) -> int:  # fmt: skip
-    """Print a table, everything about one, or start or check a file of a user's own."""
+    """Print a table, everything about one, or start or check a file of a user's own.
+
+    Parameters
+    ----------
+    arguments : of the command line
+    own : what differs between effects and laws
+    tell : returns what is told of a class, as JSON has it
+    print_one, print_table : print what is told of one class, and of several
+    """
     from ..errors import PhysicsError
 
     if arguments.name in ("new", "check"):
