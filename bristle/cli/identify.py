@@ -162,11 +162,22 @@ def _laws(found: Identified, folder: Path) -> list[str]:
             lines.append(f"  {base.name}: {variant.lacks} lowers the error by {gain:.1%}.")
     mine, best = found.model.law, min(own, key=lambda law: own[law])
     if mine in own and own[best] < BETTER * own[mine]:
-        lines.append(
-            f"  {best} errs {1.0 - own[best] / own[mine]:.0%} less than the model's law, {mine}. "
-            f"To change it:  {command('identify', folder, '--law', best)}"
-        )
+        lines.append(_better_law(mine, best, 1.0 - own[best] / own[mine], folder))
     return [*lines, "  Each law fitted by least squares of the low-passed force, without effects."]
+
+
+def _better_law(mine: str, best: str, gain: float, folder: Path) -> str:
+    """Return the line about a law that errs less; one that holds more may stand for an effect."""
+    from ..physics.laws import base_and_variant
+
+    has, holds = (set(base_and_variant(law)[0].contains) for law in (mine, best))
+    line = f"  {best} errs {gain:.0%} less than the model's law, {mine}."
+    if more := sorted(holds - has):
+        return (
+            f"{line} It holds a {' and a '.join(more)}, which may stand for a missing effect: "
+            f"diagnose first:  {command('diagnose', folder)}"
+        )
+    return f"{line} To change it:  {command('identify', folder, '--law', best)}"
 
 
 def _next(found: Identified, folder: Path) -> list[str]:
