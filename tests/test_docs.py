@@ -39,7 +39,15 @@ generate = load("generate")
 PAGES = {str(page.relative_to(ROOT)): page for page in snippets.all_pages()}
 
 
-@pytest.mark.parametrize("page", PAGES)
+LONG = {f"docs/{name}.md" for name in (
+    "first_study", "own_effect", "tutorial_bench", "tutorial_building",
+)}  # fmt: skip
+"""Pages whose commands search for effects; the README's do as well."""
+
+
+@pytest.mark.parametrize(
+    "page", [pytest.param(p, marks=pytest.mark.slow) if p in LONG else p for p in PAGES]
+)
 @pytest.mark.skipif(sys.platform == "win32", reason="the pages' commands are for a POSIX shell")
 def test_what_a_page_shows_is_what_its_commands_print(page: str) -> None:
     assert snippets.run_page(PAGES[page]) > 0

@@ -208,7 +208,7 @@ def designed(measured: Row, v: float, c: Constants, state: Row, spare: Row) -> t
     else:
         voltage = clipped_voltage(u, f, c.f_min, c.v_max)
         second = f if c.kind == CLIPPED_LQG else 0.0
-    advance(c.n, c.A, c.B, c.W, row, state, y, second, spare)
+    advance(c.n, c.A, c.B, c.W, row, state, (y, second), spare)
     return voltage, u
 
 

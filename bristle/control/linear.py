@@ -38,7 +38,7 @@ def command(n: int, C: Row, row: int, x: Row) -> float:
 
 
 def advance(
-    n: int, A: Row, B: Row, W: Row, row: int, x: Row, y: float, w: float, spare: Row
+    n: int, A: Row, B: Row, W: Row, row: int, x: Row, inputs: tuple[float, float], spare: Row
 ) -> None:
     """Move the state on by one sample, in place.
 
@@ -48,9 +48,10 @@ def advance(
     A, B, W : (rows n n,), (rows n,), (rows n,) flat
     row : which row of the table counts
     x : (n,) state, moved on in place
-    y, w : floor acceleration [m/s2]; the second input
+    inputs : floor acceleration y [m/s2]; the second input w
     spare : (n,) or more, room to work
     """
+    y, w = inputs
     at = row * n
     for i in range(n):
         total = B[at + i] * y + W[at + i] * w

@@ -151,7 +151,7 @@ def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> Non
         moved = False
         for q, hook in product(_signals(), effect.hooks()):
             z = _state(effect, q, values)
-            given = partial(_at_parameter, effect, hook, q, z, values, name, low, high)
+            given = partial(_at_parameter, effect, hook, q, z, values, (name, low, high))
             if name in CHOICES:
                 moved = moved or given(0.0) != given(1.0)
             else:
@@ -177,7 +177,7 @@ def _moved_far_out(
         q = Q(*(factor * one for one in signal))._replace(dt=signal.dt, storey=signal.storey)
         try:
             z = _state(effect, q, values)
-            given = partial(_at_parameter, effect, hook, q, z, values, name, *bounds)
+            given = partial(_at_parameter, effect, hook, q, z, values, (name, *bounds))
             if len({given(share) for share in SHARES}) > 1:
                 return True
         except FlawError:  # so far out it need not be right
@@ -186,10 +186,11 @@ def _moved_far_out(
 
 
 def _at_parameter(
-    effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float], name: str, low: float,
-    high: float, share: float,
+    effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float],
+    within: tuple[str, float, float], share: float,
 ) -> tuple[float, ...]:  # fmt: skip
     """Call a hook with a parameter between low and high, by decades where they span many."""
+    name, low, high = within
     by_decades = low > 0.0 and high > 100.0 * low
     value = low * (high / low) ** share if by_decades else low + (high - low) * share
     return _call(effect, hook, q, z, {**values, name: value})

@@ -134,7 +134,7 @@ def test_linear_controller_is_its_matrices() -> None:
     flat = [matrix.ravel().tolist() for matrix in (A, B, W, C)]
     state, spare = x.tolist(), [0.0] * n
     assert linear.command(n, flat[3], row, state) == pytest.approx(C[row] @ x)
-    linear.advance(n, *flat[:3], row, state, 0.7, -0.3, spare)
+    linear.advance(n, *flat[:3], row, state, (0.7, -0.3), spare)
     assert state == pytest.approx(A[row] @ x + 0.7 * B[row] - 0.3 * W[row])
 
 
@@ -212,7 +212,7 @@ def every_law(u, v, z, p, bingham_p, A, B, W, C, x, spare, bent, out):  # type: 
     row = row_of(v, 0.3, 3)
     out[8] = row
     out[9] = command(2, C, row, x)
-    advance(2, A, B, W, row, x, u, v, spare)
+    advance(2, A, B, W, row, x, (u, v), spare)
     out[10] = x[0]
     out[11] = x[1]
     out[12] = low_passed(z, v, u, 113.0, 0.002)

@@ -104,6 +104,7 @@ def test_a_bad_law_is_left_out_with_file_line_and_reason(
     assert before == LAWS
 
 
+@pytest.mark.slow
 def test_a_hook_that_does_not_end_is_refused_within_the_limit(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,8 +12,8 @@ from bristle.data.model import new_model, read_model
 from bristle.data.model_text import write_model
 from bristle.design.file import damper_from_model as read_damper
 from bristle.diagnose.candidates import joinable
+from bristle.diagnose.conclusion import lookalikes
 from bristle.diagnose.limits import untestable
-from bristle.diagnose.verdict import lookalikes
 from bristle.errors import StudyError
 from bristle.identify.assigned import at_site
 from bristle.identify.bench import Bench
@@ -91,6 +91,7 @@ def test_a_site_that_an_effect_has_not_is_refused_with_its_line(tmp_path: Path) 
 def test_a_design_takes_the_dampers_own_stop(tmp_path: Path) -> None:
     path = tmp_path / "model.toml"
     model = new_model("bingham", BOTH, "building.toml").with_values(VALUES)
+    (tmp_path / "building.toml").touch()  # a model is refused without its building
     write_model(path, model)
     inside = read_damper(path)
     assert inside.effects == ("end_stop",)

@@ -278,6 +278,7 @@ def test_fmu_and_coupled_engine_agree(tmp_path, damper: str) -> None:
 
 def test_compiled_and_plain_python_agree() -> None:
     from bristle.identify.bench import Bench as Fast
+    from bristle.physics.laws import LAWS as CLASSES
 
     t = 0.002 * np.arange(300)
     x, v, a = 0.009 * np.sin(9.0 * t), 0.081 * np.cos(9.0 * t), -0.729 * np.sin(9.0 * t)
@@ -285,7 +286,9 @@ def test_compiled_and_plain_python_agree() -> None:
     values = {**SHORT, "base_friction.x_s": 5e-4}
     for law in LAWS:
         fast = Fast(law, names).force(x, v, a, np.full(300, 2.0), 0.002, values)
-        slow = Bench(law, values, names)
+        first = {"x": x[0], "V": 2.0}
+        begin = {f"{state}_0": first[signal] for state, signal in CLASSES[law].starts.items()}
+        slow = Bench(law, {**values, **begin}, names)
         slow.last = x[0], v[0], 2.0
         assert fast[0] == pytest.approx(slow.model.force(x[0], v[0], a[0], 2.0, 1.0, 0, 0, False))
         for k in range(1, 300):
