@@ -94,7 +94,7 @@ def simulate(  # type: ignore[no-untyped-def]
                 V = signed_voltage(u, v, 8.0)
                 applied = applied_signed(V, v)
             second = measured if law == 5 else rate * (applied - u)
-            advance(n, A, B, W, row, state, y, second, spare)
+            advance(n, A, B, W, row, state, (y, second), spare)
         out[k, 0], out[k, 1], out[k, 2], out[k, 3] = y, x[0], plant_force(x[6], v, V), V
         if k == samples:
             break

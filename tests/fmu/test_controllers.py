@@ -283,7 +283,8 @@ def test_lpv_looks_its_matrices_up_by_the_speed_and_feeds_back_what_is_applied()
         w = linear.command(c.n, c.C, row, x)
         V = switching.signed_voltage(w, v, 8.0)
         assert slave.get_real(slave._outputs) == [V, w, v]
-        linear.advance(c.n, c.A, c.B, c.W, row, x, y, 200.0 * ((V if v >= 0 else -V) - w), spare)
+        inputs = y, 200.0 * ((V if v >= 0 else -V) - w)
+        linear.advance(c.n, c.A, c.B, c.W, row, x, inputs, spare)
         slave.set_real(slave._inputs, motion((k + 1) * H))
         assert slave.do_step(k * H, H)
 
