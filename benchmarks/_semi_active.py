@@ -110,7 +110,7 @@ def simulate(  # type: ignore[no-untyped-def]
         if law == 1:
             u = command(n, hidden, 0, state[0])
             V = clipped_voltage(u, force_of_law(LUGRE, p, x[3], V, x[6:7]), 0.5, 8.0)
-            advance(n, A, B, W, 0, state[0], y, 0.0, state[1])
+            advance(n, A, B, W, 0, state[0], (y, 0.0), state[1])
         elif law == 2:
             V = voltage(gains, x, swing, x[6:7], p)
         elif law == 3:
