@@ -115,13 +115,31 @@ def about(effect: str) -> str:
 
 
 def untestable(verdict: Verdict) -> list[str]:
-    """Return the effects that the data could not show, with their sites where there are several."""
-    names = [str(name) for name in verdict.get("untestable") or []]
+    """Return the effects that the data could not show, with their sites where there are several.
+
+    Where no run would show one, for a part of the damper's law takes it up, that is said with it.
+    """
     findings = verdict.get("findings") or []
-    if len(findings) < 2:
-        return names
-    sites = {n: [f["site"] for f in findings if n in f.get("untestable", [])] for n in names}
-    return [f"{n} ({', '.join(sites[n])})" if sites[n] else n for n in names]
+    out = []
+    for name in map(str, verdict.get("untestable") or []):
+        sites = [found["site"] for found in findings if name in found.get("untestable", [])]
+        notes = [", ".join(sites)] if len(findings) > 1 and sites else []
+        notes += _absorbing(name, sites or [DAMPER], verdict)
+        out.append(f"{name} ({': '.join(notes)})" if notes else name)
+    return out
+
+
+def _absorbing(name: str, sites: Sequence[str], verdict: Verdict) -> list[str]:
+    """Return what part of the damper's law takes an effect up, in a list; none where none does."""
+    part = EFFECTS[name].absorbed_by if name in EFFECTS else ""
+    ranking = verdict.get("ranking") or []
+    # A law without that part is offered the effect; in a reconstructed force it is the layer's.
+    offered = verdict.get("force") != "reconstructed" and any(
+        (row["effect"], row.get("site")) == (name, DAMPER) for row in ranking
+    )
+    return (
+        [f"the law's {part} force takes it up"] if part and DAMPER in sites and not offered else []
+    )
 
 
 def separating(verdict: Verdict) -> str:

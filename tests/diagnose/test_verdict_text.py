@@ -84,6 +84,22 @@ def test_effects_that_no_run_showed_are_told_with_their_sites():
     assert untestable(one) == ["coil_lag"]
 
 
+def test_what_the_law_takes_up_is_told_with_the_part_that_does():
+    hidden = at("damper", untestable=("base_friction",))
+    told = "the law's yield force takes it up"
+    assert untestable(said(damper=hidden)) == [f"base_friction ({told})"]
+    building = said(layer=at("layer"), damper=hidden)
+    assert untestable(building) == [f"base_friction (damper: {told})"]
+    # In the layer it is another friction, which these runs alone do not show.
+    layer = said(layer=at("layer", untestable=("base_friction",)), damper=at("damper"))
+    assert untestable(layer) == ["base_friction (layer)"]
+    # A law that has no such part is offered it.
+    tried = {**said(damper=hidden), "ranking": [{"effect": "base_friction", "site": "damper"}]}
+    assert untestable(tried) == ["base_friction"]
+    late = conclude({"damper": at("damper")}, About("reconstructed")).as_dict()
+    assert untestable({**late, "ranking": tried["ranking"]}) == [f"base_friction ({told})"]
+
+
 def test_a_fault_is_told_once():
     text = "Velocity lags."
     lag = SensorFault("velocity", "lag", 0.004, 1e-4, text)
