@@ -30,9 +30,14 @@ def plain(value: float, digits: int = 3) -> str:
     rounded = round(value, digits - 1 - power)
     places = digits - 1 - floor(log10(abs(rounded))) if rounded else 0
     if power < -_LONGEST or power > 15:
-        return f"{value / 10.0**power:.{digits - 1}f} × 10{str(power).translate(_RAISED)}"  # noqa: RUF001
+        return f"{value / 10.0**power:.{digits - 1}f}{times_ten(power)}"
     text = f"{rounded:.{max(places, 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
+
+
+def times_ten(power: int) -> str:
+    """Return a power of ten as a factor after a number: " × 10⁻¹²"."""
+    return f" × 10{str(power).translate(_RAISED)}"  # noqa: RUF001
 
 
 def scale(unit: str, size: float) -> tuple[float, str]:

@@ -158,7 +158,7 @@ def _print(found: Passive, files: dict[str, Path]) -> None:
         value = (
             f"at most {100 * (optimum.value - 1):.1f} % above"
             if goal == "regret"
-            else f"{plain(optimum.value, 4)}"
+            else plain(optimum.value, 4)
         )
         print(f"  {text}: {optimum.voltage:.2f} V ({value})")
     print(f"{found.runs} runs")

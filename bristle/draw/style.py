@@ -27,7 +27,7 @@ FLOOR = "#d9efe6"
 PALE = "#b8b8b8"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 
-MINUS, TIMES = "\u2212", "\u00d7"
+MINUS = "\u2212"
 
 MARGIN = 0.16
 """Space between text and the edge of a figure [in]."""

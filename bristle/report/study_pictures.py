@@ -16,11 +16,7 @@ from ..compare.panels import (
     residual_map,
 )
 from ..compare.picture import telling_patterns
-from ..draw.style import (
-    Page,
-    look,
-    short_z,
-)
+from ..draw.style import Page, look, short_z
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
@@ -44,11 +40,10 @@ def loops_page(before: Comparison | None, now: Comparison, names: tuple[str, str
                     continue
                 axes = page.figure.add_subplot(grid[row, column])
                 draw_loop(axes, prediction, over)
+                along = name_of(over, prediction.site)
                 if column == 0:
-                    along = name_of(over, prediction.site)
                     axes.set_title(f"{name}: force [{prediction.unit}] over {along}")
                 else:
-                    along = name_of(over, prediction.site)
                     axes.set_title(f"over {along}; z = {short_z(z)} on {prediction.name}")
         return page
 

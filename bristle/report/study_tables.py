@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..compare.tables import run_table
-from ..draw.style import MINUS, TIMES, percent
-from ..quantity import plain, quantity
+from ..draw.style import MINUS, percent
+from ..quantity import plain, quantity, times_ten
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from ..study.study import Study
 
 _RANKED = 8
-_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _COLOURS = {
     "white": "estimated from the samples: white",
     "low-passed": "estimated from the samples: white, low-passed above",
@@ -67,7 +66,7 @@ def with_interval(value: float, std: float | None) -> tuple[str, str]:
     scaled, width = value / 10.0**power, half / 10.0**power
     digits = 1 - floor(log10(width))
     places = max(digits, 0)
-    tail = f" {TIMES} 10{str(power).translate(_RAISED)}" if power else ""
+    tail = times_ten(power) if power else ""
     texts = (f"{round(one, digits):.{places}f}".replace("-", MINUS) for one in (scaled, width))
     number_text, wide = texts
     return f"{number_text}{tail}", f"± {wide}{tail}"
@@ -114,7 +113,7 @@ def data_words(measured: Sequence[Measurement]) -> tuple[list[str], list[list[st
         )
         unit = having[0].units[channel]
         of = percent(noise / size, 2) if size > 0.0 else "-"
-        rows.append([channel, in_lab_unit(noise, unit), of, "; ".join(found)])
+        rows.append([channel, quantity(noise, unit), of, "; ".join(found)])
     return header, rows
 
 
@@ -142,11 +141,6 @@ def ranking_table(
         at = f" ({entry['site']})" if several else ""
         rows.append([effect + at, text, share(entry.get("gain"))])
     return (["with this effect", "z held-out", "lower by"], rows, strong) if rows else None
-
-
-def in_lab_unit(value: float, unit: str) -> str:
-    """Return a quantity in SI as an engineer reads it: lengths in mm, large forces in kN."""
-    return quantity(value, unit)
 
 
 def number(value: Any) -> str:

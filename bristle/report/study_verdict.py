@@ -7,7 +7,8 @@ from ..diagnose.verdict_text import HEADINGS, Verdict, about, sentences, separat
 from ..draw import html
 from ..findings import command
 from ..physics.effect import EFFECTS
-from .study_tables import in_lab_unit, ranking_table
+from ..quantity import quantity
+from .study_tables import ranking_table
 
 _TONES = {"none": "green", "effect": "blue", "ambiguous": "purple", "unknown": "red"}
 """Colours of the kinds of a verdict."""
@@ -55,7 +56,7 @@ def noise_floor(verdict: Verdict | None) -> str:
     """Return the noise floor of a verdict as a sentence; "" where it is not told."""
     floor = (verdict or {}).get("noise_floor") or {}
     parts = [
-        f"{name} {in_lab_unit(value, channel_unit(name) if is_channel(name) else '')}".strip()
+        f"{name} {quantity(value, channel_unit(name) if is_channel(name) else '')}".strip()
         for name, value in floor.items()
         if isinstance(value, int | float)
     ]

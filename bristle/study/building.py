@@ -109,7 +109,7 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
     origin = (
         f"Identified from the response: {counted}.",
         f"Masses and start values: {model.building or 'the built-in building'}.",
-        "Frequencies [Hz]: " + ", ".join(f"{plain(f, 4)}" for f in frequencies(fit.building)),
+        "Frequencies [Hz]: " + ", ".join(plain(f, 4) for f in frequencies(fit.building)),
         "Comments give half of the 95 % interval.",
     )
     with study.writing():

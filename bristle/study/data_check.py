@@ -148,9 +148,8 @@ def _check_run(run: Measurement, level: str) -> list[Finding]:
         top = band(velocity, run.step)
         if top > 0.2 / run.step:
             text = (
-                f"motion reaches {plain(top / 1.5)} Hz at {plain(run.sampling.rate, 4)} "
-                f"samples per second: "
-                "fewer than ten per period."
+                f"motion reaches {plain(top / 1.5)} Hz at {plain(run.sampling.rate, 4)} samples "
+                "per second: fewer than ten per period."
             )
             findings.append(
                 Finding("rate", "warning", text, "Sample faster.", run.name, value=top * run.step)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,9 +23,6 @@ from .identified import Identified
 from .rig import rig_of
 from .runs import Runs
 from .study import Study
-
-if TYPE_CHECKING:
-    pass
 
 Show = Callable[[int], None]
 
@@ -235,9 +231,8 @@ def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float
     if same and same[0].train < 0.95 * after["rms_train"]:
         notes.append(
             f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
-            f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N in "
-            f"place of "
-            f"{plain(after['rms_train'], 4)} N."
+            f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N in place "
+            f"of {plain(after['rms_train'], 4)} N."
         )
     return notes
 

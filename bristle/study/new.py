@@ -250,8 +250,7 @@ def _twins(files: list[str], digests: Mapping[str, list[str]]) -> list[str]:
 
 
 def _comment(guess: Guess) -> str:
-    text = f"{guess.reason}"
-    return text + (f"\ndoubtful: {guess.doubt}" if guess.doubt else "")
+    return guess.reason + (f"\ndoubtful: {guess.doubt}" if guess.doubt else "")
 
 
 def _write(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -77,7 +77,7 @@ def split_in_time(pieces: list[Measurement]) -> Runs:
         "There is one run. It is split in time, the last 30 % held out: weaker than a run of its "
         "own, for motion, voltage and temperature there are much like those of the training part."
     )
-    return Runs(train, [replace(one) for one in holdout], (note,))
+    return Runs(train, holdout, (note,))
 
 
 def refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
