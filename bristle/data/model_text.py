@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..physics.drive import VOLTAGE
 from .correlation import set_correlation
 from .files import write_whole
 from .model import VALUE_KEYS, StudyModel, Value, table_names
@@ -30,6 +31,7 @@ def model_text(model: StudyModel, beside: Path | None = None) -> str:
     document["schema"] = 1
     document["law"] = model.law
     _set_or_drop(document, "building", model.building)
+    _set_or_drop(document, "drive", "" if model.drive == VOLTAGE.name else model.drive)
     for key in ("parameters", "effects"):
         if key not in document:
             document[key] = tomlkit.table(is_super_table=True)

@@ -13,17 +13,21 @@ from filelock import FileLock, Timeout
 
 from .. import __version__
 from ..data.files import read_json, write_json, write_whole
-from ..data.measurement import Measurement, read_measurements
+from ..data.measurement import Known, Measurement, measurements_of, stem_of
 from ..data.model import StudyModel, read_model
 from ..data.model_text import model_text
+from ..data.pieces import pieces_of
+from ..data.read import read_table
+from ..data.table import Table
 from ..errors import StudyError
 from ..findings import command, written
 from ..physics.user import Loaded, waiting
 from ..trust import load
 from .history import History, Step
 from .new import make_folder
+from .run_file import ROLES, RunFile
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
-from .settings import ROLES, Settings, read_settings
+from .settings import Settings, read_settings
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -148,7 +152,8 @@ class Study:
 
     def files(self, role: str | None = None) -> list[Path]:
         """Return the files of the runs, all or those of one role."""
-        return [self.folder / run.file for run in self.settings.runs if role in (None, run.role)]
+        own = [run.file for run in self.settings.runs if role in (None, run.role)]
+        return [self.folder / file for file in dict.fromkeys(own)]
 
     def read(self, role: str | None = None) -> list[Measurement]:
         """Return the measurements as they are in the files, without a look at what they are for.
@@ -158,7 +163,32 @@ class Study:
         RecordError
             If a file cannot be read.
         """
-        return read_measurements(self.files(role), self.settings.channels)
+        tables: dict[str, list[Table]] = {}
+        found: list[Measurement] = []
+        for run in self.settings.runs:
+            if role not in (None, run.role):
+                continue
+            if run.file not in tables:
+                tables[run.file] = self._tables(run.file)
+            found += self._measured(run, tables[run.file])
+        return found
+
+    def _tables(self, file: str) -> list[Table]:
+        """Return the runs in a file, each as a table."""
+        table, split = read_table(self.folder / file), self.settings.split
+        return pieces_of(table, split, self.settings.channels) if split else [table]
+
+    def _measured(self, run: RunFile, tables: list[Table]) -> list[Measurement]:
+        """Return the measurements of a run among those of its file."""
+        if run.piece > len(tables):
+            raise StudyError(
+                f"{self.folder / 'study.toml'}: {run.file} holds {len(tables)} runs, and "
+                f"piece = {run.piece} is none of them."
+            )
+        name = f"{stem_of(run.file)} run {run.piece}" if run.piece else ""
+        own = self.settings
+        known = Known(name, run.levels, run.labels, own.rate, own.mask)
+        return measurements_of(tables[max(run.piece, 1) - 1], own.channels, known=known)
 
     def runs(self) -> Runs:
         """Return the measurements for training and those held out.
@@ -208,7 +238,12 @@ class Study:
         except StudyError as error:
             raise StudyError(f"{error}{self._other_version()}") from None
         self._seen = self._state()
-        return model
+        return model.with_drive(self.drive or model.drive)
+
+    @property
+    def drive(self) -> str:
+        """The channel that commands the damper, "" where none was measured."""
+        return self.settings.drive
 
     def _other_version(self) -> str:
         """Return that another version of bristle wrote the present model, "" where this one did."""
