@@ -41,6 +41,9 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument(
+        "--mask", action="store_true", help="from now on isolated spikes count as not measured"
+    )
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     parser.set_defaults(act=_check)
 
@@ -218,6 +221,10 @@ def _check(arguments: argparse.Namespace) -> int:
     if arguments.action == _OLD:
         print("`bristle study first-look` is now `bristle study check`.", file=sys.stderr)
     study = Study(arguments.folder)
+    if arguments.mask and not study.settings.mask:
+        study = study.with_mask()
+        if not arguments.json:
+            print(f"{study.folder / 'study.toml'}: mask = true; isolated spikes are masked.\n")
     total = len(study.settings.runs)
     with Progress("checking the data", total, not arguments.json) as progress:
         found = check_data(study, progress.show)

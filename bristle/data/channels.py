@@ -75,7 +75,8 @@ class Meaning(NamedTuple):
 _QUANTITIES = {
     "time": "time t zeit tempo temps tiempo timestamp elapsed zeitstempel clock",
     "displacement": "displacement disp displ displac x position pos stroke weg hub lvdt travel "
-    "deslocamento posicao curso auslenkung deflection d y s piston desloc deplacement course",
+    "deslocamento posicao curso auslenkung deflection extension crosshead d y s piston desloc "
+    "deplacement course",
     "velocity": "velocity vel v speed geschwindigkeit velocidade vitesse velo rate vp xdot xd dx",
     "acceleration": "acceleration acc accel a beschleunigung aceleracao acel xddot xdd ddx accn",
     "force": "force f load kraft forca fd last fuerza loadcell effort kraftaufnehmer fdamper",

@@ -19,6 +19,7 @@ _WINDOW = 2 * LONGEST + 1  # of the running median, which jumps with a step and 
 _ABOVE_MOST = 8.0  # by what factor a spike exceeds what 99 % of the samples differ from it
 _ABOVE_NOISE = 15.0  # standard deviations of the same, told from its median
 _OF_RANGE = 0.03  # share of the channel's range that is worth a word
+_INSIDE = 2.5  # by what factor more a spike stands out that stays inside the usual range
 _TOLD = 3  # times that are told
 
 
@@ -50,10 +51,22 @@ def find_spikes(y: Array) -> list[tuple[int, int]]:
         _OF_RANGE * float(high - low),
     )
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (size > least).astype(np.int8), [0]])))
+    margin = _OF_RANGE * float(high - low)
+
+    def stands_out(a: int, b: int) -> bool:
+        """Return whether samples a to b are outside of the usual range, or alone and far off.
+
+        A motion that turns back for a moment takes a yield force through its range and back.
+        """
+        part = there[a:b]
+        if bool(np.all((part > high + margin) | (part < low - margin))):
+            return True
+        return b - a == 1 and float(size[a]) > _INSIDE * least
+
     return [
         (int(good[a]), int(good[b - 1]) + 1)
         for a, b in edges.reshape(-1, 2).tolist()
-        if b - a <= LONGEST and a > 0 and b < len(there)
+        if b - a <= LONGEST and 0 < a < b < len(there) and stands_out(a, b)
     ]
 
 

@@ -108,6 +108,7 @@ _RENAMED = {
     "hour": "h",
     "newton": "N",
     "newtons": "N",
+    "sec": "s",
     "sec.": "s",
     "secs": "s",
     "second": "s",

@@ -133,6 +133,20 @@ def write_settings(path: Path, settings: Settings) -> None:
     write_whole(path, tomlkit.dumps(document))
 
 
+def with_mask(text: str) -> str:
+    """Return the text of a study.toml with `mask = true`, all else as it was."""
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    if "mask" in document:
+        document["mask"] = True
+        return tomlkit.dumps(document)
+    lines = text.split("\n")
+    first = next((k for k, line in enumerate(lines) if line.lstrip().startswith("[")), len(lines))
+    line = "mask = true # isolated spikes count as not measured"
+    return "\n".join([*lines[:first], line, "", *lines[first:]])
+
+
 def _as_toml(spec: ChannelSpec) -> dict[str, Any]:
     if spec.step is not None:
         return {"step": spec.step}

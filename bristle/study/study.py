@@ -27,7 +27,7 @@ from .history import History, Step
 from .new import make_folder
 from .run_file import ROLES, RunFile
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
-from .settings import Settings, read_settings
+from .settings import Settings, read_settings, with_mask
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -308,6 +308,13 @@ class Study:
             self._set_aside(step.number)
             self._seen = self._state()
         return step
+
+    def with_mask(self) -> Study:
+        """Write `mask = true` into study.toml, and return the study as it is then."""
+        path = self.folder / "study.toml"
+        with self.writing():
+            write_whole(path, with_mask(path.read_text(encoding="utf-8-sig")))
+        return Study(self.folder)
 
     def verdict(self) -> dict[str, Any] | None:
         """Return the verdict on the present model in the present schema, None if there is none.
