@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="maps",
         action="append",
         default=[],
-        metavar="PORT=CHANNEL",
+        metavar="PORT=CHANNEL@UNIT",
         help="with --fmu: which channel an input is fed from or an output is held against",
     )
     parser.add_argument(
