@@ -228,13 +228,20 @@ def measurements_of(
     notes += _masked(spikes) if known.mask else []
     even = evenly(time, values, table.lines, table.source, table.place)
     notes += even.notes + _what_is_missing({**values, **known.levels})
-    even, said = decimated(even, known.rate)
-    notes += said
+    fewer = decimated(even, known.rate)
+    even, notes = fewer.even, [*notes, *fewer.notes]
     out = []
     stem = known.name or stem_of(table.source)
     for number, (piece, parts, measured) in enumerate(even.pieces, 1):
         name = stem if len(even.pieces) == 1 else f"{stem} ({number} of {len(even.pieces)})"
         noise, facts = _noise(table, channels, parts, estimate)
+        for channel, gain in fewer.gain.items():
+            found = fewer.noise[number - 1].get(channel) if facts.get(channel) else None
+            if found is not None:  # behind the filter it is not white, and is told from before
+                facts[channel] = replace(found, std=gain * found.std)
+                noise[channel] = gain * found.std
+            elif channel in facts and facts[channel] is None:
+                noise[channel] *= gain
         for channel, level in known.levels.items():
             units[channel], noise[channel], facts[channel] = channel_unit(channel), 0.0, None
             parts[channel] = np.full(len(piece), level)
@@ -242,6 +249,7 @@ def measurements_of(
             Measurement(
                 name, piece, parts, units, measured, noise, facts, even.sampling, table.source,
                 tuple(notes), labels=known.labels, spikes=() if known.mask else spikes,
+                lost=fewer.lost[number - 1],
             )
         )  # fmt: skip
     return out

@@ -87,39 +87,66 @@ def test_fast_runs_are_decimated_and_that_is_said(tmp_path, capsys) -> None:
     np.testing.assert_allclose(run.time, slow["time [s]"], atol=1e-9)
     np.testing.assert_array_equal(np.unique(run["voltage"]), np.unique(slow["U [V]"]))
     np.testing.assert_allclose(run["displacement"], 1e-3 * slow["x [mm]"], atol=2e-5)
-    # White noise of 0.1 N in four times the band: half of it is left, and white.
-    assert run.noise["force"] == pytest.approx(0.05, rel=0.2)
+    # What the short filter leaves of white noise of 0.1 N.
+    assert run.noise["force"] == pytest.approx(0.1 * 6.0**0.5 / 4.0 / 2.0**0.5, rel=0.2)
+    assert run.lost["force"].any()
     main(["study", "new", str(tmp_path / "all"), "--rate", "0", "--data", *map(str, files)])
     assert Study(tmp_path / "all").read()[0].step == pytest.approx(0.0005)
 
 
-def test_white_noise_stays_white_and_what_would_fold_is_gone() -> None:
-    rng, n = np.random.default_rng(3), 80_000
-    t = np.arange(n) / 2000.0
-    tone, kept = np.sin(2.0 * np.pi * 700.0 * t), np.sin(2.0 * np.pi * 40.0 * t)
+def even_run(rate: float = 2000.0, seconds: float = 40.0, **channels) -> Even:
+    n = round(rate * seconds)
     measured = np.ones(n, dtype=bool)
     measured[400] = False
-    pieces = [(t, {"noise": rng.normal(size=n), "tone": tone, "kept": kept}, measured)]
-    even, notes = decimated(Even(pieces, Sampling(1 / 2000.0, n), []), 500.0)
-    time, found, known = even.pieces[0]
-    assert notes
-    assert even.sampling.step == pytest.approx(0.002)
-    power = np.abs(np.fft.rfft(found["noise"])) ** 2
+    return Even([(np.arange(n) / rate, channels, measured)], Sampling(1.0 / rate, n), [])
+
+
+def test_a_motion_keeps_white_noise_and_loses_what_would_fold() -> None:
+    rng, n = np.random.default_rng(3), 80_000
+    t = np.arange(n) / 2000.0
+    kept = np.sin(2.0 * np.pi * 40.0 * t)
+    given = even_run(
+        displacement=rng.normal(size=n),
+        velocity=np.sin(2.0 * np.pi * 700.0 * t),
+        base_velocity=kept,
+    )
+    found = decimated(given, 500.0)
+    time, y, known = found.even.pieces[0]
+    assert len(found.notes) == 1
+    assert found.even.sampling.step == pytest.approx(0.002)
+    power = np.abs(np.fft.rfft(y["displacement"])) ** 2
     edge = power[int(0.9 * len(power)) :].mean() / power[: len(power) // 2].mean()
     assert 0.8 < edge < 1.25
-    assert np.std(found["noise"]) == pytest.approx(0.5, rel=0.05)
-    assert np.max(np.abs(found["tone"][50:-50])) < 5e-3
-    np.testing.assert_allclose(found["kept"], np.sin(2.0 * np.pi * 40.0 * time), atol=5e-3)
+    assert np.std(y["displacement"]) == pytest.approx(0.5, rel=0.05)
+    assert found.gain["displacement"] == pytest.approx(0.5, rel=0.05)
+    assert np.max(np.abs(y["velocity"][50:-50])) < 5e-3
+    np.testing.assert_allclose(y["base_velocity"], np.sin(2.0 * np.pi * 40.0 * time), atol=5e-3)
     assert np.flatnonzero(~known).tolist() == [100]
-    same, notes = decimated(Even(pieces, Sampling(1 / 2000.0, n), []), 1500.0)
-    assert same.pieces is pieces
-    assert not notes
+    same = decimated(given, 1500.0)
+    assert same.even is given
+    assert not same.notes
+
+
+def test_a_force_does_not_ring_where_it_jumps() -> None:
+    rng, t = np.random.default_rng(4), np.arange(80_000) / 2000.0
+    clean = 5.0 * np.sign(np.sin(2.0 * np.pi * 1.3 * t)) + np.sin(2.0 * np.pi * 2.0 * t)
+    given = even_run(force=clean + rng.normal(0.0, 0.05, t.size), voltage=np.floor(t % 3.0))
+    found = decimated(given, 500.0)
+    _, y, _ = found.even.pieces[0]
+    lost = found.lost[0]["force"]
+    error = (y["force"] - clean[::4])[~lost]
+    assert np.max(np.abs(error)) < 6.0 * found.gain["force"] * 0.05
+    assert np.std(error) == pytest.approx(found.gain["force"] * 0.05, rel=0.05)
+    assert found.noise[0]["force"].std == pytest.approx(0.05, rel=0.1)
+    assert np.mean(lost) < 0.03
+    assert "beside jumps of force are not judged" in found.notes[0]
+    np.testing.assert_array_equal(y["voltage"], np.floor(t % 3.0)[::4])
 
 
 def test_too_few_samples_are_not_decimated() -> None:
     t = np.arange(100) / 2000.0
     even = Even([(t, {"x": np.sin(t)}, np.ones(100, dtype=bool))], Sampling(1 / 2000.0, 100), [])
-    with pytest.raises(RecordError, match="Take rate out"):
+    with pytest.raises(RecordError, match="take rate out"):
         decimated(even, 500.0)
 
 
