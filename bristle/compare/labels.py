@@ -73,9 +73,10 @@ def with_levels(
     top = max((float(np.max(np.abs(y))) for y in commands if y is not None), default=0.0)
     out: list[Labels] = []
     for own, level in zip(labels, commands, strict=True):
-        steady = level is not None and float(np.ptp(level)) <= STEADY * top
-        mean = {drive: float(f"{float(np.mean(level)):.{_DIGITS}g}")} if steady else {}
-        out.append({**own, **mean})
+        if level is None or float(np.ptp(level)) > STEADY * top:
+            out.append(dict(own))
+        else:
+            out.append({**own, drive: float(f"{float(np.mean(level)):.{_DIGITS}g}")})
     return out
 
 

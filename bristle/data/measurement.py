@@ -6,7 +6,7 @@ Units are converted here, once. What was done to the samples is in `notes`; no s
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -227,7 +227,7 @@ def measurements_of(
     spikes = spikes_of(time, values, mask=known.mask)
     notes += _masked(spikes) if known.mask else []
     even = evenly(time, values, table.lines, table.source, table.place)
-    notes += even.notes + _what_is_missing({**values, **known.levels})
+    notes += even.notes + _what_is_missing([*values, *known.levels])
     fewer = decimated(even, known.rate)
     even, notes = fewer.even, [*notes, *fewer.notes]
     out = []
@@ -331,7 +331,7 @@ def _noise(
     return noise, facts
 
 
-def _what_is_missing(values: Mapping[str, Array]) -> list[str]:
+def _what_is_missing(values: Sequence[str]) -> list[str]:
     """Say which channels are absent, for much depends on it."""
     notes = []
     x, v = "displacement" in values, "velocity" in values

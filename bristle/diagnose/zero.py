@@ -63,7 +63,7 @@ def zero_fault(
         return None
     if not _significant(problem, model, rule):
         return None
-    return _fault(*zero_of(problem, model), decision)
+    return _fault(*zero_of(problem, model), decision, problem.runs[0].drive)
 
 
 def renewed_zero(opened: Opening, decision: Decision) -> tuple[SensorFault, ...]:
