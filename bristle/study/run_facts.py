@@ -115,6 +115,13 @@ def _offered(
         if (drive and (commanded or choices.levels or choices.table)) or name in given:
             continue
         values = [one[name][0] for one in tokens]
+        if drive and _counts(values):
+            pattern = tokens[0][name][2]
+            notes.append(
+                f'"{tokens[0][name][1]}" and the like in the names may count the files; '
+                f"--level '{pattern}' takes them for the {name}"
+            )
+            continue
         unit = PLAIN[name] if drive else ""
         levels = ", ".join(label_text(name, value, unit) for value in sorted(set(values)))
         seen = tokens[0][name][1]
@@ -126,6 +133,11 @@ def _offered(
             more = Facts(levels={name: value}) if drive else Facts(labels={name: value})
             found[k] = found[k].and_(more)
     return found, notes
+
+
+def _counts(values: Sequence[float]) -> bool:
+    """Return whether numbers only count the files: 1, 2, 3 ..., each once."""
+    return len(values) > 2 and sorted(values) == [float(k) for k in range(1, len(values) + 1)]
 
 
 def _tokens(file: Path) -> dict[str, tuple[float, str, str]]:
@@ -182,7 +194,7 @@ def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
             )
     target = PLAIN.get(named) or UNITS.get(named, "")
     number = target != "" or known is not None
-    wanted = rf"[-+]?{_NUMBER}" if number else r"[A-Za-z0-9.]+?"
+    wanted = rf"[-+]?{_NUMBER}" if number else r"[A-Za-z0-9.]+"
     match = re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}", file.stem + "_")
     match = match or re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}$", file.stem)
     if match is None:

@@ -145,6 +145,26 @@ def test_a_table_beside_the_files_gives_level_role_and_labels(lab, tmp_path) -> 
     assert runs[1].labels["batch"] == "B1"
 
 
+def test_numbers_that_count_files_are_no_levels(tmp_path) -> None:
+    runs = [write(tmp_path / f"run_{k}A.csv", one_run(1.0, k / 2)) for k in (1, 2, 3)]
+    created = create_study(tmp_path / "rig", runs)
+    assert not created.study.drive
+    assert any("may count the files; --level '{}A' takes them" in note for note in created.notes)
+    taken = create_study(tmp_path / "two", runs, runs=RunChoices(levels=["{}A"]))
+    assert taken.study.drive == "current"
+
+
+def test_the_report_tells_what_is_known_of_runs_and_how_to_make_them_again(lab, tmp_path) -> None:
+    from bristle.report.reproduce import commands
+    from bristle.report.study_tables import data_table
+
+    study = Study.create(tmp_path / "rig", files(lab)[:4])
+    header, rows = data_table(study, study.read())
+    assert header[-1] == "known"
+    assert rows[0][-1] == "current 0.5 A, frequency 0.5 Hz, amplitude 10 mm"
+    assert "--split" not in commands(study)[0]
+
+
 @pytest.mark.parametrize(
     ("choices", "what"),
     [

@@ -23,7 +23,8 @@ LARGEST = 512 * 1024**2
 """Largest content of a workbook that is unpacked [bytes]."""
 
 _MERGED = re.compile(rb'<mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
-_FORMULA = re.compile(rb"<c (?:(?!</c>).)*?<f[ >/](?:(?!</c>).)*?</c>", re.DOTALL)
+_CELL = re.compile(rb"<c [^>]*[^>/]>.*?</c>", re.DOTALL)
+_ANY_FORMULA = re.compile(rb"<f[ >/]")
 _VALUE = re.compile(rb"<v(?: [^>/]*)?>[^<]")
 _PLACE = re.compile(rb'r="([A-Z]+\d+)"')
 
@@ -96,7 +97,7 @@ def _with_notes(
     from dataclasses import replace
 
     _refuse_merged(part, table, where)
-    formulas = len(_FORMULA.findall(part))
+    formulas = len(_formulas(part))
     if formulas:
         notes = [*notes, f"{formulas} cells hold formulas: their stored values are taken"]
     others = [title for title in titles if title != own]
@@ -151,9 +152,16 @@ def _cell(value: Any) -> str:
     return " ".join(str(value).split())
 
 
+def _formulas(part: bytes) -> list[bytes]:
+    """Return the cells of a sheet's XML that hold formulas."""
+    if not _ANY_FORMULA.search(part):
+        return []
+    return [cell for cell in _CELL.findall(part) if _ANY_FORMULA.search(cell)]
+
+
 def _refuse_without_values(part: bytes, where: str) -> None:
     """Refuse formulas that were never computed: nothing here computes them."""
-    for cell in _FORMULA.findall(part):
+    for cell in _formulas(part):
         if not _VALUE.search(cell):
             place = _PLACE.search(cell)
             at = f", cell {place.group(1).decode()}" if place else ""
