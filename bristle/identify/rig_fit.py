@@ -77,7 +77,7 @@ class RigFit:
         """Return the covariance (p, p) of parameters that sites share, each counted as `_mean`."""
         total = np.zeros((len(names), len(names)))
         telling = {name: self._telling(name) for name in names}
-        certainty = {n: sum(max(f.std[n], 1e-300) ** -2 for f in telling[n]) for n in names}
+        certainty = {n: sum(max(f.std[n], 1e-150) ** -2 for f in telling[n]) for n in names}
         for found in self.fits.values():
             own = list(found.std)
             shared = [n for n in names if any(f is found for f in telling[n])]

@@ -259,6 +259,18 @@ def test_words_and_units_of_a_command() -> None:
     assert text_for("the voltage V", VOLTAGE) == "the voltage V"
 
 
+def test_a_verdict_speaks_of_its_own_command() -> None:
+    from bristle.diagnose.verdict_text import about, drive_of
+    from bristle.report.study_verdict import untestable_rows
+
+    verdict = {"noise_floor": {"force": 1.0, "current": 0.0}, "untestable": ["coil_lag"]}
+    assert drive_of(verdict) == DRIVES["current"]
+    assert drive_of({}) == VOLTAGE
+    told = " ".join(untestable_rows(verdict)[0]) + about("remanence", DRIVES["current"])
+    assert "current" in told
+    assert "volt" not in told
+
+
 def test_labels_part_the_runs_or_they_are_not_told() -> None:
     def errors(*z: float) -> list[LabelError]:
         return [LabelError("temperature", 20.0 + 10.0 * k, one, 2) for k, one in enumerate(z)]
