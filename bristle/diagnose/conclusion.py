@@ -108,7 +108,7 @@ def _reasons(parts: Sequence[Finding], kind: str) -> list[str]:
 
 
 def _without_load_cell(reason: str) -> str:
-    return f"Without a measured force {reason}: a load cell at the damper would tell."
+    return f"Without a measured force {reason}: a load cell at the damper would distinguish them."
 
 
 def _untestable(

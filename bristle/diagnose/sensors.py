@@ -102,8 +102,8 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
         found.append(
             SensorFault(
                 "velocity", "high-pass", theta[4] * gain, std[4] * gain,
-                "Velocity lacks what is slow in the rate of displacement, as from a geophone with "
-                f"a corner near {plain(theta[4] * gain / (2.0 * np.pi), 2)} Hz.",
+                "Velocity lacks the low frequencies of the rate of displacement, like a geophone "
+                f"with a corner near {plain(theta[4] * gain / (2.0 * np.pi), 2)} Hz.",
             )
         )  # fmt: skip
         return found
@@ -115,7 +115,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
             SensorFault(
                 "velocity", "gain", gain, spread,
                 f"Velocity is {gain:.3f} times the rate of displacement: one of the two gains is "
-                f"off, and neither motion nor force can tell which. If velocity is right, "
+                f"off, and neither motion nor force shows which one. If velocity is right, "
                 f"displacement shows {1.0 / gain:.3f} of what it should.",
                 either="displacement",
             )

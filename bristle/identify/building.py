@@ -186,9 +186,7 @@ def _finish(
             )
             zeta[r] = 0.0
     if first:
-        notes.append(
-            f"the damper's force was not measured: what is below {levels[0]} keeps its given values"
-        )
+        notes.append(f"the damper's force was not measured: values below {levels[0]} stay as given")
     modes = modes_of(building, stiffness)
     # d(omega^2)/dk_i = (shape_i - shape_{i-1})^2 (Nelson 1976, AIAA J. 14(9)).
     part = np.diff(modes.shapes, axis=0, prepend=np.zeros((1, n))) ** 2

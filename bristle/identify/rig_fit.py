@@ -112,7 +112,7 @@ def _line_text(found: Fit, site: Site) -> str:
         whole = plain(already + found.model.value(DAMPING), 4)
         error = plain(1.96 * found.std[DAMPING], 2)
         texts.append(f"c = {whole} +- {error} N s/m, {plain(already, 4)} of the file")
-    text = ", ".join(texts) + " (fitted along, not in model.toml)."
+    text = ", ".join(texts) + " (fitted too, not in model.toml)."
     if at_bound(found.model):
         text += (
             " The data push its damping below zero, where it is held "
