@@ -56,7 +56,7 @@ MISTAKES = [
     ("stop nan", "stop = 35.0", "stop = nan", "stop", ["nan, not a finite number"]),
     ("stop inf", "stop = 35.0", "stop = +inf", "stop", ["inf, not a finite number"]),
     ("stop true", "stop = 35.0", "stop = true", "stop", ["stop is true, not a number"]),
-    ("stop text", "stop = 35.0", 'stop = "35.0"', "stop", ["a number stands without quotes"]),
+    ("stop text", "stop = 35.0", 'stop = "35.0"', "stop", ["a number needs no quotes"]),
     ("stop words", "stop = 35.0", 'stop = "all"', "stop", ['the text "all", not a number']),
     ("stop a list", "stop = 35.0", "stop = [35.0]", "stop", ["is a list, not a number"]),
     ("stop a date", "stop = 35.0", "stop = 2020-01-01", "stop", ["not a number"]),
@@ -162,7 +162,7 @@ MISTAKES = [
      ['"damper.velocity" [m/s] is fed by "structure.base_displacement" [m]', "another quantity"]),
     ("output fed by output", '"structure.damper_force" = "damper.force"',
      '"damper.dissipated_energy" = "damper.force"\n"structure.damper_force" = "damper.force"',
-     "dissipated_energy", ['"damper.dissipated_energy" is an output; an input stands on the left']),
+     "dissipated_energy", ['"damper.dissipated_energy" is an output; an input belongs on the left']),
     ("input fed by input", '"voltage.voltage"', '"structure.extra_force"', "extra_force",
      ['"structure.extra_force" is an input; an output stands on the right']),
     ("the wrong way round", '"damper.voltage" = "voltage.voltage"',
@@ -192,7 +192,7 @@ MISTAKES = [
     # TOML itself
     ("no TOML", "step = 0.002", "step == 0.002", "step =", ["not TOML", "step == 0.002"]),
     ("decimal comma", "step = 0.002", "step = 0,002", "step =", ["not TOML", "one key = value"]),
-    ("no quotes", '"gauss-seidel"', "gauss-seidel", "algorithm", ["text stands in quotes"]),
+    ("no quotes", '"gauss-seidel"', "gauss-seidel", "algorithm", ["text needs quotes"]),
     ("broken inline table", '{ "gas_spring.on" = true,', '{ "gas_spring.on" = true,\n',
      "gas_spring.on", ["stays on one line"]),
     ("backslash", "el_centro_1940_ns", "C:\\my\\rec.csv", "record", ["single quotes"]),
@@ -472,4 +472,4 @@ def test_an_input_without_unit_takes_anything_and_says_so(foreign):
 def test_an_fmu_that_lives_once_cannot_be_two_components(foreign):
     again = '"structure.extra_force" = "mine.force"\n[components.twin]\nfmu = "once.fmu"\n[x]\n'
     errors = foreign("once.fmu", extra=again)
-    assert any("once.fmu can live once in a process" in error for error in errors)
+    assert any("once.fmu allows one instance per process" in error for error in errors)
