@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE.json",
-        help="the controller file, its picture beside it; else the design file's name, here",
+        help="the controller file, with its figure; else the design file's name, here",
     )
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 

@@ -43,7 +43,7 @@ class Experiment:
         """Return the run as a sentence of an experiment's plan."""
         if self.deviations < rule.tells:
             return (
-                "No run within the strokes, speeds and voltages of these would distinguish them: "
+                "No run within the strokes, speeds and voltages so far would distinguish them: "
                 f"at best the forces differ by {self.deviations:.1f} standard deviations over "
                 f"{LENGTH:g} s. Go beyond them."
             )

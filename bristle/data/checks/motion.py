@@ -88,7 +88,7 @@ def check_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
         yield Finding(
             "sign",
             "error",
-            f"force drives the motion, for it is positive along it ({text}).",
+            f"force drives the motion, because it is positive along it ({text}).",
             "Turn sign in [channels.force]: a force is positive when it resists motion along +x.",
             run.name,
             "force",
