@@ -189,7 +189,7 @@ def draw_regimes(axes: Axes, comparison: Comparison) -> None:
     axes.set_xticks(range(len(columns)), [_short(name) for name in columns], fontsize=8)
     axes.set_yticks(range(len(rows)), [_short(name) for name in rows], fontsize=8)
     axes.grid(visible=False)
-    axes.set_title("z: error over the noise that explains it")
+    axes.set_title("error / noise (z)")
 
 
 def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, Array] | None:

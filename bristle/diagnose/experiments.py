@@ -45,7 +45,7 @@ class Experiment:
             return (
                 "No run within the strokes, speeds and voltages so far would distinguish them: "
                 f"at best the forces differ by {self.deviations:.1f} standard deviations over "
-                f"{LENGTH:g} s. Go beyond them."
+                f"{LENGTH:g} s. Use a wider range."
             )
         motion = (
             f"a sine of {1e3 * self.amplitude:.3g} mm at {self.low:.3g} Hz"
@@ -61,8 +61,8 @@ class Experiment:
             f"{self.switch:.3g} s"
         )
         return (
-            f"Run {motion} {drive} for {LENGTH:g} s: there the forces of the alternatives differ "
-            f"by {self.contrast:.2g} times the noise, however they are refitted."
+            f"Run {motion} {drive} for {LENGTH:g} s: then the forces of the alternatives differ "
+            f"by {self.contrast:.2g} times the noise, even if they are fitted again."
         )
 
     def signals(self, dt: float) -> tuple[Array, Array, Array, Array]:

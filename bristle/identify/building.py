@@ -206,10 +206,9 @@ def _finish(
     if z[worst] > MISFIT:
         notes.append(
             f"equilibrium at {levels[worst]} leaves {plain(z[worst])} times the noise: the "
-            f"building "
-            "is not linear there, or its masses are not as given, or the displacements are not "
-            "what the accelerations say. The values are those of the linear building that comes "
-            "nearest, and the intervals hold for it alone"
+            "building is not linear there, or its masses are wrong, or displacements and "
+            "accelerations contradict each other. The values are those of the nearest linear "
+            "building, and the intervals are valid only for it"
         )
     return StructureFit(
         found, stiffness, std_k, zeta, std_zeta, modes.omega / (2.0 * np.pi),

@@ -115,10 +115,9 @@ def _line_text(found: Fit, site: Site) -> str:
     text = ", ".join(texts) + " (fitted too, not in model.toml)."
     if at_bound(found.model):
         text += (
-            " The data push its damping below zero, where it is held "
-            f"({plain(already, 4)} N s/m of the file are taken away): something else feeds in what "
-            "this damping would have to, such as an effect that is missing or a velocity that is "
-            "late."
+            " The data ask for a negative damping, so it is held at zero "
+            f"({plain(already, 4)} N s/m of the file are removed). A missing effect or a late "
+            "velocity may feed energy in."
         )
     return text
 

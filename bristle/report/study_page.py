@@ -188,8 +188,8 @@ def _where(content: Content) -> str:
         html.table(*run_errors(now), numbers=range(1, 6)),
         html.table(header, rows, numbers=range(1, 4)),
         html.paragraphs(
-            "Chance is that of such a share under a true model with an error as correlated as this "
-            "one, all coordinates together.", kind="soft",
+            "Chance: how often a true model, with an error as correlated as this one, would show "
+            "such a share along any coordinate.", kind="soft",
         ),
     )  # fmt: skip
 

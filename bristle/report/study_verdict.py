@@ -78,8 +78,8 @@ def untold_section(verdict: Verdict | None) -> str:
     hidden = untestable_rows(verdict)
     parts = [
         html.paragraphs(
-            "These effects could be there all the same: either the data do not excite them, or "
-            "refitting the model takes them up.", kind="soft",
+            "These effects may still be present: the data do not excite them, or the fit of the "
+            "model absorbs them.", kind="soft",
         ),
         html.table(["effect", "what it does", "what it would look like"], hidden),
     ] if hidden else []  # fmt: skip

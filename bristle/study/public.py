@@ -259,7 +259,7 @@ def diagnose(
         if model is None and not effects:
             return diagnose_study(given, write=write)
         raise StudyError(
-            "of a study the present model is diagnosed: identify the other one first, with "
+            "diagnose uses the present model of a study: identify the other one first, with "
             "bristle.identify(study, ...)."
         )
     chosen = model_of(model, effects, DEFAULT)

@@ -219,7 +219,7 @@ def test_the_comparison_of_a_study_by_the_command(folder, capsys):
     assert answer["held_out"] is True
     assert Path(answer["picture"]).read_bytes().startswith(b"\x89PNG")
     assert main(["compare", str(folder), "--runs", "train"]) == 0
-    assert "On the runs that it was fitted to" in capsys.readouterr().out
+    assert "On the training runs" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
