@@ -185,11 +185,7 @@ def test_nothing_is_said_of_noise():
 
 def test_the_runs_of_the_fit_are_called_so():
     held = predictions_with()
-    assert (
-        compare_predictions(held, seen=True)
-        .sentences[0]
-        .startswith("On the runs that it was fitted")
-    )
+    assert compare_predictions(held, seen=True).sentences[0].startswith("On the training runs")
     assert compare_predictions(held, seen=None).sentences[0].startswith("In this measurement")
 
 
