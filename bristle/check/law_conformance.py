@@ -34,12 +34,12 @@ def _says(law: type[Law]) -> Check:
     if not re.search(r"\b(1[89]|20)\d\d\b", law.source):
         lacking.append("a source with its year")
     found = "lacks " + ", ".join(lacking) if lacking else ""
-    return Check("it says what it is", not lacking, found)
+    return Check("name, texts and source are complete", not lacking, found)
 
 
 def _compiles(law: type[Law]) -> Check:
     flaw = refused(law)
-    return Check("compiled it gives the same numbers", flaw is None, flaw[1] if flaw else "")
+    return Check("compiled code gives the same numbers", flaw is None, flaw[1] if flaw else "")
 
 
 def _corners(law: type[Law]) -> Iterator[dict[str, float]]:
@@ -86,7 +86,7 @@ def _steps(law: type[Law]) -> Check:
     apart = max(abs(a - b) for a, b in zip(coarse, fine[FINER - 1 :: FINER], strict=True))
     share = apart / max(most, 1e-9)
     found = f"{100.0 * share:.2g} % of the force apart from steps of {2.0 / FINER:g} ms"
-    return Check("a step of 2 ms is fine enough", share < COARSE, found)
+    return Check("a step of 2 ms is small enough", share < COARSE, found)
 
 
 def _forces(law: type[Law], dt: float) -> list[float]:
@@ -104,4 +104,4 @@ def _forces(law: type[Law], dt: float) -> list[float]:
 
 
 def _has_effects(law: type[Law]) -> Check:
-    return Check("effects join it by its parts", bool(effects_of("damper", law.name)))
+    return Check("effects join its parts", bool(effects_of("damper", law.name)))

@@ -36,7 +36,7 @@ def build_parser() -> argparse.ArgumentParser:
         module = importlib.import_module(f"{__name__}.{found.name}")
         name = _NAMES.get(found.name, found.name)
         sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
-        sub.add_argument("--quiet", action="store_true", help="do not tell what is being done")
+        sub.add_argument("--quiet", action="store_true", help="print no progress")
         sub.add_argument("--debug", action="store_true", help="show the traceback of an error")
         module.add_arguments(sub)
         sub.set_defaults(main=module.main)

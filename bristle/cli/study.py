@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     # The name until 0.1; here for one release.
     _add_check(commands.add_parser(_OLD, description="The old name of `study check`."))
     auto = commands.add_parser(
-        "auto", help="identify, diagnose, add, until nothing that the library knows is missing"
+        "auto", help="repeat identify, diagnose and add until no effect of the library is missing"
     )
     auto.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     add_trust(auto)
@@ -157,7 +157,7 @@ def _print_new(created: Created) -> None:
 
     folder = created.study.folder
     print(
-        f"{folder}: a study of {len(created.study.settings.runs)} run(s). The columns are taken as:"
+        f"{folder}: a study of {len(created.study.settings.runs)} run(s). The columns are read as:"
     )
     for guess in created.guesses:
         turned = "turned" if guess.sign < 0 else ""
@@ -196,7 +196,7 @@ def _check(arguments: argparse.Namespace) -> int:
         print(found.text())
         print(f"\nPicture: {picture}")
         if not found.ok:
-            print("Mend the above before a model is fitted.", file=sys.stderr)
+            print("Correct these errors before you fit a model.", file=sys.stderr)
     return 0
 
 

@@ -112,8 +112,8 @@ def refuse(predictions: Sequence[RunPrediction]) -> None:
                 )
         if not np.min(one.sigma) > 0.0:
             raise RecordError(
-                f"{one.name}: the noise of the {one.quantity} is zero: nothing tells what error "
-                f"is large. Give one in study.toml, noise = ... in [channels.{one.quantity}]."
+                f"{one.name}: the noise of the {one.quantity} is zero, so no error can be "
+                f"judged. Give one in study.toml, noise = ... in [channels.{one.quantity}]."
             )
 
 

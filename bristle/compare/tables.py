@@ -57,10 +57,7 @@ def run_table(comparison: Comparison) -> Table:
     header = ["run", "z", f"error [{unit}]", "of RMS", f"noise [{unit}]", "half step [z]"]
     runs = [*comparison.runs]
     rows = [_run(one, factor) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
-    title = (
-        "Error over the noise that a true model would show (z), RMS at all frequencies, and what "
-        "half the step changes"
-    )
+    title = "Error / noise (z), RMS at all frequencies, and the sensitivity to halving the step"
     if comparison.sites:
         title = f"{begin(site_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
     return title, header, rows
@@ -79,7 +76,7 @@ def pattern_table(comparison: Comparison) -> Table:
     """Return the coordinates by how much of the error's power each carries."""
     header = ["coordinate", "of the error", "of what exceeds noise", "chance"]
     rows = [_pattern(one, comparison.site) for one in comparison.patterns[:_SHOWN]]
-    return "Where the error lives: the part of its power that a coordinate carries", header, rows
+    return "Where the error occurs: the share of its power along each coordinate", header, rows
 
 
 def _pattern(pattern: ResidualPattern, site: str) -> list[str]:

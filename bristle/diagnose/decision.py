@@ -151,8 +151,9 @@ def _too_loud(before: Trial, best: Trial) -> Decision:
         (
             f"On held-out runs {Z} = {before.z:.2f}: the noise was estimated too high, as happens "
             "where a force turns within a few samples. "
-            f"{_new(best, before)[0].capitalize()} lowers the error further, which this noise "
-            "cannot judge. State the noise of the channels in study.toml, or sample faster.",
+            f"{_new(best, before)[0].capitalize()} lowers the error further, but this noise "
+            "estimate cannot decide. State the noise of the channels in study.toml, or sample "
+            "faster.",
         ),
     )  # fmt: skip
 

@@ -112,13 +112,12 @@ def _line_text(found: Fit, site: Site) -> str:
         whole = plain(already + found.model.value(DAMPING), 4)
         error = plain(1.96 * found.std[DAMPING], 2)
         texts.append(f"c = {whole} +- {error} N s/m, {plain(already, 4)} of the file")
-    text = ", ".join(texts) + " (fitted along, not in model.toml)."
+    text = ", ".join(texts) + " (fitted too, not in model.toml)."
     if at_bound(found.model):
         text += (
-            " The data push its damping below zero, where it is held "
-            f"({plain(already, 4)} N s/m of the file are taken away): something else feeds in what "
-            "this damping would have to, such as an effect that is missing or a velocity that is "
-            "late."
+            " The data ask for a negative damping, so it is held at zero "
+            f"({plain(already, 4)} N s/m of the file are removed). A missing effect or a late "
+            "velocity may feed energy in."
         )
     return text
 

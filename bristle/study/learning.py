@@ -57,7 +57,7 @@ def _turned(study: Study) -> list[SensorFault]:
     return [
         SensorFault(
             name, "sign", -1.0, 0.0,
-            f"{name.capitalize()} has the other sign in its files; study.toml turns it.",
+            f"{name.capitalize()} has the other sign in its files; study.toml reverses it.",
         )
         for name, channel in study.settings.channels.items()
         if channel.sign < 0

@@ -56,7 +56,7 @@ def staircase_page(history_steps: Sequence[HistoryStep], unit: str = "N") -> Pag
         axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
         axes.yaxis.set_minor_formatter(lambda value, _: "")
         axes.grid(visible=False, axis="x")
-        axes.set_title("z: error over what noise explains")
+        axes.set_title("error / noise (z)")
         last = steps[-1]
         ends = [
             ("noise floor", 1.0, GREEN),

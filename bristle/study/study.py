@@ -181,7 +181,7 @@ class Study:
             lacking = ROLES[0] if not train else ROLES[1]
             raise StudyError(
                 f'{self.folder / "study.toml"}: no run has role = "{lacking}". Give it to some: a '
-                "model is judged on runs that it was not fitted to."
+                "model is tested on runs that it was not fitted to."
             )
         refuse_twins(train, holdout)
         twins = twins_within(train) + twins_within(holdout)
