@@ -18,7 +18,7 @@ from typing import Any, Self
 
 PATIENCE = 1.5
 """Seconds that a component may take to finish its step after Ctrl-C."""
-HURRY = 1.0
+HURRY = 0.7
 """Seconds that a command may take to end after Ctrl-C."""
 
 

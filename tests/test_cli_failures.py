@@ -181,3 +181,14 @@ raise SystemExit(main(["undo", "rig"]))
     while alive(child.pid) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not alive(child.pid)
+
+
+def test_ctrl_c_before_the_command_begins_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bristle.cli.build_parser", interrupted)
+    assert main(["undo", "rig"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"

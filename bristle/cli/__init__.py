@@ -48,7 +48,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     The traceback of an error that nobody foresaw is kept in a file, which the one line names.
     """
-    arguments = build_parser().parse_args(argv)
+    debug = False
+    try:
+        arguments = build_parser().parse_args(argv)
+        debug = arguments.debug
+        return _run(arguments)
+    except KeyboardInterrupt:
+        if debug:
+            raise
+        print("interrupted", file=sys.stderr)
+        return 130
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    """Run a command; say in one line why it fails, unless its tracebacks are asked for."""
     from ..interrupt import Hurry
 
     try:
@@ -62,11 +75,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of a pipe, such as head, has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except KeyboardInterrupt:
-        if arguments.debug:
-            raise
-        print("interrupted", file=sys.stderr)
-        return 130
     except Exception as error:
         if arguments.debug:
             raise
@@ -89,20 +97,28 @@ def _progress(arguments: argparse.Namespace) -> Iterator[None]:
 
 
 def _with_consent(arguments: argparse.Namespace) -> int:
-    """Run a command; ask, on a terminal, about code that has not run here, and run it again."""
-    if getattr(arguments, "trust", False):
-        from ..trust import granted
+    """Run a command; ask, on a terminal, about code that has not run here, and run it again.
 
+    What the command can do without is left out where the answer is no, or nobody can be asked.
+    """
+    from ..trust import asking, digest, granted
+
+    if getattr(arguments, "trust", False):
         with granted():
             return int(arguments.main(arguments))
-    while True:
-        try:
-            return int(arguments.main(arguments))
-        except TrustError as error:
-            from . import _consent
+    with asking() as declined:
+        while True:
+            try:
+                return int(arguments.main(arguments))
+            except TrustError as error:
+                from . import _consent
 
-            if not _consent.given(error):
-                raise
+                answered = digest(error.text)
+                if _consent.given(error):
+                    continue
+                if not error.optional or answered in declined:
+                    raise
+                declined.add(answered)
 
 
 def run_and_exit() -> NoReturn:

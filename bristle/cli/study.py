@@ -201,7 +201,7 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _auto(arguments: argparse.Namespace) -> int:
-    from ..study.learning import learn
+    from ..study.learning import learn, verdict_of
     from ..study.staircase import staircase
     from ..study.study import Study
     from .diagnose import text
@@ -226,5 +226,5 @@ def _auto(arguments: argparse.Namespace) -> int:
         return 0
     if not shown:
         print(f"{staircase(study.steps(), cut_off=low)}\n")
-    print(text(learned.verdict.as_dict(), arguments.folder))
+    print(text(verdict_of(study, learned.verdict), arguments.folder))
     return 0
