@@ -14,6 +14,7 @@ import pytest
 from study.made import write_runs
 
 from bristle.cli import main
+from bristle.errors import StudyError
 from bristle.study import create_study
 from bristle.study.study import Study
 
@@ -192,3 +193,25 @@ def test_ctrl_c_before_the_command_begins_is_one_line(
     monkeypatch.setattr("bristle.cli.build_parser", interrupted)
     assert main(["undo", "rig"]) == 130
     assert capsys.readouterr().err == "interrupted\n"
+
+
+def test_every_action_takes_the_options_of_every_command(
+    rig: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", "check", str(rig), "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+    (rig / "study.toml").unlink()
+    for line in (["study", "--debug", "check", str(rig)], ["study", "check", str(rig), "--debug"]):
+        with pytest.raises(StudyError):
+            main(line)
+
+
+def test_a_file_may_follow_an_option(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["laws", "new", "--json", "my_law"]) == 0
+    assert (tmp_path / "my_law.py").is_file()
+    with pytest.raises(SystemExit):
+        main(["laws", "new", "--json", "my_law", "other"])
+    assert "unrecognized arguments: my_law other" in capsys.readouterr().err

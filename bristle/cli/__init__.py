@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from typing import NoReturn
 
 from ..errors import BristleError, TrustError
+from ._common import add_common
 
 _NAMES = {"list_": "list"}
 
@@ -36,11 +37,25 @@ def build_parser() -> argparse.ArgumentParser:
         module = importlib.import_module(f"{__name__}.{found.name}")
         name = _NAMES.get(found.name, found.name)
         sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
-        sub.add_argument("--quiet", action="store_true", help="do not tell what is being done")
-        sub.add_argument("--debug", action="store_true", help="show the traceback of an error")
+        add_common(sub)
         module.add_arguments(sub)
         sub.set_defaults(main=module.main)
     return parser
+
+
+def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Return the arguments of a command line.
+
+    argparse gives a word that may be missing up at the first option: in `laws check --trust FILE`
+    the file would be left over.
+    """
+    parser = build_parser()
+    arguments, rest = parser.parse_known_args(argv)
+    if len(rest) == 1 and not rest[0].startswith("-") and getattr(arguments, "target", "") is None:
+        arguments.target = rest.pop()
+    if rest:
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    return arguments
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -50,7 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     debug = False
     try:
-        arguments = build_parser().parse_args(argv)
+        arguments = _parsed(argv)
         debug = arguments.debug
         return _run(arguments)
     except KeyboardInterrupt:

@@ -8,6 +8,7 @@ from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._common import add_common_to_actions
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_trust(auto)
     auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
+    add_common_to_actions(commands)
 
 
 def main(arguments: argparse.Namespace) -> int:
