@@ -215,3 +215,24 @@ def test_a_file_may_follow_an_option(
     with pytest.raises(SystemExit):
         main(["laws", "new", "--json", "my_law", "other"])
     assert "unrecognized arguments: my_law other" in capsys.readouterr().err
+
+
+def test_an_interrupted_command_ends_without_taking_the_process_down_first(tmp_path: Path) -> None:
+    code = """
+import atexit, time
+import bristle.cli.undo as command
+from bristle.cli import run_and_exit
+
+def work(arguments):
+    print("half a line", end="")
+    raise KeyboardInterrupt
+
+atexit.register(time.sleep, 60.0)  # as compiled code takes its time
+command.main = work
+run_and_exit()
+"""
+    file = tmp_path / "slow_to_end.py"
+    file.write_text(code)
+    command = [sys.executable, str(file), "undo", "rig"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "half a line", "interrupted\n")

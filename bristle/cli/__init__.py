@@ -144,6 +144,10 @@ def run_and_exit() -> NoReturn:
     FMUs ends without calling such libraries again.
     """
     code = main()
+    if code == 130:
+        from ..interrupt import leave
+
+        leave(code)
     if "bristle.simulate.session" in sys.modules:
         sys.stdout.flush()
         sys.stderr.flush()
