@@ -58,6 +58,8 @@ def text(verdict: Verdict, folder: Path) -> str:
             f"  {one['channel']:14} {one['fault']:10} {one['value']:.5g}"
             for one in verdict["sensors"]
         ]
+    for note in verdict.get("notes", ()):
+        lines += ["", f"Note: {note.rstrip('.')}."]
     lines += _trials(verdict)
     if hidden := untestable(verdict):
         lines += ["", f"Not testable with these runs: {', '.join(hidden)}."]

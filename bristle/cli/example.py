@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ._common import add_common_to_actions
+
 HELP = "studies to try things on: measurements of a rig with a hidden effect"
 
 
@@ -27,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
     reveal.add_argument("--json", action="store_true", help="print the answer as JSON")
     reveal.set_defaults(act=_reveal)
+    add_common_to_actions(commands)
 
 
 def _add_choices(parser: argparse.ArgumentParser) -> None:

@@ -8,6 +8,7 @@ from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._common import add_common_to_actions
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_trust(auto)
     auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
+    add_common_to_actions(commands)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -201,7 +203,7 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _auto(arguments: argparse.Namespace) -> int:
-    from ..study.learning import learn
+    from ..study.learning import learn, verdict_of
     from ..study.staircase import staircase
     from ..study.study import Study
     from .diagnose import text
@@ -226,5 +228,5 @@ def _auto(arguments: argparse.Namespace) -> int:
         return 0
     if not shown:
         print(f"{staircase(study.steps(), cut_off=low)}\n")
-    print(text(learned.verdict.as_dict(), arguments.folder))
+    print(text(verdict_of(study, learned.verdict), arguments.folder))
     return 0

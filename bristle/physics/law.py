@@ -19,7 +19,7 @@ from .command import Form
 from .command import Linear as Linear
 from .command import Monotone as Monotone
 from .command import Quadratic as Quadratic
-from .field_check import check_fields
+from .field_check import check_fields, told
 from .inputs import Inputs
 from .law_check import ALL_HOOKS, FIELDS, HOOKS, check_law
 from .law_check import PARTS as PARTS
@@ -166,7 +166,7 @@ class Law:
         super().__init_subclass__(**kwargs)
         if not cls.name:
             return
-        check_fields(cls, f"law {cls.name!r} ({cls.__module__}.{cls.__qualname__})", FIELDS)
+        check_fields(cls, told("law", cls), FIELDS)
         cls.parameters = all_parameters(cls.parameters, cls.tables)
         if any(not isinstance(form, Constant) for form in cls.command.values()):
             cls.parts = tuple(dict.fromkeys((*cls.parts, "command")))

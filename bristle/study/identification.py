@@ -20,6 +20,7 @@ from ..physics.laws import base_and_variant, law_names
 from ..quantity import plain
 from ..units import convert
 from .identified import Identified
+from .joining import refuse_left_out
 from .rig import rig_of
 from .runs import Runs
 from .study import Study
@@ -69,6 +70,8 @@ def identify_study(
     """
     if starts < 1:
         raise StudyError(f"starts = {starts}; 1 or more is right.")
+    if law is not None:
+        refuse_left_out(study.laws_folder / f"{law}.py")
     model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     found = identify_model(study, model, FitTask(cutoff, starts, table, show=show or _show_nothing))

@@ -13,7 +13,7 @@ from ..progress import tell, telling
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified
-from .joining import as_named_here, refuse_effect
+from .joining import as_named_here, refuse_effect, refuse_left_out
 from .rig import building_of
 from .study import Study
 
@@ -65,10 +65,10 @@ def _turned(study: Study) -> list[SensorFault]:
 
 
 def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
-    """Return the content of verdict.json, with what weakens the split of the runs."""
+    """Return the content of verdict.json, with what weakens the split and what is left out."""
     verdict = found.as_dict()
-    notes = study.runs().notes
-    return {**verdict, "notes": list(notes)} if notes else verdict
+    notes = [*study.runs().notes, *(f"Left out: {why}" for why in study.left_out())]
+    return {**verdict, "notes": notes} if notes else verdict
 
 
 @dataclass(frozen=True)
@@ -101,8 +101,10 @@ def add_effects(
     StudyError
         If an effect is not known, is there already, or cannot join the model.
     """
+    study.usable_effects()
+    for name in names:
+        refuse_left_out(study.effects_folder / f"{name}.py")
     tell("reading the runs")
-    study.usable_effects()  # raises where one of the study's own waits for consent
     model = present = study.model()
     bench = not study.settings.has_building
     names = tuple(as_named_here(name, bench) for name in names)

@@ -19,7 +19,7 @@ from ..data.model_text import model_text
 from ..errors import StudyError
 from ..findings import command, written
 from ..physics.user import Loaded, waiting
-from ..trust import load
+from ..trust import can_do_without, load
 from .history import History, Step
 from .new import make_folder
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
@@ -125,20 +125,25 @@ class Study:
         """Register the user's own effects and laws that can be compiled; say why others cannot be.
 
         Call it before a fit or a diagnosis: an effect that cannot be compiled would take all others
-        along.
+        along. What waits for consent, and is not in the model, is left out like these.
 
         Raises
         ------
         TrustError
-            If the code of one must not run yet.
+            If the model has one whose code must not run yet.
         """
         from ..check.user_effects import usable
 
         laws, effects = load(self.laws_folder, "law"), load(self.effects_folder)
         for one in (*laws, *effects):
             if untrusted := waiting(one.path):
-                raise untrusted
+                read_model(self.folder / "model.toml")  # raises where the model has it
+                can_do_without(untrusted)
         self.own_laws, self.own_effects = usable(laws), usable(effects)
+        return self.left_out()
+
+    def left_out(self) -> list[str]:
+        """Return why own laws and effects were left out when they were last read."""
         return [one.error for one in (*self.own_laws, *self.own_effects) if one.error]
 
     @property
