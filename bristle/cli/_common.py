@@ -17,7 +17,7 @@ def add_common_to_actions(commands: argparse._SubParsersAction[argparse.Argument
 
 
 def _add(parser: argparse.ArgumentParser, default: object) -> None:
-    text = "do not tell what is being done"
+    text = "print no progress"
     parser.add_argument("--quiet", action="store_true", default=default, help=text)
     text = "show the traceback of an error"
     parser.add_argument("--debug", action="store_true", default=default, help=text)

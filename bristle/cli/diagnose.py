@@ -97,7 +97,8 @@ def _next(verdict: Verdict, folder: Path) -> str:
         return command("add", folder, *verdict["effects"][:count])
     if verdict["kind"] == "unknown":
         return (
-            f"{command('compare', folder)} , which shows where the residual is;  bristle effects "
-            "new NAME  starts your own effect."
+            f"{command('learn', folder)} , which learns what is missing;  "
+            f"{command('compare', folder)} , which shows where the residual is;  "
+            "bristle effects new NAME  starts your own effect."
         )
     return command("report", folder)

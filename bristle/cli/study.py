@@ -30,6 +30,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "auto", help="repeat identify, diagnose and add until no effect of the library is missing"
     )
     auto.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    auto.add_argument(
+        "--learn", action="store_true",
+        help="where no known effect explains the error, learn a curve and go on",
+    )  # fmt: skip
     add_trust(auto)
     auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
@@ -203,7 +207,7 @@ def _check(arguments: argparse.Namespace) -> int:
 
 
 def _auto(arguments: argparse.Namespace) -> int:
-    from ..study.learning import learn, verdict_of
+    from ..study.learning import complete, verdict_of
     from ..study.staircase import staircase
     from ..study.study import Study
     from .diagnose import text
@@ -220,13 +224,15 @@ def _auto(arguments: argparse.Namespace) -> int:
         print(f"\n{staircase(steps, cut_off=low)}\n", flush=True)
         shown.append(len(steps))
 
-    learned = learn(study, on_step=show)
+    done = complete(study, curves=arguments.learn, on_step=show)
     if arguments.json:
         import json
 
-        print(json.dumps(learned.as_dict(), indent=2, ensure_ascii=False))
+        print(json.dumps(done.as_dict(), indent=2, ensure_ascii=False))
         return 0
     if not shown:
         print(f"{staircase(study.steps(), cut_off=low)}\n")
-    print(text(verdict_of(study, learned.verdict), arguments.folder))
+    for one in done.curves:
+        print("\n".join(one.sentences()) + "\n")
+    print(text(verdict_of(study, done.verdict), arguments.folder))
     return 0
