@@ -160,7 +160,7 @@ def test_channel_written_less_often_is_held() -> None:
     data["U"] = np.where(np.arange(N) % 10 == 0, data["U"], np.nan)
     (run,) = measured(data)
     assert set(np.unique(run["voltage"])) == {0.0, 4.0}
-    assert any("less often" in note for note in run.notes)
+    assert any("fewer samples" in note for note in run.notes)
 
 
 @pytest.mark.parametrize(
