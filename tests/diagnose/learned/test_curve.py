@@ -87,7 +87,7 @@ def test_a_learned_effect_conforms_as_any_other(closed):
         formula = formula_of(best, curve)
     text = effect_text("learned_9", curve, "made for a test, 2026", formula)
     with defined({"learned_9": text}):
-        failed = [check for check in examine(EFFECTS["learned_9"]) if not check.passed]
+        failed = [check for check in examine(EFFECTS["learned_9"]) if not check.holds]
     assert failed == []
 
 
