@@ -54,7 +54,8 @@ def _site(one: SiteError, factor: float) -> list[str]:
 def run_table(comparison: Comparison) -> Table:
     """Return the error on each run and over all, with the numerical error beside it."""
     factor, unit = scale(comparison.unit, comparison.total.signal)
-    header = ["run", "z", f"error [{unit}]", "of RMS", f"noise [{unit}]", "half step [z]"]
+    header = ["run", "z", f"error [{unit}]", "of RMS", "fit", "VAF"]
+    header += [f"noise [{unit}]", "half step [z]"]
     runs = [*comparison.runs]
     rows = [_run(one, factor) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
     title = "Error / noise (z), RMS at all frequencies, and the sensitivity to halving the step"
@@ -66,9 +67,8 @@ def run_table(comparison: Comparison) -> Table:
 def _run(run: RunError, factor: float) -> list[str]:
     numerical = plain(run.numerical_z, 2) if run.numerical_z == run.numerical_z else "not tried"
     return [
-        run.name, short_z(run.z), plain(factor * run.rms), percent(run.share),
-        plain(factor * run.noise),
-        numerical,
+        run.name, short_z(run.z), plain(factor * run.rms), percent(run.share), percent(run.fit),
+        percent(run.accounted), plain(factor * run.noise), numerical,
     ]  # fmt: skip
 
 

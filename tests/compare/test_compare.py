@@ -63,6 +63,16 @@ def test_the_truth_is_right_within_its_noise_and_a_wrong_model_is_not():
     assert wrong.total.rms > truth.total.rms
 
 
+def test_fit_and_variance_accounted_for_are_their_definitions():
+    found = compare(bench(), Model("lugre", (), {"sigma_2": 200.0}))
+    parts = [(one.measured[one.skip :], one.residual) for one in found.predictions]
+    measured, residual = (np.concatenate(group) for group in zip(*parts, strict=True))
+    about = np.sqrt(np.sum((measured - measured.mean()) ** 2))
+    assert found.total.fit == pytest.approx(1.0 - np.sqrt(np.sum(residual**2)) / about, rel=1e-12)
+    assert found.total.accounted == pytest.approx(1.0 - np.var(residual) / np.var(measured))
+    assert found.as_dict()["total"]["fit"] == found.total.fit
+
+
 def test_the_numerical_error_falls_with_the_step():
     run = bench(count=1, noise=1e-6).runs[0]
     finer = halved(run)

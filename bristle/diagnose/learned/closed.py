@@ -48,8 +48,8 @@ class Form:
 
 
 _NUMPY = {
-    "__builtins__": {}, "abs": np.abs, "copysign": np.copysign, "cos": np.cos, "exp": np.exp,
-    "log": np.log, "max": np.maximum, "min": np.minimum, "sin": np.sin, "tanh": np.tanh,
+    **{one.__name__: one for one in (np.copysign, np.cos, np.exp, np.log, np.sin, np.tanh)},
+    "__builtins__": {}, "abs": np.abs, "max": np.maximum, "min": np.minimum,
 }  # fmt: skip
 
 
@@ -97,7 +97,7 @@ FORMS = (
     Form("power", "c + m sgn(s) |s|^d", ("copysign(1.0, {s}) * abs({s}) ** {d}",), _powers),
     Form("exponential fall", "c + m exp(-|s|/d)", ("exp(-abs({s}) / {d})",), _lengths),
     Form("bell", "c + m exp(-(s/d)^2)", ("exp(-(({s} / {d}) ** 2))",), _lengths),
-    Form("saturation", "c + m tanh(s/d)", ("tanh({s} / {d})",), _lengths),
+    Form("levelling off", "c + m tanh(s/d)", ("tanh({s} / {d})",), _lengths),
     Form("hyperbola", "c + m/(1 + |s|/d)", ("1.0 / (1.0 + abs({s}) / {d})",), _lengths),
     Form("logarithm", "c + m ln(1 + |s|/d)", ("log(1.0 + abs({s}) / {d})",), _lengths),
     Form("threshold", "c + m/(1 + (d/s)^4)", ("{s} ** 4 / ({s} ** 4 + {d} ** 4)",), _lengths),

@@ -6,6 +6,7 @@ read by the user is the same.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -16,6 +17,11 @@ from .along import ALONG, MEMORIES, Along
 BOUND = 30.0
 """Times the largest value of a learned curve: bounds of each of its values."""
 
+
+MATH = tuple(
+    one.__name__ for one in (math.copysign, math.cos, math.exp, math.log, math.sin, math.tanh)
+)
+"""Functions that a hook may import."""
 
 POSITIVE = ("tau", "way", "d")
 """Parameters that are times, lengths and scales: they stay above zero."""
@@ -158,9 +164,7 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     if along.advance:
         body += ["", "    @staticmethod", "    def advance(q, z, p):"]
         body += ["    " + line for line in along.advance.splitlines()]
-    functions = [
-        n for n in ("copysign", "cos", "exp", "log", "sin", "tanh") if f"{n}(" in "\n".join(body)
-    ]
+    functions = [name for name in MATH if f"{name}(" in "\n".join(body)]
     parameters = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
     if formula:
         parameters += [(*given, "of the formula") for given in formula.parameters]
