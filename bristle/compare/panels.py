@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
+from ..quantity import tick
 from .coordinates import SHOWN
 from .names import name_of
 
@@ -165,7 +166,7 @@ def draw_spectrum(axes: Axes, comparison: Comparison) -> None:
     axes.set_xlim(f[0], f[-1])
     axes.set_title(f"PSD [{comparison.unit}²/Hz]")
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.set_major_formatter(lambda value, _: tick(value))
         axis.set_minor_formatter(lambda value, _: "")
     axes.set_xlabel("frequency [Hz]")
     _legend(axes, ("measured", PALE), ("error", ERROR), ("expected noise", BLUE))

@@ -237,6 +237,7 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     if building and not (beside / building).is_file():
         toml.error(("building",), f"there is no file {beside / building}.")
     model = StudyModel(law, parameters, effects, building, tuple(only_shown))
+    toml.check()  # else what is wrong with an effect would be said again of its correlation
     correlation = None
     if "correlation" in data:
         correlation = read_correlation(toml, list(model.flat()), model.uncertain())

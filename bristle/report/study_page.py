@@ -147,7 +147,8 @@ def _tiles(content: Content) -> str:
         ),
         (
             quantity(now.total.rms, now.unit, 2, now.total.signal),
-            f"RMS error at all frequencies, {percent(now.total.share)} of the {now.quantity}'s RMS",
+            f"RMS error at all frequencies, {percent(now.total.share)} of the RMS of the "
+            f"{now.quantity}",
         ),
     ]
     first = next((one.z for one in content.history_steps if one.z is not None), None)

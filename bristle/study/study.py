@@ -273,6 +273,7 @@ class Study:
             If there is no step to undo, or as for `add_step`.
         """
         with self.writing():
+            self.history.refuse_damaged()  # before an edit is kept
             self.history.keep_edit()
             step = self.history.undo()
             self._set_aside(step.number)
