@@ -77,10 +77,13 @@ def learn(
     """
     before, train, held_out = opened.before, opened.searched, opened.held_out
     residual = residual_of(train, before.model)
+    worth = (1.0 - rule.gain) ** 2 * Normal(residual).without_curve()
     found = [
         one
         for one in promises(residual)
-        if (not parts or one.curve.part in parts) and (not along or one.curve.along in along)
+        if one.loss <= worth
+        and (not parts or one.curve.part in parts)
+        and (not along or one.curve.along in along)
     ]
     chosen = distinct(found, TRIED)
     if not chosen:
