@@ -260,6 +260,6 @@ def _conserves(curve: Curve) -> bool:
 
 def _row(begin: str, values: tuple[float, ...], end: str = "") -> list[str]:
     """Return the lines of a tuple of numbers, some to a line."""
-    texts = [f"{value:.6g}," for value in values]
+    texts = [f"{float(f'{value:.6g}')!r}," for value in values]  # 0.0, for numba wants one type
     rows = [" ".join(texts[k : k + 6]) for k in range(0, len(texts), 6)]
     return [f"{begin}(", *(f"    {row}" for row in rows), f"){end}"]
