@@ -16,6 +16,8 @@ parameters = { k = { value = 81.2, unit = "N/m", std = 3.0 } }
 parameters = ["sigma_a", "gas_spring.k"]
 rows = [[1.0], [-0.42, 1.0]]
 
+`command = "quadratic"`, or `command = "table"` with `command_knots = [0.0, 1.5, 3.0]` [V], beside
+the law is a form that was chosen (`physics.forms`); `StudyModel.law` names both together.
 `correlation` is how the errors of identified parameters go together (`data.correlation`); files
 without it open as before. `data.model_text` writes the file.
 """
@@ -36,6 +38,7 @@ from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..physics.user import waiting, why_left_out
 from ..units import canonical, convert
+from .command_form import law_in_form
 from .correlation import (
     Array,
     Correlation,
@@ -46,7 +49,16 @@ from .correlation import (
 from .files import Toml
 
 ORIGINS = ("reconstructed", "measured", "assumed", "identified")
-_KEYS = ("schema", "law", "building", "parameters", "effects", "correlation")
+_KEYS = (
+    "schema",
+    "law",
+    "command",
+    "command_knots",
+    "building",
+    "parameters",
+    "effects",
+    "correlation",
+)
 VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")
 
 
@@ -224,6 +236,7 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     if law not in law_names():
         toml.error(("law",), unknown("law", law, law_names()))
         toml.check()
+    law = law_in_form(toml, data, law)
     parameters = _values(toml, ("parameters",), toml.table((), data, "parameters"), law)
     effects: dict[str, dict[str, Value]] = {}
     only_shown = []
