@@ -38,7 +38,7 @@ from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..physics.user import waiting, why_left_out
 from ..units import canonical, convert
-from .command_form import law_in_form
+from .command_form import FORM_KEYS, law_in_form
 from .correlation import (
     Array,
     Correlation,
@@ -49,16 +49,7 @@ from .correlation import (
 from .files import Toml
 
 ORIGINS = ("reconstructed", "measured", "assumed", "identified")
-_KEYS = (
-    "schema",
-    "law",
-    "command",
-    "command_knots",
-    "building",
-    "parameters",
-    "effects",
-    "correlation",
-)
+_KEYS = ("schema", "law", *FORM_KEYS, "building", "parameters", "effects", "correlation")
 VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")
 
 
