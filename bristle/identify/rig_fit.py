@@ -23,6 +23,11 @@ from .table import error_rms, force_rms
 Array = NDArray[np.float64]
 
 
+_LEAST_STD = 1e-150
+"""Takes the place of a standard deviation of zero, of which the data cannot speak: its square can
+still be divided by."""
+
+
 class SiteModel(NamedTuple):
     """A site, and the part of a model that predicts its runs."""
 
@@ -77,7 +82,7 @@ class RigFit:
         """Return the covariance (p, p) of parameters that sites share, each counted as `_mean`."""
         total = np.zeros((len(names), len(names)))
         telling = {name: self._telling(name) for name in names}
-        certainty = {n: sum(max(f.std[n], 1e-300) ** -2 for f in telling[n]) for n in names}
+        certainty = {n: sum(max(f.std[n], _LEAST_STD) ** -2 for f in telling[n]) for n in names}
         for found in self.fits.values():
             own = list(found.std)
             shared = [n for n in names if any(f is found for f in telling[n])]
@@ -85,7 +90,7 @@ class RigFit:
                 continue
             part = np.zeros((len(names), len(own)))
             for name in shared:
-                weight = max(found.std[name], 1e-300) ** -2 / certainty[name]
+                weight = max(found.std[name], _LEAST_STD) ** -2 / certainty[name]
                 part[names.index(name), own.index(name)] = weight
             total += part @ found.covariance @ part.T
         return total
@@ -127,7 +132,7 @@ def _mean(estimates: list[tuple[float, float]]) -> tuple[float, float]:
     """Return the mean of values with their standard deviations, and its own."""
     if len(estimates) == 1:
         return estimates[0]
-    weight = np.array([1.0 / max(std, 1e-300) ** 2 for _, std in estimates])
+    weight = np.array([1.0 / max(std, _LEAST_STD) ** 2 for _, std in estimates])
     mean = float(np.dot(weight, [value for value, _ in estimates]) / weight.sum())
     return mean, float(weight.sum() ** -0.5)
 
