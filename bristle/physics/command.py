@@ -81,7 +81,13 @@ class Quadratic(Form):
 
 
 def rising(level: float, slope: float, bend: float, V: float) -> float:
-    """Return level + slope V + bend V^2 up to where that is largest, and the same beyond."""
+    """Return level + slope V + bend V^2 up to where that is largest, and the same beyond.
+
+    Parameters
+    ----------
+    level, slope, bend : in the quantity's unit, per volt, per volt squared; the slope not negative
+    V : voltage [V]
+    """
     if bend < 0.0:
         V = min(V, -0.5 * slope / bend)
     return level + V * (slope + V * bend)

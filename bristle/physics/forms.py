@@ -127,7 +127,7 @@ class LawsByName(dict[str, "type[Law]"]):
         plain, form, knots = split_form(name)
         if not form or plain not in self:
             raise KeyError(name)
-        return with_form(self[plain], form, knots)
+        return with_form(self[plain], form, knots)  # type: ignore[arg-type]  # a class can be hashed
 
 
 class _Chosen:

@@ -21,7 +21,7 @@ from .command import Monotone as Monotone
 from .command import Quadratic as Quadratic
 from .command import Rising as Rising
 from .field_check import check_fields
-from .forms import LawsByName, split_form, with_form
+from .forms import LawsByName, joined_form, split_form
 from .inputs import Inputs
 from .law_check import ALL_HOOKS, FIELDS, HOOKS, check_law
 from .law_check import PARTS as PARTS
@@ -382,7 +382,7 @@ def base_and_variant(name: str) -> tuple[type[Law], Variant]:
     for law in LAWS.values():
         for suffix, variant in law.variants.items():
             if plain == f"{law.name}_{suffix}":
-                return (with_form(law, form, knots) if form else law), variant
+                return LAWS[joined_form(law.name, form, knots)], variant
     raise PhysicsError(f'no law is named "{name}". There are: {", ".join(law_names())}.')
 
 

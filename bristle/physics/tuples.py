@@ -52,9 +52,14 @@ def law_values(
 ) -> str:
     """Return the source that makes a law's parameter tuple from `p` at the voltage V.
 
-    `factors` are the sources of `FACTORS`, 1 where one is missing; `felt` is the sequence of states
-    that holds the voltage of a law with a lag of its own, "" where V stands for it; `place` is
-    where in `p` the numbers of a chosen form begin, of which the variable `form` tells; -1: none.
+    Parameters
+    ----------
+    law : class of a law
+    factors : the sources of `FACTORS`, 1 where one is missing
+    felt : the sequence of states that holds the voltage of a law with a lag of its own, "" where V
+        stands for it
+    place : where in `p` the numbers of a chosen form begin, of which the variable `form` tells; -1
+        where there is none
     """
     V = f"{felt}[{list(law.states).index(law.felt)}]" if law.felt and felt else "V"
     at = {name: f"p[{k}]" for k, name in enumerate(law.parameters)}

@@ -53,7 +53,7 @@ def _named(
     where = f"[components.{part.name}]"
     fmu, path = settings.get("fmu"), (*part.path, "law")
     if "law" not in settings:
-        own = library.law_of(fmu) if fmu in library.names() else ""
+        own = library.law_of(str(fmu)) if fmu in library.names() else ""
         if not own:
             words = (
                 f"{where}: only a built-in damper takes a form of the command, or law = ... does."
