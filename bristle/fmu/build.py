@@ -25,7 +25,7 @@ from typing import Any
 from uuid import UUID, uuid5
 
 from ..errors import BuildError
-from ..physics.law import LAWS
+from ..physics.forms import split_form
 from ..physics.user import own_laws
 from ..resources import fmus_folder
 from ..trust import require
@@ -159,7 +159,7 @@ def plan(
     if starts:
         baked["starts"] = _checked_starts(component, building, effects, starts)
     law = getattr(kind, "law", "")
-    laws = tuple(file for name, file in own_laws().items() if law and name == LAWS[law].base.name)
+    laws = tuple(file for name, file in own_laws().items() if name == split_form(law)[0])
     return Plan(chosen, path, baked, files, effects, laws)
 
 

@@ -15,6 +15,7 @@ from typing import Any
 
 from .. import units
 from ..errors import BuildError
+from ..physics.forms import split_form
 from ..physics.law import LAWS
 from ..physics.user import own_laws
 from ..resources import cache_folder, components_folder
@@ -86,7 +87,7 @@ def component_of_law(law: str) -> str:
     BuildError
         If there is none.
     """
-    if LAWS[law].form:
+    if split_form(law)[1]:
         return str(_own_source(law))
     if law in own_laws():
         return _own_component(law)

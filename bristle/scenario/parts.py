@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..findings import Findings, nearest
+from ..findings import Findings, command, nearest
 from ..fmu.description import Description, Value, Variable
 from ..lines import KeyPath
 
@@ -60,6 +60,11 @@ class Part:
     def variables(self) -> dict[str, Variable]:
         """Variables of the FMU by name; none where it could not be read."""
         return self.description.variables if self.description else {}
+
+    @property
+    def ports_command(self) -> str:
+        """The command that lists all ports; "" where its law was made for this scenario."""
+        return "" if self.law else command("list", "ports", self.fmu)
 
     def value(self, name: str) -> Value | None:
         """Return a parameter's value as set, else its start value, else None."""
