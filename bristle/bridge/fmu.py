@@ -178,7 +178,7 @@ def _one(
     if noise < floor:
         noise = floor
         notes.append(
-            f"{signal} has no noise to speak of: errors are in units of {SILENT:.1%} of its RMS"
+            f"{signal} has almost no noise: errors are in units of {SILENT:.1%} of its RMS"
         )
     spread = draws - middle
     bias = spread.mean(axis=0)
@@ -237,8 +237,8 @@ def _turned(outputs: tuple[Comparison, ...]) -> list[str]:
         p = np.concatenate([run.predicted for run in one.predictions])
         if np.std(y) > 0.0 and np.std(p) > 0.0 and float(np.corrcoef(y, p)[0, 1]) < -0.5:
             notes.append(
-                f"{one.quantity} goes against what was measured: signs may differ; --channel "
-                f"{one.quantity}=-COLUMN@UNIT turns the measured one"
+                f"{one.quantity} has the opposite sign of the measured channel; --channel "
+                f"{one.quantity}=-COLUMN@UNIT reverses the measured one"
             )
     return notes
 

@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--no-table", action="store_true", help="leave out the table that compares the laws"
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="show what would be found; leave the study as it is"
+        "--dry-run", action="store_true", help="show the result; do not change the study"
     )
     parser.add_argument(
         "--structure",
@@ -145,7 +145,7 @@ def _errors(found: Identified) -> list[str]:
         if f"z_{role}" in found.after:
             before, after = found.before[f"z_{role}"], found.after[f"z_{role}"]
             lines.append(f"  {name:34} {short_z(before):>22} {short_z(after):>22}")
-    return [*lines, "  z: error over the noise that a true model would show; a true model has 1."]
+    return [*lines, "  z: error / noise; a true model has 1."]
 
 
 def _forms(found: Identified, folder: Path) -> list[str]:
@@ -204,11 +204,11 @@ def _better_law(mine: str, best: str, gain: float, folder: Path) -> str:
     from ..physics.laws import base_and_variant
 
     has, holds = (set(base_and_variant(law)[0].contains) for law in (mine, best))
-    line = f"  {best} errs {gain:.0%} less than the model's law, {mine}."
+    line = f"  The error of {best} is {gain:.0%} smaller than that of the model's law, {mine}."
     if more := sorted(holds - has):
         return (
-            f"{line} It holds a {' and a '.join(more)}, which may stand for a missing effect: "
-            f"diagnose first:  {command('diagnose', folder)}"
+            f"{line} It contains a {' and a '.join(more)}, which may replace a missing effect. "
+            f"Diagnose first:  {command('diagnose', folder)}"
         )
     return f"{line} To change it:  {command('identify', folder, '--law', best)}"
 
@@ -217,8 +217,8 @@ def _next(found: Identified, folder: Path) -> list[str]:
     z = max(found.after.get("z_holdout", 0.0), found.after["z_train"])
     if z > 1.15:
         return [
-            f"The error is {short_z(z)} times what noise explains. Next: where it is,  "
+            f"The error is {short_z(z)} times the noise floor. Next: where it occurs,  "
             f"{command('compare', folder)} ; what is missing,  {command('diagnose', folder)}"
         ]
     then = command("diagnose", folder)
-    return [f"Noise explains the error. Next:  {then} , which says what it saw."]
+    return [f"Noise explains the error. Next:  {then} , which lists what these data show."]

@@ -13,7 +13,7 @@ from . import _own
 if TYPE_CHECKING:
     from ..physics.law import Law
 
-HELP = "list the laws of a damper, tell all of one, start or check one of your own"
+HELP = "list the laws of a damper, describe one, start or check your own"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

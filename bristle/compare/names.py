@@ -8,8 +8,8 @@ from collections.abc import Sequence
 NAMES = {
     "voltage_rate": "recent changes of the voltage",
     "dissipated_energy": "the energy dissipated so far",
-    "time_since_reversal": "the time since the motion turned",
-    "rest": "how long it has rested of late",
+    "time_since_reversal": "the time since the last reversal",
+    "rest": "the recent time at rest",
     "time": "time",
     "direction": "the direction of motion",
 }

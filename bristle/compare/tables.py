@@ -54,13 +54,11 @@ def _site(one: SiteError, factor: float) -> list[str]:
 def run_table(comparison: Comparison) -> Table:
     """Return the error on each run and over all, with the numerical error beside it."""
     factor, unit = scale(comparison.unit, comparison.total.signal)
-    header = ["run", "z", f"error [{unit}]", "of RMS", f"noise [{unit}]", "half step [z]"]
+    header = ["run", "z", f"error [{unit}]", "of RMS", "fit", "VAF"]
+    header += [f"noise [{unit}]", "half step [z]"]
     runs = [*comparison.runs]
     rows = [_run(one, factor) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
-    title = (
-        "Error over the noise that a true model would show (z), RMS at all frequencies, and what "
-        "half the step changes"
-    )
+    title = "Error / noise (z), RMS at all frequencies, and the sensitivity to halving the step"
     if comparison.sites:
         title = f"{begin(site_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
     return title, header, rows
@@ -69,9 +67,8 @@ def run_table(comparison: Comparison) -> Table:
 def _run(run: RunError, factor: float) -> list[str]:
     numerical = plain(run.numerical_z, 2) if run.numerical_z == run.numerical_z else "not tried"
     return [
-        run.name, short_z(run.z), plain(factor * run.rms), percent(run.share),
-        plain(factor * run.noise),
-        numerical,
+        run.name, short_z(run.z), plain(factor * run.rms), percent(run.share), percent(run.fit),
+        percent(run.accounted), plain(factor * run.noise), numerical,
     ]  # fmt: skip
 
 
@@ -79,7 +76,7 @@ def pattern_table(comparison: Comparison) -> Table:
     """Return the coordinates by how much of the error's power each carries."""
     header = ["coordinate", "of the error", "of what exceeds noise", "chance"]
     rows = [_pattern(one, comparison.site) for one in comparison.patterns[:_SHOWN]]
-    return "Where the error lives: the part of its power that a coordinate carries", header, rows
+    return "Where the error occurs: the share of its power along each coordinate", header, rows
 
 
 def _pattern(pattern: ResidualPattern, site: str) -> list[str]:

@@ -14,8 +14,14 @@ from .files import Toml
 FORM_KEYS = ("command", "command_knots")
 
 
-def law_in_form(toml: Toml, data: Mapping[str, Any], law: str) -> str:
+def law_in_form(toml: Toml, data: Mapping[str, Any], law: str, known: bool = True) -> str:
     """Return a law's name with the form of the command that a file names.
+
+    Parameters
+    ----------
+    toml, data : the file
+    law : the name that stands in it
+    known : whether the law is registered; else it is not asked whether it can have the form
 
     Raises
     ------
@@ -34,7 +40,8 @@ def law_in_form(toml: Toml, data: Mapping[str, Any], law: str) -> str:
         toml.check()
     try:
         name = joined_form(law, form, tuple(map(float, given)))
-        base_and_variant(name)
+        if known:
+            base_and_variant(name)
     except PhysicsError as error:
         toml.error(("command",), str(error))
         toml.check()

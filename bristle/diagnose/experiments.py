@@ -43,9 +43,9 @@ class Experiment:
         """Return the run as a sentence of an experiment's plan."""
         if self.deviations < rule.tells:
             return (
-                "No run within the strokes, speeds and voltages of these would distinguish them: "
+                "No run within the strokes, speeds and voltages so far would distinguish them: "
                 f"at best the forces differ by {self.deviations:.1f} standard deviations over "
-                f"{LENGTH:g} s. Go beyond them."
+                f"{LENGTH:g} s. Use a wider range."
             )
         motion = (
             f"a sine of {1e3 * self.amplitude:.3g} mm at {self.low:.3g} Hz"
@@ -61,8 +61,8 @@ class Experiment:
             f"{self.switch:.3g} s"
         )
         return (
-            f"Run {motion} {drive} for {LENGTH:g} s: there the forces of the alternatives differ "
-            f"by {self.contrast:.2g} times the noise, however they are refitted."
+            f"Run {motion} {drive} for {LENGTH:g} s: then the forces of the alternatives differ "
+            f"by {self.contrast:.2g} times the noise, even if they are fitted again."
         )
 
     def signals(self, dt: float) -> tuple[Array, Array, Array, Array]:

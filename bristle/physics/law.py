@@ -20,7 +20,7 @@ from .command import Linear as Linear
 from .command import Monotone as Monotone
 from .command import Quadratic as Quadratic
 from .command import Rising as Rising
-from .field_check import check_fields
+from .field_check import check_fields, told
 from .forms import LawsByName, joined_form, split_form
 from .inputs import Inputs
 from .law_check import ALL_HOOKS, FIELDS, HOOKS, check_law
@@ -176,7 +176,7 @@ class Law:
         if not cls.name or not register:
             return
         cls.base = cls
-        check_fields(cls, f"law {cls.name!r} ({cls.__module__}.{cls.__qualname__})", FIELDS)
+        check_fields(cls, told("law", cls), FIELDS)
         cls.parameters = all_parameters(cls.parameters, cls.tables)
         if any(not isinstance(form, Constant) for form in cls.command.values()):
             cls.parts = tuple(dict.fromkeys((*cls.parts, "command")))

@@ -26,8 +26,12 @@ def commands(study: Study) -> list[str]:
     old = study.name
     new = old + AGAIN
     lines = [_new(study, old, new), _copy(f"{old}/study.toml", f"{new}/study.toml")]
-    for file in sorted(study.effects_folder.glob("*.py")):
-        lines.append(_copy(f"{old}/effects/{file.name}", f"{new}/effects/{file.name}"))
+    own_laws = sorted(study.laws_folder.glob("*.py"))
+    if own_laws:  # `study new` makes a folder for effects alone
+        lines.append(shlex.join(["mkdir", "-p", f"{new}/laws"]))
+    for file in (*own_laws, *sorted(study.effects_folder.glob("*.py"))):
+        place = f"{file.parent.name}/{file.name}"
+        lines.append(_copy(f"{old}/{place}", f"{new}/{place}"))
     lines.append(command("study", "check", new))
     law = ""
     for step in study.steps():

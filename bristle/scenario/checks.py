@@ -270,7 +270,7 @@ def _choose_effects(
         return
     fmu = str(settings.get("fmu", ""))
     if fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu:
-        findings.error(path, f"{where}: an FMU carries its own; a built-in name takes them.")
+        findings.error(path, f"{where}: an FMU has its own effects; a built-in name takes files.")
         return
     found = [existing_file(file, folder, path, where, findings) for file in files]
     part.effects = tuple(file for file in found if file is not None)

@@ -144,7 +144,7 @@ def _wrong_end(end: str, part: Part, variable: Variable, wanted: str) -> str:
     place = "left" if wanted == "input" else "right"
     listed = ", ".join(names) if names else "none"
     return (
-        f'"{end}" is {kind}; {_ARTICLE[wanted]} stands on the {place} of "=". '
+        f'"{end}" is {kind}; {_ARTICLE[wanted]} belongs on the {place} of "=". '
         f"{part.fmu} has: {listed}."
     )
 

@@ -26,7 +26,7 @@ FILE_PARAMETERS = ("record", "file")
 
 _POSITION = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 _HINTS = (
-    ("Invalid value", 'text stands in quotes, numbers have a decimal point: 0.5, "text", true'),
+    ("Invalid value", 'text needs quotes, numbers have a decimal point: 0.5, "text", true'),
     ("Invalid initial character for a key", "an inline table { ... } stays on one line"),
     ("Unclosed", "every bracket and quote needs its partner"),
     ("Expected '='", "a line reads: key = value"),

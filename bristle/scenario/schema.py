@@ -38,7 +38,7 @@ def build_schema(library: Library | None = None) -> dict[str, Any]:
         "additionalProperties": False,
         "properties": {
             "schema": {"const": SCHEMA, "description": "version of this format"},
-            "title": {"type": "string", "description": "stands over figures and tables"},
+            "title": {"type": "string", "description": "title of figures and tables"},
             "run": _run(),
             "components": {
                 "type": "object",

@@ -22,6 +22,7 @@ from ..quantity import plain
 from ..units import convert
 from .forms import FormError, form_of, forms_asked, in_form
 from .identified import Identified
+from .joining import refuse_left_out
 from .rig import rig_of
 from .runs import Runs
 from .study import Study
@@ -74,6 +75,8 @@ def identify_study(
     """
     if starts < 1:
         raise StudyError(f"starts = {starts}; 1 or more is right.")
+    if law is not None:
+        refuse_left_out(study.laws_folder / f"{law}.py")
     model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
@@ -222,7 +225,7 @@ def _by_site(models: SiteModels) -> list[str]:
         return []
     z = {n: robust_z(p, models[n].model) for n, p in problems.items() if p is not None}
     text = ", ".join(f"{site} {plain(z[site])}" for site in sorted(z, key=lambda site: -z[site]))
-    return [f"z on held-out runs by site: {text}; the errors' z is the worst site's."]
+    return [f"z on held-out runs by site: {text}; the z of the errors is that of the worst site."]
 
 
 def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
@@ -256,14 +259,14 @@ def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float
     if after["z_train"] <= _MISFIT:
         return []
     notes = [
-        "The error is more than noise: intervals are drawn from the error itself, and hold for "
-        "this model's best values, not for a damper's constants."
+        "The error exceeds the noise. The intervals come from the error itself: they describe "
+        "the best values of this model, not the constants of a damper."
     ]
     same = [row for row in rows if row.law == model.law and not model.effects]
     if same and same[0].train < 0.95 * after["rms_train"]:
         notes.append(
             f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
-            f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N in place "
+            f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N instead "
             f"of {plain(after['rms_train'], 4)} N."
         )
     return notes
@@ -312,12 +315,12 @@ def _doubts(runs: list[Measurement]) -> list[str]:
         share = saturated_share(run["force"])
         if share > _SATURATED:
             raise StudyError(
-                f"{run.name}: {share:.0%} of the force's samples stand at its extremes: the load "
+                f"{run.name}: {share:.0%} of the force's samples are at its extremes: the load "
                 "cell or its amplifier is saturated. Measure with a wider range, or leave the run "
                 "out in study.toml."
             )
         if share > 0.0:
-            notes.append(f"{run.name}: {share:.1%} of the force's samples stand at its extremes.")
+            notes.append(f"{run.name}: {share:.1%} of the force's samples are at its extremes.")
     doubtful: dict[str, int] = {}
     for run in runs:
         for channel, fact in run.noise_facts.items():
@@ -326,8 +329,8 @@ def _doubts(runs: list[Measurement]) -> list[str]:
     if doubtful:
         where = ", ".join(f"{c} ({n} of {len(runs)} runs)" for c, n in doubtful.items())
         notes.append(
-            f"The noise cannot be told well from the signal: {where}. Give it in study.toml: z and "
-            "intervals rest on it."
+            f"The noise is hard to separate from the signal: {where}. Give it in study.toml: z and "
+            "intervals depend on it."
         )
     return notes
 
@@ -336,7 +339,7 @@ def _why(found: Identified) -> str:
     runs, held_out = len(found.train.runs), len(found.holdout.runs) if found.holdout else 0
     lost = ", ".join(found.unidentified)
     return (
-        f"fit to {runs} training run{'s' * (runs != 1)}, judged on {held_out} held out; "
+        f"fit to {runs} training run{'s' * (runs != 1)}, tested on {held_out} held out; "
         f"{found.fit.agreed} of {found.fit.starts} starts agree"
         + (f"; the data do not identify {lost}" if lost else "")
     )

@@ -121,7 +121,7 @@ class Identified:
         rows = []
         for name, value in self.model.flat().items():
             if name in self.fit.unidentified:
-                how = "cannot be told"
+                how = "not identified"
             elif name in self.fit.std:
                 how = "identified"
             else:

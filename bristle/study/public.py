@@ -184,7 +184,7 @@ def compare(
         return comparer(given, role).compare(as_model(chosen))
     if model is None:
         raise StudyError(
-            "compare needs a model beside the runs: what identify returned, a model.toml, or a "
+            "compare needs a model besides the runs: what identify returned, a model.toml, or a "
             "law's name."
         )
     chosen = model_of(model, effects, DEFAULT)
@@ -263,7 +263,7 @@ def diagnose(
         if model is None and not effects:
             return diagnose_study(given, write=write)
         raise StudyError(
-            "of a study the present model is diagnosed: identify the other one first, with "
+            "diagnose uses the present model of a study: identify the other one first, with "
             "bristle.identify(study, ...)."
         )
     chosen = model_of(model, effects, DEFAULT)
@@ -285,8 +285,8 @@ def _refuse_of_study(**given: object) -> None:
     wrong = [name for name, value in given.items() if value is not None]
     if wrong:
         raise StudyError(
-            f"{', '.join(wrong)}: study.toml and model.toml of a study say it; change it there, or "
-            "give the runs themselves in place of the study."
+            f"{', '.join(wrong)}: study.toml and model.toml of a study set this; change it there, "
+            "or give the runs instead of the study."
         )
 
 

@@ -63,7 +63,7 @@ def read(content: bytes, name: str) -> Table:
     others = sorted({key for key, array in found if array.ndim and len(array) not in (1, size)})
     notes = []
     if others:
-        notes.append(f"left out, for they have another length than {size}: {', '.join(others)}")
+        notes.append(f"left out, because their length is not {size}: {', '.join(others)}")
     _add_time(data, {key: array for key, array in found if array.size == 1}, size, notes)
     return from_arrays(data, name, notes=tuple(notes))
 
