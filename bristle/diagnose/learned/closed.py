@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,7 @@ class Form:
         return np.stack([np.ones_like(s), *given], axis=1)
 
 
-_NUMPY = {
+_NUMPY: dict[str, Any] = {
     **{one.__name__: one for one in (np.copysign, np.cos, np.exp, np.log, np.sin, np.tanh)},
     "__builtins__": {}, "abs": np.abs, "max": np.maximum, "min": np.minimum,
 }  # fmt: skip
