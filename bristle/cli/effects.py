@@ -56,7 +56,7 @@ def tell(effect: type[Effect]) -> dict[str, Any]:
 
 
 def _print_one(found: dict[str, Any]) -> None:
-    joins = f", joins {' and '.join(found['laws'])}" if found["laws"] else ""
+    joins = f", joins {', '.join(found['laws'])}" if found["laws"] else ""
     print(f"{found['name']} ({', '.join(found['sites'])}{joins}): {found['about']}\n")
     print(found["text"])
     print(f"\nWhen it is missing: {found['expect']}.\nSource: {found['source']}.\n")
