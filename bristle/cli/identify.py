@@ -26,6 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument("--law", help="another law than the model's: bingham, lugre, ..._standard")
     parser.add_argument(
+        "--command",
+        dest="form",
+        metavar="FORM",
+        help="how the command enters: linear, quadratic or table; several with commas, or all, are "
+        "compared by their errors on held-out runs; else as the model has it",
+    )
+    parser.add_argument(
         "--cutoff",
         type=float,
         metavar="HZ",
@@ -67,6 +74,7 @@ def main(arguments: argparse.Namespace) -> int:
         found = identify_study(
             study,
             law=arguments.law,
+            command=arguments.form,
             cutoff=arguments.cutoff,
             starts=arguments.starts,
             table=not arguments.no_table,
@@ -96,6 +104,8 @@ def text(found: Identified, folder: Path) -> str:
     if found.unidentified:
         lines += ["", f"The data do not identify: {', '.join(found.unidentified)}."]
     lines += ["", *_errors(found)]
+    if found.forms:
+        lines += ["", *_forms(found, folder)]
     if found.table:
         lines += ["", *_laws(found, folder)]
     for note in found.notes:
@@ -136,6 +146,29 @@ def _errors(found: Identified) -> list[str]:
             before, after = found.before[f"z_{role}"], found.after[f"z_{role}"]
             lines.append(f"  {name:34} {short_z(before):>22} {short_z(after):>22}")
     return [*lines, "  z: error / noise; a true model has 1."]
+
+
+def _forms(found: Identified, folder: Path) -> list[str]:
+    """Return the table of the forms of the command, and which one would do better."""
+    lines = [f"  {'command':18} {'training':>11} {'held out':>11} {'of force':>9} {'z':>8} fitted"]
+    size = max(row.errors["rms_train"] for row in found.forms)
+    for row in found.forms:
+        own = row.errors
+        held_out = quantity(own["rms_holdout"], "N", 4, size) if "rms_holdout" in own else "-"
+        z = short_z(own.get("z_holdout", own["z_train"]))
+        lines.append(
+            f"  {row.form:18} {quantity(own['rms_train'], 'N', 4, size):>11} {held_out:>11} "
+            f"{row.judged:>9.1%} {z:>8} {row.numbers:>6}"
+        )
+    mine = next(row for row in found.forms if row.model.law == found.model.law)
+    best = min(found.forms, key=lambda row: row.judged)
+    if best.judged < BETTER * mine.judged:
+        gain = 1.0 - best.judged / mine.judged
+        lines.append(
+            f"  {best.form} errs {gain:.0%} less than {mine.form}. To take it:  "
+            f"{command('identify', folder, '--command', best.form)}"
+        )
+    return [*lines, "  Each form identified with all effects of the model, on the same runs."]
 
 
 def _laws(found: Identified, folder: Path) -> list[str]:

@@ -16,6 +16,8 @@ parameters = { k = { value = 81.2, unit = "N/m", std = 3.0 } }
 parameters = ["sigma_a", "gas_spring.k"]
 rows = [[1.0], [-0.42, 1.0]]
 
+`command = "quadratic"`, or `command = "table"` with `command_knots = [0.0, 1.5, 3.0]` [V], beside
+the law is a form that was chosen (`physics.forms`); `StudyModel.law` names both together.
 `correlation` is how the errors of identified parameters go together (`data.correlation`); files
 without it open as before. `data.model_text` writes the file.
 """
@@ -36,6 +38,7 @@ from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..physics.user import waiting, why_left_out
 from ..units import convert
+from .command_form import FORM_KEYS, law_in_form
 from .correlation import (
     Array,
     Correlation,
@@ -49,7 +52,7 @@ from .model_value import VALUE_KEYS as VALUE_KEYS
 from .model_value import Value as Value
 from .model_value import as_written, waiting_law
 
-_KEYS = ("schema", "law", "building", "parameters", "effects", "correlation")
+_KEYS = ("schema", "law", *FORM_KEYS, "building", "parameters", "effects", "correlation")
 
 
 @dataclass(frozen=True)
@@ -212,6 +215,8 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     beside = study or path.parent
     law = toml.text((), data, "law")
     only_shown = _unusable_law(toml, law, beside / "laws", to_show)
+    law = law_in_form(toml, data, law, known=not only_shown)
+    only_shown = [law] if only_shown else []
     given = toml.table((), data, "parameters")
     if only_shown:
         parameters = as_written(toml, ("parameters",), given)

@@ -320,7 +320,11 @@ class Effect:
         """Return whether the effect can join a law: it has the parts, and not the effect in it."""
         if law.site not in cls.sites:
             return False
-        if cls.laws and law.name not in cls.laws and not set(cls.laws) >= set(_ALL_LAWS_OF_ONCE):
+        if (
+            cls.laws
+            and law.base.name not in cls.laws
+            and not set(cls.laws) >= set(_ALL_LAWS_OF_ONCE)
+        ):
             return False
         if (cls.kind or cls.name) in law.contains:
             return False

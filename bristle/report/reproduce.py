@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..data.model import read_model
 from ..findings import command
+from ..physics.forms import split_form
 
 if TYPE_CHECKING:
     from ..data.channels import ChannelSpec
@@ -47,7 +48,7 @@ def _new(study: Study, old: str, new: str) -> str:
         words += ["--rig", settings.rig]
     if first.is_file():
         model = read_model(first, study.folder, to_show=True)
-        words += ["--law", model.law]
+        words += ["--law", split_form(model.law)[0]]
         if model.building:
             words += ["--building", f"{old}/{model.building}"]
     for name, spec in settings.channels.items():
@@ -73,8 +74,15 @@ def _step(step: Step, old: str, new: str, law: str) -> list[str]:
         return [command("identify", new, "--structure")]
     if verb == "identify":
         other = rest.split(" + ")[0]
-        return [command("identify", new, *(["--law", other] if other != law else []))]
+        return [command("identify", new, *(_other_law(law, other) if other != law else []))]
     return [_copy(f"{old}/history/{step.number:03d}/model.toml", f"{new}/model.toml")]
+
+
+def _other_law(law: str, other: str) -> list[str]:
+    """Return the options that lead from a law to another one, or to another form of it."""
+    (before, _, _), (after, form, _) = split_form(law), split_form(other)
+    named = ["--law", after] if after != before or not form else []
+    return named + (["--command", form] if form else [])
 
 
 def _law(study: Study, step: Step) -> str:

@@ -12,7 +12,7 @@ from math import sqrt
 from ..errors import BristleError, PhysicsError
 from ..findings import Findings
 from ..physics.effect import EFFECTS
-from ..physics.laws import laws_of
+from ..physics.laws import LAWS, laws_of
 from .connections import Wire
 from .library import Library
 from .parts import Part, Run
@@ -239,7 +239,7 @@ def slopes(damper: Part, voltage: float) -> tuple[float, float]:
 
     Of the law whose parameters the damper has, its jump aside; (0, 0) where that is none we know.
     """
-    for law in laws_of("damper"):
+    for law in (LAWS[damper.law.name],) if damper.law else laws_of("damper"):
         values = {name: damper.real(name) for name in law.parameters}
         given = {name: value for name, value in values.items() if value is not None}
         if given and all(name in given for name in law.linear()):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,8 +17,10 @@ from ..identify.rig import DAMPER, Rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
 from ..identify.table import LawError, error_table
 from ..physics.laws import base_and_variant, law_names
+from ..progress import tell
 from ..quantity import plain
 from ..units import convert
+from .forms import FormError, form_of, forms_asked, in_form
 from .identified import Identified
 from .joining import refuse_left_out
 from .rig import rig_of
@@ -40,6 +42,7 @@ def identify_study(
     study: Study,
     *,
     law: str | None = None,
+    command: str | Sequence[str] | None = None,
     model: StudyModel | None = None,
     cutoff: float | None = None,
     starts: int = 4,
@@ -53,6 +56,8 @@ def identify_study(
     ----------
     study : the folder, opened
     law : another law to take than the model's; its effects stay where they can join it
+    command : the form in which the command enters, one of `physics.forms.FORMS`; several, or
+        "all", are compared, and the model keeps its own if it is among them, else the first
     model : a model to take in place of the present one
     cutoff : Hz, of the low-pass for the table of errors; None takes the study's
     starts : how many starting points are tried
@@ -74,7 +79,8 @@ def identify_study(
         refuse_left_out(study.laws_folder / f"{law}.py")
     model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    found = identify_model(study, model, FitTask(cutoff, starts, table, show=show or _show_nothing))
+    task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
+    found = identify_model(study, model, task)
     if not write:
         return found
     step = study.add_step(
@@ -94,7 +100,8 @@ class FitTask:
 
     `cutoff` [Hz] of the low-pass for the table of errors; `starts` how many starting points are
     tried; `table` whether to compare the laws; `present` the model whose errors are those before,
-    None for the one that is identified; `begin` values in SI by name from which one more fit
+    None for the one that is identified; `command` the form or forms of the command, None for the
+    model's; `begin` values in SI by name from which one more fit
     begins, the better one counts; `show` is told how many of `STAGES` are done.
     """
 
@@ -103,6 +110,7 @@ class FitTask:
     table: bool = True
     present: StudyModel | None = None
     begin: Mapping[str, float] = field(default_factory=dict)
+    command: str | Sequence[str] | None = None
     show: Show = _show_nothing
 
 
@@ -122,7 +130,7 @@ def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified
 
 
 def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
-    """Identify a model on a rig: fit it at all sites, then judge it there.
+    """Identify a model on a rig, in the form of the command that the task asks for.
 
     Parameters
     ----------
@@ -136,6 +144,29 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
     StudyError, RecordError
         As `identify_study`.
     """
+    if task.command is None:
+        return _in_own_form(rig, runs, model, task)
+    forms = forms_asked(task.command)
+    own = form_of(model) if form_of(model) in forms else forms[0]
+    models = {form: in_form(model, form, runs.train) for form in forms}
+    present = task.present or model
+    found = _in_own_form(rig, runs, models.pop(own), replace(task, present=present))
+    if not models:
+        return found
+    rows = [_form_error(own, found)]
+    for form, other in models.items():
+        tell(f"identifying with the form {form} of the command")
+        alone = replace(task, present=present, table=False, show=_show_nothing)
+        rows.append(_form_error(form, _in_own_form(rig, runs, other, alone)))
+    return replace(found, forms=tuple(sorted(rows, key=lambda row: forms.index(row.form))))
+
+
+def _form_error(form: str, found: Identified) -> FormError:
+    return FormError(form, found.model, found.after, len(found.fit.std))
+
+
+def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+    """Fit a model at all sites of a rig, then judge it there."""
     start = as_model(model)
     rig.prepare(start)
     notes = [*runs.notes, *_doubts([run for run in runs.all if run.has("force")])]
@@ -183,7 +214,8 @@ def _tabled(own: str) -> tuple[str, ...]:
     What is integrated by its rates takes minutes to fit; whoever wants it asks for it by name.
     """
     named = {name: base_and_variant(name)[0] for name in law_names()}
-    return tuple(n for n, law in named.items() if law.exact() or law.name == own)
+    names = tuple(n for n, law in named.items() if law.exact() or law.name == own)
+    return names if own in names else (*names, own)
 
 
 def _by_site(models: SiteModels) -> list[str]:

@@ -42,6 +42,7 @@ def identify(
     model: Given | None = None,
     *,
     effects: str | Sequence[str] = (),
+    command: str | Sequence[str] | None = None,
     holdout: Data | None = None,
     channels: Channels | None = None,
     building: str | Path | Building | None = None,
@@ -60,6 +61,9 @@ def identify(
         The law, such as "bingham", or a model to begin with; else the study's, else "lugre".
     effects : str or list of str
         Effects that the model has on top.
+    command : str or list of str, optional
+        How the command enters: "linear", "quadratic" or "table"; of several, or "all", the errors
+        of each are in `forms` of the result. Else as the model has it.
     holdout : as data, optional
         Runs to judge on. Without them every third run is held out, of one run the last 30 %. A
         study says itself which are.
@@ -106,12 +110,12 @@ def identify(
     if isinstance(given, Study):
         _refuse_of_study(holdout=holdout, channels=channels, building=building)
         begin = None if model is None and not effects else _present(given, model, effects)
-        return identify_study(given, model=begin, table=table, write=write)
+        return identify_study(given, model=begin, command=command, table=table, write=write)
     chosen = model_of(model, effects, DEFAULT)
     house = building_from(building)
     runs = _runs(given, holdout, channels, house)
     rig = _rig(runs, house)
-    return identify_on_rig(rig, runs, chosen, FitTask(CUT_OFF, table=table))
+    return identify_on_rig(rig, runs, chosen, FitTask(CUT_OFF, table=table, command=command))
 
 
 def compare(
