@@ -2,8 +2,8 @@
 
 A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them. `blind`
 named first has options of its own (`python -m benchmarks blind --help`): it takes hours, and the
-table here shows what its last run found. So has `instruments`, and `calibrate`, whose own table
-shows what each value of the decision rule trades.
+table here shows what its last run found. So have `instruments`, `learned` and `calibrate`, whose
+own table shows what each value of the decision rule trades.
 """
 
 from __future__ import annotations
@@ -42,6 +42,10 @@ def main() -> int:
         from .instruments import main as instruments
 
         return instruments(sys.argv[2:])
+    if sys.argv[1:2] == ["learned"] and len(sys.argv) > 2:
+        from .learned import main as learned
+
+        return learned(sys.argv[2:])
     names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")

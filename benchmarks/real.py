@@ -109,8 +109,8 @@ def bench_row(
     row.reference = told(after)
     if row.after > BEYOND:
         row.worth = (
-            f"Nothing by itself: {row.after:.0%} of the force stays unexplained, so that the law "
-            f"is not this rig's and what is named beside it means little. {row.worth}"
+            f"Little by itself: {row.after:.0%} of the force stays unexplained. The law does not "
+            f"describe this rig, so the effect named with it means little. {row.worth}"
         )
 
 
@@ -145,12 +145,12 @@ def utfpr(folder: Path, law: str) -> Row:
     row.fitted = f"{len(train)} of 38 ident runs, 10 s each, 0 to 3.2 V"
     row.held_out = f"{len(held)} of 12 valid runs, 0.87 V and 2.18 V (a voltage not fitted)"
     row.worth = (
-        "The force stands some 130 N off zero, and the displacement's zero differs from run to "
-        "run: a constant force and a stiffness are needed, and gas_spring is the only effect that "
-        "has the one. Whether it is an accumulator or the load cell's zero these data cannot tell. "
-        "The noise is small beside what any law misses, and its estimates differ between like "
-        "runs: z has no firm unit here, read the share. "
-        "One frequency per run says nothing of what needs several."
+        "The force is offset by some 130 N, and the zero of the displacement differs between runs. "
+        "So the model needs a constant force and a stiffness, and gas_spring is the only effect "
+        "with a constant force. The data cannot distinguish an accumulator from an offset of the "
+        "load cell. The noise is small compared with the error of any law, and its estimates "
+        "differ between similar runs. So z has no firm unit here: read the share. Each run has one "
+        "frequency, and cannot show what needs several."
     )
 
     def told(trial: Trial) -> str:
@@ -189,11 +189,11 @@ def velocity_force(folder: Path, law: str) -> Row:
     train, held = [run.part(0, 2000, "1-2000")], [run.part(2000, len(run.time), "2001-3499")]
     row.fitted, row.held_out = "samples 1-2000 (10 s)", "samples 2001-3499 (7.5 s)"
     row.worth = (
-        "One run at one unknown current, in two parts: nothing can be said of the voltage. The "
-        "noise of the velocity cannot be told from the velocity itself, so z has no firm unit here "
-        "and the share decides. Beside a Bingham law mount_compliance, presliding and backlash "
-        "leave nearly the same: that the force lags behind a sign law is certain, which of them "
-        "does it is not."
+        "This is one run at one unknown current, cut in two parts. It shows nothing about the "
+        "voltage. The noise of the velocity cannot be separated from the velocity itself, so z has "
+        "no firm unit here: read the share. With a Bingham law, mount_compliance, presliding and "
+        "backlash leave nearly the same error. It is certain that the force lags behind a sign "
+        "law; it is not certain which of the three causes it."
     )
     viscous, best_tanh = (fit_of(run, tanh) for tanh in (False, True))
 
@@ -236,10 +236,11 @@ def friction(folder: Path, law: str) -> Row:
     train, held = [between(run, 20.0, 50.0)], [between(run, 150.0, 170.0)]
     row.fitted, row.held_out = "20 - 50 s of 213 s", "150 - 170 s"
     row.worth = (
-        "No damper: dry friction under 5 N, half of the time at rest, where a Bingham law has no "
-        "answer and any force is right by its own measure. Each reversal is a ramp over 0.1 mm, "
-        "four tenths of the stroke, which is rig and contact in series. No voltage, one speed and "
-        "one stroke: what acts along speed cannot be told from what acts along time."
+        "This is no damper, but dry friction under 5 N. Half of the time the slider is at rest, "
+        "where a Bingham law predicts no force and any value fits. Each reversal is a ramp over "
+        "0.1 mm, which is four tenths of the stroke: rig and contact act in series. There is no "
+        "voltage, one speed and one stroke, so a dependence on speed cannot be distinguished from "
+        "a dependence on time."
     )
 
     def told(trial: Trial) -> str:
@@ -313,11 +314,11 @@ def shake_table(folder: Path, law: str) -> Row:
     )
     row.reference = "none with the data"
     row.worth = (
-        "The masses are not published and were taken as equal, so stiffnesses are relative and "
-        "shear is per mass. Channels are filtered and displacements integrated from accelerations "
-        "by the authors: noise reads far too small and z far too large. The first frequency and "
-        "its damping are what to keep: rubber isolators are not linear, and the library has no "
-        "hysteresis of an isolation layer other than dry friction."
+        "The masses are not published. They were taken as equal, so stiffnesses are relative and "
+        "shear is per mass. The authors filtered the channels and integrated the accelerations to "
+        "displacements. So the estimated noise is far too small and z far too large. Keep the "
+        "first frequency and its damping. Rubber isolators are not linear, and the only hysteresis "
+        "of an isolation layer in the library is dry friction."
     )
     return row
 
@@ -372,8 +373,8 @@ def markdown(found: Sequence[Row]) -> str:
         lines += ["", f"- **Said**: {row.words}", f"- **Reference**: {row.reference}."]
         if row.after > row.before:
             lines.append(
-                "- **Doubt**: z falls and the plain error rises: what is named fits the many quiet "
-                "samples and misses the others. Not to be believed."
+                "- **Doubt**: z falls and the plain error rises. The named effect fits the many "
+                "quiet samples and misses the others. Do not trust it."
             )
         lines.append(f"- **Worth**: {row.worth}")
     return "\n".join([*lines, ""])

@@ -75,8 +75,11 @@ class StudyError(BristleError):
 class TrustError(BristleError):
     """Code that came with a file and that this machine's user has not consented to.
 
-    `path` is the file, `text` the code that would run, "" where consent cannot be kept, `why`.
+    `path` is the file, `text` the code that would run, "" where consent cannot be kept, `why`;
+    `optional` whether the work can go on without it.
     """
+
+    optional = False
 
     def __init__(self, path: PathLike[str], text: str = "", why: str = "") -> None:
         self.path = path

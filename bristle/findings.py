@@ -122,7 +122,7 @@ def number(value: object) -> float | str:
             float(value)
         except ValueError:
             return f"is {written(value)}, not a number"
-        return f"is {written(value)}: a number stands without quotes"
+        return f"is {written(value)}: a number needs no quotes"
     if isinstance(value, bool) or not isinstance(value, int | float):
         return f"is {written(value)}, not a number"
     try:

@@ -40,6 +40,16 @@ def times_ten(power: int) -> str:
     return f" × 10{str(power).translate(_RAISED)}"  # noqa: RUF001
 
 
+def tick(value: float) -> str:
+    """Return a number at a mark of a logarithmic axis: 0.01, 1, 100, and 10⁻⁵ for 1e-05."""
+    if not value > 0.0 or 1e-4 <= value < 1e5:
+        return plain(value)
+    power = floor(log10(value) + 1e-9)  # 1e-05 is one decade, whatever the logarithm rounds to
+    share = plain(value / 10.0**power, 2)
+    raised = times_ten(power)
+    return raised.rpartition(" ")[2] if share == "1" else f"{share}{raised}"
+
+
 def scale(unit: str, size: float) -> tuple[float, str]:
     """Return the factor and the unit in which values in an SI unit are shown.
 

@@ -26,6 +26,7 @@ VARIABLE = "BRISTLE_TRUST"
 """The environment variable that consents to all code, for CI: 1 is yes."""
 
 _granted: ContextVar[bool] = ContextVar("granted", default=False)
+_declined: ContextVar[set[str] | None] = ContextVar("declined", default=None)
 
 
 def digest(text: str) -> str:
@@ -96,6 +97,31 @@ def require(path: Path, text: str) -> None:
     if not _granted.get():
         raise TrustError(path, text)
     remember(path, text)
+
+
+@contextmanager
+def asking() -> Iterator[set[str]]:
+    """Let `can_do_without` ask first; give the digests of the texts whose user said no."""
+    declined: set[str] = set()
+    before = _declined.set(declined)
+    try:
+        yield declined
+    finally:
+        _declined.reset(before)
+
+
+def can_do_without(untrusted: TrustError) -> None:
+    """Pass where work may go on without a text that must not run here.
+
+    Raises
+    ------
+    TrustError
+        The same, where somebody can be asked (`asking`) and was not yet.
+    """
+    declined = _declined.get()
+    if declined is not None and digest(untrusted.text) not in declined:
+        untrusted.optional = True
+        raise untrusted
 
 
 def load(folder: Path, word: str = "effect", *, trust: bool = False) -> list[user.Loaded]:

@@ -14,6 +14,7 @@ import pytest
 from study.made import write_runs
 
 from bristle.cli import main
+from bristle.errors import StudyError
 from bristle.study import create_study
 from bristle.study.study import Study
 
@@ -181,3 +182,57 @@ raise SystemExit(main(["undo", "rig"]))
     while alive(child.pid) and time.monotonic() < deadline:
         time.sleep(0.05)
     assert not alive(child.pid)
+
+
+def test_ctrl_c_before_the_command_begins_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bristle.cli.build_parser", interrupted)
+    assert main(["undo", "rig"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
+
+
+def test_every_action_takes_the_options_of_every_command(
+    rig: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["study", "check", str(rig), "--quiet"]) == 0
+    assert capsys.readouterr().err == ""
+    (rig / "study.toml").unlink()
+    for line in (["study", "--debug", "check", str(rig)], ["study", "check", str(rig), "--debug"]):
+        with pytest.raises(StudyError):
+            main(line)
+
+
+def test_a_file_may_follow_an_option(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["laws", "new", "--json", "my_law"]) == 0
+    assert (tmp_path / "my_law.py").is_file()
+    with pytest.raises(SystemExit):
+        main(["laws", "new", "--json", "my_law", "other"])
+    assert "unrecognized arguments: my_law other" in capsys.readouterr().err
+
+
+def test_an_interrupted_command_ends_without_taking_the_process_down_first(tmp_path: Path) -> None:
+    code = """
+import atexit, time
+import bristle.cli.undo as command
+from bristle.cli import run_and_exit
+
+def work(arguments):
+    print("half a line", end="")
+    raise KeyboardInterrupt
+
+atexit.register(time.sleep, 60.0)  # as compiled code takes its time
+command.main = work
+run_and_exit()
+"""
+    file = tmp_path / "slow_to_end.py"
+    file.write_text(code)
+    command = [sys.executable, str(file), "undo", "rig"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "half a line", "interrupted\n")

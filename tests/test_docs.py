@@ -40,7 +40,7 @@ PAGES = {str(page.relative_to(ROOT)): page for page in snippets.all_pages()}
 
 
 LONG = {f"docs/{name}.md" for name in (
-    "first_study", "own_effect", "tutorial_bench", "tutorial_building",
+    "first_study", "learn", "own_effect", "tutorial_bench", "tutorial_building",
 )}  # fmt: skip
 """Pages whose commands search for effects; the README's do as well."""
 

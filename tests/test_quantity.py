@@ -9,7 +9,7 @@ import pytest
 from study.made import bench_run, write
 
 from bristle.cli import main
-from bristle.quantity import plain, quantity, scale, short_z
+from bristle.quantity import plain, quantity, scale, short_z, tick
 from bristle.study import create_study
 
 POWER = re.compile(r"\d[eE][+-]?\d")
@@ -76,3 +76,10 @@ def test_nor_does_a_diagnosis(rig: Path, capsys: pytest.CaptureFixture[str]) -> 
         assert main(words) == 0
         told = capsys.readouterr()
         assert not POWER.search(told.out), told.out
+
+
+def test_marks_of_a_logarithmic_axis() -> None:
+    marks = (1e-9, 2e-6, 1e-5, 1e-4, 0.01, 1.0, 100.0, 1e4, 1e5, 3e7)
+    shown = ["10⁻⁹", "2 × 10⁻⁶", "10⁻⁵", "0.0001", "0.01", "1", "100", "10000", "10⁵", "3 × 10⁷"]  # noqa: RUF001
+    assert [tick(mark) for mark in marks] == shown
+    assert tick(0.0) == "0"

@@ -14,9 +14,11 @@ from bristle import trust
 from bristle.cli import main
 from bristle.cli._consent import plain
 from bristle.cli._effect_template import template
+from bristle.cli._law_template import template as law_template
 from bristle.errors import PhysicsError, StudyError, TrustError
 from bristle.physics import user
 from bristle.physics.effect import EFFECTS
+from bristle.physics.laws import LAWS
 from bristle.study import Study, create_study
 from bristle.study.learning import add_effects
 
@@ -102,6 +104,88 @@ def test_a_command_that_would_run_it_refuses_in_one_line(
     assert not marker.exists()
     assert "seal" not in EFFECTS
     assert content(mailed) == before
+
+
+@pytest.fixture
+def law_mailed(tmp_path: Path, marker: Path) -> Path:
+    """Return a study that somebody sent, whose model has a law of their own."""
+    study = create_study(tmp_path / "my rig", write_runs(tmp_path / "lab", seconds=2.0)).study
+    study.laws_folder.mkdir()
+    write = f"open({str(marker)!r}, 'w').close()"
+    more = f'def said(made):\n    return "{write}"\n\n\n@exec\n@said\nclass Made:\n    """."""\n'
+    (study.laws_folder / "oil.py").write_text(f"{law_template('oil')}\n\n{more}", encoding="utf-8")
+    (study.folder / "model.toml").write_text(
+        'schema = 1\nlaw = "oil"\n[parameters.f_c]\nvalue = 1.5\nunit = "N"\n'
+        'origin = "identified"\n',
+        encoding="utf-8",
+    )
+    return study.folder
+
+
+@pytest.mark.parametrize("line", [*RUNNING[:-1], "identify --law oil", "laws oil --study"])
+def test_a_law_in_the_model_that_waits_for_consent_is_named(
+    line: str, law_mailed: Path, marker: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = content(law_mailed)
+    assert main([*words(line, law_mailed), "--quiet"][: None if "auto" not in line else -1]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert "oil.py: this file's code has not run here before" in told.err.splitlines()[-1]
+    assert not marker.exists()
+    assert "oil" not in LAWS
+    assert content(law_mailed) == before
+
+
+def test_the_report_shows_such_a_law(law_mailed: Path, marker: Path) -> None:
+    assert main(["report", str(law_mailed)]) == 0
+    page = (law_mailed / "reports" / "report.html").read_text(encoding="utf-8")
+    assert "f_c" in page
+    assert "has not run here before" in page
+    assert not marker.exists()
+    assert Study(law_mailed).model(to_show=True).only_shown == ("oil",)
+
+
+@pytest.fixture
+def beside(mailed: Path) -> Path:
+    """Return a study whose model does without the effect that somebody sent along."""
+    file = mailed / "model.toml"
+    text = file.read_text(encoding="utf-8").partition("[effects.seal]")[0]
+    file.write_text(text, encoding="utf-8")
+    return mailed
+
+
+@pytest.mark.parametrize(
+    "line", ["identify --dry-run --no-table --starts 1", "add {} stribeck", "diagnose --dry-run"]
+)
+def test_work_goes_on_without_an_effect_that_the_model_does_without(
+    line: str, beside: Path, marker: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words(line, beside)) == 0
+    told = capsys.readouterr().out
+    assert not marker.exists()
+    assert "seal" not in EFFECTS
+    if "add" not in line:
+        assert "Left out: " in told
+        assert "seal.py: this file's code has not run here before" in told
+        assert "--trust" in told
+
+
+def test_the_effect_itself_is_refused(
+    beside: Path, marker: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = content(beside)
+    assert main(["add", str(beside), "seal"]) == 2
+    assert "seal.py: this file's code has not run here" in capsys.readouterr().err
+    assert not marker.exists()
+    assert content(beside) == before
+
+
+def test_a_broken_effect_is_refused_with_its_line(
+    beside: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (beside / "effects" / "seal.py").write_text("import socket\n", encoding="utf-8")
+    assert main(["add", str(beside), "seal", "--trust"]) == 2
+    assert "seal.py, line 1: socket is imported" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("line", READING)

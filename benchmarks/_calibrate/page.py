@@ -37,10 +37,10 @@ def conditions(cases: list[Stored], seed: int) -> str:
     bench = sum(not case.site for case in cases)
     buildings = len({case.task.key for case in cases if case.site})
     codes = len({case.code for case in cases})
-    more = f" They were made by {codes} versions of the code." if codes > 1 else ""
+    more = f" {codes} versions of the code made them." if codes > 1 else ""
     return (
-        f"Seed {seed}: cases on the bench {bench}, buildings {buildings}, whose sites count one by "
-        f"one.{more} Today's value stands in bold."
+        f"Seed {seed}: {bench} cases on the bench, {buildings} buildings. Each site of a building "
+        f"counts as a case.{more} Today's value is in bold."
     )
 
 
@@ -50,15 +50,15 @@ def sensitivity(rows: list[Traded]) -> str:
     moved = [name for name in fields if _moves([row for row in rows if row.field == name])]
     if not moved:
         return (
-            "**No value of any field changes a count here. These cases lie too far from every "
-            "border to tell one value from another: they neither support today's values nor show "
-            "that values do not matter.**"
+            "**No value of any field changes a count here. These cases are too far from every "
+            "threshold to distinguish values: they neither support today's values nor show that "
+            "values do not matter.**"
         )
     still = len(fields) - len(moved)
     return (
-        f"Counts change with {', '.join(f'`{name}`' for name in moved)}. Of the other {still} "
-        "fields these cases say nothing, for none lies near their borders: the table has no row of "
-        "them."
+        f"Counts change with {', '.join(f'`{name}`' for name in moved)}. These cases say nothing "
+        f"about the other {still} fields, because no case is near their thresholds. The table "
+        "leaves them out."
     )
 
 

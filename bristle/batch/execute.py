@@ -213,7 +213,7 @@ def _cores() -> int:
 
 def _kept(table: RunsTable) -> str:
     if table.path is None:
-        return "Nothing was kept, for no folder was given."
+        return "Nothing was kept, because no folder was given."
     return (
         f"{len(table.outcomes)} of {table.plan.runs} runs are kept in {table.path}; the same "
         "command continues them."

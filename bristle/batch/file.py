@@ -286,8 +286,8 @@ def place_of(name: str, base: Scenario, engine: str) -> str:
     if component is not None and rest.startswith("building."):
         if engine != "compiled":
             raise EnsembleError(
-                f'"{name}": a building\'s data varies with engine = "compiled" only, for it is '
-                "baked into the FMU."
+                f'"{name}": a building\'s data varies only with engine = "compiled", because '
+                "an FMU contains its building."
             )
         if component.path is not None or component.fmu != "Structure":
             raise EnsembleError(f'"{name}": {component.name} is no Structure.')

@@ -167,8 +167,9 @@ def _read(plan: Plan, path: Path) -> dict[int, Outcome]:
         raise EnsembleError(f"{path}: is no runs table of bristle; another folder is right.")
     if head[1].decode(errors="replace") != _DIGEST + plan.digest():
         raise EnsembleError(
-            f"{path}: its runs are of another ensemble: {plan.file.name}, its scenario, a record "
-            "or bristle itself has changed since. Take --fresh to start anew, or another folder."
+            f"{path}: its runs belong to another ensemble: {plan.file.name}, its scenario, "
+            "a record or bristle itself has changed since. Use --fresh to start again, or another "
+            "folder."
         )
     body = data[: data.rindex(b"\n") + 1].decode()
     rows = csv.reader(line for line in io.StringIO(body, newline="") if line[0] != "#")
@@ -184,6 +185,6 @@ def _read(plan: Plan, path: Path) -> dict[int, Outcome]:
                 outcomes[run] = Outcome(run, tuple(map(float, numbers)))
     except (ValueError, IndexError, csv.Error) as error:
         raise EnsembleError(
-            f"{path}: damaged ({error}). Take --fresh to start anew, or another folder."
+            f"{path}: damaged ({error}). Use --fresh to start again, or another folder."
         ) from None
     return outcomes

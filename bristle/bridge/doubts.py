@@ -44,9 +44,10 @@ def doubts(outputs: tuple[Comparison, ...], ports: PortMap, fmu: str) -> list[st
         correlation = float(np.corrcoef(y, p)[0, 1])
         text = _sign(port, correlation)
         if text and not port.sign_given:
+            channel = f"{port.name}={{}}{port.signal}"
             raise FmuError(
-                f"{fmu}: {text}: its sign is in doubt. --map {port.name}=-{port.signal} turns it, "
-                f"--map {port.name}=+{port.signal} keeps it."
+                f"{fmu}: {text}: its sign is in doubt. --map {channel.format('-')} reverses it, "
+                f"--map {channel.format('+')} keeps it."
             )
         notes += [text] if text else []
         text, unit = _unit(port, float(np.std(y) / np.std(p)), correlation)
@@ -62,7 +63,7 @@ def doubts(outputs: tuple[Comparison, ...], ports: PortMap, fmu: str) -> list[st
 def _sign(port: Port, correlation: float) -> str:
     if correlation >= AGAINST:
         return ""
-    return f"{port.name} goes against what was measured (correlation {correlation:.2f})"
+    return f"{port.name} has the opposite sign of {port.signal} (correlation {correlation:.2f})"
 
 
 def _unit(port: Port, ratio: float, correlation: float) -> tuple[str, str]:

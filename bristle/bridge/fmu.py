@@ -181,7 +181,7 @@ def _one(
     if noise < floor:
         noise = floor
         notes.append(
-            f"{signal} has no noise to speak of: errors are in units of {SILENT:.1%} of its RMS"
+            f"{signal} has almost no noise: errors are in units of {SILENT:.1%} of its RMS"
         )
     spread = draws - middle
     bias = spread.mean(axis=0)

@@ -51,14 +51,14 @@ class PortMap:
             for one in self.inputs
         ]
         out += [
-            f"  {one.name} [{one.unit}] is held against {_turned(one)}: {one.reason}"
+            f"  {one.name} [{one.unit}] is compared with {_turned(one)}: {one.reason}"
             for one in self.outputs
         ]
         return out + [f"  {text}" for text in self.left]
 
 
 def _turned(port: Port) -> str:
-    return f"{port.signal}, turned" if port.sign < 0 else port.signal
+    return f"{port.signal}, reversed" if port.sign < 0 else port.signal
 
 
 def map_ports(
@@ -300,12 +300,12 @@ def _refuse_nothing(
     if not out:
         has = ", ".join(f"{v.name} [{v.unit or '?'}]" for v in outputs.values()) or "none"
         raise FmuError(
-            f"{description.name}: no output can be held against what was measured. It has: {has}; "
+            f"{description.name}: no output matches a measured channel. It has: {has}; "
             f"measured: {there}. --map OUTPUT=CHANNEL says which belong together."
         )
     if description.of("input") and not into:
         has = ", ".join(f"{v.name} [{v.unit or '?'}]" for v in description.of("input"))
         raise FmuError(
-            f"{description.name}: no input can be fed from what was measured. It has: {has}; "
+            f"{description.name}: no input matches a measured channel. It has: {has}; "
             f"measured: {there}. --map INPUT=CHANNEL says which belong together."
         )

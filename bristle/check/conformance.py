@@ -48,13 +48,15 @@ def _says(effect: type[Effect]) -> Check:
     if len(effect.expect.split()) < 5:
         lacking.append("expect, what a residual looks like without it")
     return Check(
-        "it says what it is", not lacking, "lacks " + ", ".join(lacking) if lacking else ""
+        "name, texts and source are complete",
+        not lacking,
+        "lacks " + ", ".join(lacking) if lacking else "",
     )
 
 
 def _compiles(effect: type[Effect]) -> Check:
     flaw = refused(effect)
-    return Check("compiled it gives the same numbers", flaw is None, flaw[1] if flaw else "")
+    return Check("compiled code gives the same numbers", flaw is None, flaw[1] if flaw else "")
 
 
 def _corners(effect: type[Effect]) -> Iterator[dict[str, float]]:
@@ -65,7 +67,7 @@ def _corners(effect: type[Effect]) -> Iterator[dict[str, float]]:
 
 
 def _rests(effect: type[Effect]) -> Check:
-    asked = "no force at rest" if effect.zero_at_rest else "a force at rest, as it says"
+    asked = "no force at rest" if effect.zero_at_rest else "a force at rest, as declared"
     most, at = 0.0, ""
     for law in laws_joined(effect):
         for values in _corners(effect):
@@ -107,7 +109,7 @@ def _matters(effect: type[Effect]) -> Check:
         change = float(np.sqrt(np.mean((rows[1] - rows[0]) ** 2) / np.mean(rows[0] ** 2)))
         best = max(best, change)
     text = f"{100.0 * best:.3g} % of the force RMS on a damper of 10 N, at its defaults"
-    return Check("switched on it changes the force by more than 1 %", best > 0.01, text)
+    return Check("it changes the force by more than 1 %", best > 0.01, text)
 
 
 def _bounds(effect: type[Effect]) -> Check:

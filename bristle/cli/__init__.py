@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from typing import NoReturn
 
 from ..errors import BristleError, TrustError
+from ._common import add_common
 
 _NAMES = {"list_": "list"}
 
@@ -36,11 +37,25 @@ def build_parser() -> argparse.ArgumentParser:
         module = importlib.import_module(f"{__name__}.{found.name}")
         name = _NAMES.get(found.name, found.name)
         sub = commands.add_parser(name, help=module.HELP, description=module.__doc__)
-        sub.add_argument("--quiet", action="store_true", help="do not tell what is being done")
-        sub.add_argument("--debug", action="store_true", help="show the traceback of an error")
+        add_common(sub)
         module.add_arguments(sub)
         sub.set_defaults(main=module.main)
     return parser
+
+
+def _parsed(argv: Sequence[str] | None) -> argparse.Namespace:
+    """Return the arguments of a command line.
+
+    argparse gives a word that may be missing up at the first option: in `laws check --trust FILE`
+    the file would be left over.
+    """
+    parser = build_parser()
+    arguments, rest = parser.parse_known_args(argv)
+    if len(rest) == 1 and not rest[0].startswith("-") and getattr(arguments, "target", "") is None:
+        arguments.target = rest.pop()
+    if rest:
+        parser.error(f"unrecognized arguments: {' '.join(rest)}")
+    return arguments
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -48,7 +63,20 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     The traceback of an error that nobody foresaw is kept in a file, which the one line names.
     """
-    arguments = build_parser().parse_args(argv)
+    debug = False
+    try:
+        arguments = _parsed(argv)
+        debug = arguments.debug
+        return _run(arguments)
+    except KeyboardInterrupt:
+        if debug:
+            raise
+        print("interrupted", file=sys.stderr)
+        return 130
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    """Run a command; say in one line why it fails, unless its tracebacks are asked for."""
     from ..interrupt import Hurry
 
     try:
@@ -62,11 +90,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader of a pipe, such as head, has had enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except KeyboardInterrupt:
-        if arguments.debug:
-            raise
-        print("interrupted", file=sys.stderr)
-        return 130
     except Exception as error:
         if arguments.debug:
             raise
@@ -89,20 +112,28 @@ def _progress(arguments: argparse.Namespace) -> Iterator[None]:
 
 
 def _with_consent(arguments: argparse.Namespace) -> int:
-    """Run a command; ask, on a terminal, about code that has not run here, and run it again."""
-    if getattr(arguments, "trust", False):
-        from ..trust import granted
+    """Run a command; ask, on a terminal, about code that has not run here, and run it again.
 
+    What the command can do without is left out where the answer is no, or nobody can be asked.
+    """
+    from ..trust import asking, digest, granted
+
+    if getattr(arguments, "trust", False):
         with granted():
             return int(arguments.main(arguments))
-    while True:
-        try:
-            return int(arguments.main(arguments))
-        except TrustError as error:
-            from . import _consent
+    with asking() as declined:
+        while True:
+            try:
+                return int(arguments.main(arguments))
+            except TrustError as error:
+                from . import _consent
 
-            if not _consent.given(error):
-                raise
+                answered = digest(error.text)
+                if _consent.given(error):
+                    continue
+                if not error.optional or answered in declined:
+                    raise
+                declined.add(answered)
 
 
 def run_and_exit() -> NoReturn:
@@ -113,6 +144,10 @@ def run_and_exit() -> NoReturn:
     FMUs ends without calling such libraries again.
     """
     code = main()
+    if code == 130:
+        from ..interrupt import leave
+
+        leave(code)
     if "bristle.simulate.session" in sys.modules:
         sys.stdout.flush()
         sys.stderr.flush()

@@ -56,7 +56,7 @@ def text(found: IdentifiedBuilding) -> str:
             for errors in (found.before, found.after)
         ]
         lines.append(f"  {name:38} {cells[0]:>18} {cells[1]:>18}")
-    lines.append("  z: over the noise that a true model would show, 1; in brackets: of the shear.")
+    lines.append("  z: error / noise; a true model has 1. In brackets: share of the shear.")
     for note in found.notes:
         lines += ["", f"Note: {note.rstrip('.')}."]
     if found.file is not None:

@@ -10,7 +10,7 @@ from bristle.fmu.own_controller import OwnController
 class {cls}(OwnController):
     """{title}: brakes the base the more, the faster it moves."""
 
-    # Numbers that are kept from one sample to the next, 0 at first; () for none.
+    # Values that are kept from one sample to the next, 0 at first; () for none.
     memory = ("speed",)
 
     def declare_law(self):
@@ -22,10 +22,10 @@ class {cls}(OwnController):
         text = "the speed is low-passed at this frequency"
         self.add_parameter("corner", 10.0, "Hz", text, (1e-3, 1e4))
 
-    # Asked at every sample. `measured` holds floor_acceleration [m/s2], base_displacement [m],
-    # base_velocity [m/s] and damper_force [N]; `memory` what the sample before has returned.
+    # Called at every sample. `measured` has floor_acceleration [m/s2], base_displacement [m],
+    # base_velocity [m/s] and damper_force [N]; `memory` has the values of the previous sample.
     # Returns the wanted voltage [V], which is limited to 0 .. v_max, and the new memory.
-    # Python 3.9 and its standard library alone: the file travels inside the FMU.
+    # Use only Python 3.9 and its standard library, because the FMU contains this file.
     def command(self, measured, memory):
         share = 1.0 - exp(-2.0 * pi * self.corner * self.sample_period)
         speed = memory.speed + share * (abs(measured.base_velocity) - memory.speed)
@@ -39,6 +39,6 @@ def class_name(name: str) -> str:
 
 
 def template(name: str) -> str:
-    """Return the text of a file with a controller of this name, which works as it is."""
+    """Return the text of a working file with a controller of this name."""
     title = " ".join(name.split("_")).strip().capitalize()
     return TEMPLATE.format(title=title, cls=class_name(name))

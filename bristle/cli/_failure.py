@@ -18,7 +18,7 @@ KEPT = 20
 def line(error: Exception, command: str) -> str:
     """Return one line about an error, with the file that holds its traceback."""
     what = " ".join(f"{type(error).__name__}: {error}".split())[:200].rstrip(": ")
-    said = f"bristle {command}: an error that nobody foresaw ({what})."
+    said = f"bristle {command}: an unexpected error ({what})."
     file = _keep(error)
     if file is None:
         return f"{said} Its traceback could not be written; --debug shows it."

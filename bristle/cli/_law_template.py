@@ -15,21 +15,21 @@ class {cls}(Law):
     Leaves out hysteresis: doubt it when the force depends on where the motion came from.
     """
 
-    # The name in commands and model.toml; that of this file too.
+    # The name in commands and model.toml, and the name of this file.
     name = "{name}"
 
-    # What it has, and effects act on: "yield" a force to be overcome, "sign" where this jumps with
-    # direction, "bristle" where it is carried by what bends before it slips, "viscous", "spring".
+    # The parts on which effects act: "yield", a force to be overcome; "sign", if this force jumps
+    # with direction; "bristle", if bristles bend under it before they slip; "viscous"; "spring".
     parts = ("yield", "viscous", "spring")
 
-    # Kinds of effects that it has in it already; they are not offered beside it.
+    # Kinds of effects that the law already contains. They are not offered with it.
     contains = ("spring",)
 
-    # Where the formula is from.
+    # The source of the formula.
     source = "Gavin (2001), Earthq. Eng. Struct. Dyn. 30(9), 1281-1300, hyperbolic functions"
 
-    # Value, SI unit, bounds of what is physical, meaning. Values of a damper of 10 N; a fit scales
-    # its first guesses to the rig.
+    # Value, SI unit, physical bounds, meaning. The values are those of a damper of 10 N; a fit
+    # scales its initial guesses to the rig.
     parameters = {{
         "f_c": Parameter(1.3, "N", (0.0, 1e5), "yield force without voltage"),
         "f_v": Parameter(0.83, "N/V", (0.0, 1e5), "yield force per volt"),
@@ -40,23 +40,22 @@ class {cls}(Law):
 
     # How quantities depend on the voltage: Constant("a"), Linear("a", "b"), Quadratic("a", "b",
     # "c"), or Monotone("curve"), a table over the voltage that never falls. A hook reads the
-    # quantity as p.yield_force, and not the parameters that make it.
+    # quantity as p.yield_force. It does not see the parameters behind it.
     command = {{"yield_force": Linear("f_c", "f_v")}}
 
-    # Parameters in which the force is not linear: where a fit looks for them, as factors on the
-    # rig's typical size (low, high, how many), and the parameters whose force they shape.
+    # Parameters in which the force is not linear: the initial guesses of a fit, as factors on the
+    # rig's typical size (low, high, number), and the parameters whose force they shape.
     shapes = {{"v_s": Shape(0.02, 5.0, 9, ("f_c", "f_v"))}}
 
-    # Memory, if there is any, is a state: states = {{"deflection": "m"}}, read as z.deflection. It
-    # moves by
-    #     rate(q, z, p)     its derivative, as a tuple: (q.v - p.rho * abs(q.v) * z.deflection,)
-    # and, where that is known exactly,
-    #     advance(q, z, p)  its value after q.dt at the velocity q.v, as a tuple.
+    # A law with memory has states: states = {{"deflection": "m"}}, read as z.deflection. Write
+    #     rate(q, z, p)     the derivatives, as a tuple: (q.v - p.rho * abs(q.v) * z.deflection,)
+    # and, if you know them exactly,
+    #     advance(q, z, p)  the values after q.dt at the velocity q.v, as a tuple.
 
-    # Hooks are pure functions of q (x [m], v [m/s], a [m/s2], V [V], dt [s]), z (states) and p:
-    # math, arithmetic and if. Forces [N] are positive where they resist motion along +x. There are
+    # Hooks are pure functions of q (x [m], v [m/s], a [m/s2], V [V], dt [s]), z (states) and p. Use
+    # math, arithmetic and if. Forces [N] are positive if they resist motion along +x. The hooks are
     # `limit` (the part "sign": a force that jumps with direction), `yielding`, `damping` (of
-    # bristles), `viscous` and `elastic`; their sum is the force of the damper.
+    # bristles), `viscous` and `elastic`. Their sum is the force of the damper.
 
     @staticmethod
     def yielding(q, z, p):
@@ -73,7 +72,7 @@ class {cls}(Law):
 
 
 def template(name: str) -> str:
-    """Return the text of a file with a law of this name, which works as it is."""
+    """Return the text of a working file with a law of this name."""
     parts = name.split("_")
     title = " ".join(parts).strip().capitalize()
     cls = "".join(word[:1].upper() + word[1:] for word in parts)

@@ -223,10 +223,16 @@ def parameter_lines(found: dict[str, Any], begin: str) -> list[str]:
     """Return a line per parameter: value, unit, bounds, meaning."""
     lines = []
     for name, about in found["parameters"].items():
-        low, high = about["bounds"]
+        low, high = (_bound(bound) for bound in about["bounds"])
         value = f"{about['value']:g} {about['unit']}" if about["unit"] != "1" else about["value"]
-        lines.append(f"  {begin}{name} = {value}  ({low:g} to {high:g}): {about['text']}")
+        lines.append(f"  {begin}{name} = {value}  ({low} to {high}): {about['text']}")
     return lines
+
+
+def _bound(value: float) -> str:
+    from ..quantity import tick
+
+    return f"-{tick(-value)}" if value < 0.0 else tick(value)
 
 
 def shortly(row: dict[str, Any]) -> list[str]:

@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from ..bridge.fmu import FmuComparison
     from ..compare.comparison import Comparison
 
-HELP = "where a model, or any FMU, fails against measurements: in words, then pictures"
+HELP = "show where a model, or any FMU, deviates from measurements: in text, then in figures"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle compare`."""
     parser.epilog = (
-        "z is the error over the noise that a true model would show: 1 is as good as the data can "
-        "tell. With --fmu the FMU's code runs on this machine, with your rights."
+        "z is the error divided by the noise floor, the error of a true model: 1 is the best that "
+        "the data can confirm. With --fmu the FMU's code runs on this machine, with your rights."
     )
     parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="PORT=CHANNEL@UNIT",
-        help="with --fmu: which channel an input is fed from or an output is held against",
+        help="with --fmu: the channel for an input, or the channel to compare an output with",
     )
     parser.add_argument(
         "--channel",

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-HELP = "list the components, or start a controller of your own"
+HELP = "list the components, or start your own controller"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

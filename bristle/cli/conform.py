@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..conformance.report import Report
 
-HELP = "judge an FMU against FMI 2.0 co-simulation"
+HELP = "check an FMU against FMI 2.0 co-simulation"
 
 _COLOURS = {"pass": "green", "fail": "bold red", "note": "yellow"}
 
@@ -18,10 +18,10 @@ _COLOURS = {"pass": "green", "fail": "bold red", "note": "yellow"}
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle conform`."""
     parser.epilog = (
-        "Exit codes: 0 no rule is broken (a lack of robustness is told, and counts with --strict), "
-        "1 one is, "
-        "2 the file cannot or must not be opened. The FMU's code runs on this machine: "
-        "in processes of its own, with a time limit, with your rights."
+        "Exit codes: 0 no rule is broken (a lack of robustness is reported; it counts with "
+        "--strict), 1 one is, "
+        "2 the file cannot be opened, or is not safe to open. The FMU's code runs on this machine: "
+        "in separate processes, with a time limit, with your rights."
     )
     parser.add_argument("fmu", metavar="FILE.fmu", help="the FMU, anybody's")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")

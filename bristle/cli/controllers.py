@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
     from ..paper.comparison.make import Report
 
-HELP = "run the paper's comparison of controllers and judge its statements"
+HELP = "run the paper's comparison of controllers and check its statements"
 
 _WIDTH = 14
 """Of a column of numbers."""

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE.json",
-        help="the controller file, its picture beside it; else the design file's name, here",
+        help="the controller file, with its figure; else the design file's name, here",
     )
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
@@ -96,7 +96,7 @@ def _print(answer: dict[str, Any], out: Path) -> None:
     if "norm" in facts:
         print(f"  gamma {facts['gamma']:.5g} (no controller below {facts['least_gamma']:.5g}), "
               f"solver: {facts['solver']}")  # fmt: skip
-        print(f"  closed-loop norm, computed anew: {facts['norm']:.5g} "
+        print(f"  closed-loop norm, recomputed: {facts['norm']:.5g} "
               f"(without control {facts['open_loop_norm']:.5g})")  # fmt: skip
     elif "gamma" in facts:
         _print_table(facts)
@@ -111,7 +111,7 @@ def _print(answer: dict[str, Any], out: Path) -> None:
 
 def _print_table(facts: dict[str, Any]) -> None:
     print(f"  gamma {facts['gamma']:.5g}, proved at the grid points; solver: {facts['solver']}")
-    print("  closed-loop norm, computed anew with the speed held:")
+    print("  closed-loop norm, recomputed at constant speed:")
     for speed, norm, open_loop in zip(
         facts["grid"], facts["norms"], facts["open_loop_norms"], strict=True
     ):

@@ -20,7 +20,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle diagnose`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
-        "--dry-run", action="store_true", help="show the verdict; leave verdict.json as it is"
+        "--dry-run", action="store_true", help="show the verdict; do not change verdict.json"
     )
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print verdict.json")
@@ -41,7 +41,7 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-SHORT = "  (short search: it gains too little, as the others do)"
+SHORT = "  (short search: it gains too little, like all others)"
 
 
 def text(verdict: Verdict, folder: Path) -> str:
@@ -58,6 +58,8 @@ def text(verdict: Verdict, folder: Path) -> str:
             f"  {one['channel']:14} {one['fault']:10} {one['value']:.5g}"
             for one in verdict["sensors"]
         ]
+    for note in verdict.get("notes", ()):
+        lines += ["", f"Note: {note.rstrip('.')}."]
     lines += _trials(verdict)
     if hidden := untestable(verdict):
         lines += ["", f"Not testable with these runs: {', '.join(hidden)}."]
@@ -74,7 +76,7 @@ def _trials(verdict: Verdict) -> list[str]:
         return []
     lines = ["", f"  {'error / noise (z) of the model':34} {'training':>12} {'held out':>12}"]
     before = at["z_train_before"], at["z_holdout_before"]
-    lines.append(f"  {'as it is':34} {before[0]:>12.3f} {before[1]:>12.3f}")
+    lines.append(f"  {'present model':34} {before[0]:>12.3f} {before[1]:>12.3f}")
     refined = [row for row in rows[:5] if row["refined"]]
     # The order of equals is that of a rounding: one stands for all of them.
     others = sorted(
@@ -85,7 +87,7 @@ def _trials(verdict: Verdict) -> list[str]:
         note = "" if row["refined"] else SHORT
         z = row["z_train"], row["z_holdout"]
         lines.append(f"  {'with ' + row['effect']:34} {z[0]:>12.3f} {z[1]:>12.3f}{note}")
-    return [*lines, "  A true model has z = 1: it errs by the noise alone."]
+    return [*lines, "  A true model has z = 1: its only error is the noise."]
 
 
 def _next(verdict: Verdict, folder: Path) -> str:
@@ -95,7 +97,8 @@ def _next(verdict: Verdict, folder: Path) -> str:
         return command("add", folder, *verdict["effects"][:count])
     if verdict["kind"] == "unknown":
         return (
-            f"{command('compare', folder)} , which shows where the residual is;  bristle effects "
-            "new NAME  begins an effect of your own."
+            f"{command('learn', folder)} , which learns what is missing;  "
+            f"{command('compare', folder)} , which shows where the residual is;  "
+            "bristle effects new NAME  starts your own effect."
         )
     return command("report", folder)

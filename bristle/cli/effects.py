@@ -14,7 +14,7 @@ from . import _own
 if TYPE_CHECKING:
     from ..physics.effect import Effect
 
-HELP = "list the physical effects, tell all of one, start or check one of your own"
+HELP = "list the physical effects, describe one, start or check your own"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,13 +56,13 @@ def tell(effect: type[Effect]) -> dict[str, Any]:
 
 
 def _print_one(found: dict[str, Any]) -> None:
-    joins = f", joins {' and '.join(found['laws'])}" if found["laws"] else ""
+    joins = f", joins {', '.join(found['laws'])}" if found["laws"] else ""
     print(f"{found['name']} ({', '.join(found['sites'])}{joins}): {found['about']}\n")
     print(found["text"])
     print(f"\nWhen it is missing: {found['expect']}.\nSource: {found['source']}.\n")
     print("\n".join(_own.parameter_lines(found, f"{found['name']}.")))
     if found["site"] == "sensor":
-        print("\nIn a model that is held against measurements; never inside a damper.")
+        print("\nUsed in a model that is compared with measurements; never inside a damper.")
     else:
         places = " or a ".join(found["sites"])
         print(f'\nIn a scenario, among the parameters of a {places}:  "{found["name"]}.on" = true')

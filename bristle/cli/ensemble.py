@@ -12,7 +12,7 @@ from ._consent import add_trust
 if TYPE_CHECKING:
     from ..batch.execute import Ensemble
 
-HELP = "run a scenario hundreds of times with what is uncertain varied"
+HELP = "run a scenario hundreds of times with varied parameters"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,11 +28,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FOLDER",
-        help="where runs, quantiles and figure go; an ensemble that was stopped there goes on; "
+        help="where runs, quantiles and figure go; a stopped ensemble continues there; "
         "else results/NAME/",
     )
-    parser.add_argument("--fresh", action="store_true", help="start anew, whatever is there")
-    parser.add_argument("--retry", action="store_true", help="run again what failed")
+    parser.add_argument("--fresh", action="store_true", help="start again, replace earlier runs")
+    parser.add_argument("--retry", action="store_true", help="repeat failed runs")
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ._common import add_common_to_actions
+
 HELP = "studies to try things on: measurements of a rig with a hidden effect"
 
 
@@ -23,10 +25,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--no-load-cell", action="store_true", help="leave the damper's force out of the files"
     )
     building.set_defaults(act=_building)
-    reveal = commands.add_parser("reveal", help="what was hidden, beside what the study found")
+    reveal = commands.add_parser("reveal", help="show the hidden answer and what the study found")
     reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
     reveal.add_argument("--json", action="store_true", help="print the answer as JSON")
     reveal.set_defaults(act=_reveal)
+    add_common_to_actions(commands)
 
 
 def _add_choices(parser: argparse.ArgumentParser) -> None:
@@ -115,7 +118,7 @@ def _made(folder: Path) -> int:
     runs = Study(folder).settings.runs
     held = sum(run.role == "holdout" for run in runs)
     print(f"{folder}: a study of {len(runs) - held} runs for training and {held} held out.")
-    print(f"What is hidden in it stands in {folder / FILE}.")
+    print(f"The hidden answer is in {folder / FILE}.")
     print(f"Next:  bristle study auto {folder}")
     return 0
 

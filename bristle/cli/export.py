@@ -39,8 +39,9 @@ def main(arguments: argparse.Namespace) -> int:
         }
         print(json.dumps(answer, indent=2))
         return 0
-    print(f"{found.fmu}: the model's damper, its values baked in.")
-    print(f"{found.scenario}: plays {found.run} on it. Run it:  {command('run', found.scenario)}")
+    print(f"{found.fmu}: the damper with the model's values.")
+    print(f"{found.scenario}: applies the motion of {found.run} to it.")
+    print(f"Run it:  {command('run', found.scenario)}")
     for note in found.notes:
         print(f"{note[:1].upper()}{note[1:]}")
     return 0

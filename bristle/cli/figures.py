@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-HELP = "draw the paper's figures anew, each with its numbers as CSV"
+HELP = "draw the paper's figures, each with its numbers as CSV"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -26,6 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument("--law", help="another law than the model's: bingham, lugre, ..._standard")
     parser.add_argument(
+        "--command",
+        dest="form",
+        metavar="FORM",
+        help="how the command enters: linear, quadratic or table; several with commas, or all, are "
+        "compared by their errors on held-out runs; else as the model has it",
+    )
+    parser.add_argument(
         "--cutoff",
         type=float,
         metavar="HZ",
@@ -39,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--no-table", action="store_true", help="leave out the table that compares the laws"
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="show what would be found; leave the study as it is"
+        "--dry-run", action="store_true", help="show the result; do not change the study"
     )
     parser.add_argument(
         "--structure",
@@ -67,6 +74,7 @@ def main(arguments: argparse.Namespace) -> int:
         found = identify_study(
             study,
             law=arguments.law,
+            command=arguments.form,
             cutoff=arguments.cutoff,
             starts=arguments.starts,
             table=not arguments.no_table,
@@ -96,6 +104,8 @@ def text(found: Identified, folder: Path) -> str:
     if found.unidentified:
         lines += ["", f"The data do not identify: {', '.join(found.unidentified)}."]
     lines += ["", *_errors(found)]
+    if found.forms:
+        lines += ["", *_forms(found, folder)]
     if found.table:
         lines += ["", *_laws(found, folder)]
     for note in found.notes:
@@ -135,7 +145,30 @@ def _errors(found: Identified) -> list[str]:
         if f"z_{role}" in found.after:
             before, after = found.before[f"z_{role}"], found.after[f"z_{role}"]
             lines.append(f"  {name:34} {short_z(before):>22} {short_z(after):>22}")
-    return [*lines, "  z: error over the noise that a true model would show; a true model has 1."]
+    return [*lines, "  z: error / noise; a true model has 1."]
+
+
+def _forms(found: Identified, folder: Path) -> list[str]:
+    """Return the table of the forms of the command, and which one would do better."""
+    lines = [f"  {'command':18} {'training':>11} {'held out':>11} {'of force':>9} {'z':>8} fitted"]
+    size = max(row.errors["rms_train"] for row in found.forms)
+    for row in found.forms:
+        own = row.errors
+        held_out = quantity(own["rms_holdout"], "N", 4, size) if "rms_holdout" in own else "-"
+        z = short_z(own.get("z_holdout", own["z_train"]))
+        lines.append(
+            f"  {row.form:18} {quantity(own['rms_train'], 'N', 4, size):>11} {held_out:>11} "
+            f"{row.judged:>9.1%} {z:>8} {row.numbers:>6}"
+        )
+    mine = next(row for row in found.forms if row.model.law == found.model.law)
+    best = min(found.forms, key=lambda row: row.judged)
+    if best.judged < BETTER * mine.judged:
+        gain = 1.0 - best.judged / mine.judged
+        lines.append(
+            f"  {best.form} errs {gain:.0%} less than {mine.form}. To take it:  "
+            f"{command('identify', folder, '--command', best.form)}"
+        )
+    return [*lines, "  Each form identified with all effects of the model, on the same runs."]
 
 
 def _laws(found: Identified, folder: Path) -> list[str]:
@@ -171,11 +204,11 @@ def _better_law(mine: str, best: str, gain: float, folder: Path) -> str:
     from ..physics.laws import base_and_variant
 
     has, holds = (set(base_and_variant(law)[0].contains) for law in (mine, best))
-    line = f"  {best} errs {gain:.0%} less than the model's law, {mine}."
+    line = f"  The error of {best} is {gain:.0%} smaller than that of the model's law, {mine}."
     if more := sorted(holds - has):
         return (
-            f"{line} It holds a {' and a '.join(more)}, which may stand for a missing effect: "
-            f"diagnose first:  {command('diagnose', folder)}"
+            f"{line} It contains a {' and a '.join(more)}, which may replace a missing effect. "
+            f"Diagnose first:  {command('diagnose', folder)}"
         )
     return f"{line} To change it:  {command('identify', folder, '--law', best)}"
 
@@ -184,8 +217,8 @@ def _next(found: Identified, folder: Path) -> list[str]:
     z = max(found.after.get("z_holdout", 0.0), found.after["z_train"])
     if z > 1.15:
         return [
-            f"The error is {short_z(z)} times what noise explains. Next: where it is,  "
+            f"The error is {short_z(z)} times the noise floor. Next: where it occurs,  "
             f"{command('compare', folder)} ; what is missing,  {command('diagnose', folder)}"
         ]
     then = command("diagnose", folder)
-    return [f"Noise explains the error. Next:  {then} , which says what it saw."]
+    return [f"Noise explains the error. Next:  {then} , which lists what these data show."]

@@ -13,7 +13,7 @@ from . import _own
 if TYPE_CHECKING:
     from ..physics.law import Law
 
-HELP = "list the laws of a damper, tell all of one, start or check one of your own"
+HELP = "list the laws of a damper, describe one, start or check your own"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,8 +36,10 @@ def main(arguments: argparse.Namespace) -> int:
 def tell(law: type[Law]) -> dict[str, Any]:
     """Return what users are told of a law: class data, first line and formula of its text."""
     from ..physics.effect import effects_of
+    from ..physics.forms import FORMS, LINEAR_FORM, choosable
 
     about, text = _own.text_of(law)
+    free = list(choosable(law))  # quantities that may have another form
     return {
         "name": law.name,
         "about": about,
@@ -48,6 +50,7 @@ def tell(law: type[Law]) -> dict[str, Any]:
             quantity: [type(form).__name__.lower(), *form.names()]
             for quantity, form in law.command.items()
         },
+        "forms": {form: free for form in FORMS if form != LINEAR_FORM and free},
         "source": law.source,
         "states": dict(law.states),
         "variants": [f"{law.name}_{suffix}" for suffix in law.variants],
@@ -65,6 +68,9 @@ def _print_one(found: dict[str, Any]) -> None:
         print(f"Contains: {', '.join(found['contains'])}; no effect of that kind is offered.")
     for quantity, (form, *names) in found["command"].items():
         print(f"Over the voltage: {quantity} is {form}, by {', '.join(names)}.")
+    if found["forms"]:
+        forms = ", or ".join(f"--command {form}" for form in found["forms"])
+        print(f"To be identified in another form too:  {forms}")
     print(f"Inverse for controllers: {'yes' if found['inverse'] else 'no'}.")
     print(f"Effects that join it: {', '.join(found['effects'])}.")
     print(f"Source: {found['source']}.\n")

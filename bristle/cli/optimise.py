@@ -42,10 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         default="structure.floor2_acceleration_absolute",
         metavar="NAME",
-        help="what is to be least; else the second floor's absolute acceleration",
+        help="the output to minimise; else the second floor's absolute acceleration",
     )
     parser.add_argument(
-        "--statistic", choices=("peak", "rms"), default="peak", help="by which it is judged"
+        "--statistic", choices=("peak", "rms"), default="peak", help="statistic to minimise"
     )
     parser.add_argument(
         "--grid", type=int, default=17, metavar="N", help="voltages that are run first; else 17"

@@ -8,6 +8,7 @@ from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._common import add_common_to_actions
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -26,12 +27,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     # The name until 0.1; here for one release.
     _add_check(commands.add_parser(_OLD, description="The old name of `study check`."))
     auto = commands.add_parser(
-        "auto", help="identify, diagnose, add, until nothing that the library knows is missing"
+        "auto", help="repeat identify, diagnose and add until no effect of the library is missing"
     )
     auto.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    auto.add_argument(
+        "--learn", action="store_true",
+        help="where no known effect explains the error, learn a curve and go on",
+    )  # fmt: skip
     add_trust(auto)
     auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
+    add_common_to_actions(commands)
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -196,7 +202,7 @@ def _print_new(created: Created) -> None:
 
     folder = created.study.folder
     print(
-        f"{folder}: a study of {len(created.study.settings.runs)} run(s). The columns are taken as:"
+        f"{folder}: a study of {len(created.study.settings.runs)} run(s). The columns are read as:"
     )
     for guess in created.guesses:
         turned = "turned" if guess.sign < 0 else ""
@@ -239,12 +245,12 @@ def _check(arguments: argparse.Namespace) -> int:
         print(found.text())
         print(f"\nPicture: {picture}")
         if not found.ok:
-            print("Mend the above before a model is fitted.", file=sys.stderr)
+            print("Correct these errors before you fit a model.", file=sys.stderr)
     return 0
 
 
 def _auto(arguments: argparse.Namespace) -> int:
-    from ..study.learning import learn
+    from ..study.learning import complete, verdict_of
     from ..study.staircase import staircase
     from ..study.study import Study
     from .diagnose import text
@@ -261,13 +267,15 @@ def _auto(arguments: argparse.Namespace) -> int:
         print(f"\n{staircase(steps, cut_off=low)}\n", flush=True)
         shown.append(len(steps))
 
-    learned = learn(study, on_step=show)
+    done = complete(study, curves=arguments.learn, on_step=show)
     if arguments.json:
         import json
 
-        print(json.dumps(learned.as_dict(), indent=2, ensure_ascii=False))
+        print(json.dumps(done.as_dict(), indent=2, ensure_ascii=False))
         return 0
     if not shown:
         print(f"{staircase(study.steps(), cut_off=low)}\n")
-    print(text(learned.verdict.as_dict(), arguments.folder))
+    for one in done.curves:
+        print("\n".join(one.sentences()) + "\n")
+    print(text(verdict_of(study, done.verdict), arguments.folder))
     return 0

@@ -20,7 +20,7 @@ def main(arguments: argparse.Namespace) -> int:
 
     study = Study(arguments.folder)
     undone = study.undo()
-    now = study.steps()[-1]
+    now = study.history.step(study.history.numbers()[-1])
     if arguments.json:
         import json
         from dataclasses import asdict

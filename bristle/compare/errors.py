@@ -31,7 +31,8 @@ class RunError:
     `z` RMS(residual)/noise expected of a true model, by a robust scale; `numerical_z` the same of
     what half the step changes. `rms`, `noise`, `numerical`, `signal` [unit]: plain RMS of the
     residual, of the noise expected, of what half the step changes, of the measured output;
-    `noise_own` that of the channel's own noise.
+    `noise_own` that of the channel's own noise; `scatter`, `spread` the standard deviations of the
+    residual and of the measured output.
     """
 
     name: str
@@ -43,6 +44,18 @@ class RunError:
     numerical: float
     numerical_z: float
     signal: float
+    scatter: float
+    spread: float
+
+    @property
+    def fit(self) -> float:
+        """The normalised root mean square fit, 1 - RMS(residual)/std(measured) [1]."""
+        return 1.0 - self.rms / self.spread if self.spread > 0.0 else float("nan")
+
+    @property
+    def accounted(self) -> float:
+        """The variance accounted for (VAF), 1 - var(residual)/var(measured) [1]."""
+        return 1.0 - (self.scatter / self.spread) ** 2 if self.spread > 0.0 else float("nan")
 
     @property
     def share(self) -> float:
@@ -112,8 +125,8 @@ def refuse(predictions: Sequence[RunPrediction]) -> None:
                 )
         if not np.min(one.sigma) > 0.0:
             raise RecordError(
-                f"{one.name}: the noise of the {one.quantity} is zero: nothing tells what error "
-                f"is large. Give one in study.toml, noise = ... in [channels.{one.quantity}]."
+                f"{one.name}: the noise of the {one.quantity} is zero, so no error can be "
+                f"judged. Give one in study.toml, noise = ... in [channels.{one.quantity}]."
             )
 
 
@@ -124,10 +137,11 @@ def run_error(name: str, predictions: Sequence[RunPrediction]) -> RunError:
     own = np.concatenate([np.full(len(one.residual), one.noise) for one in predictions])
     tried = [one.numerical[one.skip :] for one in predictions if one.numerical is not None]
     moved = np.concatenate(tried) if len(tried) == len(predictions) else np.full(1, np.nan)
+    measured = np.concatenate([one.measured[one.skip :] for one in predictions])
     return RunError(
         name, len(residual), z_scale(residual / sigma), rms(residual), rms(sigma), rms(own),
         rms(moved), z_scale(moved / (sigma if len(moved) == len(sigma) else 1.0)),
-        rms(np.concatenate([one.measured[one.skip :] for one in predictions])),
+        rms(measured), float(np.std(residual)), float(np.std(measured)),
     )  # fmt: skip
 
 
@@ -145,7 +159,7 @@ def interval_of_z(normalised: Sequence[Array], finder: Finder) -> tuple[float, f
 
 def run_dict(run: RunError) -> dict[str, Any]:
     """Return an error as JSON has it."""
-    return {**asdict(run), "share": run.share}
+    return {**asdict(run), "share": run.share, "fit": run.fit, "accounted": run.accounted}
 
 
 def pattern_dict(pattern: ResidualPattern) -> dict[str, Any]:

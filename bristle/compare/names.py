@@ -10,8 +10,8 @@ from ..physics.drive import DRIVES
 NAMES = {
     **{f"{name}_rate": f"recent changes of the {name}" for name in DRIVES},
     "dissipated_energy": "the energy dissipated so far",
-    "time_since_reversal": "the time since the motion turned",
-    "rest": "how long it has rested of late",
+    "time_since_reversal": "the time since the last reversal",
+    "rest": "the recent time at rest",
     "time": "time",
     "direction": "the direction of motion",
 }

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
+from ..quantity import tick
 from .coordinates import SHOWN
 from .names import name_of
 
@@ -125,7 +126,7 @@ def draw_pattern(
     axes.set_ylim(-top, top)
     what = "more resistance than the model" if pattern.turned else "measured less model"
     if after:
-        what = f"what is left: {what}"
+        what = f"remaining: {what}"
     axes.set_title(f"{what} [{comparison.unit}]")
     axis = _axis(pattern.coordinate, comparison.site)
     axes.set_xlabel(axis + (f" [{unit}]" if unit else ""))
@@ -133,7 +134,7 @@ def draw_pattern(
         axes.set_xlim(-1.8, 1.8)
         axes.set_xticks([-1.0, 1.0], ["moving back", "moving outwards"])
     carried = percent(pattern.share, 0) if pattern.share >= 0.01 else "below 1 %"
-    of = "what is left" if after else "the error's power"
+    of = "the remaining error" if after else "the error's power"
     share = f"{carried} of {of}" if pattern.significant else "no more than chance"
     axes.text(0.98, 0.97, share, transform=axes.transAxes, ha="right", va="top", fontsize=8.5,
               bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5},
@@ -165,7 +166,7 @@ def draw_spectrum(axes: Axes, comparison: Comparison) -> None:
     axes.set_xlim(f[0], f[-1])
     axes.set_title(f"PSD [{comparison.unit}²/Hz]")
     for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_formatter(lambda value, _: f"{value:g}")
+        axis.set_major_formatter(lambda value, _: tick(value))
         axis.set_minor_formatter(lambda value, _: "")
     axes.set_xlabel("frequency [Hz]")
     _legend(axes, ("measured", PALE), ("error", ERROR), ("expected noise", BLUE))
@@ -189,7 +190,7 @@ def draw_regimes(axes: Axes, comparison: Comparison) -> None:
     axes.set_xticks(range(len(columns)), [_short(name) for name in columns], fontsize=8)
     axes.set_yticks(range(len(rows)), [_short(name) for name in rows], fontsize=8)
     axes.grid(visible=False)
-    axes.set_title("z: error over the noise that explains it")
+    axes.set_title("error / noise (z)")
 
 
 def residual_map(comparison: Comparison, bins: int = 13) -> tuple[Array, Array, Array] | None:

@@ -29,8 +29,8 @@ _STEP = 0.3  # numerical error, in units of the noise, that is worth a word
 _SPIKY = 1.4  # plain over robust RMS from which spikes carry the error
 _WHICH = {
     None: "In this measurement",
-    False: "On runs it has not seen",
-    True: "On the runs that it was fitted to",
+    False: "On held-out runs",
+    True: "On the training runs",
 }
 _NAMED = 3  # sites that fail beside the worst one, by name
 _RIPPLES = 4  # changes of sign along a coordinate from which it goes up and down
@@ -58,14 +58,14 @@ def _how_wrong(comparison: Comparison) -> str:
     step = ""
     if total.numerical_z > _STEP:
         times = plain(total.numerical_z, 2)
-        step = f"; the step of the calculation alone makes {times} times the noise"
+        step = f"; the step of the calculation alone causes {times} times the noise"
     if total.rms > _SPIKY * total.z * total.noise:
         size += ", much of it in short spikes"
     if not comparison.right:
         times = plain(total.z)
-        text = f"{where} the {what} by {size}, {times} times what its noise would explain{step}"
+        text = f"{where} the {what} by {size}, {times} times the noise{step}"
     else:
-        text = f"{where} the {what} by {size}, which its noise explains (z = {total.z:.2f}){step}"
+        text = f"{where} the {what} by {size}, which the noise explains (z = {total.z:.2f}){step}"
     return f"{text}{_elsewhere(comparison)}."
 
 
@@ -86,14 +86,14 @@ def _elsewhere(comparison: Comparison) -> str:
         are = "is right within its noise" if len(right) == 1 else "are right within their noise"
         text += f"; {site_names([one.site for one in right])} {are} ({span})"
     hidden = [one.site for one in others if not one.identifiable]
-    return text + (f"; {site_names(hidden)}: too few samples to tell" if hidden else "")
+    return text + (f"; {site_names(hidden)}: too few samples for a statement" if hidden else "")
 
 
 def _where(comparison: Comparison, finder: Finder) -> str:
     first = comparison.first
     if first is None or first.share < FAINT:
         if comparison.right:
-            return "What is left looks like noise along every coordinate."
+            return "The remaining error looks like noise along every coordinate."
         loud = _loudest(comparison)
         most = (
             "the error beyond chance"
@@ -110,12 +110,14 @@ def _where(comparison: Comparison, finder: Finder) -> str:
     also = ""
     if first.alike:
         names = " and ".join(name_of(name, comparison.site) for name in first.alike[:2])
-        also = f" (in these runs {names} tell{'s' * (len(first.alike) == 1)} the same)"
+        also = f" (in these runs {names} show{'s' * (len(first.alike) == 1)} the same)"
     text = f"The error depends mainly on {name_of(first.coordinate, comparison.site)}{also}: "
     text += _pattern_text(first, comparison.predictions[0]) + _at_levels(first, comparison, finder)
     second = comparison.second
     if second is not None and second.share > 0.03:
-        text += f"; what is left then depends on {name_of(second.coordinate, comparison.site)}"
+        text += (
+            f"; the remaining error then depends on {name_of(second.coordinate, comparison.site)}"
+        )
     return text + "."
 
 
@@ -138,11 +140,12 @@ def _where_right(comparison: Comparison) -> str:
         return text + "."
     loud = _loudest(comparison)
     if not every:
-        return f"{begin(loud)}." if loud else "There is no speed to tell regimes by."
+        return f"{begin(loud)}." if loud else "Without a speed, no regimes can be compared."
     best = min(every, key=lambda one: one.z)
     if comparison.right:
-        return f"It does best {best.text} (z = {best.z:.2f})."
-    text = f"Nowhere is it right within its noise: it does best {best.text} (z = {short_z(best.z)})"
+        return f"The model is best {best.text} (z = {best.z:.2f})."
+    text = "The model is nowhere right within its noise. It is best "
+    text += f"{best.text} (z = {short_z(best.z)})"
     return text + (f"; {loud}." if loud else ".")
 
 
@@ -313,7 +316,7 @@ def _at_levels(pattern: ResidualPattern, comparison: Comparison, finder: Finder)
     (low, low_std), (high, high_std) = sizes
     doubt = 2.0 * float(np.hypot(low_std, high_std))
     if abs(high - low) <= max(_ALIKE * max(abs(low), abs(high)), doubt):
-        return f", at every {drive.name} alike" if doubt < 0.7 else ""
+        return f", the same at every {drive.name}" if doubt < 0.7 else ""
     peak = float(np.max(np.abs(pattern.mean)))
     one = comparison.predictions[0]
     parts = (

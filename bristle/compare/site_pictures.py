@@ -61,7 +61,7 @@ def draw_sites(axes: Axes, sites: Sequence[SiteError], before: Sequence[SiteErro
     axes.set_xticks(steps, [f"{z:g}" for z in steps])
     axes.xaxis.set_minor_formatter(lambda value, _: "")
     axes.grid(visible=False, axis="y")
-    axes.set_title("z at every site: error over what noise explains (green)")
+    axes.set_title("error / noise (z) at every site; green: noise floor")
 
 
 def _floor(site: str) -> int:

@@ -66,7 +66,7 @@ def site_error(predictions: Sequence[RunPrediction], seed: int = 0) -> SiteError
     """Return how wrong a model is at a site, and along what, without the rest of a comparison."""
     first, predictions, nothing = predictions[0], usable(predictions), float("nan")
     if not predictions:
-        total = RunError("all runs", 0, *[nothing] * 7)
+        total = RunError("all runs", 0, *[nothing] * 9)
         return SiteError(first.site, first.quantity, first.unit, (), total, (nothing,) * 2, None)
     refuse(predictions)
     runs = tuple(run_error(one.name, [one]) for one in predictions)

@@ -61,15 +61,13 @@ def run_table(comparison: Comparison) -> Table:
     factor, unit = scale(comparison.unit, comparison.total.signal)
     known = known_of(comparison.predictions)
     names = varying(known)
-    header = ["run", "z", f"error [{unit}]", "of RMS", f"noise [{unit}]", "half step [z]", *names]
+    header = ["run", "z", f"error [{unit}]", "of RMS", "fit", "VAF"]
+    header += [f"noise [{unit}]", "half step [z]", *names]
     own = [[_label(name, one[name]) for name in names] for one in known]
     rows = [[*_run(run, factor), *labels] for run, labels in zip(comparison.runs, own, strict=True)]
     if len(rows) > 1:
         rows.append([*_run(comparison.total, factor), *["" for _ in names]])
-    title = (
-        "Error over the noise that a true model would show (z), RMS at all frequencies, and what "
-        "half the step changes"
-    )
+    title = "Error / noise (z), RMS at all frequencies, and the sensitivity to halving the step"
     if comparison.sites:
         title = f"{begin(site_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
     return title, header, rows
@@ -90,9 +88,8 @@ def label_table(comparison: Comparison) -> Table:
 def _run(run: RunError, factor: float) -> list[str]:
     numerical = plain(run.numerical_z, 2) if run.numerical_z == run.numerical_z else "not tried"
     return [
-        run.name, short_z(run.z), plain(factor * run.rms), percent(run.share),
-        plain(factor * run.noise),
-        numerical,
+        run.name, short_z(run.z), plain(factor * run.rms), percent(run.share), percent(run.fit),
+        percent(run.accounted), plain(factor * run.noise), numerical,
     ]  # fmt: skip
 
 
@@ -100,7 +97,7 @@ def pattern_table(comparison: Comparison) -> Table:
     """Return the coordinates by how much of the error's power each carries."""
     header = ["coordinate", "of the error", "of what exceeds noise", "chance"]
     rows = [_pattern(one, comparison.site) for one in comparison.patterns[:_SHOWN]]
-    return "Where the error lives: the part of its power that a coordinate carries", header, rows
+    return "Where the error occurs: the share of its power along each coordinate", header, rows
 
 
 def _pattern(pattern: ResidualPattern, site: str) -> list[str]:

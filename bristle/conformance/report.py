@@ -11,7 +11,7 @@ VERDICTS = ("pass", "fail", "note")
 RULES = {
     "standard": "Violations of the standard",
     "bristle": "Violations of bristle's rules for its own FMUs",
-    "robustness": "Lack of robustness, where the standard forbids the call or says nothing",
+    "robustness": "Lack of robustness, where the standard forbids the call or does not define it",
 }
 """What a failure breaks, and the heading under which it is repeated at the end."""
 

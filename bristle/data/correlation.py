@@ -116,8 +116,8 @@ def read_correlation(
     if names and (least := float(np.linalg.eigvalsh(found.matrix())[0])) < -_SLACK * len(names):
         toml.error(
             (*keys, "rows"),
-            f"no errors go together like this: the matrix has the eigenvalue {least:.3g}, and none "
-            "below zero is right. Identify anew, or take the table out.",
+            f"no errors can correlate like this: the matrix has the eigenvalue {least:.3g}, below "
+            "zero. Identify again, or remove the table.",
         )
     return found
 

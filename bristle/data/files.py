@@ -56,7 +56,7 @@ def read_json(path: Path) -> dict[str, Any]:
     try:
         found = json.loads(_text(path))
     except ValueError as error:
-        raise StudyError(f"{path}: no JSON ({error}). Remove the file, or mend it.") from None
+        raise StudyError(f"{path}: no JSON ({error}). Remove or correct the file.") from None
     if not isinstance(found, dict):
         raise StudyError(f"{path}: holds {written(found)}; an object is right.")
     return found

@@ -287,7 +287,7 @@ def _in_si(table: Table, channel: str, spec: ChannelSpec) -> Array:
     if column.text in table.not_numeric:
         raise RecordError(
             f'{table.source}: column "{column.text}" ({channel}): '
-            f"{table.not_numeric[column.text]}. Mend the file, or leave the field "
+            f"{table.not_numeric[column.text]}. Correct the file, or leave the field "
             "empty where a value is missing."
         )
     unit = spec.unit or (column.unit.name if column.unit else "")

@@ -16,6 +16,8 @@ parameters = { k = { value = 81.2, unit = "N/m", std = 3.0 } }
 parameters = ["sigma_a", "gas_spring.k"]
 rows = [[1.0], [-0.42, 1.0]]
 
+`command = "quadratic"`, or `command = "table"` with `command_knots = [0.0, 1.5, 3.0]` [V], beside
+the law is a form that was chosen (`physics.forms`); `StudyModel.law` names both together.
 `correlation` is how the errors of identified parameters go together (`data.correlation`); files
 without it open as before. `data.model_text` writes the file.
 """
@@ -36,7 +38,8 @@ from ..physics.effect import EFFECTS, exclude, laws_joined, plain_name
 from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..physics.parameter import CHOICES, Parameter, fields_of
 from ..physics.user import waiting, why_left_out
-from ..units import canonical, convert
+from ..units import convert
+from .command_form import FORM_KEYS, law_in_form
 from .correlation import (
     Array,
     Correlation,
@@ -45,23 +48,12 @@ from .correlation import (
     read_correlation,
 )
 from .files import Toml
+from .model_value import ORIGINS as ORIGINS
+from .model_value import VALUE_KEYS as VALUE_KEYS
+from .model_value import Value as Value
+from .model_value import as_written, waiting_law
 
-ORIGINS = ("reconstructed", "measured", "assumed", "identified")
-_KEYS = ("schema", "law", "building", "drive", "parameters", "effects", "correlation")
-VALUE_KEYS = ("value", "unit", "low", "high", "free", "std", "origin")
-
-
-@dataclass(frozen=True)
-class Value:
-    """A parameter: `value`, `low`, `high`, `std` in `unit`; whether a fit moves it; its origin."""
-
-    value: float
-    unit: str
-    low: float
-    high: float
-    free: bool = True
-    std: float | None = None
-    origin: str = "assumed"
+_KEYS = ("schema", "law", *FORM_KEYS, "building", "drive", "parameters", "effects", "correlation")
 
 
 @dataclass(frozen=True)
@@ -69,10 +61,10 @@ class StudyModel:
     """The content of a model.toml; all parameters of the law and its effects are there.
 
     `parameters` of the law by name; `effects` name to parameters; `building` the file of the
-    structure, relative to the study, "" on a bench; `only_shown` the effects whose code must not
-    run yet: the model can be shown, not used; `correlation` of the identified parameters' errors,
-    None where none was stored; `drive` is the channel that commands the damper, on whose unit those
-    of parameters depend.
+    structure, relative to the study, "" on a bench; `only_shown` the effects, and the law, whose
+    code must not run yet: the model can be shown, not used; `correlation` of the identified
+    parameters' errors, None where none was stored; `drive` is the channel that commands the damper,
+    on whose unit those of parameters depend.
     """
 
     law: str
@@ -109,11 +101,11 @@ class StudyModel:
     def declared(self, name: str) -> Parameter:
         """Return the declaration of a parameter: default, SI unit, bounds, text.
 
-        Of an effect that is only shown the file tells what there is.
+        Of an effect or law that is only shown the file tells what there is.
         """
         effect, _, own = name.rpartition(".")
-        if effect in self.only_shown:
-            value = self.effects[effect][own]
+        if (effect or self.law) in self.only_shown:
+            value = self.effects[effect][own] if effect else self.parameters[own]
             return Parameter(value.value, value.unit, (value.low, value.high), "")
         return _declared(self.law, effect, self.drive)[own]
 
@@ -246,44 +238,47 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     study : path, optional
         The folder where its building and its own effects are; else that of the file.
     to_show : bool
-        Whether the model is only to be shown: then an effect whose code must not run yet is there
-        with the values of the file.
+        Whether the model is only to be shown: then an effect or law whose code must not run yet is
+        there with the values of the file.
 
     Raises
     ------
     StudyError
         With every mistake of the file and its line.
     TrustError
-        If the model has an effect whose code must not run yet.
+        If the model has an effect or law whose code must not run yet.
     """
     toml = Toml(path)
     data = toml.data
     toml.schema()
     toml.known((), data, _KEYS)
+    beside = study or path.parent
     law = toml.text((), data, "law")
-    if law not in law_names():
-        toml.error(("law",), unknown("law", law, law_names()))
-        toml.check()
+    only_shown = _unusable_law(toml, law, beside / "laws", to_show)
+    law = law_in_form(toml, data, law, known=not only_shown)
     drive = toml.text((), data, "drive", VOLTAGE.name)
     if drive not in DRIVES:
         toml.error(("drive",), unknown("drive", drive, DRIVES))
         drive = VOLTAGE.name
-    parameters = _values(
-        toml, ("parameters",), toml.table((), data, "parameters"), (law, ""), drive
-    )
+    only_shown = [law] if only_shown else []
+    given = toml.table((), data, "parameters")
+    if only_shown:
+        parameters = as_written(toml, ("parameters",), given)
+    else:
+        parameters = _values(toml, ("parameters",), given, (law, ""), drive)
+    base = "" if only_shown else base_and_variant(law)[0].name
     effects: dict[str, dict[str, Value]] = {}
-    only_shown = []
-    beside = study or path.parent
     for name, table in toml.table((), data, "effects").items():
         own = beside / "effects" / f"{name}.py"
         untrusted = waiting(own) if name not in EFFECTS else None
         if untrusted and not to_show:
             raise untrusted
         if untrusted:
-            effects[name] = _as_written(toml, name, table)
+            own_values = table.get("parameters") if isinstance(table, dict) else None
+            effects[name] = as_written(toml, ("effects", name, "parameters"), own_values)
             only_shown.append(name)
             continue
-        found = _effect(toml, name, table, (base_and_variant(law)[0].name, drive), own)
+        found = _effect(toml, name, table, (base, drive), own)
         if found is not None:
             effects[name] = found
     _exclusions(toml, [name for name in effects if name not in only_shown])
@@ -291,11 +286,27 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     if building and not (beside / building).is_file():
         toml.error(("building",), f"there is no file {beside / building}.")
     model = StudyModel(law, parameters, effects, building, tuple(only_shown), drive=drive)
+    toml.check()  # else what is wrong with an effect would be said again of its correlation
     correlation = None
     if "correlation" in data:
         correlation = read_correlation(toml, list(model.flat()), model.uncertain())
     toml.check()
     return replace(model, correlation=correlation)
+
+
+def _unusable_law(toml: Toml, law: str, folder: Path, to_show: bool) -> list[str]:
+    """Return the law's name in a list where its code must not run yet, nothing where it may."""
+    if law in law_names():
+        return []
+    untrusted = waiting_law(folder, law)
+    if untrusted and not to_show:
+        raise untrusted
+    if untrusted:
+        return [law]
+    why = why_left_out(folder / f"{law}.py") if law else ""
+    toml.error(("law",), why or unknown("law", law, law_names()))
+    toml.check()
+    return []
 
 
 def _declared(law: str, effect: str = "", drive: str = VOLTAGE.name) -> dict[str, Parameter]:
@@ -335,29 +346,6 @@ def _defaults(law: str, effect: str = "", drive: str = VOLTAGE.name) -> dict[str
     }
 
 
-def _as_written(toml: Toml, name: str, table: Any) -> dict[str, Value]:
-    """Return the values of an effect as the file has them, without knowing the effect."""
-    keys: KeyPath = ("effects", name, "parameters")
-    given = table.get("parameters") if isinstance(table, dict) else None
-    out = {}
-    for own, entry in (given if isinstance(given, dict) else {}).items():
-        if not isinstance(entry, dict) or not isinstance(entry.get("value"), int | float):
-            continue  # a table of values, or what only the effect can judge
-        try:
-            unit = canonical(toml.text((*keys, own), entry, "unit") or "1")
-        except UnitError as error:
-            toml.error((*keys, own, "unit"), f"{own}: {error}")
-            continue
-        low, high, std = (toml.number((*keys, own), entry, key) for key in ("low", "high", "std"))
-        value = float(entry["value"])
-        out[own] = Value(
-            value, unit, value if low is None else low, value if high is None else high,
-            entry.get("free", True) is True, std,
-            toml.text((*keys, own), entry, "origin", "assumed"),
-        )  # fmt: skip
-    return out
-
-
 def _effect(
     toml: Toml, name: str, table: Any, joined: tuple[str, str], own_file: Path
 ) -> dict[str, Value] | None:
@@ -371,7 +359,7 @@ def _effect(
     if not isinstance(table, dict):
         toml.error(keys, f"is {written(table)}; a table is right.")
         return None
-    if EFFECTS[name].sites == ("damper",) and not EFFECTS[name].joins(LAWS[law]):
+    if law and EFFECTS[name].sites == ("damper",) and not EFFECTS[name].joins(LAWS[law]):
         joins = ", ".join(laws_joined(EFFECTS[name]))
         toml.error(keys, f"{name} cannot join the law {law}; it joins {joins}.")
     toml.known(keys, table, ("parameters",))

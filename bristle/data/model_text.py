@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..physics.drive import VOLTAGE
+from ..physics.forms import split_form
 from .correlation import set_correlation
 from .files import write_whole
 from .model import VALUE_KEYS, StudyModel, Value, table_names
@@ -29,7 +30,10 @@ def model_text(model: StudyModel, beside: Path | None = None) -> str:
         except (TOMLKitError, OSError, UnicodeDecodeError):
             document = tomlkit.document()
     document["schema"] = 1
-    document["law"] = model.law
+    law, form, knots = split_form(model.law)
+    document["law"] = law
+    _set_or_drop(document, "command", form)
+    _set_or_drop(document, "command_knots", list(knots) or "")
     _set_or_drop(document, "building", model.building)
     _set_or_drop(document, "drive", "" if model.drive == VOLTAGE.name else model.drive)
     for key in ("parameters", "effects"):

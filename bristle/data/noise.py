@@ -79,7 +79,7 @@ def estimate_noise(y: Array) -> Noise:
     y = np.asarray(y, dtype=float)
     if y.ndim != 1 or len(y) < SHORTEST:
         raise RecordError(
-            f"noise: {len(y)} samples; the noise of a channel is told from {SHORTEST} or more."
+            f"noise: {len(y)} samples; the noise of a channel needs {SHORTEST} or more."
         )
     if not np.isfinite(y).all():
         raise RecordError("noise: a sample is not finite; fill it or cut the channel there.")

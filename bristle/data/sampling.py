@@ -77,7 +77,7 @@ def evenly(
     for channel, values in channels.items():
         if np.isnan(values).all():
             raise RecordError(
-                f"{name}: {channel} holds no number. Take it out of [channels], or mend the file."
+                f"{name}: {channel} has no number. Remove it from [channels], or correct the file."
             )
     step = float(np.median(np.diff(time)))
     breaks = np.flatnonzero(np.diff(time) > (MAX_FILLED + 1.5) * step) + 1
@@ -167,7 +167,7 @@ def _grid_notes(made: list[_Stretch], time: Array, sampling: Sampling) -> list[s
             f"{_ms(sampling.step)}: taken as even{taken}"
         )
     for channel in dict.fromkeys(channel for one in made for channel in one.sparse):
-        notes.append(f"{channel} is written less often than the rest, and interpolated between")
+        notes.append(f"{channel} has fewer samples than the other channels and is interpolated")
     return notes
 
 

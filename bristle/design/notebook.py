@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 _SHOWN = {
     "gamma": "gamma",
     "least_gamma": "least gamma of any controller",
-    "norm": "closed-loop norm, computed anew",
-    "largest_norm": "largest closed-loop norm, computed anew",
+    "norm": "closed-loop norm, recomputed",
+    "largest_norm": "largest closed-loop norm, recomputed",
     "open_loop_norm": "norm without control",
     "largest_real_part": "largest real part of a pole [1/s]",
     "fastest_pole": "fastest pole [rad/s]",

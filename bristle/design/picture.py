@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..draw.style import BLUE, GREY, INK, Page, look, ramp, zero_lines
+from ..quantity import tick
 from .margins import grid_rows
 from .responses import responses
 
@@ -123,4 +124,4 @@ def _panel(
     low = min(float(np.min(response[closed])) for response in shown)
     axes.set_ylim(max(low * 0.5, top * 1e-4), top * 2.0)
     for axis in (axes.xaxis, axes.yaxis):  # powers of ten would need mathtext, which is off
-        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axis.set_major_formatter(FuncFormatter(lambda value, _: tick(value)))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import DesignError
 from ..physics.damper import DamperModel
 from ..physics.effect import EFFECTS, effects_of
+from ..physics.forms import split_form
 from ..physics.laws import DEFAULT_OF_DESIGN, LEAST, Law, base_and_variant, law_names
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ class Damper:
     known_to: float | None = None
 
     def __post_init__(self) -> None:
-        if self.law not in law_names():
+        if split_form(self.law)[0] not in law_names():
             raise DesignError(f"damper: law = {self.law!r}; there are {', '.join(law_names())}.")
         if not self.kind.exact() or self.kind.felt:
             raise DesignError(

@@ -100,9 +100,9 @@ def moved_numbers(before: Building, after: Building) -> list[str]:
     if not changed:
         return []
     return [
-        "The force is reconstructed from the building's numbers, moved within what a laboratory "
-        f"knows of them: {', '.join(changed)}. A spring or a mass of that size beside the damper "
-        "would look the same. Put them into the building's file if they suit."
+        "The force is reconstructed from the building's numbers, adjusted within the accuracy of "
+        f"a laboratory: {', '.join(changed)}. A spring or a mass of that size at the damper "
+        "would look the same. If these values are right, put them into the building's file."
     ]
 
 

@@ -108,7 +108,7 @@ def _reasons(parts: Sequence[Finding], kind: str) -> list[str]:
 
 
 def _without_load_cell(reason: str) -> str:
-    return f"Without a measured force {reason}: a load cell at the damper would tell."
+    return f"Without a measured force {reason}: a load cell at the damper would distinguish them."
 
 
 def _untestable(
@@ -159,7 +159,7 @@ def _of_load_cell(findings: Mapping[str, Finding]) -> list[SensorFault]:
         if _is_gain(finding):
             gain = float(finding.coordinate)
             text = (
-                f"The load cell shows {gain:.4g} times the force that equilibrium asks for "
+                f"The load cell shows {gain:.4g} times the force that equilibrium requires "
                 f"({Z} {finding.z_before:.3g} before, {finding.z_after:.3g} with that corrected)."
             )
             out.append(SensorFault("force", "gain", gain, float("nan"), text))

@@ -82,7 +82,7 @@ def excused_by_sensor(
     gains = any(1.0 - trial.z / before.z >= rule.gain for trial in found.trials)
     if found.kind != "unknown" or gains or max(before.z, before.train) > most:
         return found
-    why = f"{reason} The {Z} of {before.z:.2f} is no more than that."
+    why = f"{reason} This explains the {Z} of {before.z:.2f}."
     return replace(found, kind="none", reasons=(why,))
 
 

@@ -112,7 +112,8 @@ def as_noise(before: Trial, ranked: Sequence[Trial]) -> Decision:
     reason = f"On held-out runs {Z} = {before.z:.2f}"
     if ranked:
         gain = 100.0 * max(0.0, 1.0 - ranked[0].z / before.z)
-        reason += f", and no effect lowers it by more than {gain:.1f} %"
+        more = f" by more than {gain:.1f} %" if gain >= 0.05 else ""
+        reason += f", and no effect lowers it{more}"
     return Decision("none", (), before, 0.0, (reason + ".",))
 
 
@@ -151,8 +152,9 @@ def _too_loud(before: Trial, best: Trial) -> Decision:
         (
             f"On held-out runs {Z} = {before.z:.2f}: the noise was estimated too high, as happens "
             "where a force turns within a few samples. "
-            f"{_new(best, before)[0].capitalize()} lowers the error further, which this noise "
-            "cannot judge. State the noise of the channels in study.toml, or sample faster.",
+            f"{_new(best, before)[0].capitalize()} lowers the error further, but this noise "
+            "estimate cannot decide. State the noise of the channels in study.toml, or sample "
+            "faster.",
         ),
     )  # fmt: skip
 

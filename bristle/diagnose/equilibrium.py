@@ -147,12 +147,12 @@ class BuildingRuns:
     def excused(self, finding: Finding, findings: Mapping[str, Finding]) -> Finding:
         """Return the damper's finding, not unknown where an instrument explains what is left."""
         if _blurred(self._sensors):
-            why = "Without its velocity the base's reversals blur."
+            why = "Without the velocity of the base, its reversals are not located exactly."
             finding = excused_by_sensor(finding, BENCH.blurred, why)
         layer = findings.get("layer")
         if layer is not None and _rounded(layer):
             most = left_by_filter(self._present.law, *self._problems[DAMPER])
-            why = "The load cell's filter has another form than ours."
+            why = "The load cell's filter has a different functional form."
             finding = excused_by_sensor(finding, most, why)
         return finding
 

@@ -46,9 +46,9 @@ class Experiment:
         if self.deviations < rule.tells:
             return (
                 "No run within the strokes, speeds and levels of the "
-                f"{self.drive.name} of these would distinguish them: at best the forces "
+                f"{self.drive.name} so far would distinguish them: at best the forces "
                 f"differ by {self.deviations:.1f} standard deviations over "
-                f"{LENGTH:g} s. Go beyond them."
+                f"{LENGTH:g} s. Use a wider range."
             )
         motion = (
             f"a sine of {1e3 * self.amplitude:.3g} mm at {self.low:.3g} Hz"
@@ -65,8 +65,8 @@ class Experiment:
             f"{self.switch:.3g} s"
         )
         return (
-            f"Run {motion} {drive} for {LENGTH:g} s: there the forces of the alternatives differ "
-            f"by {self.contrast:.2g} times the noise, however they are refitted."
+            f"Run {motion} {drive} for {LENGTH:g} s: then the forces of the alternatives differ "
+            f"by {self.contrast:.2g} times the noise, even if they are fitted again."
         )
 
     def signals(self, dt: float) -> tuple[Array, Array, Array, Array]:

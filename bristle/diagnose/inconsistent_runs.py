@@ -17,7 +17,7 @@ from .opening import Opening
 from .rule import BENCH, DecisionRule
 
 HELD_OUT_DIFFER = (
-    "The model fits the runs that it was fitted to: the others differ from them in something that "
+    "The model explains the training runs. The held-out runs differ from them in something that "
     "no channel shows."
 )
 
@@ -131,7 +131,7 @@ def groups(
         return ""
     named = "; ".join(_list([run.name for run in group]) for group in found)
     return (
-        "One model does not explain all runs together, but with values of their own it explains "
+        "One model does not explain all runs together. With separate values it explains "
         f"each of these groups: {named}. Were they taken on one rig, with one setting?"
     )
 

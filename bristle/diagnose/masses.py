@@ -79,8 +79,9 @@ def text_of_masses(before: Building, after: Building) -> list[str]:
     share = [after.M[i][i] / before.M[i][i] - 1.0 for i in range(before.size)]
     told = ", ".join(f"{name} {one:+.1%}" for name, one in zip(names, share, strict=True))
     return [
-        f"Equilibrium asks for other masses than the building's file has: {told}. A load cell "
-        "whose gain is off by that would look the same. Weigh the building, or check the cell."
+        f"Equilibrium requires other masses than those in the building's file: {told}. A load "
+        "cell whose gain is wrong by that much would look the same. Weigh the building, or check "
+        "the cell."
     ]
 
 

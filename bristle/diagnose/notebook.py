@@ -36,7 +36,7 @@ def _rows(found: Diagnosis) -> tuple[list[list[str]], list[int]]:
     before = found.before
     if before is None:
         return [], []
-    rows = [["as it is", short_z(before.train), short_z(before.z), ""]]
+    rows = [["present model", short_z(before.train), short_z(before.z), ""]]
     strong = []
     for trial in found.trials[:MOST]:
         if trial.effects[-1] in found.effects:

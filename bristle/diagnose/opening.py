@@ -243,5 +243,5 @@ def _lacking(
     if cut:
         share = float(np.mean(np.abs(force) >= cut[0].value * (1.0 - 1e-9)))
         if share > rule.cut:
-            out.append(f"The force stands at the end of its range in {share:.0%} of the samples.")
+            out.append(f"The force is saturated in {share:.0%} of the samples.")
     return out

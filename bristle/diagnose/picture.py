@@ -43,8 +43,8 @@ def _subtitle(found: Diagnosis) -> str:
     site = found.worst.site if found.worst is not None and found.force else ""
     where = f" at the {site}" if site else ""
     return (
-        f"Dashed: the model as it is{where}. Each dot: the model with that effect, fitted anew. "
-        "Green: what noise explains."
+        f"Dashed: the present model{where}. Each dot: the model with that effect, fitted again. "
+        "Green: the noise floor."
     )
 
 
@@ -53,6 +53,6 @@ TITLES = {
     "effect": "Missing: {names}",
     "ambiguous": "One of these is missing: {names}",
     "unknown": "Something is missing that no effect explains",
-    "insufficient": "These data carry no verdict",
+    "insufficient": "These data do not allow a verdict",
 }
 """Headings by kind of verdict."""

@@ -1,13 +1,13 @@
-"""The numbers that decide a verdict, all of them, with what each one trades.
+"""All numbers that decide a verdict, and what each one trades.
 
-z is RMS(residual)/noise expected, the excess z^2 - 1 the part of a residual's power that noise does
-not account for. "Found" says how a value came about: "blind seeds" are cases of the independent
-generator whose truth was looked at while values were set by hand, on other seeds than those that
-are reported; "the method" is what follows from how a quantity is made. What a value trades is
-measured by `python -m benchmarks calibrate`.
+z is RMS(residual)/noise expected. The excess z^2 - 1 is the part of a residual's power that noise
+does not account for. "Found" says how a value came about. "blind seeds": it was set by hand on
+cases of the independent generator whose answer was known, on other seeds than those that are
+reported. "the method": it follows from how a quantity is computed. `python -m benchmarks calibrate`
+measures what a value trades.
 
-How many evaluations a search takes, step sizes and lengths of blocks decide nothing by themselves:
-they stay where they are used.
+The evaluations of a search, step sizes and lengths of blocks decide nothing by themselves: they
+stay where they are used.
 """
 
 # Longer than 300 lines: one number after the other, each with its reason.
@@ -28,51 +28,53 @@ class DecisionRule:
     # --- one effect against none
 
     gain: float = 0.02
-    """Smallest share by which an effect, or a fault, must lower z on held-out runs to be missing.
+    """Smallest share by which an effect, or a fault, must lower z on held-out runs to count.
 
-    Trades: above, weak effects are missed; below, chance is named. Found: blind seeds.
+    Trades: if higher, weak effects are missed; if lower, chance gains are named. Found: blind
+    seeds.
     """
 
     chance: float = 0.01
-    """Probability of chance at which a paired gain, or a residual's pattern, still counts.
+    """Largest probability of chance at which a paired gain, or a residual's pattern, counts.
 
-    Trades: below, effects that act in few blocks are missed; above, chance is named. Found: the
-    method's usual level.
+    Trades: if lower, effects that act in few blocks are missed; if higher, chance gains are named.
+    Found: the method's usual level.
     """
 
     most_rms: float = 1.1
-    """What an effect may leave of the plain RMS error, as a multiple: its weights are not z's.
+    """Largest plain RMS error with an effect over that without it; z weights samples differently.
 
-    Trades: above, what serves only the samples near rest is named; below, effects that act there
-    are missed. Found: blind seeds.
+    Trades: if higher, an effect that fits only the samples near rest is named; if lower, effects
+    that act there are missed. Found: blind seeds.
     """
 
     clean: float = 1.15
-    """z of the present model above which something is missing, whether an effect tells it or not.
+    """z of the present model above which something is missing, with or without an effect for it.
 
-    Trades: below, noise that was estimated too low reads as unknown; above, what no effect
-    describes goes unseen. Found: blind seeds, above the z of nearly all true models.
+    Trades: if lower, noise that was estimated too low gives unknown; if higher, effects outside the
+    library go unnoticed. Found: blind seeds, above the z of nearly all true models.
     """
 
     organised: float = 0.12
-    """Share of a residual's power along a coordinate (a correlation of 0.35) that is no accident.
+    """Share of a residual's power along a coordinate above which this is no accident.
 
-    Trades: below, accidents read as unknown; above, what no effect describes goes unseen. Found:
-    blind seeds.
+    0.12 is a correlation of 0.35. Trades: if lower, accidents give unknown; if higher, effects
+    outside the library go unnoticed. Found: blind seeds.
     """
 
     loud: float = 0.9
-    """z of the present model below which the noise was estimated too high to judge by it.
+    """z of the present model below which the noise was estimated too high for a verdict.
 
-    Trades: above, sound data count as insufficient; below, effects are named against a wrong noise.
-    Found: blind seeds.
+    Trades: if higher, sound data count as insufficient; if lower, effects are named against a wrong
+    noise. Found: blind seeds.
     """
 
     likelihood: float = 40.0
-    """Gain of the log-likelihood that counts as beyond chance where the model is adequate.
+    """Gain of the log-likelihood that counts as beyond chance if the model is adequate.
 
-    What happens in a few samples, such as a stop that is met once, is seen in no resampling of
-    blocks. Trades: above, rare contacts are missed; below, outliers are named. Found: blind seeds.
+    Resampling of blocks does not show what happens in a few samples, such as a single contact with
+    a stop. Trades: if higher, rare contacts are missed; if lower, outliers are named. Found: blind
+    seeds.
     """
 
     # --- how well an effect must do
@@ -80,45 +82,45 @@ class DecisionRule:
     adequate: float = 1.08
     """z up to which a model with an effect leaves nothing that matters.
 
-    Trades: above, second effects are missed; below, forms that differ a little from ours ask for a
-    second effect. Found: blind seeds.
+    Trades: if higher, second effects are missed; if lower, a slightly different functional form
+    asks for a second effect. Found: blind seeds.
     """
 
     share: float = 0.75
-    """Share of the excess that an effect must explain where its model is not adequate.
+    """Share of the excess that an effect must explain if its model is not adequate.
 
-    Its form may differ from ours: then the name is right and a residual remains. Trades: above,
-    effects of another form read as unknown; below, what no effect describes gets a name. Found:
-    blind seeds.
+    Its form may differ from that of the library: then the name is right and a residual remains.
+    Trades: if higher, effects of another form give unknown; if lower, effects outside the library
+    get a name. Found: blind seeds.
     """
 
     least_excess: float = 0.01
-    """Floor of z^2 - 1: the noise is not known better.
+    """Smallest value used for z^2 - 1, because the noise is not known better.
 
-    Trades: above, shares of small excesses are blunted; below, they hang on the estimate of the
-    noise. Found: the method, the noise of a run of thousands of samples.
+    Trades: if higher, shares of small excesses lose their meaning; if lower, they depend on the
+    estimate of the noise. Found: the method, the noise of a run of thousands of samples.
     """
 
     # --- rivals
 
     close: float = 0.004
-    """Share of z within which two adequate models are equal, whatever the statistics say.
+    """Share of z within which two adequate models count as equal, whatever the statistics say.
 
-    Trades: above, ambiguous where one name was right; below, one name where the data cannot
+    Trades: if higher, ambiguous where one name was right; if lower, one name where the data cannot
     distinguish. Found: blind seeds.
     """
 
     rival: float = 1.25
-    """Times the best excess up to which another one rivals it, where the best is not adequate.
+    """Times the best excess up to which another effect is a rival, if the best is not adequate.
 
-    A misfit of form cannot decide between what is nearly as wrong. Trades: above, ambiguous where
-    one name was right; below, wrong names. Found: blind seeds.
+    A wrong form cannot decide between effects that are nearly as wrong. Trades: if higher,
+    ambiguous where one name was right; if lower, wrong names. Found: blind seeds.
     """
 
     most_alternatives: int = 3
-    """Most effects that an ambiguous verdict names.
+    """Largest number of effects that an ambiguous verdict names.
 
-    Trades: above, the name is among many; below, it may be left out. Found: stated.
+    Trades: if higher, the right name is one of many; if lower, it may be left out. Found: stated.
     """
 
     # --- two effects
@@ -126,34 +128,34 @@ class DecisionRule:
     first: float = 0.2
     """Share of the excess that the first effect of a pair must explain by itself.
 
-    Trades: above, pairs that act together are missed; below, more pairs are searched, by chance
-    too. Found: blind seeds.
+    Trades: if higher, pairs that only act together are missed; if lower, more pairs are searched,
+    and more found by chance. Found: blind seeds.
     """
 
     pair_left: float = 0.5
-    """What a second effect may leave, as a share of the excess that the first one leaves.
+    """Largest excess after a second effect, as a share of the excess after the first one.
 
-    Trades: above, second effects where one was hidden; below, second effects are missed. Found:
-    blind seeds.
+    Trades: if higher, second effects where one was hidden; if lower, second effects are missed.
+    Found: blind seeds.
     """
 
     pair_part: float = 0.05
-    """Smallest part of the first excess that the lesser effect of a pair must account for.
+    """Smallest part of the first excess that the weaker effect of a pair must account for.
 
-    A misfit of form is lowered by many effects. Trades: above, small second effects are missed;
-    below, misfits of form get one. Found: blind seeds.
+    Many effects can reduce the error of a wrong form. Trades: if higher, weak second effects are
+    missed; if lower, a wrong form gets a second effect. Found: blind seeds.
     """
 
     complete: float = 1.04
-    """z up to which a pair counts whatever its lesser effect accounts for.
+    """z up to which a pair counts, whatever its weaker effect accounts for.
 
-    Only where the best single effect leaves more than `clean`: no effect closes the misfit of
-    another one's form. Trades: above, misfits of form get a second effect; below, small second
-    effects are missed. Found: blind seeds.
+    This applies only if the best single effect leaves more than `clean`: no effect removes the
+    error of another one's form. Trades: if higher, a wrong form gets a second effect; if lower,
+    weak second effects are missed. Found: blind seeds.
     """
 
     rest: float = 0.03
-    """Share of what the first effect leaves that may remain for the same where a pair is adequate.
+    """Share of the first effect's excess up to which an adequate pair counts in the same way.
 
     Trades and found: as `complete`.
     """
@@ -161,87 +163,89 @@ class DecisionRule:
     # --- data that carry no verdict
 
     quietest: float = 3.0
-    """By what factor a force must exceed its noise for a verdict to mean anything.
+    """Smallest ratio of a force to its noise that allows a verdict.
 
-    Trades: above, noisy data are refused; below, verdicts on noise. Found: stated.
+    Trades: if higher, noisy data are refused; if lower, verdicts on noise. Found: stated.
     """
 
     cut: float = 0.2
-    """Share of samples at the end of the force's range from which on nothing is judged.
+    """Share of samples at the limit of the force's range above which there is no verdict.
 
-    Trades: above, verdicts on what was cut; below, usable data are refused. Found: stated.
+    Trades: if higher, verdicts on saturated channels; if lower, usable data are refused. Found:
+    stated.
     """
 
     trained: float = 1.1
     """z on the training runs up to which "unknown" becomes "insufficient".
 
-    The held-out runs then differ in something that no channel shows. Trades: above, missing effects
-    read as insufficient data; below, data that differ read as missing effects. Found: blind seeds.
+    The held-out runs then differ in something that no channel shows. Trades: if higher, missing
+    effects read as insufficient data; if lower, data that differ read as missing effects. Found:
+    blind seeds.
     """
 
     misfit: float = 1.15
-    """z of runs above which a model has not explained them: runs of two rigs are told by it.
+    """z of runs above which a model does not explain them.
 
-    Trades: above, mixed rigs read as none or unknown; below, noise reads as mixed rigs. Found: the
-    value of `clean`.
+    It separates runs of two rigs. Trades: if higher, mixed rigs give none or unknown; if lower,
+    noise reads as mixed rigs. Found: the value of `clean`.
     """
 
     most_groups: int = 3
-    """Most groups of runs, each with values of its own, that are taken for rigs.
+    """Largest number of groups of runs, each with its own values, that count as rigs.
 
-    Trades: above, what changes from run to run reads as rigs; below, three rigs read as unknown.
-    Found: stated.
+    Trades: if higher, changes between runs read as rigs; if lower, three rigs give unknown. Found:
+    stated.
     """
 
     # --- what the data could show, and what would tell more
 
     typical: float = 0.15
-    """Share of the force that an effect is given to ask whether these data would show it.
+    """Share of the force given to an effect to test whether these data would show it.
 
-    Trades: above, effects count as testable that a weak one would not be; below, the reverse.
-    Found: stated, the middle strength of the blind benchmark.
+    Trades: if higher, effects count as testable although a weak one would not be seen; if lower,
+    the reverse. Found: stated, the middle strength of the blind benchmark.
     """
 
     silent: float = 1e-3
-    """Share of the force below which an effect of default size is not excited at all.
+    """Share of the force below which the data do not excite an effect of default size.
 
-    Trades: above, more effects are told to be untestable. Found: the method.
+    Trades: if higher, more effects are reported as not testable. Found: the method.
     """
 
     tells: float = 4.0
-    """Standard deviations between rivals below which a proposed run tells them apart by luck.
+    """Standard deviations between rivals below which a proposed run separates them only by luck.
 
-    Trades: above, runs that would tell are not proposed; below, runs are proposed in vain. Found:
+    Trades: if higher, useful runs are not proposed; if lower, useless runs are proposed. Found:
     blind seeds.
     """
 
     clear: float = 0.3
-    """Share of a residual's power along a coordinate that needs no second look.
+    """Share of a residual's power along a coordinate above which no further check is made.
 
-    Trades: above, a resonance is named in place of the coordinate; below, the reverse. Found: blind
-    seeds.
+    Trades: if higher, a resonance is named instead of the coordinate; if lower, the reverse. Found:
+    blind seeds.
     """
 
     rings: float = 0.4
-    """Share of a residual's power within a third of an octave that is a resonance.
+    """Share of a residual's power within a third of an octave, above which it is a resonance.
 
-    Trades: as `clear`, the other way. Found: blind seeds.
+    Trades: the reverse of `clear`. Found: blind seeds.
     """
 
     half: float = 0.5
-    """Share of the strongest pattern from which on a significant one is named before it.
+    """Share of the strongest pattern above which a significant pattern is named instead of it.
 
-    Trades: above, patterns by chance are named; below, significant ones that carry little. Found:
-    blind seeds.
+    Trades: if higher, chance patterns are named; if lower, significant patterns of little weight
+    are named. Found: blind seeds.
     """
 
     # --- faults that channels show of each other
 
     sure: float = 6.0
-    """Standard deviations that a fault of a channel must be away from none.
+    """Standard deviations by which a channel's fault must differ from zero.
 
-    Trades: above, small faults are missed; below, false alarms. Found: blind seeds; the spread over
-    pieces of a run is itself uncertain.
+    Trades: if higher, small faults are missed; if lower, false alarms. Found: blind seeds; the
+    spread over pieces of a run is itself uncertain.
     """
 
     least_gain: float = 0.01
@@ -251,47 +255,47 @@ class DecisionRule:
     """
 
     least_bias: float = 0.01
-    """Smallest offset that matters, by the channel's RMS. Trades and found: as `least_gain`."""
+    """Smallest offset that matters, over the channel's RMS. Trades and found: as `least_gain`."""
 
     least_delay: float = 0.2
     """Smallest delay that matters, in sampling steps. Trades and found: as `least_gain`."""
 
     least_corner: float = 0.02
-    """Smallest high-pass that matters, as the coefficient [1/s] of the integral of displacement.
+    """Smallest high-pass that matters, as coefficient [1/s] of the integral of displacement.
 
     Trades and found: as `least_gain`.
     """
 
     unrelated: float = 0.3
-    """Share of the displacement's power unexplained by the velocity: they are two motions.
+    """Share of displacement power not explained by velocity above which they are two motions.
 
-    Trades: above, effects are sought in channels that do not belong together; below, poor channels
-    are refused. Found: blind seeds.
+    Trades: if higher, effects are searched in channels that do not belong together; if lower, poor
+    channels are refused. Found: blind seeds.
     """
 
     resists: float = 0.2
-    """Mean power of the force, as a share of its size, that tells which way is forward.
+    """Mean power of the force, as a share of its size, above which its sign is reliable.
 
-    Trades: above, turned channels are told without saying which; below, springs decide it. Found:
-    blind seeds.
+    Trades: if higher, reversed channels are reported without saying which one; if lower, springs
+    decide it. Found: blind seeds.
     """
 
     turned: float = 3.0
-    """By what factor a voltage must reach further below zero than above to be turned.
+    """Ratio of a voltage's range below zero to that above, from which its sign is wrong.
 
-    Trades: above, a turned voltage is missed; below, one that swings both ways counts as turned.
-    Found: stated.
+    Trades: if higher, a reversed voltage is missed; if lower, a voltage of both signs counts as
+    reversed. Found: stated.
     """
 
     longest: int = 5
-    """Samples in a row at the very same extreme that no noisy signal shows.
+    """Samples in a row at exactly the same extreme, which no noisy signal shows.
 
-    Trades: above, channels that were cut briefly pass; below, coarse instruments count as cut.
-    Found: blind seeds and published measurements.
+    Trades: if higher, channels that saturate briefly pass; if lower, coarse instruments count as
+    saturated. Found: blind seeds and published measurements.
     """
 
     crowded: float = 8.0
-    """How many times more samples stand at a cut than at a step of a coarse instrument below it.
+    """Times as many samples at a limit as at the next step below it: then the channel saturates.
 
     Trades and found: as `longest`.
     """
@@ -299,65 +303,72 @@ class DecisionRule:
     # --- faults that only a model shows
 
     share_when_clean: float = 0.75
-    """Least part explained where a fault brings z below `clean`: of a small z it is uncertain.
+    """Smallest share explained if a fault brings z below `clean`; it is uncertain for a small z.
 
-    Trades: above, small faults read as effects; below, effects read as faults. Found: blind seeds.
+    Trades: if higher, small faults read as effects; if lower, effects read as faults. Found: blind
+    seeds.
     """
 
     margin: float = 0.02
-    """Share by which an effect's loss must be below that of a fault: its parameters are more.
+    """Share by which an effect's loss must be below a fault's, because it has more parameters.
 
-    Trades: above, effects read as faults; below, faults as effects. Found: blind seeds.
+    Trades: if higher, effects read as faults; if lower, faults read as effects. Found: blind seeds.
     """
 
     promise: float = 0.3
-    """Part of the loss that a first look at a fault must explain for a search to go on.
+    """Share of the loss that the screening of a fault must explain for the search to continue.
 
-    Trades: above, faults are missed; below, time. Found: blind seeds.
+    Trades: if higher, faults are missed; if lower, more computing time. Found: blind seeds.
     """
 
     plain: float = 1.3
-    """z above which a late record of the drive needs no comparison with effects.
+    """z above which a drive recorded late needs no comparison with effects.
 
-    No effect precedes its cause, and by chance alone no lead explains so much. Trades: below,
-    effects read as faults; above, faults as effects. Found: blind seeds.
+    No effect precedes its cause, and no lead explains so much by chance alone. Trades: if lower,
+    effects read as faults; if higher, faults read as effects. Found: blind seeds.
     """
 
     # --- buildings
 
     moved: float = 0.5
-    """What moved numbers of a building may leave of the excess, as a share, to be taken.
+    """Largest share of the excess that may remain for changed numbers of a building to be accepted.
 
-    Trades: above, numbers follow what an effect does; below, errors of the file read as effects.
+    Trades: if higher, the numbers absorb effects; if lower, errors of the file read as effects.
     Found: blind seeds.
     """
 
     stiffness_known: float = 0.03
     """Standard deviation of a stiffness in a building's file, as a share.
 
-    Trades: above, springs of the damper hide in the file; below, errors of the file read as
-    effects. Found: stated, what a careful laboratory reaches.
+    Trades: if higher, springs of the damper are absorbed by the file's numbers; if lower, errors of
+    the file read as effects. Found: stated, what a careful laboratory reaches.
     """
 
     mass_known: float = 0.01
-    """The same of a mass. Trades and found: as `stiffness_known`."""
+    """Standard deviation of a mass in a building's file, as a share.
+
+    Trades and found: as `stiffness_known`.
+    """
 
     mass_doubt: float = 0.09
-    """Share by which a mass may differ from its file, and a load cell's gain for the same reason.
+    """Share by which a mass may differ from its file; a load cell's gain too, for the same reason.
 
-    Three standard deviations of 3 %. Trades: above, gains of the load cell and effects that act
-    like masses are taken for the file's; below, errors of the file read as faults and as effects.
-    Found: stated, what buildings are known to that were never weighed.
+    Three standard deviations of 3 %. Trades: if higher, a load cell's gain, and effects that act
+    like masses, read as errors of the file; if lower, errors of the file read as faults and as
+    effects. Found: stated, how well masses are known in buildings that were never weighed.
     """
 
     farthest: float = 2.0
-    """Standard deviations by which a file's numbers may move. Trades and found: as they."""
+    """Largest change of a number of a building's file, in standard deviations.
+
+    Trades and found: as `stiffness_known`.
+    """
 
     blurred: float = 1.25
-    """z that a true sign law may read where the base's velocity had to be left out.
+    """Largest z of a true sign law if the base's velocity had to be left out.
 
-    Its jumps are then told by displacement and accelerometer alone. Trades: above, missing effects
-    are excused; below, an instrument reads as unknown. Found: blind seeds.
+    Displacement and accelerometer alone then locate the jumps of the force. Trades: if higher,
+    missing effects are excused; if lower, an instrument's fault gives unknown. Found: blind seeds.
     """
 
     @property

@@ -102,8 +102,8 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
         found.append(
             SensorFault(
                 "velocity", "high-pass", theta[4] * gain, std[4] * gain,
-                "Velocity lacks what is slow in the rate of displacement, as from a geophone with "
-                f"a corner near {plain(theta[4] * gain / (2.0 * np.pi), 2)} Hz.",
+                "Velocity lacks the low frequencies of the rate of displacement, like a geophone "
+                f"with a corner near {plain(theta[4] * gain / (2.0 * np.pi), 2)} Hz.",
             )
         )  # fmt: skip
         return found
@@ -115,7 +115,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
             SensorFault(
                 "velocity", "gain", gain, spread,
                 f"Velocity is {gain:.3f} times the rate of displacement: one of the two gains is "
-                f"off, and neither motion nor force can tell which. If velocity is right, "
+                f"off, and neither motion nor force shows which one. If velocity is right, "
                 f"displacement shows {1.0 / gain:.3f} of what it should.",
                 either="displacement",
             )
@@ -127,7 +127,7 @@ def kinematic(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[
         found.append(
             SensorFault(
                 "velocity", "bias", bias, bias_std,
-                f"Velocity shows {plain(bias)} m/s too much: its integral runs away from "
+                f"Velocity shows {plain(bias)} m/s too much: its integral drifts away from "
                 "displacement.",
             )
         )  # fmt: skip
@@ -140,7 +140,7 @@ def _turned(runs: Sequence[Measurement], rule: DecisionRule) -> SensorFault:
     begin = "Displacement and velocity have opposite signs: "
     if abs(power) < rule.resists:
         return SensorFault(
-            "velocity", "sign", -1.0, 0.0, begin + "one of the two is turned.", "displacement"
+            "velocity", "sign", -1.0, 0.0, begin + "one of the two is reversed.", "displacement"
         )
     channel = "velocity" if power < 0.0 else "displacement"
     seen = "speed up" if power < 0.0 else "resist"
@@ -149,7 +149,7 @@ def _turned(runs: Sequence[Measurement], rule: DecisionRule) -> SensorFault:
         "sign",
         -1.0,
         0.0,
-        f"{begin}the force seems to {seen} the velocity, so {channel} is the one that is turned.",
+        f"{begin}the force seems to {seen} the velocity, so {channel} is reversed.",
     )
 
 
@@ -183,7 +183,7 @@ def _late(theta: Array, std: Array, step: float, rule: DecisionRule) -> list[Sen
     return [
         SensorFault(
             channel, "delay", abs(late), late_std,
-            f"{channel.capitalize()} comes {1e3 * abs(late):.2f} ms late against the other.",
+            f"{channel.capitalize()} is {1e3 * abs(late):.2f} ms late relative to the other.",
         )
     ]  # fmt: skip
 
@@ -272,7 +272,7 @@ def signs(
             SensorFault(
                 "force", "sign", -1.0, 0.0,
                 "Force times velocity is negative on average: a damper would feed energy in. "
-                "The force, or the motion, is turned.",
+                "The sign of the force, or of the motion, is reversed.",
             )
         )  # fmt: skip
     for drive in ("voltage", "duty"):  # a current or a field may well be driven both ways
@@ -285,7 +285,7 @@ def signs(
             found.append(
                 SensorFault(
                     drive, "sign", -1.0, 0.0,
-                    f"The {drive} is negative nearly always: its sign is turned.",
+                    f"The {drive} is negative nearly always: its sign is reversed.",
                 )
             )  # fmt: skip
     return found

@@ -30,13 +30,13 @@ def current(verdict: Mapping[str, Any], where: str = "verdict.json") -> dict[str
     if schema not in (1, SCHEMA):
         raise StudyError(
             f"{where}: schema = {schema!r}; this version reads 1 and {SCHEMA}. "
-            "bristle diagnose writes the verdict anew."
+            "bristle diagnose writes it again."
         )
     if schema == 1:
         kind = _KIND_NOW.get(str(kind), kind)
     if kind not in HEADINGS:
         raise StudyError(
             f"{where}: kind = {kind!r}; there are {', '.join(HEADINGS)}. "
-            "bristle diagnose writes the verdict anew."
+            "bristle diagnose writes it again."
         )
     return {**verdict, "schema": SCHEMA, "kind": kind}

@@ -21,7 +21,7 @@ HEADINGS = {
     "effect": "Missing physics found",
     "ambiguous": "One of a few is missing",
     "unknown": "Something unknown is missing",
-    "insufficient": "The data carry no verdict",
+    "insufficient": "The data do not allow a verdict",
 }
 """The kinds of a verdict, and how each is headed."""
 
@@ -51,7 +51,7 @@ def headline(verdict: Verdict) -> str:
         return "The model misses something that no known effect explains."
     if kind == "none":
         return "These data show nothing that the model misses."
-    return "These data carry no verdict."
+    return "These data do not allow a verdict."
 
 
 def effects_at(verdict: Verdict) -> list[str]:

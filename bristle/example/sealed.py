@@ -50,9 +50,9 @@ def unseal(folder: Path) -> dict[str, Any]:
     try:
         answer = json.loads(base64.b64decode("".join(code.split()), validate=True))
     except ValueError as error:
-        raise StudyError(f"{path}: its text was changed; make the example anew.") from error
+        raise StudyError(f"{path}: its text was changed; make the example again.") from error
     if not isinstance(answer, dict) or "hidden" not in answer:
-        raise StudyError(f"{path}: it holds no answer; make the example anew.")
+        raise StudyError(f"{path}: it contains no answer; make the example again.")
     return answer
 
 

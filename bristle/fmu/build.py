@@ -26,6 +26,7 @@ from uuid import UUID, uuid5
 
 from ..errors import BuildError
 from ..physics.drive import VOLTAGE
+from ..physics.forms import split_form
 from ..physics.user import own_laws
 from ..resources import fmus_folder
 from ..trust import require
@@ -166,7 +167,7 @@ def plan(
         known = catalogue.describe(component, building, effects=effects, drive=drive).variables
         baked["starts"] = _checked_starts(component, known, starts)
     law = getattr(kind, "law", "")
-    laws = tuple(file for name, file in own_laws().items() if name == law)
+    laws = tuple(file for name, file in own_laws().items() if name == split_form(law)[0])
     return Plan(chosen, path, baked, files, effects, laws)
 
 
@@ -378,15 +379,15 @@ def ensure(
         If a name or a file is wrong, or the FMU cannot be built.
     """
     effects = tuple(effects)
-    if building is None and controller is None and not effects:
-        return build(plan(component), fmus_folder())
+    what = plan(component, building=building, controller=controller, effects=effects)
+    if building is None and controller is None and not effects and not what.laws:
+        return build(what, fmus_folder())
     named = hashlib.sha256()
     if building is not None:
         named.update(json.dumps(catalogue.read_building_data(building), sort_keys=True).encode())
-    what = plan(component, building=building, controller=controller, effects=effects)
     if controller is not None:
         named.update(controller.read_bytes())
-    for path in effects:
+    for path in (*effects, *what.laws):
         named.update(path.name.encode() + path.read_bytes())
     return build(replace(what, **_named(what, named.hexdigest()[:8])), fmus_folder())
 

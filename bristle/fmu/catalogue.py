@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import sys
 import tomllib
 from collections.abc import Iterable
@@ -14,6 +15,7 @@ from typing import Any
 
 from .. import units
 from ..errors import BuildError
+from ..physics.forms import split_form
 from ..physics.law import LAWS
 from ..physics.user import own_laws
 from ..resources import cache_folder, components_folder
@@ -22,7 +24,7 @@ from .description import Description, Variable
 from .slave import Slave
 
 _PACKAGE = Path(__file__).resolve().parent.parent
-_OWN_DAMPER = '''"""FMU: a damper by the law {law}, a user's own."""
+_OWN_DAMPER = '''"""FMU: a damper by the law {law}, which no component of the library has."""
 
 from bristle.fmu.damper import DamperSlave
 
@@ -85,6 +87,8 @@ def component_of_law(law: str) -> str:
     BuildError
         If there is none.
     """
+    if split_form(law)[1]:
+        return str(_own_source(law))
     if law in own_laws():
         return _own_component(law)
     for name, path in sources().items():
@@ -95,12 +99,19 @@ def component_of_law(law: str) -> str:
 
 def _own_component(law: str) -> str:
     """Return the name of the component that is a damper of a user's own law."""
-    return "Own" + "".join(word[:1].upper() + word[1:] for word in law.split("_")) + "Damper"
+    return "Own" + "".join(word[:1].upper() + word[1:] for word in _words(law)) + "Damper"
+
+
+def _words(law: str) -> list[str]:
+    """Return the words of a law's name, those of a chosen form with it."""
+    return re.findall(
+        r"\w+", law.replace(".", "p").replace("-", "m").replace("+", "").replace("_", " ")
+    )
 
 
 def _own_source(law: str) -> Path:
     """Return the file of the component that is a damper of a user's own law, written if need be."""
-    path = cache_folder() / "components" / f"{law}_damper.py"
+    path = cache_folder() / "components" / f"{'_'.join(_words(law))}_damper.py"
     about = LAWS[law].first_line().replace("\\", "/").replace('"', "'")
     text = _OWN_DAMPER.format(law=law, component=_own_component(law), about=about)
     if not path.is_file() or path.read_text(encoding="utf-8") != text:

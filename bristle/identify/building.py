@@ -186,9 +186,7 @@ def _finish(
             )
             zeta[r] = 0.0
     if first:
-        notes.append(
-            f"the damper's force was not measured: what is below {levels[0]} keeps its given values"
-        )
+        notes.append(f"the damper's force was not measured: values below {levels[0]} stay as given")
     modes = modes_of(building, stiffness)
     # d(omega^2)/dk_i = (shape_i - shape_{i-1})^2 (Nelson 1976, AIAA J. 14(9)).
     part = np.diff(modes.shapes, axis=0, prepend=np.zeros((1, n))) ** 2
@@ -208,10 +206,9 @@ def _finish(
     if z[worst] > MISFIT:
         notes.append(
             f"equilibrium at {levels[worst]} leaves {plain(z[worst])} times the noise: the "
-            f"building "
-            "is not linear there, or its masses are not as given, or the displacements are not "
-            "what the accelerations say. The values are those of the linear building that comes "
-            "nearest, and the intervals hold for it alone"
+            "building is not linear there, or its masses are wrong, or displacements and "
+            "accelerations contradict each other. The values are those of the nearest linear "
+            "building, and the intervals are valid only for it"
         )
     return StructureFit(
         found, stiffness, std_k, zeta, std_zeta, modes.omega / (2.0 * np.pi),

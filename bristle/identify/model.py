@@ -213,7 +213,9 @@ def sizes(runs: list[Run]) -> dict[str, float]:
     return {
         "N": force, "N/m": force / x, "N/m2": force / x**2, "N/m3": force / x**3, "m": x, "m/s": v,
         "N.s/m": force / v, "N.s2/m2": force / v**2, "kg": force / a, "J": force * x, "V": V,
-        "N/V": force / V, "N/(m.V)": force / (x * V), "N.s/(m.V)": force / (v * V), "1/m": 1.0 / x,
+        "N/V": force / V, "N/(m.V)": force / (x * V), "N.s/(m.V)": force / (v * V),
+        "N/V2": force / V**2, "N/(m.V2)": force / (x * V**2), "N.s/(m.V2)": force / (v * V**2),
+        "1/m": 1.0 / x,
         "s": 0.05, "1": 1.0,
     }  # fmt: skip
 

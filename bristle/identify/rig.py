@@ -199,7 +199,7 @@ def building_rig(
     found = responses([*train, *holdout], building)
     notes: tuple[str, ...] = ()
     if any(one.driven for one in found) and any(one.force is None for one in found):
-        notes = ("The damper's force was not measured: it is what equilibrium asks for.",)
+        notes = ("The damper's force was not measured: it is computed from equilibrium.",)
     return Rig(_BuildingSites(found, len(train), building), building, notes)
 
 

@@ -34,6 +34,9 @@ SiteModels = dict[str, SiteModel]
 """What predicts a rig's runs, by site."""
 
 
+_TINY = 1e-150  # its square and the inverse of that are numbers still
+
+
 @dataclass(frozen=True)
 class RigFit:
     """The fits by site."""
@@ -77,7 +80,7 @@ class RigFit:
         """Return the covariance (p, p) of parameters that sites share, each counted as `_mean`."""
         total = np.zeros((len(names), len(names)))
         telling = {name: self._telling(name) for name in names}
-        certainty = {n: sum(max(f.std[n], 1e-150) ** -2 for f in telling[n]) for n in names}
+        shares = {n: _shares([f.std[n] for f in telling[n]]) for n in names}
         for found in self.fits.values():
             own = list(found.std)
             shared = [n for n in names if any(f is found for f in telling[n])]
@@ -85,8 +88,8 @@ class RigFit:
                 continue
             part = np.zeros((len(names), len(own)))
             for name in shared:
-                weight = max(found.std[name], 1e-300) ** -2 / certainty[name]
-                part[names.index(name), own.index(name)] = weight
+                place = next(k for k, f in enumerate(telling[name]) if f is found)
+                part[names.index(name), own.index(name)] = shares[name][place]
             total += part @ found.covariance @ part.T
         return total
 
@@ -112,13 +115,12 @@ def _line_text(found: Fit, site: Site) -> str:
         whole = plain(already + found.model.value(DAMPING), 4)
         error = plain(1.96 * found.std[DAMPING], 2)
         texts.append(f"c = {whole} +- {error} N s/m, {plain(already, 4)} of the file")
-    text = ", ".join(texts) + " (fitted along, not in model.toml)."
+    text = ", ".join(texts) + " (fitted too, not in model.toml)."
     if at_bound(found.model):
         text += (
-            " The data push its damping below zero, where it is held "
-            f"({plain(already, 4)} N s/m of the file are taken away): something else feeds in what "
-            "this damping would have to, such as an effect that is missing or a velocity that is "
-            "late."
+            " The data ask for a negative damping, so it is held at zero "
+            f"({plain(already, 4)} N s/m of the file are removed). A missing effect or a late "
+            "velocity may feed energy in."
         )
     return text
 
@@ -127,9 +129,23 @@ def _mean(estimates: list[tuple[float, float]]) -> tuple[float, float]:
     """Return the mean of values with their standard deviations, and its own."""
     if len(estimates) == 1:
         return estimates[0]
-    weight = np.array([1.0 / max(std, 1e-300) ** 2 for _, std in estimates])
-    mean = float(np.dot(weight, [value for value, _ in estimates]) / weight.sum())
-    return mean, float(weight.sum() ** -0.5)
+    share = _shares([std for _, std in estimates])
+    known = [(part, std) for part, (_, std) in zip(share, estimates, strict=True) if part > 0.0]
+    mean = float(np.dot(share, [value for value, _ in estimates]))
+    return mean, float(np.sqrt(sum((part * std) ** 2 for part, std in known)))
+
+
+def _shares(stds: list[float]) -> Array:
+    """Return what each of several estimates counts in their mean, by its certainty.
+
+    Where none is told (a parameter that the data do not move) all count alike; where one is told
+    without an error (a parameter at its bound) it stands alone.
+    """
+    std = np.maximum(stds, _TINY)
+    if not np.isfinite(std).any():
+        return np.full(len(stds), 1.0 / len(stds))
+    weight = (np.min(std) / std) ** 2
+    return np.asarray(weight / weight.sum())
 
 
 def fit_rig(

@@ -210,8 +210,8 @@ def layer_run(response: Response, building: Building) -> StructureRun:
     """
     if response.force is None:
         raise RecordError(
-            f"{response.name}: force was not measured; what the isolation layer carries beside the "
-            "damper cannot be told from the damper's force."
+            f"{response.name}: force was not measured, so the forces of isolation layer and damper "
+            "cannot be separated."
         )
     force, noise = shear(response, building, 0)
     x, v, a = response.x[0], response.v[0], response.a[0]

@@ -132,7 +132,13 @@ def make(
     written = [image]
     for ending, table in drawing.tables.items():
         path = folder / f"{name}{ending}.csv"
-        _write(table, path, name, f"{figure.number} of Shirazi et al. (2012) drawn anew", engine)
+        _write(
+            table,
+            path,
+            name,
+            f"{figure.number} of Shirazi et al. (2012), by bristle",
+            engine,
+        )
         written.append(path)
     return written
 

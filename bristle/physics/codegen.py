@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from copy import copy
 from typing import Any
 
+from .command import MOST_KNOTS, entered, rising
 from .effect import Effect, Q, effects_of
 from .inputs import Inputs
 from .law import Law, laws_of
@@ -28,7 +29,8 @@ class Slots:
     laws : tuple of Law classes, by code; none where the site's law is not generated
     effects : tuple of Effect classes, by name
     law_parameters, law_states : int
-        How many slots in front of `p` and `z` belong to the law.
+        How many slots in front of `p` and `z` belong to the law. In `p` the knots and numbers of a
+        chosen form come next (see `command.entered`).
     parameters, states : dict
         Name, such as "gas_spring.k", to its index in `p` or `z`.
     switches : dict
@@ -49,7 +51,8 @@ class Slots:
         self.block = ""
         self.law_parameters = max((len(law.parameters) for law in self.laws), default=0)
         self.law_states = max((len(law.states) for law in self.laws), default=0)
-        self.p_size = self.law_parameters
+        quantities = max((len(law.command) for law in self.laws), default=-1)
+        self.p_size = self.law_parameters + MOST_KNOTS * (quantities + 1)
         self.z_size = self.law_states
         for effect in self.effects:
             self.switches[effect.name] = len(self.switches)
@@ -155,7 +158,8 @@ def switched_laws(slots: Slots, lines: Callable[[type[Law]], list[str]]) -> list
 
 def generate(name: str, source: str, slots: Slots) -> Any:
     """Compile generated source; return the function `name` with the hooks in its globals."""
-    namespace: dict[str, Any] = {"Q": Q, "Inputs": Inputs, "record": record, "climb": climb}
+    namespace: dict[str, Any] = {"Q": Q, "Inputs": Inputs, "record": record}
+    namespace.update(climb=climb, rising=rising, entered=entered)
     namespace["__name__"] = __name__
     owners: tuple[type[Law] | type[Effect], ...] = (*slots.laws, *slots.effects)
     for owner in owners:

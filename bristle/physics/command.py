@@ -11,6 +11,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
+from .linear import Row
+from .parameter import climb
+
 Place = Callable[[str], str]
 """Name of a parameter to the source of its value; of a table to the source of its tuple."""
 
@@ -77,6 +80,36 @@ class Quadratic(Form):
         return f"{at(self.level)} + {V} * ({at(self.slope)} + {V} * {at(self.bend)})"
 
 
+def rising(level: float, slope: float, bend: float, V: float) -> float:
+    """Return level + slope V + bend V^2 up to where that is largest, and the same beyond.
+
+    Parameters
+    ----------
+    level, slope, bend : in the quantity's unit, per volt, per volt squared; the slope not negative
+    V : voltage [V]
+    """
+    if bend < 0.0:
+        V = min(V, -0.5 * slope / bend)
+    return level + V * (slope + V * bend)
+
+
+@dataclass(frozen=True)
+class Rising(Form):
+    """level + slope V + bend V^2 that never falls: where it would it keeps its largest value.
+
+    With a slope of zero or more; a curve that bends down stands for a magnet that saturates.
+    """
+
+    level: str
+    slope: str
+    bend: str
+    affine: ClassVar[bool] = False
+
+    def source(self, at: Place, knots: str, V: str = "V") -> str:
+        """Return the source of the rising parabola at V."""
+        return f"rising({at(self.level)}, {at(self.slope)}, {at(self.bend)}, {V})"
+
+
 @dataclass(frozen=True)
 class Monotone(Form):
     """A table over the voltage that never falls: its first value, then what it gains to each knot.
@@ -90,3 +123,26 @@ class Monotone(Form):
     def source(self, at: Place, knots: str, V: str = "V") -> str:
         """Return the source of the climbing line at V."""
         return f"climb({V}, {knots}, {at(self.table)})"
+
+
+MOST_KNOTS = 6
+"""Knots that a table may have that takes the place of a linear dependence."""
+
+LINEAR, QUADRATIC = 0, 1
+"""Codes of how the command enters where a user may choose it; of a table its number of knots."""
+
+
+def entered(form: int, p: Row, place: int, quantity: int, V: float) -> float:
+    """Return a quantity at V [V] whose dependence on the command was chosen.
+
+    Parameters
+    ----------
+    form : `QUADRATIC`, or the number of knots of a table
+    p : flat parameters, from `place` on: the knots [V] of a table, then the numbers of each
+        quantity, `MOST_KNOTS` of room for each
+    quantity : which one it is among those of the law
+    """
+    own = place + MOST_KNOTS * (quantity + 1)
+    if form == QUADRATIC:
+        return rising(p[own], p[own + 1], p[own + 2], V)
+    return climb(V, p[place : place + form], p[own : own + form])

@@ -16,10 +16,11 @@ from ..errors import PhysicsError
 from . import damper_source as source
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .codegen import Slots, generate, hand_out, hold
+from .command import MOST_KNOTS
 from .effect import effects_of
 from .implicit import advance_implicit
 from .inputs import Inputs, Setup
-from .law import LAWS, law_code
+from .law import LAWS, Law, law_code
 from .linear import Row
 from .series import INSTANT, SETTLE, Balance, advance_series, balanced_speed
 from .tuples import record
@@ -313,10 +314,26 @@ class DamperModel:
 def pack(law: str, values: dict[str, float]) -> list[float]:
     """Return the flat parameters of a law and of all effects; missing ones take their defaults."""
     p = [0.0] * SLOTS.p_size
-    for slot, (name, parameter) in enumerate(LAWS[law].parameters.items()):
-        p[slot] = values.get(name, parameter.value)
+    kind = LAWS[law]
+    for slot, name in enumerate(kind.base.parameters):
+        if name in kind.parameters:
+            p[slot] = values.get(name, kind.parameters[name].value)
+    if kind.form:
+        _pack_form(kind, values, p)
     for effect in effects_of("damper"):
         for name, parameter in effect.parameters.items():
             key = effect.name + "." + name
             p[SLOTS.parameters[key]] = values.get(key, parameter.value)
     return p
+
+
+def _pack_form(law: type[Law], values: dict[str, float], p: list[float]) -> None:
+    """Write knots and numbers of a law's chosen form where `command.entered` reads them."""
+    place = SLOTS.law_parameters
+    p[place : place + len(law.knots)] = law.knots
+    for k, form in enumerate(law.command.values()):
+        own = place + MOST_KNOTS * (k + 1)
+        names = [n for one in form.names() for n in law.listed(one)]
+        if len(names) <= MOST_KNOTS:  # else it is a table of the law's own, which stays as it is
+            found = [values.get(name, law.parameters[name].value) for name in names]
+            p[own : own + len(found)] = found

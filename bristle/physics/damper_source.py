@@ -6,15 +6,17 @@ the motion, then the factors, then the forces, then what the states make of all 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from .codegen import Slots, switched, switched_laws
 from .effect import Effect
 from .law import Law
-from .tuples import FACTORS, law_state, law_values
+from .tuples import FACTORS, FORM_OF_LAW, law_state, law_values
 
 _FACTORS = {"limit": " * yield_factor * slip_length", "viscous": " * viscous_factor"}
 _ALL_FACTORS = {name: name for name in FACTORS}  # variables of the generated source
 _NOW = "    x, v, a, V, dt, energy, halt, halts = now"
-_SETUP = "    law, p, on = setup.law, setup.p, setup.on"
+_SETUP = f"    law, p, on = setup.law, setup.p, setup.on\n{FORM_OF_LAW}"
 _MORE_THAN_ANY = "1e30"  # N, which no friction is: what would stop a motion that is prescribed
 _BY_SIGN = f"({_MORE_THAN_ANY} if v > 0.0 else -{_MORE_THAN_ANY} if v < 0.0 else 0.0)"
 _LEFT = f"halt - force if halts else {_BY_SIGN}"
@@ -75,6 +77,11 @@ def series_source(slots: Slots) -> str:
     return "\n".join([*lines, "    return -1, -1"])
 
 
+def _values(slots: Slots, law: type[Law], factors: Mapping[str, str] | None = None) -> str:
+    """Return the source of a law's parameter tuple, in the form of the command that `p` holds."""
+    return law_values(law, factors, place=slots.law_parameters)
+
+
 def advance_law_source(slots: Slots) -> str:
     """Return `advance_law`: the law's own states after a step at the motion of `now`, exactly."""
 
@@ -82,13 +89,14 @@ def advance_law_source(slots: Slots) -> str:
         if law.hook("advance") is None:
             return []
         return [
-            f"k = {law_values(law, {'slip_length': 'slip_length'})}",
+            f"k = {_values(slots, law, {'slip_length': 'slip_length'})}",
             f"{_targets(law, 'z_next')} = {law.name}_advance(now, {law_state(law)}, k)",
         ]
 
     lines = [
         "def advance_law(law, p, now, slip_length, z, z_next):",
         "    V = now.V",
+        FORM_OF_LAW,
         *switched_laws(slots, own),
         "    return",
     ]
@@ -126,12 +134,17 @@ def law_force_source(slots: Slots) -> str:
     """Return `law_force`: force and friction of the law alone, without any effect."""
 
     def own(law: type[Law]) -> list[str]:
-        lines = [f"s = {law_state(law)}", f"k = {law_values(law)}", f"rest = {_forces(law, False)}"]
+        lines = [
+            f"s = {law_state(law)}",
+            f"k = {_values(slots, law)}",
+            f"rest = {_forces(law, False)}",
+        ]
         return [*lines, *(_friction(f"{law.name}_limit(q, s, k)") if law.has("sign") else [])]
 
     lines = [
         "def law_force(law, p, q, z):",
         "    v, V, halt, halts = q.v, q.V, q.stick_force, q.sticks",
+        FORM_OF_LAW,
         "    friction = 0.0",
         "    rest = 0.0",
         *switched_laws(slots, own),
@@ -156,7 +169,7 @@ def hold_law_source(slots: Slots) -> str:
 
 def _law_steps(slots: Slots, head: str, middle: list[str]) -> str:
     def own(law: type[Law]) -> list[str]:
-        lines = [f"k = {law_values(law)}"]
+        lines = [f"k = {_values(slots, law)}"]
         if law.hook("advance") is not None:
             advanced = f"{law.name}_advance(m, {law_state(law)}, k)"
             lines += [*middle, f"{_targets(law, 'z1')} = {advanced}"]
@@ -166,6 +179,7 @@ def _law_steps(slots: Slots, head: str, middle: list[str]) -> str:
     lines = [
         head,
         "    v, V, halt, halts = q.v, q.V, q.stick_force, q.sticks",
+        FORM_OF_LAW,
         "    friction = 0.0",
         "    rest = 0.0",
         *switched_laws(slots, own),
@@ -182,7 +196,7 @@ def evaluate_source(slots: Slots) -> str:
     def own(law: type[Law]) -> list[str]:
         lines = [
             f"s = {law_state(law)}",
-            f"k = {law_values(law, _ALL_FACTORS)}",
+            f"k = {_values(slots, law, _ALL_FACTORS)}",
             f"rest = ({_forces(law)}) * factor + added",
         ]
         if law.has("sign"):
@@ -276,11 +290,11 @@ def net_force_source(slots: Slots) -> str:
         lines = [f"s = {law_state(law)}"]
         if law.hook("advance") is not None:
             lines += [
-                f"k = {law_values(law, {**_ALL_FACTORS, 'slip_length': 'half_slip_length'})}",
+                f"k = {_values(slots, law, {**_ALL_FACTORS, 'slip_length': 'half_slip_length'})}",
                 "m = record(Inputs, (x, middle, a, V, dt, energy, 0.0, False))",
                 f"s = record({law.name}_Z, {law.name}_advance(m, s, k))",
             ]
-        lines.append(f"k = {law_values(law, _ALL_FACTORS)}")
+        lines.append(f"k = {_values(slots, law, _ALL_FACTORS)}")
         forces = _forces(law)
         if law.has("sign"):
             friction = f"{law.name}_limit(q, s, k){_FACTORS['limit']} * direction"

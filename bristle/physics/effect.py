@@ -25,7 +25,7 @@ from .effect_names import AT as AT  # the rest of the package takes these from h
 from .effect_names import EFFECTS as EFFECTS
 from .effect_names import exclude as exclude
 from .effect_names import plain_name as plain_name
-from .field_check import check_fields
+from .field_check import check_fields, told
 from .law import LAWS, PARTS, Law, laws_of
 from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
 from .parameter import Table as Table
@@ -258,7 +258,7 @@ class Effect:
     def __init_subclass__(cls, register: bool = True, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         if cls.name and register:
-            check_fields(cls, f"effect {cls.name!r} ({cls.__module__}.{cls.__qualname__})", FIELDS)
+            check_fields(cls, told("effect", cls), FIELDS)
             _take_sites(cls)
             cls.parameters = all_parameters(cls.parameters, cls.tables)
             cls.State = named("State", tuple(cls.states))
@@ -320,7 +320,11 @@ class Effect:
         """Return whether the effect can join a law: it has the parts, and not the effect in it."""
         if law.site not in cls.sites:
             return False
-        if cls.laws and law.name not in cls.laws and not set(cls.laws) >= set(_ALL_LAWS_OF_ONCE):
+        if (
+            cls.laws
+            and law.base.name not in cls.laws
+            and not set(cls.laws) >= set(_ALL_LAWS_OF_ONCE)
+        ):
             return False
         if (cls.kind or cls.name) in law.contains:
             return False
@@ -351,7 +355,7 @@ def _take_sites(effect: type[Effect]) -> None:
 
 def _check(effect: type[Effect]) -> None:
     """Refuse an effect whose class data could not work, when it is defined."""
-    where = f"effect {effect.name!r} ({effect.__module__}.{effect.__qualname__})"
+    where = told("effect", effect)
     check_sites(effect, where, SITES, (SHARED_HOOKS, SHARED_SIGNALS))
     if not effect.name.isidentifier():
         raise PhysicsError(f"{where}: a name is one word of letters, digits and _.")

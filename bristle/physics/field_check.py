@@ -9,7 +9,23 @@ from typing import Any
 from ..errors import PhysicsError
 from .parameter import Parameter, Table
 
+LARGEST = 10**308
+"""The largest whole number of a law or effect: beyond it there is no float."""
+
 _Right = Callable[[Any], bool]
+
+
+def told(word: str, cls: Any) -> str:
+    """Return how a message names a class: by its name, and where that is not in a file of a user's.
+
+    Parameters
+    ----------
+    word : "effect" or "law"
+    cls : the class, with `name`
+    """
+    at_home = cls.__module__.partition(".")[0] == __name__.partition(".")[0]
+    where = f" ({cls.__module__}.{cls.__qualname__})" if at_home else ""
+    return f"{word} {cls.name!r}{where}"
 
 
 def _text(value: Any) -> bool:
@@ -21,6 +37,8 @@ def _switch(value: Any) -> bool:
 
 
 def _real(value: Any) -> bool:
+    if isinstance(value, int) and abs(value) > LARGEST:
+        return False  # no float: whatever computes with it would raise
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
@@ -47,7 +65,7 @@ def _by_name(right: _Right) -> _Right:
 
 def _bounded(value: Any) -> bool:
     low_high = isinstance(value, tuple) and len(value) == 2
-    return low_high and all(isinstance(one, (int, float)) for one in value)
+    return low_high and all(map(_real, value))
 
 
 def _parameter(value: Any) -> bool:
@@ -118,6 +136,13 @@ def check_fields(cls: type, where: str, kinds: Mapping[str, tuple[str, _Right]])
         except Exception:  # a class of the user's own may raise whatever it likes
             good = False
         if not good:
-            shown = repr(value)
-            shown = shown if len(shown) <= 60 else shown[:57] + "..."
-            raise PhysicsError(f"{where}: {field} = {shown}; {words} is right.")
+            raise PhysicsError(f"{where}: {field} = {_shown(value)}; {words} is right.")
+
+
+def _shown(value: Any) -> str:
+    """Return the beginning of what a value looks like, for a message."""
+    try:
+        text = repr(value)
+    except Exception:  # a whole number of thousands of digits; a class of the user's own
+        return f"a {type(value).__name__} that cannot be written"
+    return text if len(text) <= 60 else text[:57] + "..."

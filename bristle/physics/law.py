@@ -19,13 +19,15 @@ from .command import Form
 from .command import Linear as Linear
 from .command import Monotone as Monotone
 from .command import Quadratic as Quadratic
-from .field_check import check_fields
+from .command import Rising as Rising
+from .field_check import check_fields, told
+from .forms import LawsByName, joined_form, split_form
 from .inputs import Inputs
 from .law_check import ALL_HOOKS, FIELDS, HOOKS, check_law
 from .law_check import PARTS as PARTS
 from .parameter import CHOICES, Parameter, Table, all_parameters, fields_of, named
 from .parameter import interpolate as interpolate
-from .tuples import FACTORS, values_of_law
+from .tuples import FACTORS, FORM_STEP, values_of_law
 
 FOREVER = 1e15
 """Time [s] after which sliding is steady at any speed."""
@@ -65,7 +67,7 @@ class Variant(NamedTuple):
     lacks: str = ""
 
 
-LAWS: dict[str, type[Law]] = {}
+LAWS: dict[str, type[Law]] = LawsByName()
 
 
 class Law:
@@ -102,6 +104,9 @@ class Law:
         Where it is from, with the year.
     own
         Whether it is a user's own, outside the library; `user.load_laws` sets it.
+    base, form, knots, form_code
+        Of a law with a chosen form (see `forms`) the law that it is made of, the form's word, its
+        knots [V] and its code; of others itself, "", () and 0.
 
     Hooks
     -----
@@ -159,14 +164,19 @@ class Law:
     stiffness: ClassVar[str] = ""
     source: ClassVar[str] = ""
     own: ClassVar[bool] = False
+    base: ClassVar[type[Law]]
+    form: ClassVar[str] = ""
+    knots: ClassVar[tuple[float, ...]] = ()
+    form_code: ClassVar[int] = 0
     State: ClassVar[Any]
     Values: ClassVar[Any]
 
-    def __init_subclass__(cls, **kwargs: Any) -> None:
+    def __init_subclass__(cls, register: bool = True, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        if not cls.name:
+        if not cls.name or not register:
             return
-        check_fields(cls, f"law {cls.name!r} ({cls.__module__}.{cls.__qualname__})", FIELDS)
+        cls.base = cls
+        check_fields(cls, told("law", cls), FIELDS)
         cls.parameters = all_parameters(cls.parameters, cls.tables)
         if any(not isinstance(form, Constant) for form in cls.command.values()):
             cls.parts = tuple(dict.fromkeys((*cls.parts, "command")))
@@ -199,6 +209,11 @@ class Law:
         return (*cls.command, *own, *(FACTORS if cls.has("bristle") else ()))
 
     @classmethod
+    def listed(cls, name: str) -> tuple[str, ...]:
+        """Return the parameters that a name of `command` stands for: several of a table."""
+        return fields_of(cls.parameters, cls.tables).get(name, (name,))
+
+    @classmethod
     def linear(cls) -> tuple[str, ...]:
         """Return the names of the parameters in which the force is linear."""
         return tuple(n for n in cls.parameters if n not in cls.shapes and n not in cls.fixed())
@@ -214,8 +229,7 @@ class Law:
         names: list[str] = []
         for form in cls.command.values():
             if isinstance(form, Monotone):
-                count = len(cls.tables[form.table].knots)
-                names += [f"{form.table}[{k}]" for k in range(2, count + 1)]
+                names += cls.listed(form.table)[1:]
             else:
                 names += form.driven()
         return tuple(names)
@@ -337,8 +351,12 @@ def laws_of(site: str = "damper") -> tuple[type[Law], ...]:
 
 
 def law_code(name: str) -> int:
-    """Return the number of a damper's law, by which compiled code tells them apart."""
-    return [law.name for law in laws_of("damper")].index(name)
+    """Return the number of a damper's law, by which compiled code tells them apart.
+
+    From `FORM_STEP` on it says which form of the command was chosen (see `forms`).
+    """
+    law = LAWS[name]
+    return laws_of("damper").index(law.base) + FORM_STEP * law.form_code
 
 
 def law_names(site: str = "damper") -> tuple[str, ...]:
@@ -358,12 +376,13 @@ def base_and_variant(name: str) -> tuple[type[Law], Variant]:
     PhysicsError
         If there is no such law.
     """
-    if name in LAWS:
+    plain, form, knots = split_form(name)
+    if plain in LAWS:
         return LAWS[name], Variant({})
     for law in LAWS.values():
         for suffix, variant in law.variants.items():
-            if name == f"{law.name}_{suffix}":
-                return law, variant
+            if plain == f"{law.name}_{suffix}":
+                return LAWS[joined_form(law.name, form, knots)], variant
     raise PhysicsError(f'no law is named "{name}". There are: {", ".join(law_names())}.')
 
 

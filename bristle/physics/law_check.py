@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import PhysicsError
 from .command import Form, Monotone
-from .field_check import PARAMETERS, TABLES, TEXT, TEXT_BY_NAME, TEXTS, by_name
+from .field_check import PARAMETERS, TABLES, TEXT, TEXT_BY_NAME, TEXTS, by_name, told
 from .parameter import check_numbers
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def _variant(one: Any) -> bool:
 
 def check_law(law: type[Law]) -> None:
     """Refuse a law whose class data could not work, when it is defined."""
-    where = f"law {law.name!r} ({law.__module__}.{law.__qualname__})"
+    where = told("law", law)
     if law.site not in SITES:
         raise PhysicsError(f"{where}: site {law.site!r} is none of {SITES}.")
     if not law.name.isidentifier():

@@ -37,6 +37,9 @@ GAIN = 1e-3
 def probe_law(law: type[Law]) -> None:
     """Call every hook at rest, in motion and at the bounds; then move a damper in closed cycles.
 
+    The damper is moved with the defaults, and with each parameter at either of its bounds: a fit
+    may lead there.
+
     Raises
     ------
     FlawError
@@ -45,10 +48,7 @@ def probe_law(law: type[Law]) -> None:
         a closed cycle gives energy.
     """
     defaults = {name: p.value for name, p in law.parameters.items()}
-    corners = [defaults]
-    for name, parameter in law.parameters.items():
-        corners += [{**defaults, name: bound} for bound in parameter.bounds]
-    for values in corners:
+    for values in [{**defaults, **end} for end in ends(law)]:
         for q in _signals():
             z = _state(law, q, values)
             for hook in law.hooks():
@@ -59,8 +59,17 @@ def probe_law(law: type[Law]) -> None:
     _smooth(law, defaults)
     _moving(law, defaults)
     damper.regenerate()
-    for amplitude, frequency, V in CYCLES:
-        cycle(law, {}, amplitude, frequency, V)
+    for values in ends(law):
+        for amplitude, frequency, V in CYCLES:
+            cycle(law, values, amplitude, frequency, V)
+
+
+def ends(law: type[Law]) -> Iterator[dict[str, float]]:
+    """Give what differs from the defaults: nothing, then each parameter at each of its bounds."""
+    yield {}
+    for name, parameter in law.parameters.items():
+        for bound in parameter.bounds:
+            yield {name: bound}
 
 
 def cycle(
@@ -82,6 +91,7 @@ def cycle(
     model = damper.DamperModel(law.name, values)
     w, dt = 2.0 * pi * frequency, 1.0 / (frequency * STEPS)
     where = f"at {1e3 * amplitude:g} mm, {frequency:g} Hz and {V:g} V"
+    where += "".join(f", where {name} = {value:g}," for name, value in values.items())
     work, most = 0.0, 1e-9
     for k in range(1, 3 * STEPS + 1):
         t = k * dt

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
+from .command import rising
+from .forms import choosable
 from .parameter import climb, fields_of
 
 if TYPE_CHECKING:
@@ -18,6 +20,13 @@ FACTORS = ("slip_length", "yield_factor", "viscous_factor")
 """What the `p` of a law with bristles holds beside its own numbers: the factors by which effects
 stretch the travel before sliding, and change the yield force and the viscous part. The last two act
 on the forces that the law gives; only what balances forces inside of a law needs them."""
+
+
+FORM_STEP = 64
+"""By how much codes of laws differ that differ in a chosen form alone; more laws there are not."""
+
+FORM_OF_LAW = f"    form, law = law // {FORM_STEP}, law % {FORM_STEP}"
+"""The line of generated source that tells a chosen form from a law's code."""
 
 
 def made(kind: str, sources: Sequence[str]) -> str:
@@ -38,21 +47,32 @@ def law_state(law: type[Law]) -> str:
     return made(f"{law.name}_Z", [f"z[{k}]" for k in range(len(law.states))])
 
 
-def law_values(law: type[Law], factors: Mapping[str, str] | None = None, felt: str = "z") -> str:
+def law_values(
+    law: type[Law], factors: Mapping[str, str] | None = None, felt: str = "z", place: int = -1
+) -> str:
     """Return the source that makes a law's parameter tuple from `p` at the voltage V.
 
-    `factors` are the sources of `FACTORS`, 1 where one is missing; `felt` is the sequence of states
-    that holds the voltage of a law with a lag of its own, "" where V stands for it.
+    Parameters
+    ----------
+    law : class of a law
+    factors : the sources of `FACTORS`, 1 where one is missing
+    felt : the sequence of states that holds the voltage of a law with a lag of its own, "" where V
+        stands for it
+    place : where in `p` the numbers of a chosen form begin, of which the variable `form` tells; -1
+        where there is none
     """
     V = f"{felt}[{list(law.states).index(law.felt)}]" if law.felt and felt else "V"
     at = {name: f"p[{k}]" for k, name in enumerate(law.parameters)}
     fields = fields_of(law.parameters, law.tables)
     given = dict(zip(fields, listed(fields, law.tables, at)))
-    for quantity, form in law.command.items():
+    free = choosable(law) if place >= 0 else {}
+    for k, (quantity, form) in enumerate(law.command.items()):
         table = law.tables.get(form.names()[0])
-        given[quantity] = form.source(given.__getitem__, repr(table.knots) if table else "", V)
+        source = form.source(given.__getitem__, repr(table.knots) if table else "", V)
+        chosen = f" if form == 0 else entered(form, p, {place}, {k}, {V})"
+        given[quantity] = f"({source}{chosen})" if quantity in free else source
     given.update({name: (factors or {}).get(name, "1.0") for name in FACTORS})
-    return made(f"{law.name}_P", [given[name] for name in law.seen()])
+    return made(f"{law.base.name}_P", [given[name] for name in law.seen()])
 
 
 def values_of_law(law: type[Law], values: Mapping[str, float], V: float) -> Any:
@@ -64,5 +84,5 @@ def values_of_law(law: type[Law], values: Mapping[str, float], V: float) -> Any:
 @cache
 def _maker(law: type[Law]) -> Any:
     """Return what makes the `p` of a law's hooks from its flat parameters and the voltage."""
-    names = {"record": record, "climb": climb, f"{law.name}_P": law.Values}
+    names = {"record": record, "climb": climb, "rising": rising, f"{law.base.name}_P": law.Values}
     return eval(f"lambda p, V: {law_values(law, felt='')}", names)

@@ -15,7 +15,8 @@ import math
 import re
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -203,6 +204,35 @@ def unload_effects() -> None:
     """Take every effect and law of a user's out of the library: it is as it came."""
     _waiting.clear()
     if [path for path in list(_known) if _forget(path)]:
+        _regenerate()
+
+
+@contextmanager
+def defined(texts: Mapping[str, str]) -> Iterator[None]:
+    """Define effects by name that bristle itself wrote, as long as the context lasts.
+
+    Raises
+    ------
+    PhysicsError
+        If a text is not right, or its name is taken.
+    """
+    taken = [name for name in texts if name in EFFECTS]
+    if taken:
+        raise PhysicsError(f"effect {taken[0]!r}: the name is taken. Another one is right.")
+    made = []
+    try:
+        for name, text in texts.items():
+            path = Path(f"{name}.py").absolute()
+            try:
+                made.append(_made(text, path, path, "effect"))
+            except FlawError as error:
+                raise PhysicsError(_where(path, error)) from None
+        _regenerate()
+        yield
+    finally:
+        for effect in made:
+            if EFFECTS.get(effect.name) is effect:
+                del EFFECTS[effect.name]
         _regenerate()
 
 

@@ -52,7 +52,7 @@ EFFECT = Dialect(
     needs=True,
 )
 _OF_LAWS = ("Law", "Parameter", "Shape", "Table", "Variant", "interpolate")
-_FORMS = ("Constant", "Linear", "Monotone", "Quadratic")
+_FORMS = ("Constant", "Linear", "Monotone", "Quadratic", "Rising")
 LAW = Dialect(
     "law",
     "Law",

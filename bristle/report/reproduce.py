@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..data.model import read_model
 from ..findings import command
+from ..physics.forms import split_form
 
 if TYPE_CHECKING:
     from ..data.channels import ChannelSpec
@@ -25,8 +26,12 @@ def commands(study: Study) -> list[str]:
     old = study.name
     new = old + AGAIN
     lines = [_new(study, old, new), _copy(f"{old}/study.toml", f"{new}/study.toml")]
-    for file in sorted(study.effects_folder.glob("*.py")):
-        lines.append(_copy(f"{old}/effects/{file.name}", f"{new}/effects/{file.name}"))
+    own_laws = sorted(study.laws_folder.glob("*.py"))
+    if own_laws:  # `study new` makes a folder for effects alone
+        lines.append(shlex.join(["mkdir", "-p", f"{new}/laws"]))
+    for file in (*own_laws, *sorted(study.effects_folder.glob("*.py"))):
+        place = f"{file.parent.name}/{file.name}"
+        lines.append(_copy(f"{old}/{place}", f"{new}/{place}"))
     lines.append(command("study", "check", new))
     law = ""
     for step in study.steps():
@@ -46,7 +51,7 @@ def _new(study: Study, old: str, new: str) -> str:
         words += ["--rig", settings.rig]
     if first.is_file():
         model = read_model(first, study.folder, to_show=True)
-        words += ["--law", model.law]
+        words += ["--law", split_form(model.law)[0]]
         if model.building:
             words += ["--building", f"{old}/{model.building}"]
     for name, spec in settings.channels.items():
@@ -72,8 +77,15 @@ def _step(step: Step, old: str, new: str, law: str) -> list[str]:
         return [command("identify", new, "--structure")]
     if verb == "identify":
         other = rest.split(" + ")[0]
-        return [command("identify", new, *(["--law", other] if other != law else []))]
+        return [command("identify", new, *(_other_law(law, other) if other != law else []))]
     return [_copy(f"{old}/history/{step.number:03d}/model.toml", f"{new}/model.toml")]
+
+
+def _other_law(law: str, other: str) -> list[str]:
+    """Return the options that lead from a law to another one, or to another form of it."""
+    (before, _, _), (after, form, _) = split_form(law), split_form(other)
+    named = ["--law", after] if after != before or not form else []
+    return named + (["--command", form] if form else [])
 
 
 def _law(study: Study, step: Step) -> str:

@@ -115,7 +115,7 @@ def render(content: Content) -> str:
     what = " + ".join([content.model.law, *content.model.effects])
     body = [
         f"<h1>{html.escape(settings.title)}</h1>",
-        html.paragraphs(f"A damper on a {rig}, held against its model: {what}.", kind="soft"),
+        html.paragraphs(f"A damper on a {rig}, compared with its model: {what}.", kind="soft"),
         f'<div class="notes">{html.escape(settings.notes)}</div>' if settings.notes.strip() else "",
         verdict_section(content.verdict, study.name),
         _tiles(content),
@@ -128,9 +128,9 @@ def render(content: Content) -> str:
         _reproduce(content),
     ]
     foot = (
-        f"bristle {html.escape(__version__)}. Error / noise (z) is the error over the noise floor, "
-        "which a true model would show: the noise of force and measured motion together. A few "
-        "large errors do not carry it; z = 1 is as good as these data can tell."
+        f"bristle {html.escape(__version__)}. Error / noise (z) is the error divided by the noise "
+        "floor, the error of a true model: the noise of force and measured motion together. A few "
+        "large errors do not decide it. z = 1 is the best that these data can confirm."
     )
     return html.page(settings.title, [part for part in body if part], foot)
 
@@ -147,7 +147,8 @@ def _tiles(content: Content) -> str:
         ),
         (
             quantity(now.total.rms, now.unit, 2, now.total.signal),
-            f"RMS error at all frequencies, {percent(now.total.share)} of the {now.quantity}'s RMS",
+            f"RMS error at all frequencies, {percent(now.total.share)} of the RMS of the "
+            f"{now.quantity}",
         ),
     ]
     first = next((one.z for one in content.history_steps if one.z is not None), None)
@@ -165,7 +166,7 @@ def _tiles(content: Content) -> str:
 def _where(content: Content) -> str:
     now = content.now
     if now is None:
-        return html.section("Where the model stands", html.paragraphs(content.trouble))
+        return html.section("Error of the present model", html.paragraphs(content.trouble))
     from ..compare.tables import pattern_table
     from ..draw.style import png
     from .study_pictures import error_page
@@ -173,7 +174,7 @@ def _where(content: Content) -> str:
     _, header, rows = pattern_table(now)
     along = "the two coordinates that it depends on most"
     if now.second:
-        along = "the coordinate that it depends on most, and what is left after that along the next"
+        along = "the coordinate that it depends on most, and the remaining error along the next"
     caption = (
         f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
         "interval, the blue band twice the expected noise. Below: its spectrum against that of "
@@ -181,15 +182,15 @@ def _where(content: Content) -> str:
     )
     title, say = headline(now), now.sentences
     return html.section(
-        "Where the model stands now",
+        "Error of the present model",
         html.paragraphs(*say, kind="lead"),
         *_sites(content),
         html.figure(png(error_page(now)), title, caption),
         html.table(*run_errors(now), numbers=range(1, 6)),
         html.table(header, rows, numbers=range(1, 4)),
         html.paragraphs(
-            "Chance is that of such a share under a true model with an error as correlated as this "
-            "one, all coordinates together.", kind="soft",
+            "Chance: how often a true model, with an error as correlated as this one, would show "
+            "such a share along any coordinate.", kind="soft",
         ),
     )  # fmt: skip
 
@@ -211,7 +212,7 @@ def _sites(content: Content) -> list[str]:
     if worst.fails:
         title = f"Of the building's sites {name} is worst: z = {short_z(worst.z)}"
     caption = (
-        "z at every site, from the top storey down, each held against equilibrium on runs that no "
+        "z at every site, from the top storey down, each compared with equilibrium on runs that no "
         "fit has seen: small dots are runs, the large one all of them with its 95 % interval."
         + rings
     )
@@ -239,8 +240,8 @@ def _history(content: Content) -> str:
             png(staircase_page([replace(one, rms=None) for one in with_z])),
             f"The staircase of the history: z on held-out runs {fall}",
             "The error of each model of the history, on runs that no fit has seen (blue) and on "
-            "those that it was fitted to (grey), over what noise explains. A model at the "
-            "green floor cannot be told from the truth by these data.",
+            "those that it was fitted to (grey), over the noise floor. These data "
+            "cannot distinguish a model at the green line from a true one.",
         )  # fmt: skip
     return html.section("How the error fell", picture, html.table(header, rows, numbers=(2, 3)))
 
@@ -311,8 +312,8 @@ def _reproduce(content: Content) -> str:
     return html.section(
         "How to reproduce",
         html.paragraphs(
-            "The study's folder holds the data, the model and every step of its history. From the "
-            "folder above it, these commands make it again beside it:"
+            "The study's folder contains the data, the model and every step of its history. In the "
+            "folder above it, these commands repeat the study:"
         ),
         "<pre>" + html.escape("\n".join(commands(study))) + "</pre>",
         html.table(["file", "SHA-256, first 16 digits"], [*rows, ["model.toml", model]]),

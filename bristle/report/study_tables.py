@@ -25,7 +25,7 @@ _COLOURS = {
     "low-passed": "estimated from the samples: white, low-passed above",
     "blue": "estimated from the samples: it grows with frequency, so this is an upper limit",
     "resting": "estimated where the channel is at rest",
-    "hidden": "estimated: it cannot be told well from the signal, so this is a lower limit",
+    "hidden": "estimated: hard to separate from the signal, so this is a lower limit",
     "rough": "estimated: the signal itself is rough, so this is an upper limit",
     "none": "none seen",
 }
@@ -46,14 +46,12 @@ def parameter_table(model: StudyModel) -> tuple[list[str], list[list[str]], list
         "Intervals: 1.96 standard deviations, the noise of force and measured motion both counted."
     ]
     if edges:
-        notes.append(
-            f"{', '.join(edges)}: at the edge of what is allowed, so the interval says little."
-        )
+        notes.append(f"{', '.join(edges)}: at a bound of the fit, so the interval means little.")
     silent = [
         n for n, v in model.flat().items() if v.free and v.std is None and v.origin == "assumed"
     ]
     if silent:
-        notes.append(f"Not identified, or not told by these data: {', '.join(silent)}.")
+        notes.append(f"Not identified by these data: {', '.join(silent)}.")
     return header, rows, notes
 
 

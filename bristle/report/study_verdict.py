@@ -45,8 +45,8 @@ def verdict_section(verdict: Verdict | None, name: str) -> str:
         inner.append("<h3>The evidence</h3>")
         inner.append(
             html.paragraphs(
-                "Each effect was tried inside the model, everything refitted, and judged on runs "
-                "that no fit has seen.", kind="soft",
+                "Each effect was added to the model, all parameters were fitted again, and runs "
+                "that no fit has seen decide.", kind="soft",
             )
         )  # fmt: skip
         inner.append(html.table(header, cells, numbers=(1, 2), strong=strong))
@@ -57,7 +57,7 @@ def verdict_section(verdict: Verdict | None, name: str) -> str:
 def _undiagnosed(name: str) -> list[str]:
     return [
         "No diagnosis has been made of the present model.",
-        f"{command('diagnose', name)} tells what it misses, and how sure that is.",
+        f"{command('diagnose', name)} finds what it misses, and how certain that is.",
     ]
 
 
@@ -88,18 +88,16 @@ def untold_section(verdict: Verdict | None) -> str:
     hidden = untestable_rows(verdict)
     parts = [
         html.paragraphs(
-            "These effects could be there all the same: either the data do not excite them, or "
-            "refitting the model takes them up.", kind="soft",
+            "These effects may still be present: the data do not excite them, or the fit of the "
+            "model absorbs them.", kind="soft",
         ),
         html.table(["effect", "what it does", "what it would look like"], hidden),
     ] if hidden else []  # fmt: skip
     experiment = separating(verdict or {})
     if experiment:
-        parts.append("<h3>The experiment that would tell</h3>")
+        parts.append("<h3>The experiment that would distinguish them</h3>")
         parts.append(html.paragraphs(experiment))
     if not parts:
-        none = (
-            "No diagnosis has been made of this model, so nothing is known of what it could miss."
-        )
+        none = "No diagnosis has been made of this model, so its missing effects are unknown."
         parts = [html.paragraphs(none if verdict is None else "The diagnosis names nothing.")]
     return html.section("What could not be tested", *parts)

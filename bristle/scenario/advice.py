@@ -13,7 +13,7 @@ from ..errors import BristleError, PhysicsError
 from ..findings import Findings
 from ..physics.drive import DRIVES, Drive
 from ..physics.effect import EFFECTS
-from ..physics.laws import laws_of
+from ..physics.laws import LAWS, laws_of
 from .connections import Wire
 from .library import Library
 from .parts import Part, Run
@@ -105,8 +105,8 @@ def _instances(network: Network, findings: Findings) -> None:
             if part.file in first:
                 findings.error(
                     part.path,
-                    f"[components.{part.name}]: {part.file.name} can live once in a process and is "
-                    f"already [components.{first[part.file]}].",
+                    f"[components.{part.name}]: {part.file.name} allows one instance per process, "
+                    f"and it is already [components.{first[part.file]}].",
                 )
             first.setdefault(part.file, part.name)
 
@@ -120,9 +120,9 @@ def _order(run: Run, network: Network, findings: Findings) -> None:
         if ground and network.order.index(ground[0].name) > network.order.index(structure.name):
             findings.warning(
                 ground[0].path,
-                f"[components.{ground[0].name}] stands after [components.{structure.name}], which "
-                "then sees the ground acceleration one step late; put it before, components step "
-                "in the order of the file.",
+                f"[components.{ground[0].name}] comes after [components.{structure.name}], which "
+                "then gets the ground acceleration one step late; put it first, because components "
+                "step in the order of the file.",
             )
 
 
@@ -196,8 +196,8 @@ def _holding(damper: Part, network: Network, findings: Findings) -> None:
     if fed and mass == 0.0:
         findings.error(
             wire.path if wire else damper.places["holding_force"],
-            f'{where}: holding_force is fed while moving_mass is 0; set "moving_mass" to the mass '
-            "that the damper holds, in kg, or leave holding_force open.",
+            f'{where}: holding_force is connected while moving_mass is 0; set "moving_mass" to the '
+            "mass that the damper holds, in kg, or leave holding_force unconnected.",
         )
     elif not fed and mass != 0.0:
         findings.error(
@@ -250,7 +250,7 @@ def slopes(damper: Part, level: float) -> tuple[float, float]:
 
     Of the law whose parameters the damper has, its jump aside; (0, 0) where that is none we know.
     """
-    for law in laws_of("damper"):
+    for law in (LAWS[damper.law.name],) if damper.law else laws_of("damper"):
         values = {name: damper.real(name) for name in law.parameters}
         given = {name: value for name, value in values.items() if value is not None}
         if given and all(name in given for name in law.linear()):

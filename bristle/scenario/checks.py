@@ -1,5 +1,7 @@
 """Checks of a scenario's own tables: the run, the components and their parameters."""
 
+# Longer than 300 lines: half of it are messages that say what would be right.
+
 from __future__ import annotations
 
 import re
@@ -10,7 +12,8 @@ from typing import Any
 from ..errors import BristleError, PhysicsError, TrustError
 from ..findings import Findings, number, unknown, written
 from ..lines import KeyPath
-from .document import COMPONENT_KEYS, MADE_FROM, Document, flatten
+from .document import COMPONENT_KEYS, LAW_KEYS, MADE_FROM, Document, flatten
+from .laws import choose_law
 from .library import Library
 from .parameters import check_parameter, check_together
 from .parts import ALGORITHMS, Part, Run, existing_file
@@ -212,7 +215,10 @@ def _check_component(
     _choose_building(part, settings, folder, findings)
     _choose_effects(part, settings, folder, findings)
     _choose_controller(part, settings, folder, findings)
-    _choose_fmu(part, settings, folder, library, findings)
+    if not any(key in settings for key in LAW_KEYS):
+        _choose_fmu(part, settings, folder, library, findings)
+    elif choose_law(part, settings, folder, library, findings):
+        _describe(part, (*part.path, "law"), settings, library, findings)
     for key in settings:
         if key in COMPONENT_KEYS:
             continue
@@ -264,7 +270,7 @@ def _choose_effects(
         return
     fmu = str(settings.get("fmu", ""))
     if fmu.lower().endswith(".fmu") or "/" in fmu or "\\" in fmu:
-        findings.error(path, f"{where}: an FMU carries its own; a built-in name takes them.")
+        findings.error(path, f"{where}: an FMU has its own effects; a built-in name takes files.")
         return
     found = [existing_file(file, folder, path, where, findings) for file in files]
     part.effects = tuple(file for file in found if file is not None)
@@ -303,19 +309,38 @@ def _choose_fmu(
         )
         return
     part.fmu = value
+    if value.lower().endswith(".fmu") or "/" in value or "\\" in value:
+        part.file = existing_file(value, folder, path, where, findings)
+        if part.controller:
+            words = "a foreign FMU takes no controller file; the built-in controllers do."
+            findings.error((*part.path, "controller"), f"{where}: {words}")
+        if part.file is None:
+            return
+    elif value not in library.names():
+        findings.error(path, f"{where}: {unknown('built-in FMU', value, library.names())}")
+        return
+    _describe(part, path, settings, library, findings)
+
+
+def _describe(
+    part: Part, path: KeyPath, settings: Mapping[str, Any], library: Library, findings: Findings
+) -> None:
+    """Read what a component's FMU says of itself.
+
+    Parameters
+    ----------
+    part, settings : the component
+    path : the keys that lead to what chose its FMU
+    library, findings : where it is looked up; takes what is found
+    """
+    where = f"[components.{part.name}]"
     try:
-        if value.lower().endswith(".fmu") or "/" in value or "\\" in value:
-            part.file = existing_file(value, folder, path, where, findings)
-            if part.controller:
-                words = "a foreign FMU takes no controller file; the built-in controllers do."
-                findings.error((*part.path, "controller"), f"{where}: {words}")
-            if part.file:
-                part.description = library.describe_file(part.file)
-        elif value not in library.names():
-            findings.error(path, f"{where}: {unknown('built-in FMU', value, library.names())}")
+        if part.file:
+            part.description = library.describe_file(part.file)
         elif all(getattr(part, key) or key not in settings for key in MADE_FROM):
             own = (part.effects,) if part.effects else ()
-            part.description = library.describe(value, part.building, part.controller, *own)
+            made_of = part.law.component if part.law else part.fmu
+            part.description = library.describe(made_of, part.building, part.controller, *own)
     except TrustError:
         raise  # no mistake of the file, and it is asked about
     except BristleError as error:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..errors import UnitError
-from ..findings import Findings, command, nearest, unknown, written
+from ..findings import Findings, nearest, unknown, written
 from ..fmu.description import Variable
 from ..lines import KeyPath
 from ..units import Unit, parse
@@ -126,8 +126,8 @@ def _end(
         return None  # what is wrong with the component has been said
     if port not in part.variables:
         names = [variable.name for variable in part.description.of(wanted)]
-        more = command("list", "ports", part.fmu)
-        findings.error(path, f'"{text}": {part.fmu}: {unknown(wanted, port, names, more)}')
+        words = unknown(wanted, port, names, part.ports_command)
+        findings.error(path, f'"{text}": {part.fmu}: {words}')
         return None
     return part, part.variables[port]
 
@@ -144,7 +144,7 @@ def _wrong_end(end: str, part: Part, variable: Variable, wanted: str) -> str:
     place = "left" if wanted == "input" else "right"
     listed = ", ".join(names) if names else "none"
     return (
-        f'"{end}" is {kind}; {_ARTICLE[wanted]} stands on the {place} of "=". '
+        f'"{end}" is {kind}; {_ARTICLE[wanted]} belongs on the {place} of "=". '
         f"{part.fmu} has: {listed}."
     )
 

@@ -16,7 +16,9 @@ from ..lines import KeyPath, key_lines, repeated_keys
 MAX_BYTES = 1_000_000
 """A scenario is a page of text; a file larger than this [byte] is something else."""
 
-COMPONENT_KEYS = ("fmu", "building", "controller", "effects", "step", "parameters")
+LAW_KEYS = ("law", "command", "command_knots")
+"""Those that say which law a damper has, and how the command enters it."""
+COMPONENT_KEYS = ("fmu", *LAW_KEYS, "building", "controller", "effects", "step", "parameters")
 MADE_FROM = ("building", "controller")
 """Those of them that name a file which a component is made from."""
 FILE_PARAMETERS = ("record", "file")
@@ -24,7 +26,7 @@ FILE_PARAMETERS = ("record", "file")
 
 _POSITION = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
 _HINTS = (
-    ("Invalid value", 'text stands in quotes, numbers have a decimal point: 0.5, "text", true'),
+    ("Invalid value", 'text needs quotes, numbers have a decimal point: 0.5, "text", true'),
     ("Invalid initial character for a key", "an inline table { ... } stays on one line"),
     ("Unclosed", "every bracket and quote needs its partner"),
     ("Expected '='", "a line reads: key = value"),
@@ -183,7 +185,7 @@ def _plain(value: object, key: str) -> object:
     item = getattr(value, "item", None)
     if callable(item) and getattr(value, "size", 1) == 1:  # numbers of numpy
         value = item()
-    is_file_name = key in (*FILE_PARAMETERS, *MADE_FROM, "fmu", "effects")
+    is_file_name = key in (*FILE_PARAMETERS, *MADE_FROM, "fmu", "law", "effects")
     if is_file_name and isinstance(value, str) and Path(value).suffix:
         here = Path(value).absolute()
         return str(here) if exists(here) else value

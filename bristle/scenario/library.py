@@ -8,8 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..control.controller import KINDS, Controller, parse_controller
-from ..errors import DesignError
+from ..errors import DesignError, PhysicsError
+from ..findings import unknown
 from ..fmu.description import Description
+from ..physics.forms import joined_form
+from ..physics.laws import LAWS, laws_of
+from .parts import DamperLaw
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,11 @@ class Library:
         component carries a design for another building.
     check_carried
         (FMU file, building file or None); likewise for the design that a built FMU carries.
+    damper_of
+        (law's name or file of a user's own, form of the command, knots [V]) -> the law of a damper;
+        raises BristleError.
+    law_of
+        (component) -> the law of a built-in damper, "" of what is none.
     driven_mass
         (building file or None) -> mass [kg] that a damper's force acts on; raises PhysicsError.
     """
@@ -43,6 +52,8 @@ class Library:
     driven_mass: Callable[[Path | None], float]
     check_controller: Callable[[str, Path | None, Path | None], None]
     check_carried: Callable[[Path, Path | None], None]
+    damper_of: Callable[[str | Path, str, tuple[float, ...]], DamperLaw]
+    law_of: Callable[[str], str]
 
 
 def installed() -> Library:
@@ -59,7 +70,43 @@ def installed() -> Library:
         driven_mass=driven_mass,
         check_controller=catalogue.check_controller,
         check_carried=check_carried,
+        damper_of=damper_of,
+        law_of=law_of,
     )
+
+
+def damper_of(law: str | Path, form: str = "", knots: tuple[float, ...] = ()) -> DamperLaw:
+    """Return a damper's law, registered, with the component that is a damper of it.
+
+    Parameters
+    ----------
+    law : name of a law of the library, or the file of a user's own
+    form, knots : form of the command, one of `physics.forms.FORMS`, and a table's knots [V]
+
+    Raises
+    ------
+    PhysicsError
+        If there is no such law, its file is not right, or it cannot have the form.
+    TrustError
+        If nobody consented to the file's code.
+    """
+    from ..fmu import catalogue
+    from ..trust import load_file
+
+    file = law if isinstance(law, Path) else None
+    name = str(law) if file is None else load_file(file, "law").name
+    known = [one.name for one in laws_of("damper")]
+    if name not in known:
+        raise PhysicsError(unknown("law", name, known))
+    whole = joined_form(name, form, knots)
+    return DamperLaw(whole, catalogue.component_of_law(LAWS[whole].name), file)
+
+
+def law_of(component: str) -> str:
+    """Return the law of a built-in damper, "" of a component that is none."""
+    from ..fmu import catalogue
+
+    return getattr(catalogue.component_class(catalogue.source(component)), "law", "")
 
 
 def driven_mass(building: Path | None) -> float:

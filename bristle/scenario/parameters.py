@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import PhysicsError, RecordError
-from ..findings import Findings, command, number, unknown, written
+from ..findings import Findings, number, unknown, written
 from ..fmu.description import Value, Variable
 from ..physics.record import read_two_column
 from ..physics.signals import read_steps
@@ -41,10 +41,8 @@ def check_parameter(
     variable = part.variables.get(name)
     if variable is None:
         settable = [v.name for v in part.variables.values() if v.causality == "parameter"]
-        more = command("list", "ports", part.fmu)
-        findings.error(
-            place, f"[components.{part.name}]: {unknown('parameter', name, settable, more)}"
-        )
+        words = unknown("parameter", name, settable, part.ports_command)
+        findings.error(place, f"[components.{part.name}]: {words}")
         return
     if variable.causality not in ("parameter", "input"):
         kind = {"output": "an output", "local": "internal"}.get(

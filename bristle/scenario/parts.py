@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..findings import Findings, nearest
+from ..findings import Findings, command, nearest
 from ..fmu.description import Description, Value, Variable
 from ..lines import KeyPath
 
@@ -21,6 +21,24 @@ class Run:
     algorithm: str = ALGORITHMS[0]
 
 
+@dataclass(frozen=True)
+class DamperLaw:
+    """The law of a damper that a scenario names.
+
+    `name` is the law's, its form with it (see `physics.forms`), `component` what the catalogue
+    makes it from, `file` that of a user's own law.
+    """
+
+    name: str
+    component: str
+    file: Path | None = None
+
+    @property
+    def shown(self) -> str:
+        """What the component is called in messages and titles."""
+        return Path(self.component).stem
+
+
 @dataclass
 class Part:
     """A component as far as it could be read; `places` gives the path of each parameter."""
@@ -32,6 +50,7 @@ class Part:
     building: Path | None = None
     effects: tuple[Path, ...] = ()
     controller: Path | None = None
+    law: DamperLaw | None = None
     step: float | None = None
     description: Description | None = None
     parameters: dict[str, Value] = field(default_factory=dict)
@@ -41,6 +60,11 @@ class Part:
     def variables(self) -> dict[str, Variable]:
         """Variables of the FMU by name; none where it could not be read."""
         return self.description.variables if self.description else {}
+
+    @property
+    def ports_command(self) -> str:
+        """The command that lists all ports; "" where its law was made for this scenario."""
+        return "" if self.law else command("list", "ports", self.fmu)
 
     def value(self, name: str) -> Value | None:
         """Return a parameter's value as set, else its start value, else None."""

@@ -26,6 +26,7 @@ from .document import (
 )
 from .library import Library, installed
 from .naming import changed_title, needs_title
+from .parts import DamperLaw
 
 __all__ = [
     "Component",
@@ -50,7 +51,8 @@ class Component:
     Structure is made from, None for the default; `controller` the controller file of a designed
     controller, None for the one that it carries; `effects` the files of a user's own effects that a
     built-in one carries besides the library's; `parameters` the values that the scenario sets,
-    inputs that are held constant included; `step` its own step [s], None for the run's.
+    inputs that are held constant included; `step` its own step [s], None for the run's; `law` that
+    of a damper where the scenario names it.
     """
 
     name: str
@@ -62,6 +64,17 @@ class Component:
     description: Description
     effects: tuple[Path, ...] = ()
     controller: Path | None = None
+    law: DamperLaw | None = None
+
+    def made_of(self) -> str:
+        """Return what the catalogue makes it from; a law of a user's own is registered then."""
+        if self.law is None:
+            return self.fmu
+        if self.law.file is not None:  # this process may not have read it yet
+            from ..trust import load_file
+
+            load_file(self.law.file, "law")
+        return self.law.component
 
 
 @dataclass(frozen=True)
@@ -196,6 +209,7 @@ def _read(
             description,
             part.effects,
             part.controller,
+            part.law,
         )
         for part in parts.values()
         if (description := part.description) is not None

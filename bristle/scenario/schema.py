@@ -10,6 +10,7 @@ import json
 from typing import Any
 
 from ..fmu.description import Description, Variable
+from ..physics.forms import FORMS
 from .checks import SCHEMA
 from .library import Library, installed
 from .parameters import choices
@@ -37,7 +38,7 @@ def build_schema(library: Library | None = None) -> dict[str, Any]:
         "additionalProperties": False,
         "properties": {
             "schema": {"const": SCHEMA, "description": "version of this format"},
-            "title": {"type": "string", "description": "stands over figures and tables"},
+            "title": {"type": "string", "description": "title of figures and tables"},
             "run": _run(),
             "components": {
                 "type": "object",
@@ -77,7 +78,11 @@ def _component(names: list[str]) -> dict[str, Any]:
     """Return the schema of one component; its parameters depend on its FMU."""
     each: list[dict[str, Any]] = [
         {
-            "if": {"required": ["fmu"], "properties": {"fmu": {"const": name}}},
+            "if": {
+                "required": ["fmu"],
+                "not": {"required": ["command"]},
+                "properties": {"fmu": {"const": name}},
+            },
             "then": {"properties": {"parameters": {"$ref": f"#/definitions/{name}"}}},
         }
         for name in names
@@ -88,12 +93,22 @@ def _component(names: list[str]) -> dict[str, Any]:
     }
     return {
         "type": "object",
-        "required": ["fmu"],
+        "oneOf": [{"required": ["fmu"]}, {"required": ["law"]}],
         "additionalProperties": False,
         "properties": {
             "fmu": {
                 "description": "a built-in name, or a path relative to this file",
                 "anyOf": [{"enum": names}, {"type": "string", "pattern": r"(\.[fF][mM][uU]|/|\\)"}],
+            },
+            "law": {
+                "type": "string",
+                "description": "a damper's law in place of fmu: its name, or a file of your own",
+            },
+            "command": {"enum": list(FORMS), "description": "how the command enters the law"},
+            "command_knots": {
+                "type": "array",
+                "items": {"type": "number"},
+                "description": "knots of a table over the command [V]",
             },
             "building": {"type": "string", "description": "data file of another building"},
             "effects": {

@@ -9,9 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..fmu.description import Value
+from ..physics.forms import split_form
 from .document import FILE_PARAMETERS
 
 if TYPE_CHECKING:
+    from .parts import DamperLaw
     from .scenario import Component, Scenario
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
@@ -46,7 +48,7 @@ def scenario_text(scenario: Scenario) -> str:
 
 def _component(component: Component, folder: Path) -> list[str]:
     fmu = component.fmu if component.path is None else component.path.absolute().as_posix()
-    lines = [f"fmu = {_value(fmu)}"]
+    lines = [f"fmu = {_value(fmu)}"] if component.law is None else _law(component.law)
     if component.building is not None:
         lines.append(f"building = {_value(component.building.absolute().as_posix())}")
     if component.effects:
@@ -63,6 +65,16 @@ def _component(component: Component, folder: Path) -> list[str]:
                 values[name] = (folder / str(values[name])).absolute().as_posix()
         pairs = [f"{_key(name)} = {_value(value)}" for name, value in values.items()]
         lines.append(f"parameters = {{ {', '.join(pairs)} }}")
+    return lines
+
+
+def _law(law: DamperLaw) -> list[str]:
+    name, form, knots = split_form(law.name)
+    lines = [f"law = {_value(law.file.absolute().as_posix() if law.file else name)}"]
+    if form:
+        lines.append(f"command = {_value(form)}")
+    if knots:
+        lines.append(f"command_knots = {list(knots)}")
     return lines
 
 

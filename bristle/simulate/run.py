@@ -281,7 +281,7 @@ class _Job:
         paths, descriptions = {}, {}
         for component in self.scenario.components:
             path = component.path or ensure(
-                component.fmu, component.building, component.controller, component.effects
+                component.made_of(), component.building, component.controller, component.effects
             )
             # A missing binary is explained when the FMU is loaded, with the way out.
             description = read_description(path, any_platform=True)

@@ -21,6 +21,7 @@ from fmpy.fmi1 import FMICallException
 from ..errors import FmuError, RunError
 from ..fmu.archive import extract
 from ..fmu.description import Description, Value, Variable
+from ..interrupt import Interrupt
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 WARNING, DISCARD, FATAL = 1, 2, 4
@@ -105,6 +106,8 @@ class Instance:
     ------
     FmuError
         No binary for this platform, or the FMU cannot be loaded or instantiated.
+    KeyboardInterrupt
+        Ctrl-C came meanwhile; the FMU is closed again.
     """
 
     def __init__(
@@ -117,12 +120,17 @@ class Instance:
         self._last: deque[str] = deque(maxlen=3)
         self._listen = listen
         self._key = _register(self)
-        self._slave = self._load(folder)
-        try:
-            self._slave.instantiate(callbacks=_callbacks(self._key), loggingOn=True)
-        except Exception as error:  # fmpy raises Exception itself
-            _LISTENERS.pop(self._key)
-            raise FmuError(f"{self._where()}: cannot be instantiated.{self.said()}") from error
+        # A KeyboardInterrupt in an FMU written in Python would be told as that FMU's failure.
+        with Interrupt() as interrupt:
+            self._slave = self._load(folder)
+            try:
+                self._slave.instantiate(callbacks=_callbacks(self._key), loggingOn=True)
+            except Exception as error:  # fmpy raises Exception itself
+                _LISTENERS.pop(self._key)
+                raise FmuError(f"{self._where()}: cannot be instantiated.{self.said()}") from error
+        if interrupt.asked:
+            self.close()
+            raise KeyboardInterrupt
 
     @property
     def component(self) -> int:

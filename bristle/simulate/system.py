@@ -224,8 +224,8 @@ def kind_of(component: Component, scenario: Scenario) -> str:
         Naming a component that cannot be compiled.
     """
     known = catalogue.component_names()
-    if component.path is None and component.fmu in known:
-        kind: Any = catalogue.component_class(catalogue.source(component.fmu))
+    if component.path is None and (component.law or component.fmu in known):
+        kind: Any = catalogue.component_class(catalogue.source(component.made_of()))
         return KINDS[kind.functions]
     raise ScenarioError(
         f"{scenario.file} [components.{component.name}]: {component.fmu} cannot be compiled. "
@@ -236,7 +236,7 @@ def kind_of(component: Component, scenario: Scenario) -> str:
 def configured(component: Component, scenario: Scenario) -> Slave:
     """Return the component's Python object with the scenario's values, its model built."""
     slave = catalogue.instantiate(
-        component.fmu,
+        component.made_of(),
         component.building,
         component.name,
         component.controller,

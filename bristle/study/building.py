@@ -105,7 +105,7 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
         return found
     names = study.history.numbers()
     path = study.folder / f"building_{names[-1] + 1 if names else 0}.toml"
-    counted = f"{len(runs.train)} training run(s), judged on {len(runs.holdout)} held out"
+    counted = f"{len(runs.train)} training run(s), tested on {len(runs.holdout)} held out"
     origin = (
         f"Identified from the response: {counted}.",
         f"Masses and start values: {model.building or 'the built-in building'}.",

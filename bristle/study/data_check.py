@@ -17,7 +17,7 @@ from ..data.relation import band
 from ..quantity import plain, scale
 from .study import Study
 
-_HEADINGS = {"error": "To mend", "warning": "To know", "note": "Noted"}
+_HEADINGS = {"error": "Errors", "warning": "Warnings", "note": "Notes"}
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def _unmeasured(runs: list[Measurement]) -> list[Finding]:
     if "force" not in there:
         text = (
             "the damper's force was not measured: it is reconstructed from the equilibrium of the "
-            "base, and base_friction, a duffing spring and the base's mass cannot be told from it."
+            "base. base_friction, a duffing spring and the base's mass cannot be separated from it."
         )
         do = "Put a load cell between damper and base."
         findings.append(Finding("force", "warning", text, do))

@@ -126,7 +126,7 @@ class History:
         Raises
         ------
         StudyError
-            If there is no step but the first model.
+            If there is no step but the first model, or a step cannot be read.
         """
         numbers = self.numbers()
         if len(numbers) < 2:
@@ -134,11 +134,25 @@ class History:
                 f"{self.study}: there is nothing to undo: the model is the one that the study "
                 "began with."
             )
+        self.refuse_damaged()
         last = self.step(numbers[-1])
         self._keep_verdict(last.number)
         self._begin({"undo": last.number})
         self.recover()
         return last
+
+    def refuse_damaged(self) -> None:
+        """Refuse to take a step back where that step, or the one before, cannot be read.
+
+        Raises
+        ------
+        StudyError
+            Naming the file.
+        """
+        for number in self.numbers()[-2:]:
+            self.step(number)
+            if not self.model_file(number).is_file():
+                raise StudyError(f"{self.model_file(number)}: there is no such file.")
 
     def recover(self) -> None:
         """Complete what a process began and did not end; nothing where nothing is pending."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,9 +17,12 @@ from ..identify.rig import DAMPER, Rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
 from ..identify.table import LawError, error_table
 from ..physics.laws import base_and_variant, law_names
+from ..progress import tell
 from ..quantity import plain
 from ..units import convert
+from .forms import FormError, form_of, forms_asked, in_form
 from .identified import Identified
+from .joining import refuse_left_out
 from .rig import rig_of
 from .runs import Runs
 from .study import Study
@@ -39,6 +42,7 @@ def identify_study(
     study: Study,
     *,
     law: str | None = None,
+    command: str | Sequence[str] | None = None,
     model: StudyModel | None = None,
     cutoff: float | None = None,
     starts: int = 4,
@@ -52,6 +56,8 @@ def identify_study(
     ----------
     study : the folder, opened
     law : another law to take than the model's; its effects stay where they can join it
+    command : the form in which the command enters, one of `physics.forms.FORMS`; several, or
+        "all", are compared, and the model keeps its own if it is among them, else the first
     model : a model to take in place of the present one
     cutoff : Hz, of the low-pass for the table of errors; None takes the study's
     starts : how many starting points are tried
@@ -69,9 +75,12 @@ def identify_study(
     """
     if starts < 1:
         raise StudyError(f"starts = {starts}; 1 or more is right.")
+    if law is not None:
+        refuse_left_out(study.laws_folder / f"{law}.py")
     model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
-    found = identify_model(study, model, FitTask(cutoff, starts, table, show=show or _show_nothing))
+    task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
+    found = identify_model(study, model, task)
     if not write:
         return found
     step = study.add_step(
@@ -91,7 +100,8 @@ class FitTask:
 
     `cutoff` [Hz] of the low-pass for the table of errors; `starts` how many starting points are
     tried; `table` whether to compare the laws; `present` the model whose errors are those before,
-    None for the one that is identified; `begin` values in SI by name from which one more fit
+    None for the one that is identified; `command` the form or forms of the command, None for the
+    model's; `begin` values in SI by name from which one more fit
     begins, the better one counts; `show` is told how many of `STAGES` are done.
     """
 
@@ -100,6 +110,7 @@ class FitTask:
     table: bool = True
     present: StudyModel | None = None
     begin: Mapping[str, float] = field(default_factory=dict)
+    command: str | Sequence[str] | None = None
     show: Show = _show_nothing
 
 
@@ -119,7 +130,7 @@ def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified
 
 
 def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
-    """Identify a model on a rig: fit it at all sites, then judge it there.
+    """Identify a model on a rig, in the form of the command that the task asks for.
 
     Parameters
     ----------
@@ -133,6 +144,29 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
     StudyError, RecordError
         As `identify_study`.
     """
+    if task.command is None:
+        return _in_own_form(rig, runs, model, task)
+    forms = forms_asked(task.command)
+    own = form_of(model) if form_of(model) in forms else forms[0]
+    models = {form: in_form(model, form, runs.train) for form in forms}
+    present = task.present or model
+    found = _in_own_form(rig, runs, models.pop(own), replace(task, present=present))
+    if not models:
+        return found
+    rows = [_form_error(own, found)]
+    for form, other in models.items():
+        tell(f"identifying with the form {form} of the command")
+        alone = replace(task, present=present, table=False, show=_show_nothing)
+        rows.append(_form_error(form, _in_own_form(rig, runs, other, alone)))
+    return replace(found, forms=tuple(sorted(rows, key=lambda row: forms.index(row.form))))
+
+
+def _form_error(form: str, found: Identified) -> FormError:
+    return FormError(form, found.model, found.after, len(found.fit.std))
+
+
+def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+    """Fit a model at all sites of a rig, then judge it there."""
     start = as_model(model)
     rig.prepare(start)
     notes = [*runs.notes, *_doubts([run for run in runs.all if run.has("force")])]
@@ -180,7 +214,8 @@ def _tabled(own: str) -> tuple[str, ...]:
     What is integrated by its rates takes minutes to fit; whoever wants it asks for it by name.
     """
     named = {name: base_and_variant(name)[0] for name in law_names()}
-    return tuple(n for n, law in named.items() if law.exact() or law.name == own)
+    names = tuple(n for n, law in named.items() if law.exact() or law.name == own)
+    return names if own in names else (*names, own)
 
 
 def _by_site(models: SiteModels) -> list[str]:
@@ -190,7 +225,7 @@ def _by_site(models: SiteModels) -> list[str]:
         return []
     z = {n: robust_z(p, models[n].model) for n, p in problems.items() if p is not None}
     text = ", ".join(f"{site} {plain(z[site])}" for site in sorted(z, key=lambda site: -z[site]))
-    return [f"z on held-out runs by site: {text}; the errors' z is the worst site's."]
+    return [f"z on held-out runs by site: {text}; the z of the errors is that of the worst site."]
 
 
 def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
@@ -224,14 +259,14 @@ def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float
     if after["z_train"] <= _MISFIT:
         return []
     notes = [
-        "The error is more than noise: intervals are drawn from the error itself, and hold for "
-        "this model's best values, not for a damper's constants."
+        "The error exceeds the noise. The intervals come from the error itself: they describe "
+        "the best values of this model, not the constants of a damper."
     ]
     same = [row for row in rows if row.law == model.law and not model.effects]
     if same and same[0].train < 0.95 * after["rms_train"]:
         notes.append(
             f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
-            f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N in place "
+            f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N instead "
             f"of {plain(after['rms_train'], 4)} N."
         )
     return notes
@@ -280,12 +315,12 @@ def _doubts(runs: list[Measurement]) -> list[str]:
         share = saturated_share(run["force"])
         if share > _SATURATED:
             raise StudyError(
-                f"{run.name}: {share:.0%} of the force's samples stand at its extremes: the load "
+                f"{run.name}: {share:.0%} of the force's samples are at its extremes: the load "
                 "cell or its amplifier is saturated. Measure with a wider range, or leave the run "
                 "out in study.toml."
             )
         if share > 0.0:
-            notes.append(f"{run.name}: {share:.1%} of the force's samples stand at its extremes.")
+            notes.append(f"{run.name}: {share:.1%} of the force's samples are at its extremes.")
     doubtful: dict[str, int] = {}
     for run in runs:
         for channel, fact in run.noise_facts.items():
@@ -294,8 +329,8 @@ def _doubts(runs: list[Measurement]) -> list[str]:
     if doubtful:
         where = ", ".join(f"{c} ({n} of {len(runs)} runs)" for c, n in doubtful.items())
         notes.append(
-            f"The noise cannot be told well from the signal: {where}. Give it in study.toml: z and "
-            "intervals rest on it."
+            f"The noise is hard to separate from the signal: {where}. Give it in study.toml: z and "
+            "intervals depend on it."
         )
     return notes
 
@@ -304,7 +339,7 @@ def _why(found: Identified) -> str:
     runs, held_out = len(found.train.runs), len(found.holdout.runs) if found.holdout else 0
     lost = ", ".join(found.unidentified)
     return (
-        f"fit to {runs} training run{'s' * (runs != 1)}, judged on {held_out} held out; "
+        f"fit to {runs} training run{'s' * (runs != 1)}, tested on {held_out} held out; "
         f"{found.fit.agreed} of {found.fit.starts} starts agree"
         + (f"; the data do not identify {lost}" if lost else "")
     )

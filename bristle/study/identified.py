@@ -9,6 +9,8 @@ from ..data.model import StudyModel
 from ..identify.fit import Fit, Problem
 from ..identify.rig_fit import SiteModel
 from ..identify.table import LawError
+from ..physics.forms import split_form
+from .forms import FormError, form_of
 from .history import Step
 
 if TYPE_CHECKING:
@@ -36,6 +38,8 @@ class Identified:
         What to know.
     step : Step or None
         The history's new step, None where nothing was written.
+    forms : tuple of FormError
+        Errors of the forms of the command, where several were asked for.
     at : SiteModel
         The site that a picture shows, with the part of the model that predicts its runs.
 
@@ -60,6 +64,7 @@ class Identified:
     notes: tuple[str, ...]
     step: Step | None
     at: SiteModel
+    forms: tuple[FormError, ...] = ()
 
     @property
     def train(self) -> Problem:
@@ -92,7 +97,9 @@ class Identified:
         rows = {row["name"]: row for row in self.parameters()}
         return {
             "schema": 1,
-            "law": self.model.law,
+            "law": split_form(self.model.law)[0],
+            "command": form_of(self.model),
+            "command_knots": list(split_form(self.model.law)[2]),
             "effects": list(self.model.effects),
             "parameters": {
                 name: {key: row[key] for key in row if key != "name"} for name, row in rows.items()
@@ -104,6 +111,7 @@ class Identified:
             "before": self.before,
             "after": self.after,
             "table": [row.as_dict() for row in self.table],
+            "forms": [row.as_dict() for row in self.forms],
             "notes": list(self.notes),
             "step": self.step.number if self.step else None,
         }
@@ -113,7 +121,7 @@ class Identified:
         rows = []
         for name, value in self.model.flat().items():
             if name in self.fit.unidentified:
-                how = "cannot be told"
+                how = "not identified"
             elif name in self.fit.std:
                 how = "identified"
             else:

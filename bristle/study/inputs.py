@@ -101,7 +101,7 @@ def _read(
     except RecordError as error:
         if "[channels" not in str(error):
             raise
-        hint = 'What a study says in [channels.force], channels={"force": "COLUMN@UNIT"} says here.'
+        hint = 'Here channels={"force": "COLUMN@UNIT"} replaces [channels.force] of a study.'
         raise RecordError(f"{error} {hint}") from None
     notes = [f"guessed: {guess}" for guess in guesses]
     return [replace(one, notes=(*one.notes, *notes)) for one in found]

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from ..data.model import StudyModel
 from ..errors import StudyError
 from ..findings import unknown
 from ..physics.effect import AT, EFFECTS, exclude, laws_joined
 from ..physics.laws import LAWS
+from ..physics.user import waiting, why_left_out
 
 
 def as_named_here(name: str, bench: bool) -> str:
@@ -22,6 +25,22 @@ def as_named_here(name: str, bench: bool) -> str:
     if site == "structure":
         raise StudyError(f"{name}: a test bench has no structure; {own} is that of the damper.")
     return own
+
+
+def refuse_left_out(file: Path) -> None:
+    """Refuse an effect or law of a user's own that was left out when its file was read.
+
+    Raises
+    ------
+    TrustError
+        If its code must not run yet.
+    StudyError
+        Saying what is wrong with the file, and where.
+    """
+    if untrusted := waiting(file):
+        raise untrusted
+    if why := why_left_out(file):
+        raise StudyError(why)
 
 
 def refuse_effect(model: StudyModel, name: str, bench: bool) -> None:

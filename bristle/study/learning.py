@@ -10,17 +10,18 @@ from typing import Any
 from ..diagnose import Diagnosis, diagnose_rig
 from ..diagnose.faults import SensorFault
 from ..progress import tell, telling
+from .curves import LearnedEffect, learn_effect
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified
-from .joining import as_named_here, refuse_effect
+from .joining import as_named_here, refuse_effect, refuse_left_out
 from .rig import building_of
 from .study import Study
 
 Say = Callable[[str], None]
 
 MOST_EFFECTS = 4
-"""Effects that `learn` adds at the most: a model that asks for more is the wrong model."""
+"""Effects that `complete` adds at the most: a model that asks for more is the wrong model."""
 
 
 def diagnose_study(study: Study, *, write: bool = True, say: Say = tell) -> Diagnosis:
@@ -57,7 +58,7 @@ def _turned(study: Study) -> list[SensorFault]:
     return [
         SensorFault(
             name, "sign", -1.0, 0.0,
-            f"{name.capitalize()} has the other sign in its files; study.toml turns it.",
+            f"{name.capitalize()} has the other sign in its files; study.toml reverses it.",
         )
         for name, channel in study.settings.channels.items()
         if channel.sign < 0
@@ -65,10 +66,10 @@ def _turned(study: Study) -> list[SensorFault]:
 
 
 def verdict_of(study: Study, found: Diagnosis) -> dict[str, Any]:
-    """Return the content of verdict.json, with what weakens the split of the runs."""
+    """Return the content of verdict.json, with what weakens the split and what is left out."""
     verdict = found.as_dict()
-    notes = study.runs().notes
-    return {**verdict, "notes": list(notes)} if notes else verdict
+    notes = [*study.runs().notes, *(f"Left out: {why}" for why in study.left_out())]
+    return {**verdict, "notes": notes} if notes else verdict
 
 
 @dataclass(frozen=True)
@@ -101,8 +102,10 @@ def add_effects(
     StudyError
         If an effect is not known, is there already, or cannot join the model.
     """
+    study.usable_effects()
+    for name in names:
+        refuse_left_out(study.effects_folder / f"{name}.py")
     tell("reading the runs")
-    study.usable_effects()  # raises where one of the study's own waits for consent
     model = present = study.model()
     bench = not study.settings.has_building
     names = tuple(as_named_here(name, bench) for name in names)
@@ -125,16 +128,21 @@ def add_effects(
 
 
 @dataclass(frozen=True)
-class Learned:
-    """What `learn` came to: the last diagnosis, and the steps that it made."""
+class Completed:
+    """What `complete` came to: the last diagnosis, and the steps that it made.
+
+    `curves` are those learned where no effect of the library explained the error.
+    """
 
     verdict: Diagnosis
     steps: tuple[Step, ...]
+    curves: tuple[LearnedEffect, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
         return {
             "verdict": self.verdict.as_dict(),
+            **({"learned": [one.as_dict() for one in self.curves]} if self.curves else {}),
             "steps": [
                 {
                     "number": step.number, "what": step.what, "why": step.why,
@@ -145,17 +153,26 @@ class Learned:
         }  # fmt: skip
 
 
-def learn(study: Study, *, say: Say = tell, on_step: Callable[[], None] | None = None) -> Learned:
+def complete(
+    study: Study,
+    *,
+    curves: bool = False,
+    say: Say = tell,
+    on_step: Callable[[], None] | None = None,
+) -> Completed:
     """Identify, diagnose and add until the verdict is none, ambiguous, unknown or insufficient.
 
     What was done is in the history already when this is interrupted: calling it again goes on.
 
     Parameters
     ----------
+    study : the folder, opened
+    curves : whether to go on where the verdict is unknown, by learning a curve
     say : called with a few words at each stage
     on_step : called after each new step of the history
     """
     steps: list[Step] = []
+    learned: list[LearnedEffect] = []
 
     def stepped(step: Step | None) -> None:
         if step is not None:
@@ -168,8 +185,12 @@ def learn(study: Study, *, say: Say = tell, on_step: Callable[[], None] | None =
         stepped(identify_study(study, table=False).step)
     while True:
         found = diagnose_study(study, say=say)
-        enough = len(study.model().effects) + len(found.effects) > MOST_EFFECTS
-        if found.kind != "effect" or enough:
-            return Learned(found, tuple(steps))
-        say("adding " + " and ".join(found.effects))
-        stepped(add_effects(study, found.effects, found=found).step)
+        names = found.effects if found.kind == "effect" else ()
+        if found.kind == "unknown" and curves:
+            say("learning a curve")
+            learned.append(learn_effect(study))
+            names = (learned[-1].name,) if learned[-1].file is not None else ()
+        if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
+            return Completed(found, tuple(steps), tuple(learned))
+        say("adding " + " and ".join(names))
+        stepped(add_effects(study, names, found=found).step)

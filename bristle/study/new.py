@@ -239,7 +239,7 @@ def _refuse_incomplete(
         unused = left_out(table, guesses)
         rest = f"\n  Not used: {', '.join(unused)}." if unused else ""
         raise StudyError(
-            f"{table.source}: not all channels can be told."
+            f"{table.source}: some channels cannot be guessed."
             + "".join(f"\n  {line}" for line in wrong)
             + (f"\n  The guess so far:{seen}" if seen else "")
             + rest
@@ -286,7 +286,7 @@ def _roles(names: list[str]) -> tuple[list[RunFile], list[str]]:
     found = ["holdout" if w & _HOLDOUT else "train" if w & _TRAIN else "" for w in words]
     if len(names) == 1:
         return [RunFile(f"data/{names[0]}", "train")], [
-            "there is one run: its last 30 % are held out, which is weaker than a run of its own"
+            "there is one run: its last 30 % are held out, which is weaker than a separate run"
         ]
     if (
         "holdout" in found
@@ -297,9 +297,7 @@ def _roles(names: list[str]) -> tuple[list[RunFile], list[str]]:
         note = "roles follow the names of the files"
     else:
         roles = ["holdout" if k % 3 == 1 else "train" for k in range(len(names))]
-        note = (
-            "every third run is held out; change role in study.toml where another choice is better"
-        )
+        note = "every third run is held out; change role in study.toml if another choice is better"
     runs = [RunFile(f"data/{name}", role) for name, role in zip(names, roles, strict=True)]
     held_out = ", ".join(name for name, role in zip(names, roles, strict=True) if role == "holdout")
     return runs, [f"{note}. Held out: {held_out}"]

@@ -45,9 +45,25 @@ def identified_html(found: Identified) -> str:
         title,
         html.table(["parameter", "value", "95 % interval", "unit"], rows, numbers=(1, 2)),
         html.table(header, errors, numbers=(1, 2, 3)),
+        _forms(found),
         html.items(found.notes),
         html.figure(png(draw_identified(found), DPI), f"{title}: force measured and predicted"),
     )
+
+
+def _forms(found: Identified) -> str:
+    """Return the table of the forms of the command, "" where they were not compared."""
+    if not found.forms:
+        return ""
+    rows = [
+        [
+            row.form, percent(row.judged),
+            short_z(row.errors.get("z_holdout", row.errors["z_train"])), str(row.numbers),
+        ]
+        for row in found.forms
+    ]  # fmt: skip
+    header = ["command", "error of the force", "error / noise (z)", "fitted numbers"]
+    return html.table(header, rows, numbers=(1, 2, 3))
 
 
 def study_page(study: Study) -> Page:

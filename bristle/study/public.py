@@ -43,6 +43,7 @@ def identify(
     model: Given | None = None,
     *,
     effects: str | Sequence[str] = (),
+    command: str | Sequence[str] | None = None,
     holdout: Data | None = None,
     channels: Channels | None = None,
     building: str | Path | Building | None = None,
@@ -61,6 +62,9 @@ def identify(
         The law, such as "bingham", or a model to begin with; else the study's, else "lugre".
     effects : str or list of str
         Effects that the model has on top.
+    command : str or list of str, optional
+        How the command enters: "linear", "quadratic" or "table"; of several, or "all", the errors
+        of each are in `forms` of the result. Else as the model has it.
     holdout : as data, optional
         Runs to judge on. Without them every third run is held out, of one run the last 30 %. A
         study says itself which are.
@@ -107,14 +111,14 @@ def identify(
     if isinstance(given, Study):
         _refuse_of_study(holdout=holdout, channels=channels, building=building)
         begin = None if model is None and not effects else _present(given, model, effects)
-        return identify_study(given, model=begin, table=table, write=write)
+        return identify_study(given, model=begin, command=command, table=table, write=write)
     chosen = model_of(model, effects, DEFAULT)
     house = building_from(building)
     runs = _runs(given, holdout, channels, house)
     rig = _rig(runs, house)
     drives = [run.drive for run in runs.all if run.drive]
     chosen = chosen.with_drive(drives[0] if drives else chosen.drive)
-    return identify_on_rig(rig, runs, chosen, FitTask(CUT_OFF, table=table))
+    return identify_on_rig(rig, runs, chosen, FitTask(CUT_OFF, table=table, command=command))
 
 
 def compare(
@@ -183,7 +187,7 @@ def compare(
         return comparer(given, role).compare(as_model(chosen))
     if model is None:
         raise StudyError(
-            "compare needs a model beside the runs: what identify returned, a model.toml, or a "
+            "compare needs a model besides the runs: what identify returned, a model.toml, or a "
             "law's name."
         )
     chosen = model_of(model, effects, DEFAULT)
@@ -262,7 +266,7 @@ def diagnose(
         if model is None and not effects:
             return diagnose_study(given, write=write)
         raise StudyError(
-            "of a study the present model is diagnosed: identify the other one first, with "
+            "diagnose uses the present model of a study: identify the other one first, with "
             "bristle.identify(study, ...)."
         )
     chosen = model_of(model, effects, DEFAULT)
@@ -284,8 +288,8 @@ def _refuse_of_study(**given: object) -> None:
     wrong = [name for name, value in given.items() if value is not None]
     if wrong:
         raise StudyError(
-            f"{', '.join(wrong)}: study.toml and model.toml of a study say it; change it there, or "
-            "give the runs themselves in place of the study."
+            f"{', '.join(wrong)}: study.toml and model.toml of a study set this; change it there, "
+            "or give the runs instead of the study."
         )
 
 

@@ -74,8 +74,8 @@ def split_in_time(pieces: list[Measurement]) -> Runs:
             holdout.append(piece.part(wanted, size, f"{piece.name}, last {1.0 - SPLIT:.0%}"))
         wanted -= size
     note = (
-        "There is one run. It is split in time, the last 30 % held out: weaker than a run of its "
-        "own, for motion, voltage and temperature there are much like those of the training part."
+        "There is one run. It is split in time, the last 30 % held out: weaker than a "
+        "separate run, because its motion, voltage and temperature are like those in training."
     )
     return Runs(train, holdout, (note,))
 
@@ -87,7 +87,7 @@ def refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
         if one.digest() in first:
             raise StudyError(
                 f"{one.name} is held out and is the same measurement as {first[one.digest()]}, "
-                "which is for training: it can judge nothing. Take another run, or remove one."
+                "which is for training: it tests nothing. Use another run, or remove one."
             )
 
 

@@ -61,7 +61,7 @@ class Staircase:
         wide = min(max(len(name) for name in [*names, "  noise floor"]), 32)
         known = [one.z for one in self.history_steps if one.z is not None]
         top = max([*known, 2.0 * self.floor])
-        title = "error on held-out runs over what noise explains (z)"
+        title = "error / noise (z) on held-out runs"
         lines = [[(f"{'':{wide}}  {title}", "dim")]]
         for name, one in zip(names, self.history_steps, strict=True):
             lines.append([(f"{name[:wide]:{wide}}  ", "bold"), *self._line(one, top, mark)])
@@ -104,7 +104,7 @@ def staircase(steps: Sequence[Step], noise_floor: float = 1.0, cut_off: float = 
     --------
     >>> from bristle.study import Step
     >>> print(staircase([Step(0, "identify", "", {}, {"z_holdout": 4.0})]))
-                   error on held-out runs over what noise explains (z)
+                   error / noise (z) on held-out runs
     0 identify     ######################################## 4.00
       noise floor  | 1
     """

@@ -56,7 +56,7 @@ def staircase_page(history_steps: Sequence[HistoryStep], unit: str = "N") -> Pag
         axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
         axes.yaxis.set_minor_formatter(lambda value, _: "")
         axes.grid(visible=False, axis="x")
-        axes.set_title("z: error over what noise explains")
+        axes.set_title("error / noise (z)")
         last = steps[-1]
         ends = [
             ("noise floor", 1.0, GREEN),
@@ -94,7 +94,9 @@ def _step_marks(axes: Axes, i: int, one: HistoryStep, before: float | None, unit
     assert one.z is not None
     z = short_z(one.z)
     rms = "" if one.rms is None else f"  {quantity(one.rms, unit, 2)}"
-    label(axes, f"z = {z}{rms}", i, one.z, INK, xytext=(0, 7), ha="center", va="bottom")
+    # Above the higher of both lines, so that neither strikes it through.
+    height = max(one.z, one.z_train or 0.0)
+    label(axes, f"z = {z}{rms}", i, height, BLUE, xytext=(0, 7), ha="center", va="bottom")
     if before is None or before <= 0.0:
         return
     change = one.z / before - 1.0

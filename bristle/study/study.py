@@ -22,7 +22,7 @@ from ..data.table import Table
 from ..errors import StudyError
 from ..findings import command, written
 from ..physics.user import Loaded, waiting
-from ..trust import load
+from ..trust import can_do_without, load
 from .history import History, Step
 from .new import make_folder
 from .run_file import ROLES, RunFile
@@ -129,20 +129,25 @@ class Study:
         """Register the user's own effects and laws that can be compiled; say why others cannot be.
 
         Call it before a fit or a diagnosis: an effect that cannot be compiled would take all others
-        along.
+        along. What waits for consent, and is not in the model, is left out like these.
 
         Raises
         ------
         TrustError
-            If the code of one must not run yet.
+            If the model has one whose code must not run yet.
         """
         from ..check.user_effects import usable
 
         laws, effects = load(self.laws_folder, "law"), load(self.effects_folder)
         for one in (*laws, *effects):
             if untrusted := waiting(one.path):
-                raise untrusted
+                read_model(self.folder / "model.toml")  # raises where the model has it
+                can_do_without(untrusted)
         self.own_laws, self.own_effects = usable(laws), usable(effects)
+        return self.left_out()
+
+    def left_out(self) -> list[str]:
+        """Return why own laws and effects were left out when they were last read."""
         return [one.error for one in (*self.own_laws, *self.own_effects) if one.error]
 
     @property
@@ -211,7 +216,7 @@ class Study:
             lacking = ROLES[0] if not train else ROLES[1]
             raise StudyError(
                 f'{self.folder / "study.toml"}: no run has role = "{lacking}". Give it to some: a '
-                "model is judged on runs that it was not fitted to."
+                "model is tested on runs that it was not fitted to."
             )
         refuse_twins(train, holdout)
         twins = twins_within(train) + twins_within(holdout)
@@ -303,6 +308,7 @@ class Study:
             If there is no step to undo, or as for `add_step`.
         """
         with self.writing():
+            self.history.refuse_damaged()  # before an edit is kept
             self.history.keep_edit()
             step = self.history.undo()
             self._set_aside(step.number)

@@ -63,6 +63,16 @@ def test_the_truth_is_right_within_its_noise_and_a_wrong_model_is_not():
     assert wrong.total.rms > truth.total.rms
 
 
+def test_fit_and_variance_accounted_for_are_their_definitions():
+    found = compare(bench(), Model("lugre", (), {"sigma_2": 200.0}))
+    parts = [(one.measured[one.skip :], one.residual) for one in found.predictions]
+    measured, residual = (np.concatenate(group) for group in zip(*parts, strict=True))
+    about = np.sqrt(np.sum((measured - measured.mean()) ** 2))
+    assert found.total.fit == pytest.approx(1.0 - np.sqrt(np.sum(residual**2)) / about, rel=1e-12)
+    assert found.total.accounted == pytest.approx(1.0 - np.var(residual) / np.var(measured))
+    assert found.as_dict()["total"]["fit"] == found.total.fit
+
+
 def test_the_numerical_error_falls_with_the_step():
     run = bench(count=1, noise=1e-6).runs[0]
     finer = halved(run)
@@ -128,7 +138,7 @@ def test_sentences_say_the_numbers_of_a_spring_that_is_missing():
     held = predictions_with(lambda c: 40.0 * c["displacement"])
     found = compare_predictions(held)
     how, where, right = found.sentences
-    assert how.startswith("On runs it has not seen the model misses the force by")
+    assert how.startswith("On held-out runs the model misses the force by")
     rms, share, z = numbers(how)[:3]
     assert rms == pytest.approx(found.total.rms, rel=0.05)
     assert share == pytest.approx(100.0 * found.total.share, rel=0.05)
@@ -143,8 +153,8 @@ def test_sentences_say_the_numbers_of_a_spring_that_is_missing():
     # Beyond the edge the mean error is at least half of the largest.
     beyond = np.abs(found.first.centre) > 1e-3 * edge
     assert np.abs(found.first.mean[beyond]).min() > 0.4 * top
-    assert "at every voltage alike" in where
-    assert "Nowhere is it right within its noise" in right or "it is right within" in right
+    assert "the same at every voltage" in where
+    assert "The model is nowhere right within its noise" in right or "it is right within" in right
 
 
 def test_a_softer_spring_pushes_back_less():
@@ -178,18 +188,14 @@ def test_where_it_is_right_is_said():
 
 def test_nothing_is_said_of_noise():
     found = compare_predictions(predictions_with(n=6000))
-    assert "which its noise explains" in found.sentences[0]
-    assert found.sentences[1] == "What is left looks like noise along every coordinate."
+    assert "which the noise explains" in found.sentences[0]
+    assert found.sentences[1] == "The remaining error looks like noise along every coordinate."
     assert found.sentences[2].startswith("It is right within its noise at every speed and voltage")
 
 
 def test_the_runs_of_the_fit_are_called_so():
     held = predictions_with()
-    assert (
-        compare_predictions(held, seen=True)
-        .sentences[0]
-        .startswith("On the runs that it was fitted")
-    )
+    assert compare_predictions(held, seen=True).sentences[0].startswith("On the training runs")
     assert compare_predictions(held, seen=None).sentences[0].startswith("In this measurement")
 
 

@@ -83,7 +83,7 @@ def test_a_site_with_too_few_samples_is_said_to_tell_nothing():
         ("damper", True),
         ("layer", False),
     ]
-    assert "the isolation layer: too few samples to tell" in found.sentences[0]
+    assert "the isolation layer: too few samples for a statement" in found.sentences[0]
     assert found.as_dict()["sites"][1]["fails"] is False
 
 

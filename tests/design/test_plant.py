@@ -81,6 +81,18 @@ def test_both_laws_slide_alike() -> None:
     assert np.allclose(coefficients(Damper("lugre"), GRID, 0.005), bingham, rtol=1e-12)
 
 
+def test_a_design_takes_the_form_of_the_command_from_the_model() -> None:
+    line = coefficients(Damper("bingham"), GRID, 0.005)
+    table = coefficients(Damper("bingham[table 0 8]"), GRID, 0.005)
+    assert np.allclose(table, line, rtol=1e-12)  # its defaults lie on the line
+    bent = Damper("bingham[quadratic]", {"yield_force_bend": -0.05})
+    d, b = coefficients(bent, GRID, 0.005)
+    assert np.allclose(d, line[0])
+    assert (b[1:] < 0.7 * line[1][1:]).all()
+    with pytest.raises(DesignError, match="law"):
+        Damper("nobody[quadratic]")
+
+
 def test_the_standard_law_does_not_fall_with_speed() -> None:
     d, b = coefficients(Damper("bingham_standard"), GRID, 0.005)
     assert d == pytest.approx(1.3 / (GRID + 0.005) + 100.0)

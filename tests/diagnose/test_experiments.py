@@ -59,7 +59,7 @@ def test_a_plan_stays_within_what_the_rig_has_done():
     assert V.min() >= min(0.0, *(r.V.min() for r in problem.runs))
     assert V.max() <= max(r.V.max() for r in problem.runs)
     assert plan.sentence().startswith("Run a s")
-    assert "Go beyond" in replace(plan, deviations=1.0).sentence()
+    assert "Use a wider range" in replace(plan, deviations=1.0).sentence()
 
 
 def _run_of(samples: int):

@@ -45,7 +45,7 @@ def test_masses_that_are_off_are_found_and_no_fault_is_told(clean, doubt):
     assert {one.kind for one in after.values()} == {"none"}
     (text,) = text_of_masses(told, found)
     assert "floor1" in text
-    assert "load cell whose gain is off" in text
+    assert "cell whose gain is wrong" in text
 
 
 def test_right_masses_stay(clean):

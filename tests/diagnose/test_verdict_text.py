@@ -33,7 +33,7 @@ def said(**findings):
         ({"kind": "ambiguous", "effects": ["a", "b", "c"]}, "The model misses one of a, b and c. "),
         ({"kind": "unknown", "effects": []}, "The model misses something that no known effect"),
         ({"kind": "none", "effects": []}, "These data show nothing that the model misses."),
-        ({"kind": "insufficient", "effects": []}, "These data carry no verdict."),
+        ({"kind": "insufficient", "effects": []}, "These data do not allow a verdict."),
     ],
 )
 def test_every_kind_has_a_headline(verdict, says):

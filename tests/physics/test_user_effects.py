@@ -174,7 +174,7 @@ def test_the_template_conforms(
     [
         ({FORCE: "return -p.f_s * tanh(q.v / p.v_s)"}, "a closed cycle gives no energy"),
         ({FORCE: "return p.f_s * (1.0 + tanh(q.v / p.v_s))"}, "no force at rest"),
-        ({"Leaves out": "Lacks"}, "it says what it is"),
+        ({"Leaves out": "Lacks"}, "name, texts and source are complete"),
         ({"Parameter(0.2,": "Parameter(1e-6,"}, "changes the force by more than 1 %"),
     ],
     ids=lambda value: value if isinstance(value, str) else "",

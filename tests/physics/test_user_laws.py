@@ -66,6 +66,10 @@ BAD = [
         "def yielding",
     ),
     ({VISCOUS: "return -9.0 * p.c * q.v"}, "it creates energy: a closed cycle", ""),
+    # The yield force outweighs it until a fit lets that go to its bound.
+    ({VISCOUS: "return -p.c * q.v"}, "0 V, where f_c = 0, gives", ""),
+    ({"Parameter(1.3,": "Parameter(10**400,"}, "a dictionary such as", "class Rubbing"),
+    ({"Parameter(1.3,": "Parameter(10**5000,"}, "a dict that cannot be written", "class Rubbing"),
     ({"from math import tanh": "import socket"}, "socket is imported", "from math"),
     (
         {"from math import tanh": "from urllib.request import urlopen as tanh"},

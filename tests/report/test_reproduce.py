@@ -68,6 +68,17 @@ def test_the_commands_make_the_same_study(study: Study, capsys: pytest.CaptureFi
     assert read_model(first, again.folder) == read_model(study.history.model_file(0))
 
 
+def test_own_laws_and_effects_are_copied_before_anything_needs_them(study: Study) -> None:
+    study.laws_folder.mkdir()
+    (study.laws_folder / "oil.py").write_text("")
+    (study.effects_folder / "seal.py").write_text("")
+    assert [shlex.split(line) for line in commands(study)[2:5]] == [
+        ["mkdir", "-p", f"my rig{AGAIN}/laws"],
+        ["cp", "my rig/laws/oil.py", f"my rig{AGAIN}/laws/oil.py"],
+        ["cp", "my rig/effects/seal.py", f"my rig{AGAIN}/effects/seal.py"],
+    ]
+
+
 @pytest.mark.slow
 def test_all_of_them_run(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
     for line in commands(study):

@@ -169,7 +169,7 @@ def test_a_single_run_is_said_to_be_weaker(tmp_path):
     files = write_runs(tmp_path / "lab", 1, seconds=8.0)
     page = study_report(create_study(tmp_path / "one", files, law="bingham").study)
     checked(page)
-    assert "weaker than a run of its own" in text_of(page)
+    assert "weaker than a separate run" in text_of(page)
 
 
 @pytest.mark.parametrize(
@@ -219,7 +219,7 @@ def test_the_comparison_of_a_study_by_the_command(folder, capsys):
     assert answer["held_out"] is True
     assert Path(answer["picture"]).read_bytes().startswith(b"\x89PNG")
     assert main(["compare", str(folder), "--runs", "train"]) == 0
-    assert "On the runs that it was fitted to" in capsys.readouterr().out
+    assert "On the training runs" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -244,4 +244,4 @@ def test_values_have_the_digits_that_their_intervals_leave(value, std, told):
 def test_a_value_is_at_the_edge_only_where_it_stands_at_a_bound(value, low, told):
     known = Value(value, "N/m", low, 1e9, std=0.9)
     _, _, notes = parameter_table(StudyModel("lugre", parameters={"sigma_a": known}))
-    assert any("at the edge" in note for note in notes) is told
+    assert any("at a bound" in note for note in notes) is told

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from bristle.errors import FmuError, PhysicsError, RecordError
 from bristle.fmu.description import Description, Variable
-from bristle.scenario.library import Library
+from bristle.scenario.library import Library, damper_of, law_of
 
 BASE_MASS = 1.9693563369446  # kg
 
@@ -177,4 +177,6 @@ FAKE = Library(
     driven_mass=lambda building: BASE_MASS,
     check_controller=lambda name, controller, building: None,
     check_carried=lambda file, building: None,
+    damper_of=damper_of,
+    law_of=law_of,
 )

@@ -46,7 +46,7 @@ def test_the_ground_motion_after_the_structure_is_a_warning(told, tmp_path):
         "[components.voltage]", GROUND + "[components.voltage]"
     )
     (warning,) = told(text)
-    assert "[components.ground] stands after [components.structure]" in warning
+    assert "[components.ground] comes after [components.structure]" in warning
     assert "one step late" in warning
     (finding,) = check_scenario(tmp_path / "my.toml", library=FAKE)
     assert (tmp_path / "my.toml").read_text().splitlines()[

@@ -56,7 +56,7 @@ MISTAKES = [
     ("stop nan", "stop = 35.0", "stop = nan", "stop", ["nan, not a finite number"]),
     ("stop inf", "stop = 35.0", "stop = +inf", "stop", ["inf, not a finite number"]),
     ("stop true", "stop = 35.0", "stop = true", "stop", ["stop is true, not a number"]),
-    ("stop text", "stop = 35.0", 'stop = "35.0"', "stop", ["a number stands without quotes"]),
+    ("stop text", "stop = 35.0", 'stop = "35.0"', "stop", ["a number needs no quotes"]),
     ("stop words", "stop = 35.0", 'stop = "all"', "stop", ['the text "all", not a number']),
     ("stop a list", "stop = 35.0", "stop = [35.0]", "stop", ["is a list, not a number"]),
     ("stop a date", "stop = 35.0", "stop = 2020-01-01", "stop", ["not a number"]),
@@ -117,13 +117,13 @@ MISTAKES = [
      ["does not divide", "0.002 or 0.001"]),
     ("component step negative", DAMPER, f"{DAMPER}\nstep = -0.001", "-0.001",
      ["[components.damper] step = -0.001 s"]),
-    ("component step text", DAMPER, f'{DAMPER}\nstep = "0.001"', '"0.001"', ["without quotes"]),
+    ("component step text", DAMPER, f'{DAMPER}\nstep = "0.001"', '"0.001"', ["needs no quotes"]),
     ("component step absurd", DAMPER, f"{DAMPER}\nstep = 1e-12", "1e-12", ["at most 10000"]),
     # parameters
     ("unknown parameter", '"gas_spring.k"', '"gas_sprng.k"', "gas_sprng",
      ['no parameter "gas_sprng.k"', 'Did you mean "gas_spring.k"?']),
     ("parameter of text", '"gas_spring.k" = 80.0', '"gas_spring.k" = "80"', "gas_spring.k",
-     ["damper.gas_spring.k is the text", "without quotes", "in N/m"]),
+     ["damper.gas_spring.k is the text", "needs no quotes", "in N/m"]),
     ("parameter true", '"gas_spring.k" = 80.0', '"gas_spring.k" = true', "gas_spring.k",
      ["is true, not a number"]),
     ("parameter inf", '"gas_spring.k" = 80.0', '"gas_spring.k" = inf', "gas_spring.k",
@@ -162,9 +162,10 @@ MISTAKES = [
      ['"damper.velocity" [m/s] is fed by "structure.base_displacement" [m]', "another quantity"]),
     ("output fed by output", '"structure.damper_force" = "damper.force"',
      '"damper.dissipated_energy" = "damper.force"\n"structure.damper_force" = "damper.force"',
-     "dissipated_energy", ['"damper.dissipated_energy" is an output; an input stands on the left']),
+     "dissipated_energy",
+     ['"damper.dissipated_energy" is an output; an input belongs on the left']),
     ("input fed by input", '"voltage.voltage"', '"structure.extra_force"', "extra_force",
-     ['"structure.extra_force" is an input; an output stands on the right']),
+     ['"structure.extra_force" is an input; an output belongs on the right']),
     ("the wrong way round", '"damper.voltage" = "voltage.voltage"',
      '"voltage.voltage" = "damper.voltage"', '"voltage.voltage"',
      ["the wrong way round", '"damper.voltage" = "voltage.voltage"']),
@@ -192,7 +193,7 @@ MISTAKES = [
     # TOML itself
     ("no TOML", "step = 0.002", "step == 0.002", "step =", ["not TOML", "step == 0.002"]),
     ("decimal comma", "step = 0.002", "step = 0,002", "step =", ["not TOML", "one key = value"]),
-    ("no quotes", '"gauss-seidel"', "gauss-seidel", "algorithm", ["text stands in quotes"]),
+    ("no quotes", '"gauss-seidel"', "gauss-seidel", "algorithm", ["text needs quotes"]),
     ("broken inline table", '{ "gas_spring.on" = true,', '{ "gas_spring.on" = true,\n',
      "gas_spring.on", ["stays on one line"]),
     ("backslash", "el_centro_1940_ns", "C:\\my\\rec.csv", "record", ["single quotes"]),
@@ -472,4 +473,4 @@ def test_an_input_without_unit_takes_anything_and_says_so(foreign):
 def test_an_fmu_that_lives_once_cannot_be_two_components(foreign):
     again = '"structure.extra_force" = "mine.force"\n[components.twin]\nfmu = "once.fmu"\n[x]\n'
     errors = foreign("once.fmu", extra=again)
-    assert any("once.fmu can live once in a process" in error for error in errors)
+    assert any("once.fmu allows one instance per process" in error for error in errors)

@@ -146,6 +146,30 @@ def test_fmu_that_raises_while_it_is_made_says_why(scenario_of: Maker, tmp_path:
         Instance("ramp", description, unpacked.folder(broken), lambda message: None)
 
 
+def test_ctrl_c_while_an_fmu_is_made_is_no_failure_of_it(
+    scenario_of: Maker, tmp_path: Path
+) -> None:
+    import zipfile
+
+    from bristle.fmu.description import read_description
+    from bristle.simulate import session
+
+    slow = tmp_path / "slow.fmu"
+    signals = b"import os\nimport signal\nos.kill(os.getpid(), signal.SIGINT)\n"
+    with zipfile.ZipFile(scenario_of.toys["Ramp"]) as old, zipfile.ZipFile(slow, "w") as new:
+        for name in old.namelist():
+            data = old.read(name)
+            if name.endswith("ramp_toy.py"):
+                data = data.replace(b"import os\n", signals)
+            new.writestr(name, data)
+    description, said = read_description(slow), list[session.Message]()
+    known = dict(session._LISTENERS)
+    with session.Unpacked() as unpacked, pytest.raises(KeyboardInterrupt):
+        session.Instance("ramp", description, unpacked.folder(slow), said.append)
+    assert said == []
+    assert known == session._LISTENERS
+
+
 def test_python_that_offers_no_symbols_is_explained(
     scenario_of: Maker, monkeypatch: pytest.MonkeyPatch
 ) -> None:

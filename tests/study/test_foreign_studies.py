@@ -82,6 +82,34 @@ def test_a_step_of_another_version(rig: Path, capsys: pytest.CaptureFixture[str]
     assert "step.json: schema is 2" in text
 
 
+@pytest.mark.parametrize("harm", ["newer", "step gone", "model gone"])
+def test_a_step_is_not_taken_back_to_one_that_cannot_be_read(
+    harm: str, rig: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = rig / "history" / "000"
+    if harm == "newer":
+        (before / "step.json").write_text('{"schema": 5}')
+    else:
+        (before / ("step.json" if harm == "step gone" else "model.toml")).unlink()
+    with (rig / "model.toml").open("a") as model:
+        model.write("# edited\n")
+    text = refused(rig, capsys, "undo")
+    assert str(Path("history") / "000") in text
+    assert len(text.splitlines()) == 1
+
+
+def test_an_effect_that_is_gone_is_told_once(rig: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = rig / "model.toml"
+    changed(model, "[effects.stribeck]", "[effects.seal]")
+    with model.open("a") as file:
+        file.write(
+            '\n[correlation]\nparameters = ["seal.a", "seal.b"]\nrows = [[1.0], [0.1, 1.0]]\n'
+        )
+    text = refused(rig, capsys, "identify", "compare", "report")
+    assert len(text.splitlines()) == 1
+    assert 'there is no effect "seal"' in text
+
+
 def test_an_effect_that_this_version_lacks_is_told_with_the_version(
     rig: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -53,7 +53,7 @@ def test_crank_driven_damper_needs_a_spring_beside_its_law():
     assert 250.0 < at_top < 794.0
     # It is not the whole truth, and says so.
     assert spring.after["z_holdout"] > 1.15
-    assert any("more than noise" in note for note in spring.notes)
+    assert any("exceeds the noise" in note for note in spring.notes)
 
 
 def fit_percent(found):

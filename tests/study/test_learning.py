@@ -14,7 +14,7 @@ from bristle.errors import RecordError, StudyError
 from bristle.study import learning
 from bristle.study.create import create_study
 from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects, diagnose_study, learn
+from bristle.study.learning import add_effects, complete, diagnose_study
 from bristle.study.public import diagnose
 from bristle.study.study import Study
 from tests.independent.generate import make_case
@@ -156,11 +156,11 @@ def test_what_was_learnt_before_a_kill_is_kept(study):
         raise Killed
 
     with pytest.raises(Killed):
-        learn(study, on_step=killed)
+        complete(study, on_step=killed)
     again = Study(study.folder)
     assert list(again.model().effects) == ["gas_spring"]
     assert len(again.steps()) == steps + 1
-    learnt = learn(again)
+    learnt = complete(again)
     assert learnt.verdict.kind == "none"
     assert learnt.steps == ()
     assert len(again.steps()) == steps + 1
@@ -174,7 +174,7 @@ def test_a_kill_within_a_diagnosis_leaves_the_study_as_it_was(study, monkeypatch
 
     monkeypatch.setattr(learning, "diagnose_rig", killed)
     with pytest.raises(Killed):
-        learn(study)
+        complete(study)
     assert Study(study.folder).model().effects == {}
     assert (study.folder / "verdict.json").read_text() == before
 

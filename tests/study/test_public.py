@@ -236,7 +236,7 @@ WRONG = {
     "a model's file": (lambda: bristle.identify(RUN, "gone.toml"), StudyError, "no such file"),
     "no model": (lambda: bristle.compare(RUN), StudyError, "compare needs a model"),
     "role": (lambda: bristle.compare(RUN, "bingham", role="test"), StudyError, "train or holdout"),
-    "twins": (lambda: bristle.identify(RUN, holdout=RUN), StudyError, "it can judge nothing"),
+    "twins": (lambda: bristle.identify(RUN, holdout=RUN), StudyError, "it tests nothing"),
     "building": (lambda: bristle.identify(RUN, building=3), StudyError, "a building's file"),
     "scenario": (lambda: bristle.run(3), RunError, "the scenario is 3"),
     "overrides": (lambda: bristle.run("no_damper", ["a"]), RunError, "a mapping such as"),

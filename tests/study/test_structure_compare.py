@@ -63,7 +63,7 @@ def test_no_site_of_a_clean_building_fails(clean):
         assert not any(one.fails for one in found.sites)
         assert all(0.85 < one.z < 1.1 for one in found.sites)
         assert found.site == "damper"
-        assert "which its noise explains" in found.sentences[0]
+        assert "which the noise explains" in found.sentences[0]
         assert "the isolation layer and storey 1 are right within their noise" in found.sentences[0]
         assert "fails" not in " ".join(found.sentences)
 

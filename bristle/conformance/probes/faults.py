@@ -174,4 +174,4 @@ def fault_earlier_state(bench: Bench) -> Finding:
     rows += bench.run(instance, half)
     if difference := bench.differs(rows, bench.reference()):
         return failed(difference)
-    return passed("the run goes on as if nothing had been")
+    return passed("the run continues without a trace of the fault")

@@ -171,14 +171,14 @@ def _beside(bench: Bench, other: Bench, *, companion_first: bool) -> Finding:
     difference = bench.differs(rows, bench.reference())
     if difference:
         return judged(bench, f"beside {name}: {difference}")
-    return passed(f"runs beside {name} as if it were alone")
+    return passed(f"runs beside {name} exactly as alone")
 
 
 @probe(
     "bare interpreter",
     rule="robustness",
     tried="a run in an interpreter without installed packages",
-    standard="No clause. For FMUs that carry Python code: what they import beyond the standard "
+    standard="No clause. For FMUs that contain Python code: what they import beyond the standard "
     "library is missing elsewhere, although needsExecutionTool is not claimed.",
     unless=lambda plan: (
         "needsExecutionTool is claimed" if plan.claims("needsExecutionTool") else None
@@ -209,7 +209,7 @@ def bare_interpreter(bench: Bench) -> Finding:
 def memory(bench: Bench) -> Finding:
     """Measure growth per life once the first lives have warmed up."""
     if not Path("/proc/self/statm").exists():
-        return noted("not measured: this platform does not tell")
+        return noted("not measured: this platform does not report it")
     lives = max(3, bench.plan.instances)
     for _ in range(lives // 2):
         _life(bench)

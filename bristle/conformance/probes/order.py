@@ -259,7 +259,7 @@ def variable_steps(bench: Bench) -> Finding:
     "split steps",
     tried="each step as two halves",
     standard=f"FMI 2.0 section 4.3.1: {_VARIABLE} promises that shorter steps are taken; section "
-    "4.2.2: an FMU integrates exactly to the end of each. How far results may move is not said.",
+    "4.2.2: an FMU integrates exactly to the end of each. It does not limit the change.",
     unless=unless_claimed(_VARIABLE),
 )
 def split_steps(bench: Bench) -> Finding:

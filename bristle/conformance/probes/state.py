@@ -25,8 +25,8 @@ _COPY, _BYTES = "canGetAndSetFMUstate", "canSerializeFMUstate"
     "state replay",
     tried="fmi2GetFMUstate in mid-run, on to the end, fmi2SetFMUstate, on to the end; twice, and "
     "once after the same copy was overwritten at another time",
-    standard=f"FMI 2.0 section 2.1.8, with {_COPY}: the copy holds everything, so going on from it "
-    "gives the same results",
+    standard=f"FMI 2.0 section 2.1.8, with {_COPY}: the copy contains everything, so continuing "
+    "from it gives the same results",
     unless=unless_claimed(_COPY),
 )
 def state_replay(bench: Bench) -> Finding:
@@ -147,7 +147,7 @@ def serialised_state(bench: Bench) -> Finding:
     difference = _revived(bench, data, wanted)
     if difference:
         return failed(difference)
-    return passed(f"{len(data)} bytes; a fresh instance goes on bit by bit")
+    return passed(f"{len(data)} bytes; a fresh instance continues bit by bit")
 
 
 @probe(
@@ -180,4 +180,4 @@ def state_across_processes(bench: Bench) -> Finding:
             if bench.plan.repeatable
             else noted(f"not judged, since no two runs are equal: {difference}")
         )
-    return passed("a fresh process goes on bit by bit")
+    return passed("a fresh process continues bit by bit")

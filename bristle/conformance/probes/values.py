@@ -35,10 +35,10 @@ def _strange_input(bench: Bench, value: float) -> Finding:
     if bench.plan.repeatable:
         difference = bench.differs(bench.whole_run(instance), bench.reference())
         if difference:
-            return failed(f"fmi2Reset does not mend it: {difference}", rule="standard")
+            return failed(f"fmi2Reset does not clear it: {difference}", rule="standard")
     silent = [a for a in answers if a.endswith("OK")]
     if silent:
-        return noted(f"taken without a word: {some(silent)}")
+        return noted(f"accepted without a message: {some(silent)}")
     return passed(some(answers))
 
 
@@ -56,7 +56,7 @@ def _answer(bench: Bench, instance: Instance, v: Variable, value: float) -> str:
 
 _STRANGE = (
     "No clause on inputs that are no numbers. The host must survive, and section 2.1.6 demands "
-    "that fmi2Reset mends it; a value taken without a word is a note."
+    "that fmi2Reset clears it; a value accepted without a message is a note."
 )
 
 

@@ -98,7 +98,7 @@ def _clipped(
         f"stretches, "
         f"{plain(100.0 * share, 2)} % of the samples: it is cut off by its instrument or "
         f"amplifier.",
-        "Repeat the run with a larger range, or leave it out: what is cut off is lost.",
+        "Repeat the run with a larger range, or leave it out: saturated samples are lost.",
         run.name,
         channel,
         share,
@@ -165,7 +165,7 @@ def _drift(run: Measurement, x: Array, velocity: Array | None) -> Iterator[Findi
             f"displacement runs from {plain(1e3 * float(x.min()), 4)} to "
             f"{plain(1e3 * float(x.max()), 4)} mm: "
             "its zero is not the middle of the motion.",
-            "Effects of position are told from such data only up to that zero.",
+            "Such data show effects of position only up to that zero.",
             run.name,
             "displacement",
             abs(middle) / span,
@@ -185,7 +185,7 @@ def _force_offset(run: Measurement, force: Array, velocity: Array) -> Iterator[F
         f"force at equal speeds to both sides has a mean of {plain(offset, 4)} N "
         f"({plain(100 * offset / rms)} % of its RMS): the zero of the load cell, a preload, or an "
         "asymmetric damper.",
-        "Note the load cell's reading without a damper; asymmetry shows only beside it.",
+        "Note the load cell's reading without a damper; asymmetry shows only with it.",
         run.name,
         "force",
         abs(offset) / rms,

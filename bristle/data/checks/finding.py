@@ -49,5 +49,5 @@ def sentence(finding: Finding, runs: list[str]) -> str:
     """Return one finding as text: where, what, and in how many other runs."""
     where = f"{finding.run}: " if finding.run else ""
     others = len(set(runs)) - 1
-    also = f" (likewise in {others} other run{'s' * (others > 1)})" if others > 0 else ""
+    also = f" (the same in {others} other run{'s' * (others > 1)})" if others > 0 else ""
     return f"{where}{finding.text}{also}"

@@ -47,9 +47,9 @@ def check_motion(run: Measurement, level: str = "") -> Iterator[Finding]:
             yield Finding(
                 "derived",
                 "note",
-                f"{v} is the numerical derivative of {x} ({own}): it says nothing of its own, and "
+                f"{v} is the numerical derivative of {x} ({own}): it adds no information, and "
                 "its noise is that of the displacement.",
-                f"Take {v} out of [channels], or record it with an instrument of its own.",
+                f"Remove {v} from [channels], or record it with a separate instrument.",
                 run.name,
                 v,
             )
@@ -88,7 +88,7 @@ def check_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
         yield Finding(
             "sign",
             "error",
-            f"force drives the motion, for it is positive along it ({text}).",
+            f"force drives the motion, because it is positive along it ({text}).",
             "Turn sign in [channels.force]: a force is positive when it resists motion along +x.",
             run.name,
             "force",
@@ -98,7 +98,7 @@ def check_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
         yield Finding(
             "sign",
             "warning",
-            f"force neither resists nor drives the motion ({text}): its sign cannot be told.",
+            f"force neither resists nor drives the motion ({text}): its sign cannot be determined.",
             "Check that force and motion were recorded together.",
             run.name,
             "force",
@@ -125,7 +125,7 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
         f"{upper} is {plain(found.gain, 4)} (+-{plain(2 * found.gain_std, 1)}) times the "
         f"derivative of {lower}"
     )
-    after = f"; what is left is {plain(100 * found.residual, 2)} % of it"
+    after = f"; the remainder is {plain(100 * found.residual, 2)} % of it"
     off = abs(found.gain - 1.0)
     if found.gain < 0.0 or off > 0.25:
         size = abs(found.gain)

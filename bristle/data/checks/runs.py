@@ -143,7 +143,7 @@ def _too_short(runs: list[Excitation]) -> Iterator[Finding]:
             "error",
             f"all runs together hold {plain(total, 2)} cycles of motion in {plain(seconds)} s: "
             f"too few for "
-            "a model to be fitted and judged.",
+            "a model to be fitted and tested.",
             "Record ten cycles or more at several speeds.",
         )
         return
@@ -199,7 +199,7 @@ def _moving_drive(runs: list[Excitation], name: str, unit: str) -> Iterator[Find
             "warning",
             f"{name} has two levels, {plain(levels[0], 4)} and {plain(levels[1], 4)} {unit}: "
             f"saturation cannot "
-            "be told from a force that grows evenly with it.",
+            "be distinguished from a force that is linear in it.",
             "Use three levels or more.",
         )
 
@@ -235,7 +235,7 @@ def _beyond(train: list[Excitation], holdout: list[Excitation], parts: bool) -> 
                     "warning",
                     f"{name} reaches {plain(factor * value(run))} {unit}, and "
                     f"{plain(factor * known)} in "
-                    "the runs for training: the model is judged where it was not fitted.",
+                    "the runs for training: the model is tested outside the range of the fit.",
                     _exchange(run, train, holdout, checks) if not parts else _ANOTHER,
                     run.run,
                     name,
@@ -295,7 +295,7 @@ def _two_rigs(runs: list[Excitation]) -> Iterator[Finding]:
                 f"force resists with {quantity(own, 'N', 4, usual)} on average, and with "
                 f"{quantity(usual, 'N', 4)} in the middle one of {len(alike)} runs of like "
                 f"{known[0].drive or 'command'} and speed.",
-                "Is it of another damper, or in another unit? Then keep it in a study of its own.",
+                "Is it of another damper, or in another unit? Then use a separate study.",
                 run.run,
                 "force",
                 abs(np.log(ratio)),

@@ -170,7 +170,7 @@ def _header(
         if sum(state_of(one, layout.comma) == "number" for one in names) > wide / 2:
             raise RecordError(
                 f'{name}, line {k + 1}: "{shortened(above[k].strip())}" is neither titles nor a '
-                "row of numbers like those below it. Mend or remove it."
+                "row of numbers like those below it. Correct or remove it."
             )
         if k:
             notes.append(f"titles in line {k + 1}, numbers from line {first + 1} on")

@@ -103,7 +103,7 @@ def velocity_sign(search: Search, x: str, v: str) -> tuple[int, str]:
     found = derivative_relation(search.column(x), search.column(v), search.step)
     if found is None or abs(found.correlation) < 0.9 or found.gain > 0.0:
         return 1, ""
-    return -1, f'turned, for the derivative of "{x}" has the opposite sign'
+    return -1, f'turned, because the derivative of "{x}" has the opposite sign'
 
 
 def force_sign(force: Array, velocity: Array) -> tuple[int, str, str]:
@@ -114,7 +114,7 @@ def force_sign(force: Array, velocity: Array) -> tuple[int, str, str]:
     if share < 0.0:
         return (
             -1,
-            f"turned, for as recorded it would drive the motion (share of power {share:+.2f})",
+            f"turned, because as recorded it would drive the motion (share of power {share:+.2f})",
             "",
         )
     return 1, f"it resists the motion (share of power {share:+.2f})", ""

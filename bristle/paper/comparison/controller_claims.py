@@ -237,7 +237,7 @@ def windows(n: Numbers) -> Verdict:
         verdict_word(wanted <= set(n.cases()) and right and both),
         f"{len(n.cases())} cases; run over "
         + ", ".join(f"{name}: {value:g} s" for name, value in seconds.items()),
-        "The tables' RMS values are over the records as published; those over these windows stand "
+        "The tables' RMS values are over the records as published; those over these windows are "
         "in comparison.csv.",
     )
 

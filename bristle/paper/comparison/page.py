@@ -101,7 +101,7 @@ def page(report: Report) -> str:
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        "<title>The paper's comparison of controllers, done anew</title>\n"
+        "<title>The paper's comparison of controllers, repeated</title>\n"
         f"<style>{_STYLE}</style>\n</head>\n<body>\n<main>\n{''.join(parts)}</main>\n</body>\n"
         "</html>\n"
     )
@@ -120,12 +120,12 @@ def _head(report: Report, count: Counter[str]) -> str:
     )
     stroke = '<a href="#stroke">Stroke</a>' if stroke_text(report.comparison) else ""
     return f"""<header>
-<h1>Semi-active control of a base-isolated structure: the paper's comparison, done anew</h1>
+<h1>Semi-active control of a base-isolated structure: the paper's comparison, repeated</h1>
 <p class="lead">Of {total} statements in the text of Shirazi, Mohammadpour, Grigoriadis and Song
 (2012), {count[REPRODUCED]} are reproduced, {count[NOT]} are not, and {count[UNDECIDABLE]} cannot be
-decided from what the text tells.</p>
+decided from the text.</p>
 <div class="bar" role="img" aria-label="verdicts">{bar}</div>
-<nav><a href="#ledger">Ledger</a>{tables}{stroke}<a href="#figures">Figures</a>
+<nav><a href="#ledger">Statements</a>{tables}{stroke}<a href="#figures">Figures</a>
 <a href="#designs">Designs</a></nav>
 </header>
 """
@@ -146,10 +146,10 @@ def _setting(report: Report) -> str:
 base and table, and {len(LAWS)} laws for its voltage: {escape(laws)}. Controllers sample at 500 Hz;
 structure, damper and controller are solved as one system. "LPV" has the anti-windup rate
 λ = 200 1/s.</p>
-<p class="note"><b>What is not the paper's own.</b> Its tables and matrices are lost to this
-project: damper parameters, weights of the designs, and the factor {KAPPA:g} on the nominal peak of
-every ground motion are reconstructed so that its text holds as far as it can. Orders and shapes can
-be compared; values cannot.</p>
+<p class="note"><b>What is not the paper's own.</b> Its tables and matrices are not available:
+damper parameters, weights of the designs, and the factor {KAPPA:g} on the nominal peak of every
+ground motion are reconstructed so that they agree with the text as far as possible. Orders and
+shapes can be compared; values cannot.</p>
 <table><thead><tr><th>Ground motion</th><th>Nominal peaks</th><th>RMS over the record of</th>
 <th>The paper runs</th></tr></thead><tbody>{rows}</tbody></table>
 {note}
@@ -167,8 +167,8 @@ def _claims_table(claims: list[tuple[Statement, Verdict]]) -> str:
         for s, v in claims
     )
     return f"""<section>
-<h2 id="ledger">The ledger</h2>
-<p>Each statement of the text, in other words, with the number found here. Verdicts are computed
+<h2 id="ledger">The statements of the text</h2>
+<p>Each statement of the text, rephrased, with the number found here. Verdicts are computed
 from the tables below; "peak y" is the peak absolute acceleration of floor 2. Lists run from the
 weakest to the strongest intensity.</p>
 <div class="scroll"><table class="ledger"><thead><tr><th></th><th>Statement</th><th>Verdict</th>
@@ -200,7 +200,7 @@ def _figures(report: Report) -> str:
     )
     return f"""<section>
 <h2 id="figures">Figures</h2>
-<p>Numbers are the paper's; its text tells what each figure shows, and the arrangement is this
+<p>Figure numbers are the paper's. Its text says what each figure shows; the arrangement is this
 project's. Figures without a number are this project's own.</p>
 {figures}</section>
 """
@@ -231,11 +231,11 @@ def _designs(report: Report) -> str:
         )
     return f"""<section>
 <h2 id="designs">The designs</h2>
-<p>Made for this report, verified after the solver, and written beside it:
-<code>hinf.json</code> serves the clipped-optimal law and the inverses, <code>lpv.json</code> the
-LPV law.</p>
+<p>Made for this report, verified after the solver, and written to the same folder:
+<code>hinf.json</code> is for the clipped-optimal law and the inverses, <code>lpv.json</code> for
+the LPV law.</p>
 <div class="scroll"><table class="numbers"><thead><tr><th>Design</th><th>gamma</th>
-<th>closed-loop norm, computed anew</th><th>largest real part of its poles [1/s]</th>
+<th>closed-loop norm, recomputed</th><th>largest real part of its poles [1/s]</th>
 <th>largest pole of the sampled loop</th></tr></thead><tbody>{"".join(rows)}</tbody></table></div>
 </section>
 """
@@ -247,7 +247,7 @@ def _foot(report: Report) -> str:
     return f"""<footer>
 <p>bristle {__version__}; <code>{command}</code>; {len(report.comparison.table)} runs of the
 comparison and those behind Figs 5 and 9 in {report.seconds:.0f} s, designs included. Every number
-stands in the CSV files beside this page.</p>
+is in the CSV files of this folder.</p>
 <p>F. A. Shirazi, J. Mohammadpour, K. M. Grigoriadis, G. Song: Identification and Control of an MR
 Damper With Stiction Effect and its Application in Structural Vibration Mitigation. IEEE
 Transactions on Control Systems Technology 20(5), 2012.</p>

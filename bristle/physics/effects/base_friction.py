@@ -1,4 +1,4 @@
-"""Dry friction in the isolation layer."""
+"""Dry friction in the isolation layer, or in a damper."""
 
 from math import exp
 
@@ -6,7 +6,7 @@ from ..effect import Effect, Parameter
 
 
 class BaseFriction(Effect):
-    """Base friction: the slider under the base rubs, and while it sticks carries what holds it.
+    """Base friction: a dry contact under the base, or in the damper, rubs, and holds as it sticks.
 
         |F| <= limit mu,   mu = 1 - (1 - slow) exp(-|v|/v_r);   with x_s: F = limit mu m
 
@@ -25,7 +25,7 @@ class BaseFriction(Effect):
         "Coulomb (1821), Theorie des machines simples; speed: Constantinou, Mokha & Reinhorn "
         "(1990), J. Struct. Eng. 116(2), 455-474; time stepping: Moreau (1988), CISM 302"
     )
-    expect = "base motion smaller than predicted and stuck in weak shaking"
+    expect = "an error with the sign of the velocity; motion smaller than predicted, or none at all"
     states = {"share": "1"}
     parameters = {
         "limit": Parameter(0.5, "N", (0.0, 1e7), "friction force at high speed"),
@@ -36,8 +36,7 @@ class BaseFriction(Effect):
     start_shares = ({"limit": (0.1,), "x_s": (0.0, 0.05), "v_r": (0.1,)},)
     absorbed_by = "yield"
     lookalikes = {
-        "f_c of the damper": "friction under the base and the damper's own yield force add up to "
-        "one force"
+        "f_c of the damper": "dry friction and the damper's own yield force add up to one force"
     }
 
     @staticmethod

@@ -13,6 +13,7 @@ class Saturation(Effect):
 
     name = "saturation"
     sites = ("damper",)
+    kind = "command curve"
     needs = ("V",)
     passive = True
     zero_at_rest = True

@@ -1,0 +1,159 @@
+"""What is learned where no effect of the library explains the error, and on runs that hide nothing.
+
+    python -m benchmarks learned --outside 24 --none 24
+
+makes what is missing of these figures, with the generator of the blind benchmark, and prints them;
+without a number it prints what is there.
+
+outside    bench cases at 15 and 40 % with an effect that the library does not have: z on held-out
+           runs before and after, and the closed form
+none       bench cases that hide nothing: nothing must be learned
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bristle.diagnose.learned.closed import GOOD, closed_forms
+from bristle.diagnose.learned.fit import fit_closed, learn
+from bristle.diagnose.opening import Insufficient, opening
+from bristle.identify.model import Model
+from bristle.resources import cache_folder
+
+from ._blind import cases, work
+from ._blind.plan import make_plan
+from ._blind.subject import measurements
+from ._rows import Row
+
+SEED = 12
+ADEQUATE = 1.5
+"""z up to which a learned curve holds what was missing."""
+
+RIGHT = {
+    "bow": ("displacement", {"parabola", "power"}),
+    "taper": ("displacement", {"line"}),
+    "detent": ("displacement", {"ripple"}),
+    "rings": ("displacement", {"ripple"}),
+    "thixotropic": ("rebuilding", {"line"}),
+    "ageing": ("rebuilding", {"logarithm", "line", "levelling off", "hyperbola"}),
+    "jamming": ("speed", {"threshold", "levelling off"}),
+    "power": ("speed", {"threshold"}),
+}
+"""Signal and closed forms that name a hidden form; a fixture's resonance is no curve."""
+
+Answer = dict[str, Any]
+
+
+def run() -> list[Row]:
+    """Return the rows of what has been made so far."""
+    return rows(_kept())
+
+
+def main(given: list[str]) -> int:
+    """Make what is missing of the figures, print them."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks learned", description=__doc__)
+    for name in ("outside", "none"):
+        parser.add_argument(f"--{name}", type=int, default=0, metavar="CASES")
+    chosen = parser.parse_args(given)
+    done = _kept()
+    for kind, number in _jobs(chosen):
+        key = json.dumps([kind, number])
+        if key not in done:
+            done[key] = answer = _answered(kind, number)
+            with _path().open("a", encoding="utf-8") as file:
+                file.write(json.dumps({"key": key, **answer}) + "\n")
+            print(key, answer, file=sys.stderr)
+    for row in rows(done):
+        print(f"{row.name}: {row.measured} (goal {row.goal})")
+    return 0
+
+
+def _jobs(chosen: argparse.Namespace) -> Iterator[tuple[str, int]]:
+    yield from (("outside", k) for k in range(chosen.outside))
+    yield from (("none", k) for k in range(chosen.none))
+
+
+def rows(done: dict[str, Answer]) -> list[Row]:
+    """Return the rows of what has answers."""
+    out = []
+    hidden = [one for key, one in done.items() if json.loads(key)[0] == "outside"]
+    if hidden:
+        z = np.array([one.get("z", np.inf) for one in hidden])
+        middle, share = float(np.median(z)), float(np.mean(z <= ADEQUATE))
+        before = float(np.median([one.get("z_before", np.inf) for one in hidden]))
+        text = f"{middle:.2f}, before {before:.2f} ({len(hidden)} cases)"
+        out.append(Row("learned: z of outside effects, median", text, "<= 1.2", middle / 1.2))
+        text = f"{share:.0%} of {len(hidden)}"
+        out.append(Row("learned: z <= 1.5", text, ">= 80 %", 0.8 / max(share, 1e-3)))
+        able = [one for one in hidden if one.get("form") in RIGHT]
+        named = float(np.mean([bool(one.get("named")) for one in able])) if able else 0.0
+        text = f"{named:.0%} of {len(able)}"
+        out.append(Row("learned: closed form named", text, ">= 60 %", 0.6 / max(named, 1e-3)))
+    clean = [one for key, one in done.items() if json.loads(key)[0] == "none"]
+    if clean:
+        wrong = sum(bool(one.get("learned")) or "error" in one for one in clean)
+        text = f"{wrong} of {len(clean)}"
+        out.append(Row("learned: curves where nothing is missing", text, "0", float(wrong)))
+    return out
+
+
+def _answered(kind: str, number: int) -> Answer:
+    """Return what was learned of a case; an error is an answer too."""
+    able = [
+        task
+        for task in make_plan(SEED, 3 * (number + 1) + 12, kind)
+        if task.noise == 0.01 and (kind == "none" or task.strength > 0.05)
+    ]
+    task = able[number]
+    about = {"effect": task.effect, "form": task.form, "strength": task.strength, "law": task.law}
+    try:
+        return about | _learned(cases.load(task), task.law)
+    except Exception:  # whatever it is, it is the method's failure on this case
+        return about | {"error": traceback.format_exc()}
+
+
+def _learned(case: cases.Recorded, law: str) -> Answer:
+    train, held_out = (
+        measurements(case.part(role), case.channels) for role in ("train", "holdout")
+    )
+    opened = opening(train, held_out, Model(law))
+    if isinstance(opened, Insufficient):
+        return {"learned": False, "why": list(opened.reasons)}
+    before = {"z_before": opened.before.z}
+    found = learn(opened, "learned_1")
+    if found.refused or found.curve is None or found.after is None:
+        return before | {"learned": False, "z": opened.before.z, "why": found.refused}
+    forms = closed_forms(found.curve, found.std)
+    curve, z = found.curve, found.after.z
+    out = {"learned": True, "part": curve.part, "along": curve.along, "z_table": z}
+    if forms:
+        best = forms[0]
+        out |= {"name": best.name, "left": best.left}
+        closed = fit_closed(opened, found, best) if best.left <= GOOD else None
+        z = closed.trial.z if closed else z
+        out["closed"] = closed is not None
+        signal, names = RIGHT.get(case.task.form, ("", set()))
+        out["named"] = best.left <= GOOD and curve.along == signal and best.name in names
+    return before | out | {"z": z}
+
+
+def _path() -> Path:
+    """Return the record of this code's answers."""
+    digest = work.digests()["diagnosis"]
+    folder = cache_folder() / "learned"
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / f"{digest}.jsonl"
+
+
+def _kept() -> dict[str, Answer]:
+    path = _path()
+    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+    return {one.pop("key"): one for one in map(json.loads, lines)}

@@ -1,0 +1,85 @@
+"""Learn what no known effect explains: a curve inside the model, as an effect of the study.
+
+A spline along displacement, speed, acceleration, the command or a memory of these acts as an added
+force, a factor of a part of the law, or a map of the command. It is kept where it lowers the error
+on held-out runs beyond chance.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Collection
+from pathlib import Path
+
+from ..findings import command
+from ._consent import add_trust
+
+HELP = "learn what no known effect explains, as an effect of the study"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle learn`."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument(
+        "--along", metavar="SIGNAL[,SIGNAL]", default="",
+        help="signals that the curve may depend on, such as displacement,speed; default all",
+    )  # fmt: skip
+    parser.add_argument(
+        "--as", dest="parts", metavar="PART[,PART]", default="",
+        help="on which part it may act: force, friction, yield, viscous, fluid, yield_field, "
+        "fluid_field, command; default all",
+    )  # fmt: skip
+    parser.add_argument("--name", default="", help="of the effect; default learned_1, learned_2")
+    parser.add_argument(
+        "--table", action="store_true", help="keep the table where a formula does as well"
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="show what is learned; write no effect"
+    )
+    add_trust(parser)
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Learn, write the effect's file, print what was found."""
+    from ..diagnose.learned.along import ALONG
+    from ..diagnose.learned.curve import PARTS
+    from ..study.curves import learn_effect
+    from ..study.study import Study
+
+    study = Study(arguments.folder)
+    found = learn_effect(
+        study,
+        parts=_listed(arguments.parts, PARTS, "--as"),
+        along=_listed(arguments.along, ALONG, "--along"),
+        name=arguments.name,
+        table=arguments.table,
+        write=not arguments.dry_run,
+    )
+    if arguments.json:
+        print(json.dumps(found.as_dict(), indent=2, ensure_ascii=False))
+        return 0
+    print("\n".join(found.sentences()))
+    for one in found.found.others:
+        print(
+            f"  also fitted: {one.curve.words()}, z = {one.trial.z:.2f} on held-out runs, "
+            f"{one.trial.train:.2f} on training runs"
+        )
+    if found.file is not None:
+        print(f"\nEffect:  {found.file}\nPicture: {found.picture}")
+        print(f"\nNext:  {command('add', arguments.folder, found.name)}")
+    elif found.found.refused:
+        print(f"\nNext:  {command('compare', arguments.folder)}")
+    return 0
+
+
+def _listed(text: str, known: Collection[str], option: str) -> list[str]:
+    from ..errors import StudyError
+    from ..findings import unknown
+
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    for name in names:
+        if name not in known:
+            raise StudyError(f"{option}: {unknown('signal or part', name, known)}")
+    return names

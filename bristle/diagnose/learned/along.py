@@ -1,0 +1,158 @@
+"""The signals along which a missing part may be learned: as histories, and as source of a hook."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+
+from ...identify.fit import Run
+
+Array = NDArray[np.float64]
+
+TIMES = (0.02, 0.1, 0.5, 2.5)
+"""Time constants [s] at which a memory is looked at."""
+
+WAYS = (0.3, 1.5)
+"""Travels that wear a structure down which rebuilds at rest, in RMS displacements."""
+
+_FADING = "    return ({signal} + (z.recent - {signal}) * exp(-q.dt / p.tau),)"
+
+_REBUILT = """    rate = 1.0 / p.tau + abs(q.v) / p.way
+    rest = 1.0 / (p.tau * rate)
+    return (rest + (z.built - rest) * exp(-q.dt * rate),)"""
+
+_TRAVEL = """    if q.v * z.way < 0.0:
+        return 0.0, -z.way
+    way = z.way
+    if way == 0.0:
+        way = 1.0 if q.v > 0.0 else -1.0
+    return z.travel + abs(q.v) * q.dt, way"""
+
+
+MEMORIES = {
+    "tau": ("s", "time over which it fades"),
+    "way": ("m", "travel that wears it down"),
+}
+"""Unit and meaning of the parameters of a memory."""
+
+
+@dataclass(frozen=True)
+class Along:
+    """A signal that a curve may depend on.
+
+    `name` and `unit` as in a verdict; `words` for sentences; `needs` the signals that a hook reads
+    for it, `source` their expression there; `history` gives it (n,) of a run and its memory's
+    parameters, of which `memory` has the names; `states` and `advance` are the memory of the hook,
+    `starts` as in `Effect`.
+    """
+
+    name: str
+    unit: str
+    words: str
+    needs: tuple[str, ...]
+    source: str
+    history: Callable[[Run, dict[str, float]], Array]
+    states: tuple[tuple[str, str], ...] = ()
+    starts: tuple[tuple[str, str], ...] = ()
+    advance: str = ""
+    memory: tuple[str, ...] = ()
+
+    def memories(self, dt: float, length: float, stroke: float) -> list[dict[str, float]]:
+        """Return the parameters of its memory to look at.
+
+        Parameters
+        ----------
+        dt, length : step and length of the runs [s]
+        stroke : their RMS displacement [m]
+        """
+        grids = {
+            "tau": [tau for tau in TIMES if 2.0 * dt <= tau <= length / 3.0],
+            "way": [share * stroke for share in WAYS],
+        }
+        return [
+            dict(zip(self.memory, node, strict=True))
+            for node in product(*(grids[n] for n in self.memory))
+        ]
+
+
+def faded(signal: Array, dt: float, tau: float, begin: float) -> Array:
+    """Return a signal (n,) behind a first-order lag.
+
+    Parameters
+    ----------
+    signal : (n,) in its unit
+    dt, tau : sampling step and time constant [s]
+    begin : what the lag shows at the first sample
+    """
+    keep = float(np.exp(-dt / tau))
+    middle = np.append(signal[:1], 0.5 * (signal[1:] + signal[:-1]))
+    out = lfilter([1.0 - keep], [1.0, -keep], middle[1:], zi=[keep * begin])[0]
+    return np.append(np.float64(begin), out)
+
+
+def travel_since_reversal(run: Run, _memory: dict[str, float]) -> Array:
+    """Return the travel (n,) [m] since the velocity last changed sign."""
+    steps = np.append(0.0, 0.5 * (np.abs(run.v[1:]) + np.abs(run.v[:-1])) * run.dt)
+    total = np.cumsum(steps)
+    turned = np.append(True, run.v[1:] * run.v[:-1] < 0.0)
+    last = np.maximum.accumulate(np.where(turned, np.arange(len(total)), 0))
+    return np.asarray(total - total[last])
+
+
+def rebuilt(run: Run, memory: dict[str, float]) -> Array:
+    """Return a structure (n,) that rebuilds at rest and is worn down by travel, 1 when whole.
+
+    Moore (1959), Trans. Br. Ceram. Soc. 58, 470-494: its rate is (1 - s)/tau - s |v|/way.
+    """
+    speed = np.append(0.0, 0.5 * (np.abs(run.v[1:]) + np.abs(run.v[:-1])))
+    rate = 1.0 / memory["tau"] + speed / memory["way"]
+    rest, keep = 1.0 / (memory["tau"] * rate), np.exp(-run.dt * rate)
+    out, now = np.empty(len(speed)), 0.0
+    for k in range(len(speed)):
+        now = rest[k] + (now - rest[k]) * keep[k] if k else 0.0
+        out[k] = now
+    return out
+
+
+def _fading(name: str, unit: str, words: str, signal: str, needs: str, start: str) -> Along:
+    def history(run: Run, memory: dict[str, float]) -> Array:
+        now = np.abs(run.v) if signal == "abs(q.v)" else getattr(run, needs)
+        return faded(now, run.dt, memory["tau"], float(now[0]) if start else 0.0)
+
+    return Along(
+        name, unit, words, (needs, "dt"), "z.recent", history, (("recent", unit),),
+        (("recent", start),) if start else (), _FADING.format(signal=signal), ("tau",),
+    )  # fmt: skip
+
+
+ALONG = {
+    one.name: one
+    for one in (
+        Along("displacement", "m", "displacement", ("x",), "q.x", lambda run, _: run.x),
+        Along("velocity", "m/s", "velocity", ("v",), "q.v", lambda run, _: run.v),
+        Along("speed", "m/s", "speed", ("v",), "abs(q.v)", lambda run, _: np.abs(run.v)),
+        Along("acceleration", "m/s2", "acceleration", ("a",), "q.a", lambda run, _: run.a),
+        Along("voltage", "V", "the command", ("V",), "q.V", lambda run, _: run.V),
+        Along(
+            "slowing", "m/s2", "acceleration along the motion", ("v", "a"),
+            "(q.a if q.v > 0.0 else -q.a)",
+            lambda run, _: np.where(run.v > 0.0, run.a, -run.a),
+        ),
+        Along(
+            "travel", "m", "travel since the last reversal", ("v", "dt"), "z.travel",
+            travel_since_reversal, (("travel", "m"), ("way", "1")), (), _TRAVEL,
+        ),
+        Along(
+            "rebuilding", "1", "a structure that rebuilds at rest", ("v", "dt"), "z.built", rebuilt,
+            (("built", "1"),), (), _REBUILT, ("tau", "way"),
+        ),
+        _fading("recent_displacement", "m", "recent displacement", "q.x", "x", "x"),
+        _fading("recent_speed", "m/s", "recent speed", "abs(q.v)", "v", ""),
+        _fading("recent_voltage", "V", "recent command", "q.V", "V", "V"),
+    )
+}  # fmt: skip

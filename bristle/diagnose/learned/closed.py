@@ -1,0 +1,214 @@
+"""Closed forms of a learned curve: which formula it follows, and what that leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...quantity import plain, quantity
+from ...units import canonical
+from .curve import Curve, Formula
+
+Array = NDArray[np.float64]
+
+NODES = 80
+"""Values of a parameter in which a form is not linear that are looked at."""
+
+GOOD = 0.12
+"""Share of a curve's variation that a form may leave to be its name."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """A formula c + m h(s), with a scale d or without, or c + m h(s) + n k(s).
+
+    `text` for readers; `columns` h and k as Python, of {s} and {d}, which a hook and numpy both
+    take; `scales` gives the values of d to look at for a span and the least distance of knots,
+    None where there is none.
+    """
+
+    name: str
+    text: str
+    columns: tuple[str, ...]
+    scales: Callable[[float, float], Array] | None = None
+
+    def count(self) -> int:
+        """Return how many numbers it has, the constant included."""
+        return 1 + len(self.columns) + (self.scales is not None)
+
+    def at(self, s: Array, d: float) -> Array:
+        """Return the columns (n, 1 + k) of a signal (n,), that of the constant first."""
+        given = [
+            eval(one.format(s="s", d="d"), dict(_NUMPY), {"s": s, "d": d}) for one in self.columns
+        ]
+        return np.stack([np.ones_like(s), *given], axis=1)
+
+
+_NUMPY: dict[str, Any] = {
+    **{one.__name__: one for one in (np.copysign, np.cos, np.exp, np.log, np.sin, np.tanh)},
+    "__builtins__": {}, "abs": np.abs, "max": np.maximum, "min": np.minimum,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """A form fitted to a curve: `left` the share of its variation that remains, as RMS.
+
+    `values` in the order c, m, d (and what the form has more), SI; `curve` (k,) at the knots.
+    """
+
+    form: Form
+    values: tuple[float, ...]
+    left: float
+    curve: tuple[float, ...]
+
+    @property
+    def name(self) -> str:
+        """The form's name."""
+        return self.form.name
+
+
+def _lengths(span: float, step: float) -> Array:
+    return np.geomspace(0.3 * step, 3.0 * span, NODES)
+
+
+def _pitches(span: float, step: float) -> Array:
+    return np.geomspace(2.0 * step, 2.0 * span, 4 * NODES)
+
+
+def _powers(_span: float, _step: float) -> Array:
+    return np.linspace(0.25, 4.0, 61)
+
+
+def _gaps(span: float, _step: float) -> Array:
+    return np.linspace(0.02, 0.9, NODES) * span
+
+
+_TURN = "6.283185307179586 * {s} / {d}"
+FORMS = (
+    Form("constant", "c", ()),
+    Form("line", "c + m s", ("{s}",)),
+    Form("parabola", "c + m s^2", ("{s} ** 2",)),
+    Form("quadratic drag", "c + m s |s|", ("{s} * abs({s})",)),
+    Form("cubic", "c + m s^3", ("{s} ** 3",)),
+    Form("power", "c + m sgn(s) |s|^d", ("copysign(1.0, {s}) * abs({s}) ** {d}",), _powers),
+    Form("exponential fall", "c + m exp(-|s|/d)", ("exp(-abs({s}) / {d})",), _lengths),
+    Form("bell", "c + m exp(-(s/d)^2)", ("exp(-(({s} / {d}) ** 2))",), _lengths),
+    Form("levelling off", "c + m tanh(s/d)", ("tanh({s} / {d})",), _lengths),
+    Form("hyperbola", "c + m/(1 + |s|/d)", ("1.0 / (1.0 + abs({s}) / {d})",), _lengths),
+    Form("logarithm", "c + m ln(1 + |s|/d)", ("log(1.0 + abs({s}) / {d})",), _lengths),
+    Form("threshold", "c + m/(1 + (d/s)^4)", ("{s} ** 4 / ({s} ** 4 + {d} ** 4)",), _lengths),
+    Form(
+        "dead band", "c + m sgn(s) max(|s| - d, 0)",
+        ("(max({s} - {d}, 0.0) + min({s} + {d}, 0.0))",), _gaps,
+    ),
+    Form(
+        "ripple", "c + m sin(2 pi s/d) + n cos(2 pi s/d)", (f"sin({_TURN})", f"cos({_TURN})"),
+        _pitches,
+    ),
+)  # fmt: skip
+
+
+def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
+    """Return the forms fitted to a curve, the best first; fewer numbers win where two are near.
+
+    Parameters
+    ----------
+    curve : as fitted
+    std : (k,) of its values; a knot that was held at zero counts as the surest of the others
+    """
+    s, y = np.array(curve.knots), np.array(curve.values)
+    given = np.array(std)
+    some = given[given > 0.0]
+    least = float(np.median(some)) if len(some) else 1.0
+    # What the data tell least must not decide, and no knot alone.
+    weight = 1.0 / np.hypot(np.where(given > 0.0, given, least), 0.02 * float(np.ptp(y)) + 1e-300)
+    size = _spread(y, weight)
+    if not size > 0.0:
+        return []
+    found = [_fitted(form, s, y, weight, size) for form in FORMS if form.count() + 1 <= len(s)]
+    return sorted(found, key=lambda one: one.left * 1.25 ** one.form.count())
+
+
+def formula_of(found: ClosedForm, curve: Curve) -> Formula:
+    """Return a closed form as an effect computes it, without the constant that a law has."""
+    s = curve.signal.source
+    unit, along = curve.of.unit, curve.signal.unit
+    per = {"line": 1, "parabola": 2, "quadratic drag": 2, "cubic": 3}.get(found.name, 0)
+    slope = canonical(unit + f"/({along})" * per)
+    if found.name == "line" and (curve.part, curve.along) in _PHYSICAL:
+        slope = _PHYSICAL[curve.part, curve.along][1]
+    found_at = dict(zip("cm", found.values[:2], strict=False))
+    names = [f"p.{n}" for n, _ in zip("mn", found.form.columns, strict=False)]
+    terms = [one.format(s=s, d="p.d") for one in found.form.columns]
+    g = " + ".join(f"{n} * {term}" for n, term in zip(names, terms, strict=True)) or "0.0"
+    given = [("m", found_at["m"], slope)] if terms else []
+    if found.form.scales is not None:
+        given.append(("d", found.values[2], "1" if found.name == "power" else along))
+    if len(terms) > 1:
+        given.append(("n", found.values[3], unit))
+    text = found.form.text
+    if curve.of.level:  # the law's own strength is the constant
+        text = text.removeprefix("c + ")
+    else:
+        given, g = [("c", found.values[0], unit), *given], f"p.c + {g}"
+    return Formula(g, text, tuple(given))
+
+
+def _fitted(form: Form, s: Array, y: Array, weight: Array, size: float) -> ClosedForm:
+    """Return a form at its best scale, its constants by weighted least squares."""
+    best: ClosedForm | None = None
+    span, step = float(np.max(np.abs(s))), float(np.min(np.diff(s)))
+    for d in form.scales(span, step) if form.scales else [1.0]:
+        A = form.at(s, float(d))
+        found = np.linalg.lstsq(A * weight[:, None], y * weight, rcond=1e-12)[0]
+        at = A @ found
+        left = float(np.sqrt(np.sum((weight * (y - at)) ** 2) / np.sum(weight**2))) / size
+        if best is None or left < best.left:
+            own = tuple(map(float, found))
+            values = (*own[:2], *(() if len(own) < 2 else (float(d),)), *own[2:])
+            best = ClosedForm(form, values, left, tuple(map(float, at)))
+    assert best is not None
+    return best
+
+
+def _spread(y: Array, weight: Array) -> float:
+    """Return the weighted RMS of values (k,) about their mean."""
+    mean = float(np.sum(weight**2 * y) / np.sum(weight**2))
+    return float(np.sqrt(np.sum((weight * (y - mean)) ** 2) / np.sum(weight**2)))
+
+
+def in_words(found: ClosedForm, curve: Curve) -> str:
+    """Return a form with its numbers, for a sentence: "a line, 320 N/m"."""
+    unit, along = curve.of.unit, curve.signal.unit
+    if found.name == "constant":
+        return f"a constant, {quantity(found.values[0], unit)}"
+    m, d, scaled = found.values[1], found.values[2], found.form.scales is not None
+    if found.name == "line":
+        physical = _PHYSICAL.get((curve.part, curve.along))
+        if physical:
+            return (
+                f"proportional to {curve.signal.words}: {physical[0]} of {plain(m)} {physical[1]}"
+            )
+        return f"a line, {plain(m)} {unit} per {along}"
+    scale = {
+        "ripple": f", pitch {quantity(d, along)}",
+        "power": f" with exponent {plain(d, 2)}",
+        "dead band": f" of {quantity(d, along)}",
+    }.get(found.name, f" over {quantity(d, along)}" if scaled else "")
+    height = np.hypot(m, found.values[3]) if len(found.values) > 3 else abs(m)
+    article = "an" if found.name[0] in "aeiou" else "a"
+    tall = f", height {quantity(float(height), unit)}" if scale and found.name != "power" else ""
+    return f"{article} {found.name}{scale}{tall}"
+
+
+_PHYSICAL = {
+    ("force", "acceleration"): ("an added mass", "kg"),
+    ("force", "displacement"): ("a spring", "N/m"),
+    ("force", "velocity"): ("a dashpot", "N.s/m"),
+}
+"""What a force in proportion to a signal is."""

@@ -1,0 +1,192 @@
+"""A curve learned inside the model: fitted with everything else, judged on runs not seen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ...identify.fit import Model, Problem, intervals_of
+from ...identify.search_context import refine
+from ...physics.user import defined
+from ...progress import Count
+from ..candidates import Trial, judge
+from ..decision import missing
+from ..opening import Opening
+from ..rule import BENCH, DecisionRule
+from .closed import ClosedForm, formula_of
+from .curve import Curve, Formula, effect_text
+from .screen import Normal, Promise, distinct, promises, residual_of
+
+TRIED = 4
+"""Curves that are fitted with everything else, of those that promise most."""
+
+AS_GOOD = 1.03
+"""Times the error of a curve on the training runs: what a closed form in its place may have."""
+
+SWEEPS = 12
+"""Jacobians of such a fit, at the most."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A curve fitted inside the model.
+
+    `std` (k,) of its values, in its unit; `trial` how the model with it does; `loss` the mean
+    squared residual of stretches of the training runs that a fit left out.
+    """
+
+    curve: Curve
+    std: tuple[float, ...]
+    trial: Trial
+    loss: float
+
+
+@dataclass(frozen=True)
+class LearnedCurve:
+    """What `learn` came to: the best curve with its deviations, or why none is kept.
+
+    `curve` and `std` (k,) of its values, in its unit; `before`, `after` the trials without and with
+    it; `others` what else was fitted, best first; `refused` why it is not kept, "" where it is.
+    """
+
+    name: str
+    curve: Curve | None
+    std: tuple[float, ...]
+    before: Trial
+    after: Trial | None
+    others: tuple[Fitted, ...] = ()
+    refused: str = ""
+
+
+def learn(
+    opened: Opening,
+    name: str,
+    *,
+    parts: Sequence[str] = (),
+    along: Sequence[str] = (),
+    rule: DecisionRule = BENCH,
+) -> LearnedCurve:
+    """Learn what the model of an opening misses at the damper.
+
+    Parameters
+    ----------
+    opened : runs and the fitted model, as a diagnosis begins with them
+    name : of the effect that the curve becomes
+    parts, along : names of `PARTS` and `ALONG` that are tried; empty for all
+    rule : the numbers that decide
+    """
+    before, train, held_out = opened.before, opened.searched, opened.held_out
+    residual = residual_of(train, before.model)
+    worth = (1.0 - rule.gain) ** 2 * Normal(residual).without_curve()
+    found = [
+        one
+        for one in promises(residual)
+        if one.loss <= worth
+        and (not parts or one.curve.part in parts)
+        and (not along or one.curve.along in along)
+    ]
+    chosen = distinct(found, TRIED)
+    if not chosen:
+        why = "No curve lowers the error on stretches of the training runs that it has not seen."
+        return LearnedCurve(name, None, (), before, None, (), why)
+    fitted = _fitted(chosen, name, before.model, train, held_out)
+    best, curve = fitted[0], fitted[0].curve
+    refused = ""
+    if not missing(before, best.trial, rule):
+        refused = (
+            f"The best curve, {curve.words()}, does not lower the error on held-out runs beyond "
+            f"chance (z {before.z:.2f} before, {best.trial.z:.2f} with it)."
+        )
+    return LearnedCurve(name, curve, best.std, before, best.trial, tuple(fitted[1:]), refused)
+
+
+@dataclass(frozen=True)
+class Closed:
+    """A closed form in the place of a learned curve: `formula` with its fitted values, `trial`."""
+
+    form: ClosedForm
+    formula: Formula
+    trial: Trial
+    std: dict[str, float]
+
+
+def fit_closed(opened: Opening, found: LearnedCurve, form: ClosedForm) -> Closed | None:
+    """Fit a closed form in the place of a learned curve; None where it is clearly worse.
+
+    It has fewer numbers, and holds between and beyond the knots: as good is good enough.
+    """
+    assert found.curve is not None
+    assert found.after is not None
+    formula = formula_of(form, found.curve)
+    if not formula.parameters:
+        return None
+    text = effect_text(found.name, found.curve, "a trial", formula)
+    base, values = found.after.model, dict(found.after.model.values)
+    values = {k: v for k, v in values.items() if not k.startswith(f"{found.name}.curve[")}
+    values |= {f"{found.name}.{n}": value for n, value, _ in formula.parameters}
+    with defined({found.name: text}):
+        train = opened.searched.of(opened.searched.runs)
+        held_out = opened.held_out.of(opened.held_out.runs)
+        model = refine(replace(base, values=values), train, SWEEPS)
+        trial = judge(model, train, held_out)
+        if trial.train > AS_GOOD * found.after.train:
+            return None
+        std = intervals_of(train, model).std
+        given = tuple(
+            (n, model.value(f"{found.name}.{n}"), unit) for n, _, unit in formula.parameters
+        )
+        memory = {f"{found.name}.{n}": n for n, _ in found.curve.memory}
+        own = {f"{found.name}.{n}": n for n, _, _ in formula.parameters} | memory
+        own_std = {n: std.get(key, 0.0) for key, n in own.items()}
+    return Closed(form, replace(formula, parameters=given), trial, own_std)
+
+
+def _fitted(
+    chosen: Sequence[Promise], name: str, base: Model, train: Problem, held_out: Problem
+) -> list[Fitted]:
+    """Return the curves fitted with everything else, the best on the training runs first."""
+    names = [f"{name}_{k}" for k in range(len(chosen))]
+    texts = {
+        own: effect_text(own, one.curve, "a trial") for own, one in zip(names, chosen, strict=True)
+    }
+    count, out = Count("fitting a curve", len(chosen)), []
+    with defined(texts):
+        train, held_out = train.of(train.runs), held_out.of(held_out.runs)
+        for own, one in zip(names, chosen, strict=True):
+            curve = one.curve
+            values = {f"{own}.curve[{k}]": value for k, value in enumerate(curve.values, 1)}
+            values |= {f"{own}.{n}": value for n, value in curve.memory}
+            start = replace(base, effects=(*base.effects, own), values={**base.values, **values})
+            model = refine(start, train, SWEEPS)
+            trial = judge(model, train, held_out)
+            std = intervals_of(train, model).std
+            entries = [f"{own}.curve[{k + 1}]" for k in range(len(curve.knots))]
+            fitted = replace(
+                curve, values=tuple(model.value(entry) for entry in entries),
+                memory=tuple((n, model.value(f"{own}.{n}")) for n, _ in curve.memory),
+            )  # fmt: skip
+            bare = _renamed(trial, own, name)
+            out.append(
+                Fitted(
+                    fitted, tuple(std.get(entry, 0.0) for entry in entries), bare,
+                    _left_out(train, model),
+                )
+            )  # fmt: skip
+            count.done(curve.words())
+    return sorted(out, key=lambda one: one.loss)
+
+
+def _renamed(trial: Trial, own: str, name: str) -> Trial:
+    """Return a trial whose model names an effect by another name."""
+    model = trial.model
+    values = {
+        f"{name}{key[len(own) :]}" if key.startswith(f"{own}.") else key: value
+        for key, value in model.values.items()
+    }
+    effects = tuple(name if effect == own else effect for effect in model.effects)
+    return replace(trial, model=replace(model, effects=effects, values=values))
+
+
+def _left_out(train: Problem, model: Model) -> float:
+    """Return the mean squared residual of stretches that a step from a model's fit left out."""
+    return Normal(residual_of(train, model)).without_curve()

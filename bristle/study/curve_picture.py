@@ -1,0 +1,62 @@
+"""The picture of a learned curve: with its band, its closed form, and what else was tried."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..diagnose.learned.closed import GOOD, ClosedForm, in_words
+from ..diagnose.learned.fit import LearnedCurve
+from ..draw.style import BLUE, GREY, PALE, VERMILION, Page, look, png, short_z
+from ..quantity import scale
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def curve_png(found: LearnedCurve, forms: Sequence[ClosedForm]) -> bytes:
+    """Return a PNG of a learned curve with its 95 % band."""
+    return png(draw_curve(found, forms), 110)
+
+
+def draw_curve(found: LearnedCurve, forms: Sequence[ClosedForm]) -> Page:
+    """Return the figure of a learned curve, drawn and not yet written."""
+    assert found.curve is not None
+    assert found.after is not None
+    curve = found.curve
+    with look():
+        heading = f"{found.name}: {curve.words()}"
+        said = (
+            f"z on held-out runs {short_z(found.before.z)} before, {short_z(found.after.z)} with "
+            "it. The band is the 95 % interval of each value."
+        )
+        page = Page(8.0, 3.6, heading, said)
+        grid = page.grid(1, 1, top=0.3, bottom=0.55, left=0.75, right=0.4)
+        axes = page.figure.add_subplot(grid[0, 0])
+        _draw(axes, found, forms)
+    return page
+
+
+def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
+    curve = found.curve
+    assert curve is not None
+    s, y, half = np.array(curve.knots), np.array(curve.values), 1.96 * np.array(found.std)
+    across, along = scale(curve.signal.unit, float(np.max(np.abs(s))))
+    up, unit = scale(curve.of.unit, float(np.max(np.abs(y))))
+    axes.axhline(0.0, color=PALE, lw=1.0)
+    axes.fill_between(across * s, up * (y - half), up * (y + half), color=BLUE, alpha=0.18, lw=0.0)
+    axes.plot(across * s, up * y, color=BLUE, lw=2.2, marker="o", ms=4, label="learned")
+    if forms:
+        best = forms[0]
+        name = in_words(best, curve) if best.left <= GOOD else f"nearest form: {best.name}"
+        axes.plot(
+            across * s, up * np.array(best.curve), color=VERMILION, lw=1.4, ls="--", label=name
+        )
+    axes.set_xlabel(f"{curve.signal.words} [{along}]" if along else curve.signal.words)
+    quantity_name = curve.of.words.split(" ", 1)[1] if unit not in ("", "1") else "g"
+    axes.set_title(
+        f"{quantity_name} [{unit}]" if unit not in ("", "1") else f"g in {curve.of.formula}"
+    )
+    axes.legend(frameon=False, labelcolor=GREY, fontsize=9)

@@ -1,0 +1,199 @@
+"""A curve learned from a study's runs: its effect's file, its picture, and what is known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from ..diagnose.bench import BenchRuns
+from ..diagnose.equilibrium import BuildingRuns
+from ..diagnose.learned.closed import GOOD, ClosedForm, closed_forms, in_words
+from ..diagnose.learned.curve import effect_text
+from ..diagnose.learned.fit import Closed, LearnedCurve, fit_closed, learn
+from ..diagnose.opening import Insufficient, Opening
+from ..errors import StudyError
+from ..physics.effect import EFFECTS
+from ..progress import tell
+from ..quantity import plain
+from ..trust import remember_made
+from .curve_picture import curve_png
+from .identification import as_model
+from .rig import building_of
+from .study import Study
+
+
+@dataclass(frozen=True)
+class LearnedEffect:
+    """A learned curve as an effect of a study: `file` its effect's, None where none is kept.
+
+    `forms` the closed forms fitted to it, the best first; `closed` the one that the effect has in
+    the place of the table, None for the table; `picture` where it is drawn.
+    """
+
+    found: LearnedCurve
+    forms: tuple[ClosedForm, ...] = ()
+    closed: Closed | None = None
+    file: Path | None = None
+    picture: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """The effect's name."""
+        return self.found.name
+
+    def sentences(self) -> list[str]:
+        """Return what was learned, as an engineer would say it."""
+        found = self.found
+        if found.refused or found.curve is None or found.after is None:
+            return [f"Nothing was learned. {found.refused}"]
+        curve = found.curve
+        fall = 100.0 * (1.0 - _excess(found.after.z) / max(_excess(found.before.z), 1e-12))
+        out = [
+            f"{self.name} is {curve.words()}. With it the error / noise (z) on held-out runs falls "
+            f"from {found.before.z:.2f} to {found.after.z:.2f}; that is {fall:.0f} % of what "
+            "exceeds the noise."
+        ]
+        if self.forms and self.forms[0].left <= GOOD:
+            best = self.forms[0]
+            out.append(
+                f"The curve is nearly {in_words(best, curve)} "
+                f"({100.0 * best.left:.0f} % of its variation remains)."
+            )
+            if self.closed is not None:
+                out.append(
+                    f"The effect has that formula, which leaves z = {self.closed.trial.z:.2f}: "
+                    + ", ".join(self._values())
+                    + "."
+                )
+        elif self.forms:
+            out.append(
+                f"No closed form follows it: the nearest, {in_words(self.forms[0], curve)}, leaves "
+                f"{100.0 * self.forms[0].left:.0f} % of its variation."
+            )
+        return out
+
+    def _values(self) -> list[str]:
+        assert self.closed is not None
+        return [
+            f"{name} = {plain(value, 4)} +- {plain(1.96 * self.closed.std[name], 2)}"
+            + (f" {unit}" if unit != "1" else "")
+            for name, value, unit in self.closed.formula.parameters
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        found = self.found
+        out: dict[str, Any] = {
+            "name": self.name, "kept": not found.refused, "why": found.refused,
+            "sentences": self.sentences(), "z_before": found.before.z,
+            "z_train_before": found.before.train,
+        }  # fmt: skip
+        if found.curve is not None and found.after is not None:
+            curve = found.curve
+            out |= {
+                "z": found.after.z, "z_train": found.after.train, "part": curve.part,
+                "along": curve.along, "unit": curve.of.unit, "along_unit": curve.signal.unit,
+                "knots": list(curve.knots), "values": list(curve.values), "std": list(found.std),
+                "memory": dict(curve.memory),
+                "forms": [
+                    {"name": one.name, "formula": one.form.text, "values": list(one.values),
+                     "left": one.left}
+                    for one in self.forms[:3]
+                ],
+                "others": [
+                    {"part": one.curve.part, "along": one.curve.along, "z": one.trial.z,
+                     "z_train": one.trial.train}
+                    for one in found.others
+                ],
+            }  # fmt: skip
+        return out
+
+
+def learn_effect(
+    study: Study,
+    *,
+    parts: Sequence[str] = (),
+    along: Sequence[str] = (),
+    name: str = "",
+    table: bool = False,
+    write: bool = True,
+) -> LearnedEffect:
+    """Learn what a study's model misses at the damper, as an effect of the study.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    parts, along : on which parts of the model a curve may act and along which signals, by name;
+        empty for all
+    name : of the effect; else learned_1, learned_2 ...
+    table : whether the effect keeps the curve's table where a formula does as well
+    write : whether to write the effect's file and the picture
+
+    Raises
+    ------
+    StudyError
+        If the data carry no verdict, the damper's force is unknown, or the name is taken.
+    """
+    for why in study.usable_effects():
+        tell(f"left out: {why}")
+    name = name or _free_name(study)
+    if name in EFFECTS or (study.effects_folder / f"{name}.py").exists():
+        raise StudyError(f'an effect is named "{name}" already. Another name is right.')
+    opened = _opened(study)
+    found = learn(opened, name, parts=parts, along=along)
+    if found.refused or found.curve is None:
+        return LearnedEffect(found)
+    forms, closed, curve = tuple(closed_forms(found.curve, found.std)), None, found.curve
+    if forms and forms[0].left <= GOOD and not table:
+        closed = fit_closed(opened, found, forms[0])
+    if not write:
+        return LearnedEffect(found, forms, closed)
+    origin = f"learned from the runs of {study.name}, {date.today().year}"
+    if closed is not None:
+        memory = tuple((n, closed.trial.model.value(f"{name}.{n}")) for n, _ in curve.memory)
+        curve = replace(curve, memory=memory)
+    text = effect_text(name, curve, origin, closed.formula if closed else None)
+    file = study.effects_folder / f"{name}.py"
+    with study.writing():
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(text, encoding="utf-8")
+        remember_made(file, text)
+    picture = study.write_report(f"{name}.png", curve_png(found, forms))
+    return LearnedEffect(found, forms, closed, file, picture)
+
+
+def _opened(study: Study) -> Opening:
+    model, runs = study.model(), study.runs()
+    known = any(value.origin == "identified" for value in model.flat().values())
+    building = building_of(study, model)
+    at = as_model(model)
+    rig: BenchRuns | BuildingRuns
+    if building is None:
+        rig = BenchRuns(runs.train, runs.holdout, at, known, tell)
+    else:
+        rig = BuildingRuns(runs.train, runs.holdout, at, building, tell)
+    opened = rig.open_damper()
+    if opened is None:
+        raise StudyError(
+            "the damper's force was not measured and cannot be reconstructed: nothing can be "
+            "learned of the damper."
+        )
+    if isinstance(opened, Insufficient):
+        raise StudyError("the data carry no verdict: " + " ".join(opened.reasons))
+    return opened
+
+
+def _free_name(study: Study) -> str:
+    number = 1
+    while (
+        study.effects_folder / f"learned_{number}.py"
+    ).exists() or f"learned_{number}" in EFFECTS:
+        number += 1
+    return f"learned_{number}"
+
+
+def _excess(z: float) -> float:
+    return max(z * z - 1.0, 0.0)

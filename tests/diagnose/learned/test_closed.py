@@ -1,0 +1,74 @@
+"""Closed forms of a learned curve: the formula behind it comes back, with its numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bristle.diagnose.learned.closed import FORMS, GOOD, closed_forms, formula_of, in_words
+from bristle.diagnose.learned.curve import Curve
+
+KNOTS = np.linspace(-0.015, 0.015, 13)  # m
+SCALES = {"power": 1.6, "dead band": 0.004, "ripple": 0.011}
+
+
+def curve_of(values, along="displacement", part="force", knots=KNOTS):
+    return Curve(part, along, (), tuple(knots), tuple(values))
+
+
+@pytest.mark.parametrize("form", FORMS[1:], ids=lambda form: form.name)
+def test_a_form_without_noise_comes_back(form):
+    d = SCALES.get(form.name, 0.006)
+    c, m, n = 0.4, 2.0, -1.1
+    values = form.at(KNOTS, d) @ np.array([c, m, n][: 1 + len(form.columns)])
+    found = closed_forms(curve_of(values), [0.01] * len(KNOTS))
+    own = next(one for one in found if one.name == form.name)
+    assert own.left < 0.03
+    assert own.values[:2] == pytest.approx((c, m), rel=0.15)
+    if form.scales is not None:
+        assert own.values[2] == pytest.approx(d, rel=0.06)
+    # Another form may follow the same few knots as well; never one that is far off.
+    assert found[0].left <= own.left * 1.25**3 + 0.01
+
+
+def test_few_numbers_win_where_more_do_hardly_better():
+    rng = np.random.default_rng(3)
+    values = 320.0 * KNOTS + rng.normal(0.0, 0.05, len(KNOTS))
+    assert closed_forms(curve_of(values), [0.05] * len(KNOTS))[0].name == "line"
+
+
+def test_chance_has_no_form():
+    values = np.random.default_rng(1).normal(0.0, 1.0, len(KNOTS))
+    assert closed_forms(curve_of(values), [0.01] * len(KNOTS))[0].left > GOOD
+
+
+def test_a_force_in_proportion_to_acceleration_is_a_mass():
+    knots = np.linspace(-4.0, 4.0, 9)  # m/s2
+    curve = curve_of(3.2 * knots, "acceleration", knots=knots)
+    best = closed_forms(curve, [0.1] * 9)[0]
+    assert "an added mass of 3.2 kg" in in_words(best, curve)
+    formula = formula_of(best, curve)
+    assert [(n, unit) for n, _, unit in formula.parameters] == [("c", "N"), ("m", "kg")]
+
+
+@pytest.mark.parametrize(
+    ("form", "unit"), [("line", "N/m"), ("parabola", "N/m2"), ("cubic", "N/m3")]
+)
+def test_slopes_have_their_units(form, unit):
+    own = next(one for one in FORMS if one.name == form)
+    curve = curve_of(own.at(KNOTS, 1.0) @ np.array([0.0, 5.0]))
+    found = next(one for one in closed_forms(curve, [0.1] * 13) if one.name == form)
+    assert {n: u for n, _, u in formula_of(found, curve).parameters}["m"] == unit
+
+
+def test_what_the_law_has_already_is_no_number_of_the_formula():
+    curve = curve_of(-0.4 * np.exp(-((KNOTS / 0.005) ** 2)), part="fluid")
+    best = closed_forms(curve, [0.01] * 13)[0]
+    formula = formula_of(best, curve)
+    assert best.name == "bell"
+    assert [n for n, _, _ in formula.parameters] == ["m", "d"]
+    assert not formula.text.startswith("c")
+
+
+def test_a_flat_curve_has_no_forms():
+    assert closed_forms(curve_of(np.zeros(13)), [0.0] * 13) == []

@@ -1,0 +1,121 @@
+"""The effect of a learned curve: its text is an effect, for any part and signal."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bristle.check.conformance import examine
+from bristle.diagnose.learned.along import ALONG
+from bristle.diagnose.learned.closed import closed_forms, formula_of
+from bristle.diagnose.learned.curve import PARTS, Curve, effect_text, may_change
+from bristle.errors import PhysicsError
+from bristle.identify.fit import Run
+from bristle.physics.effect import EFFECTS, Q
+from bristle.physics.user import defined
+
+STEP = 0.002  # s
+T = STEP * np.arange(1500)
+NONE = np.zeros((0, len(T), 4))
+PAIRS = [(part, along) for part in PARTS for along in ALONG if may_change(part, along)]
+MEMORY = {"tau": 0.2, "way": 0.004}
+
+
+def run() -> Run:
+    x = 0.008 * np.sin(9.0 * T) + 0.003 * np.sin(23.0 * T + 1.0)
+    v = 0.072 * np.cos(9.0 * T) + 0.069 * np.cos(23.0 * T + 1.0)
+    a = -0.648 * np.sin(9.0 * T) - 1.587 * np.sin(23.0 * T + 1.0)
+    V = np.repeat([0.0, 4.0, 8.0], 500)
+    return Run("run", STEP, x, v, a, V, 0.0 * T, 0.1, NONE)
+
+
+def curve_of(part: str, along: str, size: float = 0.4) -> Curve:
+    signal = ALONG[along]
+    memory = {name: MEMORY[name] for name in signal.memory}
+    values = signal.history(run(), memory)
+    knots = np.linspace(values.min(), values.max(), 5)
+    curve = tuple(size * np.array([0.0, 0.2, 0.5, 0.4, -0.3]))
+    return Curve(part, along, tuple(memory.items()), tuple(knots), curve, (0,), 0.003, 8.0)
+
+
+def signals(now: Run, k: int, dt: float) -> Q:
+    given = {"x": now.x[k], "v": now.v[k], "a": now.a[k], "V": now.V[k], "dt": dt}
+    return Q(**{name: given.get(name, 0.0) for name in Q._fields})
+
+
+@pytest.mark.parametrize(("part", "along"), PAIRS)
+def test_every_part_along_every_signal_is_an_effect(part, along):
+    curve = curve_of(part, along)
+    with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
+        effect = EFFECTS["learned_9"]
+        p = effect.values_of({})
+        z = effect.State(*(0.0 for _ in effect.states))
+        hook = effect.hooks()[PARTS[part].hook]
+        assert np.isfinite(hook(signals(run(), 700, STEP), z, p))
+        assert effect.parameters["curve[2]"].value == pytest.approx(0.08)
+        assert effect.assumed == ("curve[1]",)
+    assert "learned_9" not in EFFECTS
+
+
+@pytest.mark.parametrize("along", [name for name, one in ALONG.items() if one.states])
+def test_the_memory_of_the_hook_is_that_of_the_scan(along):
+    curve, now = curve_of("fluid", along), run()
+    with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
+        effect = EFFECTS["learned_9"]
+        p, advance = effect.values_of({}), effect.hooks()["advance"]
+        begin = {state: getattr(signals(now, 0, 0.0), of) for state, of in effect.starts.items()}
+        z = effect.State(*(begin.get(state, 0.0) for state in effect.states))
+        out = [z[0]]
+        for k in range(1, len(T)):
+            means = {n: 0.5 * (getattr(now, n)[k - 1] + getattr(now, n)[k]) for n in "xvaV"}
+            middle = signals(now, k, STEP)._replace(**means)
+            z = effect.State(*advance(middle, z, p))
+            z = effect.State(*advance(signals(now, k, 0.0), z, p))
+            out.append(z[0])
+    expected = ALONG[along].history(now, dict(curve.memory))
+    assert np.max(np.abs(np.array(out) - expected)) < 0.02 * np.ptp(expected)
+
+
+@pytest.mark.parametrize("closed", [False, True])
+def test_a_learned_effect_conforms_as_any_other(closed):
+    curve = curve_of("fluid", "displacement", 0.5)
+    formula = None
+    if closed:
+        values = tuple(0.3 * np.exp(-((np.array(curve.knots) / 0.005) ** 2)))
+        curve = Curve("fluid", "displacement", (), curve.knots, values)
+        best = next(one for one in closed_forms(curve, [0.01] * 5) if one.name == "bell")
+        formula = formula_of(best, curve)
+    text = effect_text("learned_9", curve, "made for a test, 2026", formula)
+    with defined({"learned_9": text}):
+        failed = [check for check in examine(EFFECTS["learned_9"]) if not check.holds]
+    assert failed == []
+
+
+def test_a_factor_never_turns_the_force_round():
+    curve = curve_of("fluid", "displacement", 1.5)
+    with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
+        effect = EFFECTS["learned_9"]
+        low, _ = effect.parameters["curve[3]"].bounds
+        p = effect.values_of({f"curve[{k}]": low for k in range(1, 6)})
+        factor = effect.hooks()["factor"](signals(run(), 700, STEP), (), p)
+        assert factor >= 0.02
+        assert effect.passive
+
+
+def test_a_name_that_is_taken_is_refused_and_nothing_stays():
+    text = effect_text("gas_spring", curve_of("force", "displacement"), "a test, 2026")
+    before = set(EFFECTS)
+    with pytest.raises(PhysicsError, match=r"gas_spring.*taken"), defined({"gas_spring": text}):
+        pass
+    assert set(EFFECTS) == before
+
+
+def test_a_text_that_is_not_right_leaves_nothing_behind():
+    before = set(EFFECTS)
+    good = effect_text("learned_8", curve_of("force", "displacement"), "a test, 2026")
+    with (
+        pytest.raises(PhysicsError, match=r"learned_9\.py"),
+        defined({"learned_8": good, "learned_9": "import os\n"}),
+    ):
+        pass
+    assert set(EFFECTS) == before

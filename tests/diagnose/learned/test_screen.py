@@ -1,0 +1,112 @@
+"""Which curves promise to explain a residual: the hidden one first, none where noise is all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bristle.diagnose.learned.screen import (
+    Normal,
+    distinct,
+    hats_at,
+    knots_of,
+    promises,
+    residual_of,
+)
+from bristle.identify.bench import Bench
+from bristle.identify.fit import Model, Problem, Run, fit
+
+STEP = 0.002  # s
+T = STEP * np.arange(3000)
+VALUES = {"f_c": 1.3, "f_v": 0.83, "c_0": 100.0, "c_v": 20.0, "v_n": 0.02}
+NOISE = 0.05  # N
+NOWHERE = np.zeros((0, len(T), 4))
+
+
+def runs(hidden=lambda x, v, V, F: F):
+    """Return three runs of a Bingham damper with something hidden, the motion without noise."""
+    out = []
+    for seed in range(3):
+        random = np.random.default_rng(seed)
+        w = 2.0 * np.pi * random.uniform(0.4, 4.0, 8)
+        angle = w[:, None] * T + random.uniform(0.0, 6.0, 8)[:, None]
+        size = 0.05 / w
+        x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
+        V = np.repeat(random.choice([0.0, 3.0, 6.0], 12), len(T) // 12)
+        force = hidden(x, v, V, Bench("bingham", []).force(x, v, a, V, STEP, VALUES))
+        force = force + NOISE * random.standard_normal(len(T))
+        out.append(Run(f"run{seed}", STEP, x, v, a, V, force, NOISE, NOWHERE))
+    return Problem(out)
+
+
+def first_of(hidden):
+    problem = runs(hidden)
+    base = fit(problem, Model("bingham", (), VALUES), with_std=False).model
+    return promises(residual_of(problem, base))
+
+
+def bell(x):
+    return 1.0 - 0.5 * np.exp(-((x / 0.004) ** 2))
+
+
+CASES = {
+    "fluid along displacement": (lambda x, v, V, F: F * bell(x), "fluid", "displacement"),
+    "an added spring": (lambda x, v, V, F: F + 150.0 * x, "force", "displacement"),
+    "an added mass": (
+        lambda x, v, V, F: F + 0.4 * np.gradient(v, STEP), "force", "acceleration",
+    ),
+    "thickening under a field": (
+        lambda x, v, V, F: F * (1.0 + 0.1 * V / (1.0 + (0.1 / v) ** 4)), "field", "speed",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_hidden_curve_comes_first(case):
+    hidden, part, along = CASES[case]
+    best = first_of(hidden)[0]
+    # At high speed a Bingham damper's yield force is nearly all of its force.
+    assert best.curve.part.endswith(part)
+    assert best.curve.along == along
+    assert best.loss < 2.0  # noise alone leaves 1; the law's parameters move to first order
+
+
+def test_noise_alone_promises_nothing_worth_a_name():
+    problem = runs()
+    base = fit(problem, Model("bingham", (), VALUES), with_std=False).model
+    residual = residual_of(problem, base)
+    without = Normal(residual).without_curve()
+    found = promises(residual)
+    assert without == pytest.approx(1.0, abs=0.05)
+    assert all(one.loss > 0.99 * without for one in found)
+
+
+def test_sums_over_knots_are_those_of_columns():
+    problem = runs()
+    residual = residual_of(problem, Model("bingham", (), VALUES))
+    x = np.concatenate(
+        [run.x[keep] for run, keep in zip(residual.runs, residual.keeps, strict=True)]
+    )
+    knots = knots_of(x, 7)
+    hats = hats_at(x, knots)
+    dense = np.zeros((len(x), 7))
+    dense[np.arange(len(x)), hats.at] = 1.0 - hats.share
+    dense[np.arange(len(x)), hats.at + 1] += hats.share
+    columns = np.hstack([residual.known, dense * residual.parts["fluid"][:, None]])
+    weighted = columns * residual.weight[:, None]
+    normal = Normal(residual).with_curve(residual.parts["fluid"], hats, list(range(7)))
+    assert np.allclose(normal.grams.sum(axis=0), weighted.T @ columns, rtol=1e-9, atol=1e-9)
+    assert np.allclose(normal.sides.sum(axis=0), weighted.T @ residual.r, rtol=1e-9, atol=1e-9)
+
+
+def test_knots_stand_at_the_levels_that_a_command_holds():
+    V = np.repeat([0.0, 2.0, 8.0], 100)
+    assert knots_of(V, 13) == pytest.approx([0.0, 2.0, 8.0])
+
+
+def test_one_curve_of_a_kind_is_fitted():
+    found = first_of(CASES["fluid along displacement"][0])
+    kept = distinct(found, 4)
+    kinds = [(one.curve.part, one.curve.along) for one in kept]
+    assert kinds[0] == ("fluid", "displacement")
+    assert len(set(kinds)) == len(kinds) <= 4
