@@ -153,6 +153,9 @@ class Problem:
     def scaled(self, law: str, name: str) -> float:
         """Return a parameter's default brought to the size of this rig, within its bounds."""
         declared = parameter(law, name)
+        effect = name.partition(".")[0] if "." in name else ""
+        if effect and EFFECTS[effect].of_this_rig():
+            return declared.value
         reference = REFERENCE.get(declared.unit)
         value = declared.value * (self.size(declared.unit) / reference if reference else 1.0)
         return min(max(value, declared.bounds[0]), declared.bounds[1])
