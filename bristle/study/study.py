@@ -13,19 +13,17 @@ from filelock import FileLock, Timeout
 
 from .. import __version__
 from ..data.files import read_json, write_json, write_whole
-from ..data.measurement import Known, Measurement, measurements_of, stem_of
+from ..data.measurement import Measurement
 from ..data.model import StudyModel, read_model
 from ..data.model_text import model_text
-from ..data.pieces import pieces_of
-from ..data.read import read_table
-from ..data.table import Table
 from ..errors import StudyError
 from ..findings import command, written
 from ..physics.user import Loaded, waiting
 from ..trust import can_do_without, load
 from .history import History, Step
 from .new import make_folder
-from .run_file import ROLES, RunFile
+from .reading import read_runs
+from .run_file import ROLES
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
 from .settings import Settings, read_settings, with_mask
 
@@ -168,32 +166,7 @@ class Study:
         RecordError
             If a file cannot be read.
         """
-        tables: dict[str, list[Table]] = {}
-        found: list[Measurement] = []
-        for run in self.settings.runs:
-            if role not in (None, run.role):
-                continue
-            if run.file not in tables:
-                tables[run.file] = self._tables(run.file)
-            found += self._measured(run, tables[run.file])
-        return found
-
-    def _tables(self, file: str) -> list[Table]:
-        """Return the runs in a file, each as a table."""
-        table, split = read_table(self.folder / file), self.settings.split
-        return pieces_of(table, split, self.settings.channels) if split else [table]
-
-    def _measured(self, run: RunFile, tables: list[Table]) -> list[Measurement]:
-        """Return the measurements of a run among those of its file."""
-        if run.piece > len(tables):
-            raise StudyError(
-                f"{self.folder / 'study.toml'}: {run.file} holds {len(tables)} runs, and "
-                f"piece = {run.piece} is none of them."
-            )
-        name = f"{stem_of(run.file)} run {run.piece}" if run.piece else ""
-        own = self.settings
-        known = Known(name, run.levels, run.labels, own.rate, own.mask)
-        return measurements_of(tables[max(run.piece, 1) - 1], own.channels, known=known)
+        return read_runs(self.folder, self.settings, role)
 
     def runs(self) -> Runs:
         """Return the measurements for training and those held out.
