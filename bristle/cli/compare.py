@@ -12,6 +12,7 @@ from ._consent import add_trust
 if TYPE_CHECKING:
     from ..bridge.fmu import FmuComparison
     from ..compare.comparison import Comparison
+    from ..study.study import Study
 
 HELP = "show where a model, or any FMU, deviates from measurements: in text, then in figures"
 
@@ -24,10 +25,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
+        "--role",
         "--runs",
-        choices=("holdout", "train"),
+        dest="role",
+        choices=("holdout", "train", "test"),
         default="holdout",
-        help="of the study: those held out, or those that the model was fitted to",
+        help="which runs of the study: those held out, those that the model was fitted to, or the "
+        "test runs, whose openings the study counts",
     )
     parser.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="an FMU, anybody's")
     parser.add_argument("--data", type=Path, metavar="FILE", help="with --fmu: the measurement")
@@ -95,7 +99,7 @@ def _of_study(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    comparison = compare_study(study, role=arguments.runs)
+    comparison = compare_study(study, role=arguments.role)
     page = draw_comparison(comparison)
     if arguments.out is None:
         picture = study.write_report("compare.png", png(page))
@@ -105,14 +109,28 @@ def _of_study(arguments: argparse.Namespace) -> int:
     notes = study.runs().notes
     if arguments.json:
         _print_json(
-            {**comparison.as_dict(), "notes": list(notes), "picture": str(picture.absolute())}
-        )
+            {
+                **comparison.as_dict(), "role": arguments.role, **_opened(study),
+                "notes": list(notes), "picture": str(picture.absolute()),
+            }
+        )  # fmt: skip
         return 0
     _print(comparison)
     for note in notes:
         print(note)
     print(f"\nPicture: {picture}")
     return 0
+
+
+def _opened(study: Study) -> dict[str, Any]:
+    """Return when the test runs were opened, nothing where the study has none."""
+    from dataclasses import asdict
+
+    from ..study.openings import openings
+    from ..study.settings import TEST
+
+    opened = [asdict(one) for one in openings(study)]
+    return {"test_openings": opened} if study.files(TEST) else {}
 
 
 def _of_fmu(arguments: argparse.Namespace) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from fnmatch import fnmatchcase
 from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -84,6 +85,10 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step", type=float, metavar="S", help="sampling step in s of files without a time"
     )
+    parser.add_argument(
+        "--test", nargs="+", action="extend", default=[], metavar="GLOB",
+        help="test runs, which no fit and no verdict sees: names among the data, or more files",
+    )  # fmt: skip
     parser.add_argument("--law", help="the law that the model begins with; else lugre")
     parser.add_argument("--title", default="", help="the study's title; else its name")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -110,14 +115,17 @@ def _new(arguments: argparse.Namespace) -> int:
         if "time" in channels:
             raise StudyError("--step and --channel time=... exclude each other.")
         channels["time"] = ChannelSpec(step=arguments.step)
+    files = _files(arguments.data)
+    test = _test_files(arguments.test, files)
     created = create_study(
         arguments.name,
-        _files(arguments.data),
+        list(dict.fromkeys([*files, *test])),
         rig=arguments.rig,
         building=arguments.building,
         channels=channels,
         title=arguments.title,
         law=law,
+        test=test,
     )
     if arguments.json:
         _print_json(created)
@@ -126,16 +134,38 @@ def _new(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _test_files(patterns: list[str], files: list[str]) -> list[str]:
+    """Return the files of the test runs: names among the files of --data, or files of their own."""
+    from ..errors import StudyError
+
+    found: list[str] = []
+    for pattern in patterns:
+        named = [file for file in files if fnmatchcase(Path(file).name, pattern)]
+        matches = named or _matches(pattern)
+        if not matches:
+            raise StudyError(
+                f'--test "{pattern}": no file of --data has such a name, and no other file '
+                f"matches, seen from {Path.cwd()}."
+            )
+        found += matches
+    return list(dict.fromkeys(found))
+
+
+def _matches(pattern: str) -> list[str]:
+    """Return the files that a pattern names, in order."""
+    # pathlib takes no pattern that begins at the root.
+    matches = sorted(glob(pattern, recursive=True))  # noqa: PTH207
+    matches = [pattern] if Path(pattern).is_file() else matches
+    return [match for match in matches if Path(match).is_file()]
+
+
 def _files(patterns: list[str]) -> list[str]:
     """Return the files that patterns name, each once, in order."""
     from ..errors import StudyError
 
     found: list[str] = []
     for pattern in patterns:
-        # pathlib takes no pattern that begins at the root.
-        matches = sorted(glob(pattern, recursive=True))  # noqa: PTH207
-        matches = [pattern] if Path(pattern).is_file() else matches
-        files = [match for match in matches if Path(match).is_file()]
+        files = _matches(pattern)
         if not files:
             raise StudyError(f'--data "{pattern}": no file matches, seen from {Path.cwd()}.')
         found += files

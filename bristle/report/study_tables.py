@@ -11,6 +11,7 @@ import numpy as np
 from ..compare.tables import run_table
 from ..draw.style import MINUS, percent
 from ..quantity import plain, quantity, times_ten
+from ..study.settings import TEST
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
@@ -82,12 +83,14 @@ def _at_bound(value: Value) -> bool:
 def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str], list[list[str]]]:
     """Return header and rows: a line per run, or per piece where gaps have cut it."""
     roles = {run.file.rpartition("/")[2]: run.role for run in study.settings.runs}
-    single = len(study.settings.runs) == 1
+    single = sum(run.role != TEST for run in study.settings.runs) == 1
     header = ["run", "role", "duration [s]", "rate [Hz]", "samples", "channels"]
     rows = []
     for run in measured:
         file = run.source.replace("\\", "/").rpartition("/")[2]
-        role = ("held out" if "last" in run.name else "train") if single else roles.get(file, "")
+        role = roles.get(file, "")
+        if single and role != TEST:
+            role = "held out" if "last" in run.name else "train"
         rows.append(
             [
                 run.name, "held out" if role == "holdout" else role, plain(run.duration, 4),

@@ -32,6 +32,7 @@ def create_study(
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
     law: str = DEFAULT,
+    test: Sequence[Path | str] = (),
 ) -> Created:
     """Make a study's folder from files; it appears when it is whole.
 
@@ -49,6 +50,9 @@ def create_study(
         Channels that are known; the others are guessed from the first file.
     title, law : str
         Title of the study, and the law that its model begins with.
+    test : paths or patterns
+        Which of the files are test runs: their paths, or patterns of their names. No fit and no
+        verdict sees them; `bristle.compare(study, role="test")` opens them.
 
     Raises
     ------
@@ -58,6 +62,7 @@ def create_study(
         If a file cannot be read.
     """
     made = make_folder(
-        Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law
-    )
+        Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law,
+        test=test,
+    )  # fmt: skip
     return Created(Study(folder), made.guesses, made.unused, made.notes)

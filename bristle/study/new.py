@@ -7,6 +7,7 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..data.channels import ChannelSpec, channel_unit
@@ -21,7 +22,7 @@ from ..physics.building import read_building
 from ..physics.laws import DEFAULT
 from ..units import canonical
 from .history import History, Step
-from .settings import RunFile, Settings, write_settings
+from .settings import TEST, RunFile, Settings, write_settings
 
 _WORDS = {
     "train": "train training ident identification fit estimation est calibration cal",
@@ -49,12 +50,14 @@ def make_folder(
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
     law: str = DEFAULT,
+    test: Sequence[Path | str] = (),
 ) -> Made:
     """Make a study's folder from files.
 
     Parameters
     ----------
-    folder, files, rig, building, channels, title, law : see `bristle.study.create.create_study`
+    folder, files, rig, building, channels, title, law, test : see
+        `bristle.study.create.create_study`
 
     Raises
     ------
@@ -67,24 +70,26 @@ def make_folder(
         raise StudyError("a study needs measurements: --data 'lab/*.csv' names their files.")
     levels = _levels(rig, building)
     tables = [read_table(Path(file)) for file in files]
-    guesses = _chosen(tables[0], guess_channels(tables[0], rig, levels), channels or {})
-    _refuse_incomplete(tables[0], guesses, rig, channels or {})
+    closed = _for_test([Path(file) for file in files], test)
+    first = tables[closed.index(False)]  # a guess is a choice, which no test run may see
+    guesses = _chosen(first, guess_channels(first, rig, levels), channels or {})
+    _refuse_incomplete(first, guesses, rig, channels or {})
     specs = {
         guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses
     } | {name: spec for name, spec in (channels or {}).items() if spec.step is not None}
     digests = {}
     for file, table in zip(files, tables, strict=True):
-        _refuse_other_columns(table, guesses, tables[0])
+        _refuse_other_columns(table, guesses, first)
         pieces = measurements_of(table, specs, estimate=False)
         digests[str(file)] = [piece.digest() for piece in pieces]
     names = _names([Path(file) for file in files])
-    runs, notes = _roles(names)
-    notes += _twins([str(file) for file in files], digests)
+    runs, notes = _roles(names, closed)
+    notes += _twins([str(file) for file in files], digests, closed)
     comments = {guess.channel: _comment(guess) for guess in guesses}
     settings = Settings(title or folder.name, rig, tuple(runs), specs, comments=comments)
     _write(folder, settings, dict(zip(names, map(Path, files), strict=True)), building, law)
     unused = tuple(
-        text for text in left_out(tables[0], guesses) if text not in {g.column for g in guesses}
+        text for text in left_out(first, guesses) if text not in {g.column for g in guesses}
     )
     return Made(tuple(guesses), unused, tuple(notes))
 
@@ -208,12 +213,52 @@ def _names(files: list[Path]) -> list[str]:
     return out
 
 
-def _roles(names: list[str]) -> tuple[list[RunFile], list[str]]:
-    """Return the runs with their roles, and why: by their names, else every third is held out."""
+def _for_test(files: list[Path], chosen: Sequence[Path | str]) -> list[bool]:
+    """Return which files are test runs: those that a path or a pattern of names chooses."""
+    out = [False] * len(files)
+    for one in map(str, chosen):
+        found = [k for k, file in enumerate(files) if _is_chosen(file, one)]
+        if not found:
+            raise StudyError(
+                f"test runs: no file of the data is {one}; there are "
+                f"{', '.join(file.name for file in files)}."
+            )
+        for k in found:
+            out[k] = True
+    if all(out):
+        raise StudyError(
+            "test runs: all files are. Leave some for training, and one to be held out."
+        )
+    return out
+
+
+def _is_chosen(file: Path, one: str) -> bool:
+    return file == Path(one) or any(fnmatchcase(text, one) for text in (file.name, file.as_posix()))
+
+
+def _roles(names: list[str], closed: list[bool]) -> tuple[list[RunFile], list[str]]:
+    """Return the runs with their roles, and the notes that tell why.
+
+    Parameters
+    ----------
+    names : of the files in data/
+    closed : which of them are test runs; see `_seen_roles` for the others
+    """
+    roles, notes = _seen_roles([n for n, is_test in zip(names, closed, strict=True) if not is_test])
+    rest = iter(roles)
+    every = [TEST if is_test else next(rest) for is_test in closed]
+    test = ", ".join(name for name, role in zip(names, every, strict=True) if role == TEST)
+    if test:
+        notes.append(f"test runs, which no fit and no verdict sees: {test}")
+    return [RunFile(f"data/{n}", role) for n, role in zip(names, every, strict=True)], notes
+
+
+def _seen_roles(names: list[str]) -> tuple[list[str], list[str]]:
+    """Return roles and why: by the names of files, else every third is held out."""
     words = [set(re.split(r"[^a-z]+", name.lower())) for name in names]
     found = ["holdout" if w & _HOLDOUT else "train" if w & _TRAIN else "" for w in words]
     if len(names) == 1:
-        return [RunFile(f"data/{names[0]}", "train")], [
+        return ["train"], [
             "there is one run: its last 30 % are held out, which is weaker than a separate run"
         ]
     if (
@@ -226,16 +271,21 @@ def _roles(names: list[str]) -> tuple[list[RunFile], list[str]]:
     else:
         roles = ["holdout" if k % 3 == 1 else "train" for k in range(len(names))]
         note = "every third run is held out; change role in study.toml if another choice is better"
-    runs = [RunFile(f"data/{name}", role) for name, role in zip(names, roles, strict=True)]
     held_out = ", ".join(name for name, role in zip(names, roles, strict=True) if role == "holdout")
-    return runs, [f"{note}. Held out: {held_out}"]
+    return roles, [f"{note}. Held out: {held_out}"]
 
 
-def _twins(files: list[str], digests: Mapping[str, list[str]]) -> list[str]:
+def _twins(files: list[str], digests: Mapping[str, list[str]], closed: Sequence[bool]) -> list[str]:
     first: dict[str, str] = {}
     twins = []
+    is_test = dict(zip(files, closed, strict=True))
     for file in files:
         whole = " ".join(digests[file])
+        if whole in first and is_test[file] != is_test[first[whole]]:
+            raise StudyError(
+                f"{file} and {first[whole]} are the same measurement, and one of them is a test "
+                "run: it tests nothing. Use another run, or remove one."
+            )
         if whole in first:
             twins.append((file, first[whole]))
         first.setdefault(whole, file)

@@ -14,7 +14,10 @@ from ..findings import unknown, written
 from ..units import same_dimension
 
 RIGS = ("bench", "structure")
-ROLES = ("train", "holdout")
+TEST = "test"
+"""The role of runs that no choice sees: neither a fit nor a verdict reads them."""
+
+ROLES = ("train", "holdout", TEST)
 CUT_OFF = 18.0
 """Low-pass of measured and predicted force [Hz], as in Shirazi et al. (2012), section III-C."""
 _KEYS = ("schema", "title", "notes", "rig", "cut_off", "runs", "channels")
@@ -23,7 +26,7 @@ _CHANNEL_KEYS = ("column", "unit", "sign", "noise", "step")
 
 @dataclass(frozen=True)
 class RunFile:
-    """One `[[runs]]`: the file, relative to the study, and its role, "train" or "holdout"."""
+    """One `[[runs]]`: the file, relative to the study, and its role, one of `ROLES`."""
 
     file: str
     role: str = "train"
@@ -131,7 +134,7 @@ def _runs(toml: Toml, folder: Path) -> tuple[RunFile, ...]:
         toml.known(keys, table, ("file", "role"))
         file, role = toml.text(keys, table, "file"), toml.text(keys, table, "role", "train")
         if role not in ROLES:
-            toml.error((*keys, "role"), f'role = "{role}"; "train" or "holdout" is right.')
+            toml.error((*keys, "role"), f'role = "{role}"; "train", "holdout" or "test" is right.')
         if not file:
             toml.error(keys, 'a run has no file; file = "data/run_1.csv" is right.')
         elif not (folder / file).is_file():
