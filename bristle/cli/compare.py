@@ -7,7 +7,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._closed_loop import (
+    add_closed_loop,
+    closed_loop_of,
+    print_closed_loop,
+    refuse_alone,
+)
 from ._consent import add_trust
+from ._table import print_tables
 
 if TYPE_CHECKING:
     from ..bridge.fmu import FmuComparison
@@ -34,7 +41,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "test runs, whose openings the study counts",
     )
     parser.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="an FMU, anybody's")
-    parser.add_argument("--data", type=Path, metavar="FILE", help="with --fmu: the measurement")
+    parser.add_argument(
+        "--data", type=Path, metavar="FILE", help="with --fmu or --in: the measurement"
+    )
     parser.add_argument(
         "--set",
         dest="values",
@@ -65,6 +74,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="with --fmu: limit of the run in s",
     )
+    add_closed_loop(parser)
     parser.add_argument("--out", type=Path, metavar="FILE", help="where the picture goes")
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -74,6 +84,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Compare, print the sentences and tables, draw the picture."""
     from ..errors import StudyError
 
+    refuse_alone(arguments)
     if arguments.fmu is not None:
         if arguments.folder is not None or arguments.data is None:
             raise StudyError(
@@ -81,7 +92,10 @@ def main(arguments: argparse.Namespace) -> int:
                 "--data run.csv"
             )
         return _of_fmu(arguments)
-    fmu_only = [f"--{n}" for n in ("data", "values", "maps", "channel") if getattr(arguments, n)]
+    options = ("values", "maps", "channel") if arguments.house else (
+        "data", "values", "maps", "channel"
+    )  # fmt: skip
+    fmu_only = [f"--{n}" for n in options if getattr(arguments, n)]
     if arguments.folder is None or fmu_only:
         wrong = "a study's folder, or --fmu and --data, are needed"
         if fmu_only:
@@ -89,7 +103,16 @@ def main(arguments: argparse.Namespace) -> int:
         raise StudyError(
             f"{wrong}: bristle compare FOLDER, or bristle compare --fmu FILE.fmu --data run.csv"
         )
-    return _of_study(arguments)
+    return _in_closed_loop(arguments) if arguments.closed_loop else _of_study(arguments)
+
+
+def _in_closed_loop(arguments: argparse.Namespace) -> int:
+    found = closed_loop_of(arguments)
+    if arguments.json:
+        _print_json(found.as_dict())
+    else:
+        print_closed_loop(found)
+    return 0
 
 
 def _of_study(arguments: argparse.Namespace) -> int:
@@ -199,12 +222,4 @@ def _print(comparison: Comparison) -> None:
 
     for sentence in comparison.sentences:
         print(textwrap.fill(sentence, 96) if sys.stdout.isatty() else sentence)
-    for title, header, rows in comparison_tables(comparison):
-        print(f"\n{title}")
-        widths = [max(len(row[i]) for row in [header, *rows]) for i in range(len(header))]
-        for row in [header, *rows]:
-            cells = [
-                row[0].ljust(widths[0]),
-                *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)),
-            ]
-            print("  " + "  ".join(cells).rstrip())
+    print_tables(comparison_tables(comparison))
