@@ -16,7 +16,14 @@ Value = float | bool | str
 def signal_file(
     time: NDArray[Any], values: NDArray[Any], title: str, unit: str, path: Path
 ) -> Path:
-    """Write a signal (n,) over its times (n,) [s] as a two-column CSV; return its path."""
+    """Write a signal over its times as a two-column CSV; return its path.
+
+    Parameters
+    ----------
+    time, values : (n,) s, and the signal in its unit
+    title, unit : of its column
+    path : of the file
+    """
     rows = [f"time [s],{title} [{unit}]"]
     rows += [f"{t:.12g},{value!r}" for t, value in zip(time.tolist(), values.tolist(), strict=True)]
     write_whole(path, "\n".join(rows) + "\n")

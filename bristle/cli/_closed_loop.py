@@ -63,7 +63,8 @@ def refuse_alone(arguments: argparse.Namespace) -> None:
 
 def closed_loop_of(arguments: argparse.Namespace) -> ClosedLoop:
     """Return the prediction that the arguments ask for."""
-    from ..bridge.closed_loop import DRAWS, closed_loop, closed_loop_in
+    from ..bridge.closed_loop import closed_loop, closed_loop_in
+    from ..bridge.closed_loop_figures import DRAWS
     from ..bridge.closed_loop_input import house_of, trials_in
     from ..study.study import Study
 
