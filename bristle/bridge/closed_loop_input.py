@@ -74,7 +74,8 @@ def _at_level(trial: Trial, level: float) -> Trial:
 def _of_record(name: str, time: Array, ground: Array, level: float) -> Trial:
     """Return a record at even times from 0, with nothing measured."""
     spacing = float(np.median(np.diff(time)))
-    even = spacing * np.arange(int((time[-1] - time[0]) / spacing + 1e-6) + 1)
+    count = int((time[-1] - time[0]) / spacing + 1e-6) + 1
+    even = np.asarray(spacing * np.arange(count), dtype=np.float64)
     shaken = np.asarray(np.interp(even, time - time[0], ground), dtype=np.float64)
     shaking = Shaking(name, even, shaken, level=level)
     return Trial(shaking, {}, np.ones(len(even), dtype=bool), (0.0, 0.0))
