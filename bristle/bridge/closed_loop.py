@@ -18,7 +18,7 @@ from ..findings import command
 from ..progress import tell
 from ..study.openings import count_opening, opened_text, openings, runs_for_test
 from ..study.rig import building_of
-from ..study.settings import TEST
+from ..study.run_file import TEST
 from ..study.study import Study
 from .closed_loop_figures import DRAWS, figures_of
 from .closed_loop_result import ClosedLoop, Predicted
@@ -133,8 +133,8 @@ def _trials(
     A single run that is `split` in time is simulated from the begin of its file, and judged on its
     own part.
     """
-    seen = [*study.files("train"), *study.files("holdout")]
-    whole = [*study.read("train"), *study.read("holdout")] if split and len(seen) == 1 else []
+    single = split and sum(run.role != TEST for run in study.settings.runs) == 1
+    whole = [*study.read("train"), *study.read("holdout")] if single else []
     trials, notes = [], []
     for run in chosen:
         begun = next((one for one in whole if one.time[0] <= run.time[0] <= one.time[-1]), run)
@@ -181,4 +181,5 @@ def _before(study: Study) -> tuple[StudyModel | None, str]:
     if len(numbers) < 3:
         return None, ""
     file = study.history.model_file(numbers[-2])
-    return read_model(file, study.folder), study.history.step(numbers[-1]).what
+    model = read_model(file, study.folder)
+    return model.with_drive(study.drive or model.drive), study.history.step(numbers[-1]).what

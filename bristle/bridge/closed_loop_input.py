@@ -34,7 +34,7 @@ def trials_in(
     house : whose levels the columns of `data` may be of
     data : a measurement of the building: ground motion, and responses and command if there are any
     ground : a record by name or file, in place of `data`
-    level : the command [V or A], constant, where `data` has none; 0 by default
+    level : the command in its unit, constant, where `data` has none; 0 by default
 
     Raises
     ------

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.channels import DRIVE
 from ..data.measurement import Measurement
 from ..identify.drive import smooth_steps
 from .in_building import Shaking, shaking_of
@@ -46,8 +45,7 @@ def trial_of(
     judged : times [s] between which samples are judged
     """
     shaking = replace(shaking_of(run), name=name or run.name)
-    drive = next((one for one in DRIVE if run.has(one)), "")
-    left = 0.0
+    drive, left = run.drive, 0.0
     if drive:
         smooth, left = smooth_steps(run[drive], run.noise.get(drive, 0.0), run.step)
         shaking = replace(shaking, command=smooth)

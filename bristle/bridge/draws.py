@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..data.model import StudyModel
 from ..errors import RunError
+from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS
 from ..physics.forms import split_form
 from ..physics.user import own_effects, own_laws
@@ -24,9 +25,6 @@ from .scenario_files import part_text
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
-
-V_MAX = 8.0
-"""Largest voltage [V] that a damper takes unless it is told otherwise."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +39,7 @@ class Simulator:
     bench : bool
         Whether the model was identified on a bench.
     shaking : Shaking
+        A built-in damper calls its command a voltage, whatever it is: its numbers are the same.
     folder : Path
         An empty folder for the scenario's files.
     """
@@ -55,7 +54,7 @@ class Simulator:
         """Write the scenario of the model as it is; return it."""
         own = loads(self.model, self.house.building, self.bench)
         title = f"{self.model.law} in {self.house.building.name}"
-        quiet = replace(self.shaking, force=None)
+        quiet = replace(self.shaking, force=None, drive=VOLTAGE)
         file, _ = write_scenario(
             self.folder, (title, "# The model's damper in the building."), self.house, quiet,
             own.structure, self._damper, own.damper,
@@ -91,12 +90,14 @@ class Simulator:
             command = shaking.command
             if command is not None:
                 command = command + noise[1] * generator.standard_normal()
-            write_signals(self.folder, replace(shaking, ground=ground, command=command))
+            write_signals(
+                self.folder, replace(shaking, ground=ground, command=command, drive=VOLTAGE)
+            )
             try:
                 yield self.response(self._with_values(scenario, model))
             except RunError:
                 yield None
-        write_signals(self.folder, shaking)
+        write_signals(self.folder, replace(shaking, drive=VOLTAGE))
 
     def _with_values(self, scenario: Scenario, model: StudyModel) -> Scenario:
         own = loads(model, self.house.building, self.bench)
@@ -129,7 +130,7 @@ class Simulator:
         most = float(
             np.max(self.shaking.level if self.shaking.command is None else self.shaking.command)
         )
-        limit = {"v_max": float(ceil(1.05 * most))} if most > V_MAX else {}
+        limit = {VOLTAGE.limit: float(ceil(1.05 * most))} if most > VOLTAGE.largest else {}
         return part_text("damper", source, {**self._values(self.model), **limit, **moving})
 
 

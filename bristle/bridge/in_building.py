@@ -12,12 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.channels import DRIVE
 from ..data.files import write_whole
 from ..data.measurement import Measurement
 from ..data.model import StudyModel
 from ..errors import StudyError
 from ..physics.building import Building
+from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from .scenario_files import part_text, scenario_text, signal_file
@@ -42,8 +42,9 @@ class House:
 class Shaking:
     """What drives a building with its damper.
 
-    `time` (n,) s from 0 and the `ground`'s acceleration (n,) m/s2; the `command` (n,) V or A, None
-    where it stays at `level`; the measured `force` (n,) N, None where there is none.
+    `time` (n,) s from 0 and the `ground`'s acceleration (n,) m/s2; the `command` (n,) in the unit
+    of the `drive`, None where it stays at `level`; the measured `force` (n,) N, None where there is
+    none.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Shaking:
     command: Array | None = None
     level: float = 0.0
     force: Array | None = None
+    drive: Drive = VOLTAGE
 
     @property
     def fine(self) -> int:
@@ -77,11 +79,12 @@ def shaking_of(measurement: Measurement) -> Shaking:
             f"{measurement.name}: no ground_acceleration was measured, which a structure's "
             "scenario needs."
         )
-    drive = next((one for one in DRIVE if measurement.has(one)), None)
+    drive = measurement.drive
     return Shaking(
         measurement.name, measurement.time - measurement.time[0],
-        measurement["ground_acceleration"], None if drive is None else measurement[drive],
+        measurement["ground_acceleration"], measurement[drive] if drive else None,
         force=measurement["force"] if measurement.has("force") else None,
+        drive=drive_named(drive),
     )  # fmt: skip
 
 
@@ -165,10 +168,10 @@ def write_scenario(
     ]
     own = dict(moving)
     if shaking.command is None:
-        own["voltage"] = shaking.level
+        own[shaking.drive.name] = shaking.level
     else:
         parts.append(_signal("drive", COMMAND))
-        wires["damper.voltage"] = "drive.value"
+        wires[f"damper.{shaking.drive.name}"] = "drive.value"
     if shaking.force is not None:
         files.append(
             signal_file(shaking.time, shaking.force, "force", "N", folder / "measured.csv")
@@ -187,7 +190,8 @@ def write_signals(folder: Path, shaking: Shaking) -> list[Path]:
     ground = signal_file(shaking.time, shaking.ground, "acceleration", "m/s2", folder / GROUND)
     if shaking.command is None:
         return [ground]
-    return [ground, signal_file(shaking.time, shaking.command, "voltage", "V", folder / COMMAND)]
+    name, unit = shaking.drive.name, shaking.drive.unit
+    return [ground, signal_file(shaking.time, shaking.command, name, unit, folder / COMMAND)]
 
 
 def _signal(name: str, file: str) -> str:

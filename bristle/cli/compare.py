@@ -57,7 +57,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="maps",
         action="append",
         default=[],
-        metavar="PORT=CHANNEL",
+        metavar="PORT=CHANNEL@UNIT",
         help="with --fmu: the channel for an input, or the channel to compare an output with",
     )
     parser.add_argument(
@@ -150,7 +150,7 @@ def _opened(study: Study) -> dict[str, Any]:
     from dataclasses import asdict
 
     from ..study.openings import openings
-    from ..study.settings import TEST
+    from ..study.run_file import TEST
 
     opened = [asdict(one) for one in openings(study)]
     return {"test_openings": opened} if study.files(TEST) else {}

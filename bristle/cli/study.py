@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
-from fnmatch import fnmatchcase
-from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ._common import add_common_to_actions
 from ._consent import add_trust
+from ._files import files_of, test_files
 
 if TYPE_CHECKING:
     from ..study.create import Created
@@ -48,6 +47,9 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument(
+        "--mask", action="store_true", help="from now on isolated spikes count as not measured"
+    )
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     parser.set_defaults(act=_check)
 
@@ -60,7 +62,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         action="extend",
         required=True,
         metavar="GLOB",
-        help="measurement files, one run each: CSV, Parquet, MAT; quote the pattern: 'lab/*.csv'",
+        help="measurement files, or a folder of them; quote a pattern: 'lab/*.csv'",
     )
     parser.add_argument(
         "--rig",
@@ -89,10 +91,36 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         "--test", nargs="+", action="extend", default=[], metavar="GLOB",
         help="test runs, which no fit and no verdict sees: names among the data, or more files",
     )  # fmt: skip
+    _add_runs(parser)
     parser.add_argument("--law", help="the law that the model begins with; else lugre")
     parser.add_argument("--title", default="", help="the study's title; else its name")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(act=_new)
+
+
+def _add_runs(parser: argparse.ArgumentParser) -> None:
+    """Add what is known of whole runs, and how files hold them."""
+    parser.add_argument(
+        "--level", action="append", default=[], metavar="PATTERN",
+        help="the command's level in the names of files, {} in its place: --level 'I{}A'",
+    )  # fmt: skip
+    parser.add_argument(
+        "--label", action="append", default=[], metavar="NAME=PATTERN",
+        help="what else names tell of a run: --label 'oil=batch{}'",
+    )  # fmt: skip
+    parser.add_argument(
+        "--runs", type=Path, metavar="FILE",
+        help="a table with a row per run: file, role, current [A], temperature [degC], ...",
+    )  # fmt: skip
+    parser.add_argument(
+        "--split", default="", metavar="HOW",
+        help="files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'",
+    )  # fmt: skip
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ",
+        help="decimate faster runs to this rate; 0 keeps all samples; else 500 Hz from 1 kHz on",
+    )  # fmt: skip
+    parser.add_argument("--mask", action="store_true", help="isolated spikes count as not measured")
 
 
 def _new(arguments: argparse.Namespace) -> int:
@@ -101,6 +129,7 @@ def _new(arguments: argparse.Namespace) -> int:
     from ..physics.laws import DEFAULT, law_names
     from ..study.create import create_study
     from ..study.new import parse_channel
+    from ..study.run_facts import RunChoices
 
     law = arguments.law or DEFAULT
     if law not in law_names():
@@ -115,8 +144,13 @@ def _new(arguments: argparse.Namespace) -> int:
         if "time" in channels:
             raise StudyError("--step and --channel time=... exclude each other.")
         channels["time"] = ChannelSpec(step=arguments.step)
-    files = _files(arguments.data)
-    test = _test_files(arguments.test, files)
+    table = arguments.runs
+    files = [file for file in files_of(arguments.data) if table is None or Path(file) != table]
+    test = test_files(arguments.test, files)
+    choices = RunChoices(
+        arguments.level, arguments.label, table, arguments.split, arguments.rate, arguments.mask,
+        test,
+    )  # fmt: skip
     created = create_study(
         arguments.name,
         list(dict.fromkeys([*files, *test])),
@@ -125,51 +159,13 @@ def _new(arguments: argparse.Namespace) -> int:
         channels=channels,
         title=arguments.title,
         law=law,
-        test=test,
+        runs=choices,
     )
     if arguments.json:
         _print_json(created)
     else:
         _print_new(created)
     return 0
-
-
-def _test_files(patterns: list[str], files: list[str]) -> list[str]:
-    """Return the files of the test runs: names among the files of --data, or files of their own."""
-    from ..errors import StudyError
-
-    found: list[str] = []
-    for pattern in patterns:
-        named = [file for file in files if fnmatchcase(Path(file).name, pattern)]
-        matches = named or _matches(pattern)
-        if not matches:
-            raise StudyError(
-                f'--test "{pattern}": no file of --data has such a name, and no other file '
-                f"matches, seen from {Path.cwd()}."
-            )
-        found += matches
-    return list(dict.fromkeys(found))
-
-
-def _matches(pattern: str) -> list[str]:
-    """Return the files that a pattern names, in order."""
-    # pathlib takes no pattern that begins at the root.
-    matches = sorted(glob(pattern, recursive=True))  # noqa: PTH207
-    matches = [pattern] if Path(pattern).is_file() else matches
-    return [match for match in matches if Path(match).is_file()]
-
-
-def _files(patterns: list[str]) -> list[str]:
-    """Return the files that patterns name, each once, in order."""
-    from ..errors import StudyError
-
-    found: list[str] = []
-    for pattern in patterns:
-        files = _matches(pattern)
-        if not files:
-            raise StudyError(f'--data "{pattern}": no file matches, seen from {Path.cwd()}.')
-        found += files
-    return list(dict.fromkeys(found))
 
 
 def _print_json(created: Created) -> None:
@@ -218,6 +214,10 @@ def _check(arguments: argparse.Namespace) -> int:
     if arguments.action == _OLD:
         print("`bristle study first-look` is now `bristle study check`.", file=sys.stderr)
     study = Study(arguments.folder)
+    if arguments.mask and not study.settings.mask:
+        study = study.with_mask()
+        if not arguments.json:
+            print(f"{study.folder / 'study.toml'}: mask = true; isolated spikes are masked.\n")
     total = len(study.settings.runs)
     with Progress("checking the data", total, not arguments.json) as progress:
         found = check_data(study, progress.show)

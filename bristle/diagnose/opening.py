@@ -127,8 +127,7 @@ def opening(
     say("fitting the present model")
     base = refine(present, problem) if identified else _identified(present, problem)
     before = judge(base, problem, held_out)
-    drive = "current" if train[0].has("current") and not train[0].has("voltage") else "voltage"
-    shown = model_based_fault(before, problem, held_out, drive)
+    shown = model_based_fault(before, problem, held_out, problem.runs[0].drive)
     if shown is not None:
         faults.append(shown.fault)
         problem, held_out, before = shown.train, shown.held_out, shown.trial

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..data.model import read_model
 from ..findings import command
 from ..physics.forms import split_form
-from ..study.settings import TEST
+from ..study.run_file import TEST
 
 if TYPE_CHECKING:
     from ..data.channels import ChannelSpec
@@ -44,9 +44,12 @@ def commands(study: Study) -> list[str]:
 def _new(study: Study, old: str, new: str) -> str:
     """Return the command that makes the study; its channels are given, not guessed again."""
     settings, first = study.settings, study.history.model_file(0)
-    words = ["study", "new", new, "--data", *(f"{old}/{run.file}" for run in settings.runs)]
-    test = [f"{old}/{run.file}" for run in settings.runs if run.role == TEST]
+    files = dict.fromkeys(f"{old}/{run.file}" for run in settings.runs)
+    words = ["study", "new", new, "--data", *files]
+    test = dict.fromkeys(f"{old}/{run.file}" for run in settings.runs if run.role == TEST)
     words += ["--test", *test] if test else []
+    if settings.split:
+        words += ["--split", settings.split]
     if settings.rig != "bench":
         words += ["--rig", settings.rig]
     if first.is_file():

@@ -14,7 +14,7 @@ from ..draw import html
 from ..draw.style import percent
 from ..errors import BristleError
 from ..quantity import quantity, short_z
-from ..study.settings import TEST
+from ..study.run_file import TEST
 from ..study.staircase import HistoryStep, history_steps
 from .reproduce import commands
 from .study_tables import data_table, data_words, parameter_table, run_errors
@@ -170,7 +170,7 @@ def _tiles(content: Content) -> str:
     runs = content.study.settings.runs
     count = sum(run.role == "holdout" for run in runs)
     held_out = f"{count} of them held out" if count else "its last part held out"
-    test = len(content.study.files(TEST))
+    test = sum(run.role == TEST for run in runs)
     held_out += f", {test} test run{'s' * (test > 1)}" if test else ""
     pairs.append((f"{len(runs)} run{'s' * (len(runs) > 1)}", held_out))
     return html.tiles(pairs)
@@ -333,8 +333,8 @@ def _reproduce(content: Content) -> str:
 
     study = content.study
     rows = [
-        [run.file, hashlib.sha256((study.folder / run.file).read_bytes()).hexdigest()[:16]]
-        for run in study.settings.runs
+        [file, hashlib.sha256((study.folder / file).read_bytes()).hexdigest()[:16]]
+        for file in dict.fromkeys(run.file for run in study.settings.runs)
     ]
     versions = (
         f"bristle {__version__}, Python {platform.python_version()}, numpy {numpy.__version__}, "

@@ -10,7 +10,7 @@ from ..data.model import StudyModel
 from .identification import as_model
 from .openings import count_opening, opened_text, openings, runs_for_test
 from .rig import rig_of
-from .settings import TEST
+from .run_file import TEST
 from .study import Study
 
 

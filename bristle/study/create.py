@@ -10,6 +10,7 @@ from ..data.channels import ChannelSpec
 from ..data.guess import Guess
 from ..physics.laws import DEFAULT
 from .new import make_folder
+from .run_facts import RunChoices
 from .study import Study
 
 
@@ -32,7 +33,7 @@ def create_study(
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
     law: str = DEFAULT,
-    test: Sequence[Path | str] = (),
+    runs: RunChoices | None = None,
 ) -> Created:
     """Make a study's folder from files; it appears when it is whole.
 
@@ -50,9 +51,8 @@ def create_study(
         Channels that are known; the others are guessed from the first file.
     title, law : str
         Title of the study, and the law that its model begins with.
-    test : paths or patterns
-        Which of the files are test runs: their paths, or patterns of their names. No fit and no
-        verdict sees them; `bristle.compare(study, role="test")` opens them.
+    runs : RunChoices
+        What is known of whole runs, and how files hold them.
 
     Raises
     ------
@@ -63,6 +63,6 @@ def create_study(
     """
     made = make_folder(
         Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law,
-        test=test,
+        runs=runs,
     )  # fmt: skip
     return Created(Study(folder), made.guesses, made.unused, made.notes)

@@ -16,7 +16,7 @@ from ..data.measurement import Measurement
 from ..data.relation import band
 from ..quantity import plain, scale
 from .openings import runs_for_test
-from .settings import TEST
+from .run_file import TEST
 from .study import Study
 
 _HEADINGS = {"error": "Errors", "warning": "Warnings", "note": "Notes"}

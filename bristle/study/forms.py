@@ -15,6 +15,7 @@ from ..data.model import StudyModel, new_model
 from ..errors import PhysicsError, StudyError
 from ..findings import unknown
 from ..physics.command import MOST_KNOTS
+from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS
 from ..physics.forms import FORMS, LINEAR_FORM, TABLE_FORM, joined_form, split_form
 from ..physics.laws import base_and_variant
@@ -93,7 +94,7 @@ def knots_of(runs: Sequence[Measurement]) -> tuple[float, ...]:
     StudyError
         If the command keeps to fewer than `LEAST_LEVELS`.
     """
-    drives = [(run, drive) for run in runs if (drive := _drive(run))]
+    drives = [(run, run.drive) for run in runs if run.drive]
     if not drives:
         raise StudyError(
             "neither voltage nor current was measured: what depends on the command cannot be told. "
@@ -106,7 +107,7 @@ def knots_of(runs: Sequence[Measurement]) -> tuple[float, ...]:
         return _rounded(np.linspace(max(float(low), 0.0), float(high), _MOVING_KNOTS))
     levels = _merged(sorted(level for one in found for level, _ in one))
     if len(levels) < LEAST_LEVELS:
-        unit = "A" if drives[0][1] == "current" else "V"
+        unit = DRIVES[drives[0][1]].unit
         at = " and ".join(f"{level:.3g} {unit}" for level in levels)
         raise StudyError(
             f"the training runs hold the command at {at} alone: that tells a straight line at "
@@ -117,10 +118,6 @@ def knots_of(runs: Sequence[Measurement]) -> tuple[float, ...]:
         picked = np.round(np.linspace(0, len(levels) - 1, MOST_KNOTS)).astype(int)
         levels = [levels[k] for k in picked]
     return _rounded(levels)
-
-
-def _drive(run: Measurement) -> str:
-    return next((name for name in ("voltage", "current") if run.has(name)), "")
 
 
 def _merged(levels: list[float]) -> list[float]:
@@ -171,7 +168,7 @@ def in_form(model: StudyModel, form: str, runs: Sequence[Measurement]) -> StudyM
             f"{', '.join(unfit)} bends the command already, and a {form} would do so once more: "
             "undo that step first."
         )
-    other = replace(new_model(name, (), model.building), effects=dict(model.effects))
+    other = replace(new_model(name, (), model.building, model.drive), effects=dict(model.effects))
     return _carried(model, other)
 
 

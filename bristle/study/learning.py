@@ -166,6 +166,7 @@ def complete(
 
     Parameters
     ----------
+    study : the folder, opened
     curves : whether to go on where the verdict is unknown, by learning a curve
     say : called with a few words at each stage
     on_step : called after each new step of the history

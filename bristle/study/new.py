@@ -7,28 +7,29 @@ import shutil
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 
-from ..data.channels import ChannelSpec, channel_unit
+from ..data.channels import DRIVE, ChannelSpec, channel_unit
+from ..data.decimate import FAST, RATE
 from ..data.guess import Guess, guess_channels, left_out
 from ..data.measurement import measurements_of
 from ..data.model import new_model
 from ..data.model_text import model_text
+from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import BristleError, StudyError, UnitError
 from ..physics.building import read_building
+from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
+from ..quantity import plain
 from ..units import canonical
 from .history import History, Step
-from .settings import TEST, RunFile, Settings, write_settings
+from .roles import for_test, roles_of
+from .run_facts import Facts, RunChoices, facts_of
+from .run_file import TEST, RunFile
+from .settings import Settings, write_settings
 
-_WORDS = {
-    "train": "train training ident identification fit estimation est calibration cal",
-    "holdout": "valid validation val vali test holdout hold check verify verification",
-}
-_TRAIN, _HOLDOUT = (frozenset(words.split()) for words in _WORDS.values())
 _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<unit>[^@]*))?")
 
 
@@ -50,13 +51,13 @@ def make_folder(
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
     law: str = DEFAULT,
-    test: Sequence[Path | str] = (),
+    runs: RunChoices | None = None,
 ) -> Made:
     """Make a study's folder from files.
 
     Parameters
     ----------
-    folder, files, rig, building, channels, title, law, test : see
+    folder, files, rig, building, channels, title, law, runs : see
         `bristle.study.create.create_study`
 
     Raises
@@ -68,30 +69,96 @@ def make_folder(
         raise StudyError(f"{folder}: is there already. Take another name, or remove it.")
     if not files:
         raise StudyError("a study needs measurements: --data 'lab/*.csv' names their files.")
+    choices = runs or RunChoices()
     levels = _levels(rig, building)
     tables = [read_table(Path(file)) for file in files]
-    closed = _for_test([Path(file) for file in files], test)
+    closed = for_test([Path(file) for file in files], choices)
     first = tables[closed.index(False)]  # a guess is a choice, which no test run may see
     guesses = _chosen(first, guess_channels(first, rig, levels), channels or {})
     _refuse_incomplete(first, guesses, rig, channels or {})
     specs = {
         guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses
     } | {name: spec for name, spec in (channels or {}).items() if spec.step is not None}
-    digests = {}
-    for file, table in zip(files, tables, strict=True):
+    for table in tables:
         _refuse_other_columns(table, guesses, first)
-        pieces = measurements_of(table, specs, estimate=False)
-        digests[str(file)] = [piece.digest() for piece in pieces]
     names = _names([Path(file) for file in files])
-    runs, notes = _roles(names, closed)
-    notes += _twins([str(file) for file in files], digests, closed)
-    comments = {guess.channel: _comment(guess) for guess in guesses}
-    settings = Settings(title or folder.name, rig, tuple(runs), specs, comments=comments)
-    _write(folder, settings, dict(zip(names, map(Path, files), strict=True)), building, law)
+    about, notes = facts_of([Path(file) for file in files], choices, bool({*DRIVE} & {*specs}))
+    found = _parts(names, tables, specs, choices.split)
+    of_file = dict(zip(names, about, strict=True))
+    is_test = dict(zip(names, closed, strict=True))
+    listed, said = roles_of([one.name for one in found], [is_test[one.file] for one in found])
+    settings = Settings(
+        title or folder.name, rig,
+        tuple(_with_facts(a, b, of_file) for a, b in zip(found, listed, strict=True)),
+        specs, comments={guess.channel: _comment(guess) for guess in guesses},
+        mask=choices.mask, split=choices.split,
+        rate=_rate([one for one in found if not is_test[one.file]], choices, notes),
+    )  # fmt: skip
+    _refuse_one_role(settings.runs)
+    notes += said if not any(one.role for one in about) else []
+    notes += _twins(found, is_test)
+    data = dict(zip(names, map(Path, files), strict=True))
+    _write(folder, settings, data, building, law)
     unused = tuple(
         text for text in left_out(first, guesses) if text not in {g.column for g in guesses}
     )
     return Made(tuple(guesses), unused, tuple(notes))
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A run of a new study: its file in data/, its number there or 0, digests, samples per s."""
+
+    file: str
+    piece: int
+    digests: list[str]
+    rate: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.file}, run {self.piece}" if self.piece else self.file
+
+
+def _parts(
+    names: Sequence[str], tables: Sequence[Table], specs: Mapping[str, ChannelSpec], split: str
+) -> list[_Part]:
+    """Return the runs in the files, each read once, so that what is wrong is told now."""
+    out = []
+    for name, table in zip(names, tables, strict=True):
+        for number, piece in enumerate(pieces_of(table, split, specs) if split else [table], 1):
+            read = measurements_of(piece, specs, estimate=False)
+            digests = [one.digest() for one in read]
+            out.append(_Part(name, number if split else 0, digests, read[0].sampling.rate))
+    return out
+
+
+def _with_facts(part: _Part, listed: RunFile, facts: Mapping[str, Facts]) -> RunFile:
+    about = facts[part.file]
+    role = listed.role if listed.role == TEST else about.role or listed.role
+    return RunFile(f"data/{part.file}", role, about.levels, about.labels, part.piece)
+
+
+def _refuse_one_role(runs: Sequence[RunFile]) -> None:
+    seen = [run for run in runs if run.role != TEST]
+    roles = {run.role for run in seen}
+    if len(seen) > 1 and roles != {"train", "holdout"} and len(roles) == 1:
+        raise StudyError(
+            f'all runs have the role "{roles.pop()}": some for training, some held out are right.'
+        )
+
+
+def _rate(parts: Sequence[_Part], choices: RunChoices, notes: list[str]) -> float:
+    """Return the rate to which runs are decimated, 0 where none is fast enough."""
+    fastest = max(part.rate for part in parts)
+    rate = RATE if choices.rate is None else choices.rate
+    if rate <= 0.0 or fastest < FAST * rate * (1.0 - 1e-6):
+        return 0.0
+    notes.append(
+        f"the files hold {plain(fastest, 4)} samples per second: runs are decimated to about "
+        f"{plain(rate, 4)} Hz behind an anti-alias filter, which a fit needs; rate in study.toml "
+        "changes that, and rate = 0 keeps all"
+    )
+    return rate
 
 
 def parse_channel(text: str) -> tuple[str, ChannelSpec]:
@@ -213,88 +280,33 @@ def _names(files: list[Path]) -> list[str]:
     return out
 
 
-def _for_test(files: list[Path], chosen: Sequence[Path | str]) -> list[bool]:
-    """Return which files are test runs: those that a path or a pattern of names chooses."""
-    out = [False] * len(files)
-    for one in map(str, chosen):
-        found = [k for k, file in enumerate(files) if _is_chosen(file, one)]
-        if not found:
-            raise StudyError(
-                f"test runs: no file of the data is {one}; there are "
-                f"{', '.join(file.name for file in files)}."
-            )
-        for k in found:
-            out[k] = True
-    if all(out):
-        raise StudyError(
-            "test runs: all files are. Leave some for training, and one to be held out."
-        )
-    return out
-
-
-def _is_chosen(file: Path, one: str) -> bool:
-    return file == Path(one) or any(fnmatchcase(text, one) for text in (file.name, file.as_posix()))
-
-
-def _roles(names: list[str], closed: list[bool]) -> tuple[list[RunFile], list[str]]:
-    """Return the runs with their roles, and the notes that tell why.
+def _twins(parts: Sequence[_Part], is_test: Mapping[str, bool]) -> list[str]:
+    """Return the sentences that tell which runs are one and the same.
 
     Parameters
     ----------
-    names : of the files in data/
-    closed : which of them are test runs; see `_seen_roles` for the others
+    parts : the runs
+    is_test : whether the runs of a file are test runs, which must be none of the others
     """
-    roles, notes = _seen_roles([n for n, is_test in zip(names, closed, strict=True) if not is_test])
-    rest = iter(roles)
-    every = [TEST if is_test else next(rest) for is_test in closed]
-    test = ", ".join(name for name, role in zip(names, every, strict=True) if role == TEST)
-    if test:
-        notes.append(f"test runs, which no fit and no verdict sees: {test}")
-    return [RunFile(f"data/{n}", role) for n, role in zip(names, every, strict=True)], notes
-
-
-def _seen_roles(names: list[str]) -> tuple[list[str], list[str]]:
-    """Return roles and why: by the names of files, else every third is held out."""
-    words = [set(re.split(r"[^a-z]+", name.lower())) for name in names]
-    found = ["holdout" if w & _HOLDOUT else "train" if w & _TRAIN else "" for w in words]
-    if len(names) == 1:
-        return ["train"], [
-            "there is one run: its last 30 % are held out, which is weaker than a separate run"
-        ]
-    if (
-        "holdout" in found
-        and len(set(found) | {"train"}) == 2
-        and found.count("holdout") < len(found)
-    ):
-        roles = [role or "train" for role in found]
-        note = "roles follow the names of the files"
-    else:
-        roles = ["holdout" if k % 3 == 1 else "train" for k in range(len(names))]
-        note = "every third run is held out; change role in study.toml if another choice is better"
-    held_out = ", ".join(name for name, role in zip(names, roles, strict=True) if role == "holdout")
-    return roles, [f"{note}. Held out: {held_out}"]
-
-
-def _twins(files: list[str], digests: Mapping[str, list[str]], closed: Sequence[bool]) -> list[str]:
-    first: dict[str, str] = {}
+    first: dict[str, _Part] = {}
     twins = []
-    is_test = dict(zip(files, closed, strict=True))
-    for file in files:
-        whole = " ".join(digests[file])
-        if whole in first and is_test[file] != is_test[first[whole]]:
+    for one in parts:
+        whole = " ".join(one.digests)
+        other = first.setdefault(whole, one)
+        if other is one:
+            continue
+        if is_test[one.file] != is_test[other.file]:
             raise StudyError(
-                f"{file} and {first[whole]} are the same measurement, and one of them is a test "
+                f"{one.name} and {other.name} are the same measurement, and one of them is a test "
                 "run: it tests nothing. Use another run, or remove one."
             )
-        if whole in first:
-            twins.append((file, first[whole]))
-        first.setdefault(whole, file)
-    if len(files) > 1 and len(first) == 1:
+        twins.append((one.name, other.name))
+    if len(parts) > 1 and len(first) == 1:
         raise StudyError(
-            f"{files[0]} and the other {len(files) - 1} files hold the same measurement: nothing "
-            "can be held out. Take runs with different motions, or one file alone."
+            f"{parts[0].name} and the other {len(parts) - 1} files hold the same measurement: "
+            "nothing can be held out. Take runs with different motions, or one file alone."
         )
-    return [f"{file} is the same measurement as {other}: remove one" for file, other in twins]
+    return [f"{one} is the same measurement as {other}: remove one" for one, other in twins]
 
 
 def _comment(guess: Guess) -> str:
@@ -317,7 +329,7 @@ def _write(
             (draft / sub).mkdir()
         for name, source in data.items():
             shutil.copyfile(source, draft / "data" / name)
-        model = new_model(law)
+        model = new_model(law, drive=settings.drive or VOLTAGE.name)
         if building is not None:
             shutil.copyfile(building, draft / Path(building).name)
             model = replace(model, building=Path(building).name)

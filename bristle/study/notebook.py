@@ -9,6 +9,7 @@ from ..draw.figure import DPI
 from ..draw.style import Page, percent, png, short_z
 from ..errors import RecordError
 from .fit_picture import draw_identified
+from .run_file import TEST
 from .staircase import history_steps
 from .staircase_picture import staircase_page
 
@@ -95,7 +96,8 @@ def study_html(study: Study) -> str:
         ]
         for step, one in zip(steps, history_steps(steps), strict=True)
     ]  # fmt: skip
-    held_out, test = len(study.files("holdout")), len(study.files("test"))
+    roles = [run.role for run in settings.runs]
+    held_out, test = roles.count("holdout"), roles.count(TEST)
     verdict = study.verdict()
     return html.fragment(
         settings.title,

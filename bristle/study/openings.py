@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from ..data.files import other_schema, read_json, write_json
 from ..errors import StudyError
+from .run_file import TEST
 from .runs import Runs, refuse_seen, usable
-from .settings import TEST
 
 if TYPE_CHECKING:
     from .study import Study

@@ -32,8 +32,9 @@ from .inputs import (
     runs_of,
 )
 from .learning import diagnose_study
+from .run_file import ROLES
 from .runs import Runs
-from .settings import CUT_OFF, ROLES
+from .settings import CUT_OFF
 from .study import Study
 
 
@@ -115,6 +116,8 @@ def identify(
     house = building_from(building)
     runs = _runs(given, holdout, channels, house)
     rig = _rig(runs, house)
+    drives = [run.drive for run in runs.all if run.drive]
+    chosen = chosen.with_drive(drives[0] if drives else chosen.drive)
     return identify_on_rig(rig, runs, chosen, FitTask(CUT_OFF, table=table, command=command))
 
 
@@ -294,7 +297,7 @@ def _present(study: Study, model: Given | None, effects: str | Sequence[str]) ->
     """Return a study's model, or the one that was given, with the study's building."""
     own = study.model()
     chosen = model_of(own if model is None else model, effects, own.law)
-    return replace(chosen, building=own.building)
+    return replace(chosen.with_drive(own.drive), building=own.building)
 
 
 def _runs(

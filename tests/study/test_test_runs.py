@@ -16,6 +16,7 @@ from bristle.report.study_page import study_report
 from bristle.study import Study, create_study
 from bristle.study.data_check import check_data
 from bristle.study.openings import FILE, openings
+from bristle.study.run_facts import RunChoices
 
 SECONDS = 2.0
 
@@ -26,7 +27,9 @@ def made(folder: Path, factor: float = 1.0, seconds: float = SECONDS) -> Study:
     last = bench_run(9, seconds)
     last["F [N]"] = factor * last["F [N]"]
     files.append(write(folder / "lab" / "final.csv", last))
-    return create_study(folder / "rig", files, law="bingham", test=["final*"]).study
+    return create_study(
+        folder / "rig", files, law="bingham", runs=RunChoices(test=["final*"])
+    ).study
 
 
 @pytest.fixture
@@ -58,9 +61,22 @@ def test_the_command_takes_names_and_files_of_their_own(
     assert "no file of --data has such a name" in capsys.readouterr().err
 
 
+def test_a_table_of_runs_may_name_them(tmp_path: Path) -> None:
+    files = write_runs(tmp_path, 4, seconds=2.0)
+    table = tmp_path / "runs.csv"
+    listed = ("test", "train", "holdout", "train")
+    lines = [f"{file.name},{role}" for file, role in zip(files, listed, strict=True)]
+    table.write_text("\n".join(["file,role", *lines]) + "\n")
+    study = create_study(tmp_path / "rig", files, runs=RunChoices(table=table)).study
+    assert roles(study) == list(listed)
+    table.write_text("\n".join(["file,role", *(f"{f.name},test" for f in files)]) + "\n")
+    with pytest.raises(StudyError, match="all files are"):
+        create_study(tmp_path / "other", files, runs=RunChoices(table=table))
+
+
 def test_one_run_beside_test_runs_is_split_in_time(tmp_path: Path) -> None:
     files = write_runs(tmp_path, 2, seconds=2.0)
-    study = create_study(tmp_path / "rig", files, test=[files[0]]).study
+    study = create_study(tmp_path / "rig", files, runs=RunChoices(test=[files[0]])).study
     runs = study.runs()
     assert [len(run.time) for run in runs.all] == [700, 300]
     assert runs.holdout[0].source.endswith("run_2.csv")
@@ -71,7 +87,7 @@ def test_guesses_of_channels_do_not_see_a_test_run(tmp_path: Path) -> None:
     last["F [N]"] = -last["F [N]"]  # alone, it would be turned
     first = write(tmp_path / "a.csv", last)
     files = [first, *write_runs(tmp_path, 2, seconds=2.0)]
-    study = create_study(tmp_path / "rig", files, test=[first]).study
+    study = create_study(tmp_path / "rig", files, runs=RunChoices(test=[first])).study
     assert study.settings.channels["force"].sign == 1
     assert create_study(tmp_path / "other", files).study.settings.channels["force"].sign == -1
 
@@ -82,7 +98,9 @@ def test_guesses_of_channels_do_not_see_a_test_run(tmp_path: Path) -> None:
 )
 def test_a_choice_that_cannot_be_is_refused(tmp_path: Path, test: list[str], told: str) -> None:
     with pytest.raises(StudyError, match=told):
-        create_study(tmp_path / "rig", write_runs(tmp_path, 3, seconds=2.0), test=test)
+        create_study(
+            tmp_path / "rig", write_runs(tmp_path, 3, seconds=2.0), runs=RunChoices(test=test)
+        )
     assert not (tmp_path / "rig").exists()
 
 
@@ -90,10 +108,10 @@ def test_a_damaged_or_repeated_test_run_is_refused_when_the_study_is_made(tmp_pa
     files = write_runs(tmp_path, 3, seconds=2.0)
     files[2].write_text("no measurement")
     with pytest.raises(RecordError, match=r"run_3\.csv"):
-        create_study(tmp_path / "rig", files, test=[files[2]])
+        create_study(tmp_path / "rig", files, runs=RunChoices(test=[files[2]]))
     files[2].write_bytes(files[0].read_bytes())
     with pytest.raises(StudyError, match="same measurement, and one of them is a test run"):
-        create_study(tmp_path / "rig", files, test=[files[2]])
+        create_study(tmp_path / "rig", files, runs=RunChoices(test=[files[2]]))
 
 
 def test_fits_and_verdicts_do_not_read_a_test_run(
