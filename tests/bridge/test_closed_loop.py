@@ -25,6 +25,7 @@ from bristle.cli import main
 from bristle.data.model import StudyModel, new_model
 from bristle.errors import StudyError
 from bristle.physics.building import paper_building
+from bristle.physics.drive import drive_named
 from bristle.physics.forms import joined_form
 from bristle.study import Study, create_study
 from bristle.study.openings import openings
@@ -285,3 +286,15 @@ def test_law_form_effects_and_limits_are_in_the_scenario(tmp_path: Path) -> None
     (tmp_path / "still").mkdir()
     other = Simulator(model, paper, False, still, tmp_path / "still").scenario()
     assert other.component("damper").parameters["voltage"] == 3.0
+
+
+def test_a_command_of_another_kind_is_played_as_it_is(tmp_path: Path) -> None:
+    time = 0.01 * np.arange(101)
+    model = new_model("bingham").with_drive("current")
+    shaking = Shaking("pulse", time, np.sin(time), 2.0 * time, drive=drive_named("current"))
+    simulator = Simulator(model, House(paper_building()), False, shaking, tmp_path)
+    as_current = simulator.response(simulator.scenario())["damper.force"]
+    (tmp_path / "volts").mkdir()
+    volts = replace(shaking, drive=drive_named("voltage"))
+    other = replace(simulator, model=new_model("bingham"), shaking=volts, folder=tmp_path / "volts")
+    np.testing.assert_array_equal(as_current, other.response(other.scenario())["damper.force"])
