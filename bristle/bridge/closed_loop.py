@@ -11,14 +11,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..compare.errors import CLOSE
 from ..data.measurement import Measurement
 from ..data.model import StudyModel, read_model
 from ..errors import StudyError
 from ..findings import command
 from ..progress import tell
+from ..quantity import short_z
 from ..study.openings import count_opening, opened_text, openings, runs_for_test
 from ..study.rig import building_of
 from ..study.run_file import TEST
+from ..study.staircase import history_steps
 from ..study.study import Study
 from .closed_loop_figures import DRAWS, figures_of
 from .closed_loop_result import ClosedLoop, Predicted
@@ -169,7 +172,19 @@ def _predicted(
         strokes.append(now.stroke)
         failed += now.failed
     notes = [f"{failed} of the draws could not be simulated"] if failed else []
+    notes += _doubt(study) if draws else []
     return ClosedLoop(tuple(rows), draws, step, tuple(notes), tuple(strokes))
+
+
+def _doubt(study: Study) -> list[str]:
+    """Return the note that tells what the band cannot hold, none where noise explains the error."""
+    z = history_steps(study.steps())[-1].z
+    if z is None or z <= CLOSE:
+        return []
+    return [
+        f"on held-out runs the error of the model is {short_z(z)} times the noise; the band does "
+        "not hold what the model misses"
+    ]
 
 
 def _before(study: Study) -> tuple[StudyModel | None, str]:

@@ -97,11 +97,13 @@ def test_the_model_before_the_last_step_stands_beside_it(found: ClosedLoop) -> N
 def test_the_band_is_that_of_the_drag(made: Path, found: ClosedLoop) -> None:
     study = Study(made)
     wide = study.model()
-    study.add_step("less sure", "to see", damper(wide, DRAG, spread=0.2))
+    study.add_step("less sure", "to see", damper(wide, DRAG, spread=0.2), after={"z_holdout": 3.5})
     try:
         other = closed_loop(study, draws=12)
     finally:
         study.undo()
+    assert not found.notes
+    assert "the model is 3.50 times the noise; the band does not hold" in other.notes[0]
     one, two = (row(each, "base_displacement").band for each in (found, other))
     assert one is not None
     assert two is not None
