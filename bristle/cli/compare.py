@@ -33,13 +33,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
         "--role",
-        "--runs",
-        dest="role",
         choices=("holdout", "train", "test"),
         default="holdout",
         help="which runs of the study: those held out, those that the model was fitted to, or the "
         "test runs, whose openings the study counts",
     )
+    # The name until 0.1; here for one release.
+    parser.add_argument(
+        "--runs", dest="role", choices=("holdout", "train"), default=argparse.SUPPRESS,
+        help=argparse.SUPPRESS,
+    )  # fmt: skip
     parser.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="an FMU, anybody's")
     parser.add_argument(
         "--data", type=Path, metavar="FILE", help="with --fmu or --in: the measurement"

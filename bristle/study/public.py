@@ -32,7 +32,7 @@ from .inputs import (
     runs_of,
 )
 from .learning import diagnose_study
-from .run_file import ROLES
+from .run_file import ROLES, TEST
 from .runs import Runs
 from .settings import CUT_OFF
 from .study import Study
@@ -185,6 +185,10 @@ def compare(
         _refuse_of_study(train=train, channels=channels, building=building)
         chosen = _present(given, model, effects)
         return compare_study(given, chosen, role=role)
+    if role == TEST:
+        raise StudyError(
+            f"role is {written(role)}: a study alone has test runs; train or holdout is right."
+        )
     if model is None:
         raise StudyError(
             "compare needs a model besides the runs: what identify returned, a model.toml, or a "
