@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import re
-import shutil
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +26,8 @@ from ..physics.laws import LAWS
 from ..physics.user import own_effects
 from ..study.identification import as_model
 from ..study.study import Study
+from .in_building import House, Parameters, loads, shaking_of, write_scenario
+from .scenario_files import part_text, scenario_text, signal_file
 
 Array = NDArray[np.float64]
 
@@ -86,11 +85,6 @@ def _one_run(study: Study) -> Measurement:
     """Return the run that the scenario plays: the first that is held out."""
     runs = study.runs()
     return (runs.holdout or runs.train)[0]
-
-
-def _masses(damper: StudyModel) -> list[str]:
-    """Return the parameters of the damper's effects that are a mass which moves with the rod."""
-    return [f"{name}.{EFFECTS[name].mass}" for name in damper.effects if EFFECTS[name].mass]
 
 
 def _damper(
@@ -177,22 +171,23 @@ def _bench(
     if any("a" in effect.needs for effect in effects):
         rows["acceleration"] = ("acceleration", "m/s2", run.a)
         wires["damper.acceleration"] = "acceleration.value"
-    parts = [_part("rod", "PrescribedMotion", {"kind": "csv", "file": files[0].name})]
+    motion = {"kind": "csv", "file": files[0].name}
+    parts = [part_text("rod", {"fmu": "PrescribedMotion"}, motion)]
     for name, (title, unit, values) in rows.items():
-        files.append(_signal_file(time, values, title, unit, folder / f"{name}.csv"))
-        parts.append(_part(name, "SignalSource", {"kind": "csv", "file": files[-1].name}))
+        files.append(signal_file(time, values, title, unit, folder / f"{name}.csv"))
+        signal = {"kind": "csv", "file": files[-1].name}
+        parts.append(part_text(name, {"fmu": "SignalSource"}, signal))
     starts = _start_values(damper, run)
     if not measurement.drive:
         starts[drive.name] = 0.0
-    parts.append(_part("damper", fmu.name, starts))
-    text = _scenario(
+    parts.append(part_text("damper", {"fmu": fmu.name}, starts))
+    head = (
         f"{study.name}: the model on the bench, motion of {measurement.name}",
         f"# damper.force is the model's, measured.value the measured one [N]. Sampled at "
         f"{run.dt:g} s; the step is finer\n# because an FMU holds its inputs over a step.",
-        stop, step, parts, wires,
-    )  # fmt: skip
+    )
     scenario = folder / "bench.toml"
-    write_whole(scenario, text)
+    write_whole(scenario, scenario_text(head, (stop, step), parts, wires))
     return scenario, files
 
 
@@ -208,16 +203,7 @@ def _motion_file(run: Run, fine: int, path: Path) -> Path:
     v = np.interp(steps, run.dt * np.arange(len(run.v)), run.v)
     nodes: Array = np.concatenate([[0.0], steps + 0.5 * h])
     x: Array = run.x[0] + np.concatenate([[0.0], np.cumsum(v * np.diff(nodes))])
-    return _signal_file(nodes, x, "displacement", "m", path)
-
-
-def _signal_file(
-    time: NDArray[Any], values: NDArray[Any], title: str, unit: str, path: Path
-) -> Path:
-    rows = [f"time [s],{title} [{unit}]"]
-    rows += [f"{t:.12g},{value!r}" for t, value in zip(time.tolist(), values.tolist(), strict=True)]
-    write_whole(path, "\n".join(rows) + "\n")
-    return path
+    return signal_file(nodes, x, "displacement", "m", path)
 
 
 def _start_values(damper: StudyModel, run: Run) -> dict[str, float]:
@@ -253,100 +239,18 @@ def _structure(
     notes: list[str],
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of the study's building with the damper, under a run's ground motion."""
-    if not measurement.has("ground_acceleration"):
-        raise StudyError(
-            f"{measurement.name}: no ground_acceleration was measured, which a structure's "
-            "scenario needs."
-        )
-    files, values = [], model.values()
-    building, extra = paper_building(), {}
-    if model.building:
-        files.append(Path(shutil.copyfile(study.folder / model.building, folder / "building.toml")))
-        building, extra = read_building(files[0]), {"building": files[0].name}
-    time = measurement.time - measurement.time[0]
-    ground = measurement["ground_acceleration"]
-    files.append(_signal_file(time, ground, "acceleration", "m/s2", folder / "ground.csv"))
-    level = building.levels()[0]
-    layer = model.at("structure", bench=False)
-    own: dict[str, float | bool] = {f"{name}.on": True for name in layer.effects}
-    own |= {name: value for name, value in layer.values().items() if "." in name}
-    damper: dict[str, float | bool] = {}
-    mass = building.M[0][0]
-    for name in _masses(model.at("damper", bench=False)):
-        moved = values.get(name, 0.0)
-        if moved > 0.0:
-            own["attached_mass"] = float(own.get("attached_mass", 0.0)) + moved
-            damper[name] = 0.0
-            mass += moved
-            notes.append(
-                f"{name} = {moved:g} kg is structure.attached_mass in the scenario: from "
-                "differences of velocity it would diverge near the mass that it moves."
-            )
-    wires = {
-        "structure.ground_acceleration": "ground.ground_acceleration",
-        "structure.damper_force": "damper.force",
-        "damper.displacement": f"structure.{level}_displacement",
-        "damper.velocity": f"structure.{level}_velocity",
-    }
-    if LAWS[model.base_law].has("sign"):
-        damper["moving_mass"] = mass
-        wires["damper.holding_force"] = "structure.holding_force"
-    parts = [
-        _part("ground", "GroundMotion", {"record": "ground.csv"}),
-        _part("structure", "Structure", own, extra),
-    ]
-    drive = drive_named(measurement.drive)
-    if not measurement.drive:
-        damper[drive.name] = 0.0
-    else:
-        level_of = measurement[drive.name]
-        files.append(_signal_file(time, level_of, drive.name, drive.unit, folder / "drive.csv"))
-        parts.append(_part("drive", "SignalSource", {"kind": "csv", "file": "drive.csv"}))
-        wires[f"damper.{drive.name}"] = "drive.value"
-    if measurement.has("force"):
-        files.append(
-            _signal_file(time, measurement["force"], "force", "N", folder / "measured.csv")
-        )
-        parts.append(_part("measured", "SignalSource", {"kind": "csv", "file": "measured.csv"}))
-    parts.append(_part("damper", fmu.name, damper))
-    fine = max(1, ceil(measurement.step / 2e-3 - 1e-9))
-    step = float(f"{measurement.step / fine:.12g}")
-    stop = float(f"{(len(time) - 1) * fine * step:.12g}")
-    text = _scenario(
+    file = study.folder / model.building if model.building else None
+    house = House(paper_building() if file is None else read_building(file), file)
+    own = loads(model, house.building)
+    notes += own.notes
+    head = (
         f"{study.name}: the building with the model's damper, ground of {measurement.name}",
-        "# The model's damper in the study's building.", stop, step, parts, wires,
-    )  # fmt: skip
-    scenario = folder / "structure.toml"
-    write_whole(scenario, text)
-    return scenario, files
+        "# The model's damper in the study's building.",
+    )
 
+    def damper(parameters: Parameters) -> str:
+        return part_text("damper", {"fmu": fmu.name}, parameters)
 
-# -- text
-
-
-def _part(
-    name: str, fmu: str, parameters: Mapping[str, float | bool | str],
-    extra: Mapping[str, str] | None = None,
-) -> str:  # fmt: skip
-    lines = [f"[components.{name}]", f"fmu = {_value(fmu)}"]
-    lines += [f"{key} = {_value(value)}" for key, value in (extra or {}).items()]
-    if parameters:
-        pairs = [f"{_value(key)} = {_value(value)}" for key, value in parameters.items()]
-        lines.append(f"parameters = {{ {', '.join(pairs)} }}")
-    return "\n".join(lines)
-
-
-def _value(value: float | bool | str) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    return f'"{value}"' if isinstance(value, str) else repr(float(value))
-
-
-def _scenario(
-    title: str, about: str, stop: float, step: float, parts: list[str], wires: Mapping[str, str]
-) -> str:
-    plain = title.replace("\\", "/").replace('"', "'")
-    head = f'{about}\n\nschema = 1\ntitle = "{plain}"\n\n[run]\nstop = {stop!r}\n'
-    head += f'step = {step!r}\nalgorithm = "gauss-seidel"\n'
-    lines = [f'"{target}" = "{source}"' for target, source in wires.items()]
-    return "\n".join([head, "\n\n".join(parts), "\n[connections]", *lines]) + "\n"
+    return write_scenario(
+        folder, head, house, shaking_of(measurement), own.structure, damper, own.damper
+    )

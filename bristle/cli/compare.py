@@ -7,11 +7,19 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._closed_loop import (
+    add_closed_loop,
+    closed_loop_of,
+    print_closed_loop,
+    refuse_alone,
+)
 from ._consent import add_trust
+from ._table import print_tables
 
 if TYPE_CHECKING:
     from ..bridge.fmu import FmuComparison
     from ..compare.comparison import Comparison
+    from ..study.study import Study
 
 HELP = "show where a model, or any FMU, deviates from measurements: in text, then in figures"
 
@@ -24,13 +32,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("folder", nargs="?", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
-        "--runs",
-        choices=("holdout", "train"),
+        "--role",
+        choices=("holdout", "train", "test"),
         default="holdout",
-        help="of the study: those held out, or those that the model was fitted to",
+        help="which runs of the study: those held out, those that the model was fitted to, or the "
+        "test runs, whose openings the study counts",
     )
+    # The name until 0.1; here for one release.
+    parser.add_argument(
+        "--runs", dest="role", choices=("holdout", "train"), default=argparse.SUPPRESS,
+        help=argparse.SUPPRESS,
+    )  # fmt: skip
     parser.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="an FMU, anybody's")
-    parser.add_argument("--data", type=Path, metavar="FILE", help="with --fmu: the measurement")
+    parser.add_argument(
+        "--data", type=Path, metavar="FILE", help="with --fmu or --in: the measurement"
+    )
     parser.add_argument(
         "--set",
         dest="values",
@@ -61,6 +77,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="with --fmu: limit of the run in s",
     )
+    add_closed_loop(parser)
     parser.add_argument("--out", type=Path, metavar="FILE", help="where the picture goes")
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -70,6 +87,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Compare, print the sentences and tables, draw the picture."""
     from ..errors import StudyError
 
+    refuse_alone(arguments)
     if arguments.fmu is not None:
         if arguments.folder is not None or arguments.data is None:
             raise StudyError(
@@ -77,7 +95,10 @@ def main(arguments: argparse.Namespace) -> int:
                 "--data run.csv"
             )
         return _of_fmu(arguments)
-    fmu_only = [f"--{n}" for n in ("data", "values", "maps", "channel") if getattr(arguments, n)]
+    options = ("values", "maps", "channel") if arguments.house else (
+        "data", "values", "maps", "channel"
+    )  # fmt: skip
+    fmu_only = [f"--{n}" for n in options if getattr(arguments, n)]
     if arguments.folder is None or fmu_only:
         wrong = "a study's folder, or --fmu and --data, are needed"
         if fmu_only:
@@ -85,7 +106,16 @@ def main(arguments: argparse.Namespace) -> int:
         raise StudyError(
             f"{wrong}: bristle compare FOLDER, or bristle compare --fmu FILE.fmu --data run.csv"
         )
-    return _of_study(arguments)
+    return _in_closed_loop(arguments) if arguments.closed_loop else _of_study(arguments)
+
+
+def _in_closed_loop(arguments: argparse.Namespace) -> int:
+    found = closed_loop_of(arguments)
+    if arguments.json:
+        _print_json(found.as_dict())
+    else:
+        print_closed_loop(found)
+    return 0
 
 
 def _of_study(arguments: argparse.Namespace) -> int:
@@ -95,7 +125,7 @@ def _of_study(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    comparison = compare_study(study, role=arguments.runs)
+    comparison = compare_study(study, role=arguments.role)
     page = draw_comparison(comparison)
     if arguments.out is None:
         picture = study.write_report("compare.png", png(page))
@@ -105,14 +135,28 @@ def _of_study(arguments: argparse.Namespace) -> int:
     notes = study.runs().notes
     if arguments.json:
         _print_json(
-            {**comparison.as_dict(), "notes": list(notes), "picture": str(picture.absolute())}
-        )
+            {
+                **comparison.as_dict(), "role": arguments.role, **_opened(study),
+                "notes": list(notes), "picture": str(picture.absolute()),
+            }
+        )  # fmt: skip
         return 0
     _print(comparison)
     for note in notes:
         print(note)
     print(f"\nPicture: {picture}")
     return 0
+
+
+def _opened(study: Study) -> dict[str, Any]:
+    """Return when the test runs were opened, nothing where the study has none."""
+    from dataclasses import asdict
+
+    from ..study.openings import openings
+    from ..study.run_file import TEST
+
+    opened = [asdict(one) for one in openings(study)]
+    return {"test_openings": opened} if study.files(TEST) else {}
 
 
 def _of_fmu(arguments: argparse.Namespace) -> int:
@@ -181,12 +225,4 @@ def _print(comparison: Comparison) -> None:
 
     for sentence in comparison.sentences:
         print(textwrap.fill(sentence, 96) if sys.stdout.isatty() else sentence)
-    for title, header, rows in comparison_tables(comparison):
-        print(f"\n{title}")
-        widths = [max(len(row[i]) for row in [header, *rows]) for i in range(len(header))]
-        for row in [header, *rows]:
-            cells = [
-                row[0].ljust(widths[0]),
-                *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)),
-            ]
-            print("  " + "  ".join(cells).rstrip())
+    print_tables(comparison_tables(comparison))

@@ -17,6 +17,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="FILE", help="where it goes; else FOLDER/reports/report.html"
     )
+    parser.add_argument(
+        "--keep-test-closed", action="store_true", help="leave the study's test runs closed"
+    )
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
@@ -29,7 +32,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    content = gather(study)
+    content = gather(study, open_test=not arguments.keep_test_closed)
     page = render(content)
     if arguments.out is None:
         file = study.write_report("report.html", page)
@@ -42,6 +45,7 @@ def main(arguments: argparse.Namespace) -> int:
         answer = {
             "report": str(file.absolute()),
             "z_holdout": content.now.z if content.now else None,
+            "z_test": content.test.z if content.test else None,
             "verdict": (content.verdict or {}).get("kind"),
             "trouble": content.trouble or None,
         }

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import argparse
 import sys
-from glob import glob
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ._common import add_common_to_actions
 from ._consent import add_trust
+from ._files import files_of, test_files
 
 if TYPE_CHECKING:
     from ..study.create import Created
@@ -87,6 +87,10 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step", type=float, metavar="S", help="sampling step in s of files without a time"
     )
+    parser.add_argument(
+        "--test", nargs="+", action="extend", default=[], metavar="GLOB",
+        help="test runs, which no fit and no verdict sees: names among the data, or more files",
+    )  # fmt: skip
     _add_runs(parser)
     parser.add_argument("--law", help="the law that the model begins with; else lugre")
     parser.add_argument("--title", default="", help="the study's title; else its name")
@@ -141,44 +145,27 @@ def _new(arguments: argparse.Namespace) -> int:
             raise StudyError("--step and --channel time=... exclude each other.")
         channels["time"] = ChannelSpec(step=arguments.step)
     table = arguments.runs
-    files = [file for file in _files(arguments.data) if table is None or Path(file) != table]
+    files = [file for file in files_of(arguments.data) if table is None or Path(file) != table]
+    test = test_files(arguments.test, files)
+    choices = RunChoices(
+        arguments.level, arguments.label, table, arguments.split, arguments.rate, arguments.mask,
+        test,
+    )  # fmt: skip
     created = create_study(
         arguments.name,
-        files,
+        list(dict.fromkeys([*files, *test])),
         rig=arguments.rig,
         building=arguments.building,
         channels=channels,
         title=arguments.title,
         law=law,
-        runs=RunChoices(
-            arguments.level, arguments.label, table, arguments.split, arguments.rate, arguments.mask
-        ),
+        runs=choices,
     )
     if arguments.json:
         _print_json(created)
     else:
         _print_new(created)
     return 0
-
-
-def _files(patterns: list[str]) -> list[str]:
-    """Return the files that patterns name, or that folders hold, each once, in order."""
-    from ..data.read import files_in
-    from ..errors import StudyError
-
-    found: list[str] = []
-    for pattern in patterns:
-        if Path(pattern).is_dir():
-            found += map(str, files_in(Path(pattern)))
-            continue
-        # pathlib takes no pattern that begins at the root.
-        matches = sorted(glob(pattern, recursive=True))  # noqa: PTH207
-        matches = [pattern] if Path(pattern).is_file() else matches
-        files = [match for match in matches if Path(match).is_file()]
-        if not files:
-            raise StudyError(f'--data "{pattern}": no file matches, seen from {Path.cwd()}.')
-        found += files
-    return list(dict.fromkeys(found))
 
 
 def _print_json(created: Created) -> None:

@@ -60,6 +60,8 @@ class Comparison:
         What an engineer would say.
     seen : bool or None
         Whether the runs were those of the fit, None where nobody knows.
+    role : str
+        "test" where the runs are those that neither a fit nor a verdict has seen.
     sites : tuple of SiteError
         The errors of a building's sites, the worst first, of which this is the comparison of one,
         `site`.
@@ -91,6 +93,7 @@ class Comparison:
     sentences: tuple[str, ...] = ()
     seen: bool | None = False
     sites: tuple[SiteError, ...] = ()
+    role: str = ""
     labels: tuple[LabelError, ...] = ()
 
     @property
@@ -202,6 +205,7 @@ def compare_predictions(
     seed: int = 0,
     flips: int = FLIPS,
     others: Sequence[SiteError] = (),
+    role: str = "",
 ) -> Comparison:
     """Compare one output, measured and predicted, whatever predicted it; see `compare`.
 
@@ -212,6 +216,7 @@ def compare_predictions(
     seed : of the random signs of blocks
     flips : how many random patterns of signs say what chance would give
     others : the errors at the other sites of a building
+    role : the role of the runs in a study, if that is known
 
     Raises
     ------
@@ -234,7 +239,7 @@ def compare_predictions(
         predictions[0].quantity, predictions[0].unit, runs, run_error("all runs", predictions),
         interval_of_z(normalised, finder), tuple(found), second, spectrum(predictions),
         tuple(regimes(normalised, along, DRIVES[predictions[0].drive])), tuple(predictions),
-        seen=seen, labels=label_errors(predictions),
+        seen=seen, labels=label_errors(predictions), role=role,
     )  # fmt: skip
     if others:
         comparison = replace(comparison, sites=with_failures([site_of(comparison), *others]))

@@ -23,7 +23,7 @@ class RigComparer:
     ----------
     rig : Rig
     role : str
-        "holdout" or "train".
+        "holdout" or "train"; "test" where the rig has test runs in place of those held out.
     present : Model
         The model that the site is chosen by.
     seen : bool or None
@@ -50,8 +50,8 @@ class RigComparer:
         """Compare a model at the site, and tell how it stands at the others, if there are any."""
         here = self._models(model)[self.site]
         if not here.site.shown:
-            return compare_predictions(self._predictions(here), seen=self.seen)
-        return compare_sites(self._everywhere(model), self.site, seen=self.seen)
+            return compare_predictions(self._predictions(here), seen=self.seen, role=self.role)
+        return compare_sites(self._everywhere(model), self.site, seen=self.seen, role=self.role)
 
     def _models(self, model: Model) -> SiteModels:
         """Return what predicts the runs; that of the last model is kept: lines take long."""

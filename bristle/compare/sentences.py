@@ -32,6 +32,7 @@ _WHICH = {
     False: "On held-out runs",
     True: "On the training runs",
 }
+_OF_ROLE = {"test": "On the test runs"}
 _NAMED = 3  # sites that fail beside the worst one, by name
 _RIPPLES = 4  # changes of sign along a coordinate from which it goes up and down
 _ALIKE = 0.25  # parts of a pattern's size by which it may differ between voltages
@@ -51,7 +52,8 @@ def _how_wrong(comparison: Comparison) -> str:
     total = comparison.total
     known = comparison.quantity.islower()  # words; "F_kN" is a name that somebody gave an output
     what = comparison.quantity.replace("_", " ") if known else f'output "{comparison.quantity}"'
-    where = f"{_WHICH[comparison.seen]} the model misses"
+    which = _OF_ROLE.get(comparison.role) or _WHICH[comparison.seen]
+    where = f"{which} the model misses"
     size = f"{quantity(total.rms, comparison.unit, 2, total.signal)} RMS"
     if total.share == total.share:
         size += f" ({_percent(total.share)} of {'the ' + what if known else 'its own'})"

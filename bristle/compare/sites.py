@@ -27,6 +27,7 @@ def compare_sites(
     *,
     seen: bool | None = False,
     seed: int = 0,
+    role: str = "",
 ) -> Comparison:
     """Compare a building's sites: one at length, the worst by default, and how the others stand.
 
@@ -36,7 +37,7 @@ def compare_sites(
         Site to its runs.
     site : str
         The one to compare at length; "" for that of the largest z.
-    seen, seed
+    seen, seed, role
         As `compare_predictions` takes them.
 
     Raises
@@ -47,7 +48,9 @@ def compare_sites(
     errors = site_errors(predictions, seed)
     site = site or errors[0].site
     others = [one for one in errors if one.site != site]
-    return compare_predictions(usable(predictions[site]), seen=seen, seed=seed, others=others)
+    return compare_predictions(
+        usable(predictions[site]), seen=seen, seed=seed, others=others, role=role
+    )
 
 
 def site_errors(

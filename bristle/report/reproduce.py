@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from ..data.model import read_model
 from ..findings import command
 from ..physics.forms import split_form
+from ..study.run_file import TEST
 
 if TYPE_CHECKING:
     from ..data.channels import ChannelSpec
@@ -45,6 +46,8 @@ def _new(study: Study, old: str, new: str) -> str:
     settings, first = study.settings, study.history.model_file(0)
     files = dict.fromkeys(f"{old}/{run.file}" for run in settings.runs)
     words = ["study", "new", new, "--data", *files]
+    test = dict.fromkeys(f"{old}/{run.file}" for run in settings.runs if run.role == TEST)
+    words += ["--test", *test] if test else []
     if settings.split:
         words += ["--split", settings.split]
     if settings.rig != "bench":

@@ -14,6 +14,7 @@ from ..draw import html
 from ..draw.style import percent
 from ..errors import BristleError
 from ..quantity import quantity, short_z
+from ..study.run_file import TEST
 from ..study.staircase import HistoryStep, history_steps
 from .reproduce import commands
 from .study_tables import data_table, data_words, parameter_table, run_errors
@@ -32,7 +33,8 @@ class Content:
     """What a report tells: everything that was read and computed for it.
 
     `now` is the present model on held-out runs, `before` the model before the last effect that was
-    added; None where there is none. `trouble` says why the model could not be compared.
+    added, `test` the present one on the test runs; None where there is none. `trouble` says why the
+    model could not be compared.
     """
 
     study: Study
@@ -45,12 +47,14 @@ class Content:
     added: str
     notes: tuple[str, ...]
     trouble: str
+    test: Comparison | None = None
 
 
 def study_report(study: Study) -> str:
     """Return a study's report as one HTML document.
 
-    It is the same for the same study, whenever and wherever it is made.
+    It is the same for the same study, whenever and wherever it is made, but for the number of times
+    that its test runs have been opened.
 
     Raises
     ------
@@ -60,15 +64,18 @@ def study_report(study: Study) -> str:
     return render(gather(study))
 
 
-def gather(study: Study) -> Content:
-    """Return what the report of a study tells; it compares the models before and after."""
+def gather(study: Study, *, open_test: bool = True) -> Content:
+    """Return what the report of a study tells; it compares the models before and after.
+
+    `open_test` False leaves test runs closed; else the study counts that they were opened.
+    """
     from ..data.model import read_model
-    from ..study.comparison import comparer
+    from ..study.comparison import compare_study, comparer
     from ..study.identification import as_model
 
     model, steps = study.model(to_show=True), tuple(study.steps())
     runs = study.runs()
-    now = before = None
+    now = before = test = None
     trouble, added = "", ""
     found = history_steps(steps)
     try:
@@ -85,11 +92,14 @@ def gather(study: Study) -> Content:
                 before, added = against.compare(as_model(earlier)), " and ".join(new)
                 break
         found = [_with_error(one, against, study) for one in found]
+        if open_test and study.files(TEST):
+            test = compare_study(study, role=TEST)
     except BristleError as error:
         trouble = str(error)
     return Content(
-        study, model, study.verdict(), steps, tuple(found), now, before, added, runs.notes, trouble
-    )
+        study, model, study.verdict(), steps, tuple(found), now, before, added, runs.notes, trouble,
+        test,
+    )  # fmt: skip
 
 
 def _with_error(step: HistoryStep, against: RigComparer, study: Study) -> HistoryStep:
@@ -122,6 +132,7 @@ def render(content: Content) -> str:
         _history(content),
         _before_after(content),
         _where(content),
+        _on_test_runs(content),
         _parameters(content),
         _data(content),
         untold_section(content.verdict),
@@ -159,6 +170,8 @@ def _tiles(content: Content) -> str:
     runs = content.study.settings.runs
     count = sum(run.role == "holdout" for run in runs)
     held_out = f"{count} of them held out" if count else "its last part held out"
+    test = sum(run.role == TEST for run in runs)
+    held_out += f", {test} test run{'s' * (test > 1)}" if test else ""
     pairs.append((f"{len(runs)} run{'s' * (len(runs) > 1)}", held_out))
     return html.tiles(pairs)
 
@@ -193,6 +206,23 @@ def _where(content: Content) -> str:
             "such a share along any coordinate.", kind="soft",
         ),
     )  # fmt: skip
+
+
+def _on_test_runs(content: Content) -> str:
+    """Return the error on runs that no choice has seen; "" where there are none."""
+    if not content.study.files(TEST):
+        return ""
+    title = "Error on the test runs"
+    if content.test is None:
+        return html.section(
+            title, html.paragraphs(content.trouble or "They stay closed.", kind="soft")
+        )
+    said = (content.test.sentences[0], content.test.sentences[-1])
+    return html.section(
+        title,
+        html.paragraphs(*said, kind="lead"),
+        html.table(*run_errors(content.test), numbers=range(1, 6)),
+    )
 
 
 def _sites(content: Content) -> list[str]:
@@ -284,7 +314,9 @@ def _parameters(content: Content) -> str:
 
 
 def _data(content: Content) -> str:
-    measured = content.study.runs().all
+    measured = [*content.study.runs().all]
+    if content.test is not None:
+        measured += content.study.read(TEST)
     header, rows = data_table(content.study, measured)
     return html.section(
         "The data",

@@ -12,6 +12,7 @@ from ..compare.tables import run_table
 from ..data.labels import label_text
 from ..draw.style import MINUS, percent
 from ..quantity import plain, quantity, times_ten
+from ..study.run_file import TEST
 
 if TYPE_CHECKING:
     from ..compare.comparison import Comparison
@@ -84,13 +85,15 @@ def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str]
     """Return header and rows: a line per run, or per piece where gaps have cut it."""
     roles = {run.name.rpartition("/")[2]: run.role for run in study.settings.runs}
     labelled = any(run.labels or run.levels for run in study.settings.runs)
-    single = len(study.settings.runs) == 1
+    single = sum(run.role != TEST for run in study.settings.runs) == 1
     header = ["run", "role", "duration [s]", "rate [Hz]", "samples", "channels"]
     header += ["known"] if labelled else []
     rows = []
     for run in measured:
         file = run.source.replace("\\", "/").rpartition("/")[2]
-        role = ("held out" if "last" in run.name else "train") if single else roles.get(file, "")
+        role = roles.get(file, "")
+        if single and role != TEST:
+            role = "held out" if "last" in run.name else "train"
         rows.append(
             [
                 run.name, "held out" if role == "holdout" else role, plain(run.duration, 4),

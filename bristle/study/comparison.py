@@ -2,28 +2,38 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..compare.comparison import Comparison
 from ..compare.rig import RigComparer
 from ..data.model import StudyModel
 from .identification import as_model
+from .openings import count_opening, opened_text, openings, runs_for_test
 from .rig import rig_of
+from .run_file import TEST
 from .study import Study
 
 
 def comparer(study: Study, role: str = "holdout") -> RigComparer:
-    """Return what compares models with the runs of one role, "holdout" or "train".
+    """Return what compares models with the runs of one role, "holdout", "train" or "test".
 
-    The runs are read and prepared once, so that several models can be compared with them.
+    The runs are read and prepared once, so that several models can be compared with them. The study
+    counts how often its test runs are opened here.
 
     Raises
     ------
     StudyError
-        If an effect of the present model acts at no site of the rig.
+        If an effect of the present model acts at no site of the rig, or there is no test run.
     RecordError
         If a run cannot be read or lacks a channel that is needed.
     """
-    model = study.model()
-    return RigComparer(rig_of(study, model, study.runs()), role, as_model(model))
+    model, runs = study.model(), study.runs()
+    if role == TEST:
+        runs = runs_for_test(study, runs)
+    made = RigComparer(rig_of(study, model, runs), role, as_model(model))
+    if role == TEST:  # before anybody can have seen an error
+        count_opening(study)
+    return made
 
 
 def compare_study(
@@ -38,4 +48,8 @@ def compare_study(
     StudyError, RecordError
         As `comparer`, and if nothing tells what error is large.
     """
-    return comparer(study, role).compare(as_model(model or study.model()))
+    found = comparer(study, role).compare(as_model(model or study.model()))
+    if role != TEST:
+        return found
+    said = opened_text(len(openings(study)))
+    return replace(found, sentences=(*found.sentences, said))

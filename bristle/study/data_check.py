@@ -11,10 +11,12 @@ import numpy as np
 from ..data.checks.channels import check_channels
 from ..data.checks.finding import Finding, grouped, sentence
 from ..data.checks.motion import check_force, check_motion, velocity_of_run
-from ..data.checks.runs import Excitation, check_runs
+from ..data.checks.runs import Excitation, check_runs, excitation_of
 from ..data.measurement import Measurement
 from ..data.relation import band
 from ..quantity import plain, scale
+from .openings import runs_for_test
+from .run_file import TEST
 from .study import Study
 
 _HEADINGS = {"error": "Errors", "warning": "Warnings", "note": "Notes"}
@@ -96,6 +98,8 @@ def _table(runs: tuple[Measurement, ...]) -> list[str]:
 def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataCheck:
     """Check all measurements of a study.
 
+    Test runs are checked one by one: no advice on the other runs or on roles follows from them.
+
     Parameters
     ----------
     study : Study
@@ -108,21 +112,25 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
         If a file cannot be read, or runs cannot be told apart.
     """
     runs = study.runs()
+    test = runs_for_test(study, runs) if study.files(TEST) else None
+    every = [*runs.all, *(test.holdout if test else [])]
     level = ""
     if study.settings.has_building:
         level = damper_level(runs.all)
     findings = [Finding("split", "warning", note) for note in runs.notes]
-    for done, run in enumerate(runs.all, 1):
+    findings += [Finding("split", "warning", note) for note in (test.notes if test else ())]
+    for done, run in enumerate(every, 1):
         findings += _check_run(run, level)
         if show:
             show(done)
     together, excitations = check_runs(runs.train, runs.holdout, level)
     findings += together
+    excitations += [excitation_of(run, level) for run in every[len(runs.all) :]]
     if study.settings.has_building:
         findings += _unmeasured(runs.all)
     findings = [_milder(finding, runs.all) for finding in findings]
     ordered = [finding for level in _HEADINGS for finding in findings if finding.level == level]
-    return DataCheck(tuple(ordered), tuple(excitations), tuple(runs.all))
+    return DataCheck(tuple(ordered), tuple(excitations), tuple(every))
 
 
 def damper_level(runs: list[Measurement]) -> str:

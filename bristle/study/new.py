@@ -25,15 +25,11 @@ from ..physics.laws import DEFAULT
 from ..quantity import plain
 from ..units import canonical
 from .history import History, Step
+from .roles import for_test, roles_of
 from .run_facts import Facts, RunChoices, facts_of
-from .run_file import RunFile
+from .run_file import TEST, RunFile
 from .settings import Settings, write_settings
 
-_WORDS = {
-    "train": "train training ident identification fit estimation est calibration cal",
-    "holdout": "valid validation val vali test holdout hold check verify verification",
-}
-_TRAIN, _HOLDOUT = (frozenset(words.split()) for words in _WORDS.values())
 _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<unit>[^@]*))?")
 
 
@@ -76,31 +72,35 @@ def make_folder(
     choices = runs or RunChoices()
     levels = _levels(rig, building)
     tables = [read_table(Path(file)) for file in files]
-    guesses = _chosen(tables[0], guess_channels(tables[0], rig, levels), channels or {})
-    _refuse_incomplete(tables[0], guesses, rig, channels or {})
+    closed = for_test([Path(file) for file in files], choices)
+    first = tables[closed.index(False)]  # a guess is a choice, which no test run may see
+    guesses = _chosen(first, guess_channels(first, rig, levels), channels or {})
+    _refuse_incomplete(first, guesses, rig, channels or {})
     specs = {
         guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses
     } | {name: spec for name, spec in (channels or {}).items() if spec.step is not None}
     for table in tables:
-        _refuse_other_columns(table, guesses, tables[0])
+        _refuse_other_columns(table, guesses, first)
     names = _names([Path(file) for file in files])
     about, notes = facts_of([Path(file) for file in files], choices, bool({*DRIVE} & {*specs}))
     found = _parts(names, tables, specs, choices.split)
-    listed, said = _roles([one.name for one in found])
     of_file = dict(zip(names, about, strict=True))
+    is_test = dict(zip(names, closed, strict=True))
+    listed, said = roles_of([one.name for one in found], [is_test[one.file] for one in found])
     settings = Settings(
         title or folder.name, rig,
         tuple(_with_facts(a, b, of_file) for a, b in zip(found, listed, strict=True)),
         specs, comments={guess.channel: _comment(guess) for guess in guesses},
-        mask=choices.mask, split=choices.split, rate=_rate(found, choices, notes),
+        mask=choices.mask, split=choices.split,
+        rate=_rate([one for one in found if not is_test[one.file]], choices, notes),
     )  # fmt: skip
     _refuse_one_role(settings.runs)
     notes += said if not any(one.role for one in about) else []
-    notes += _twins([one.name for one in found], {one.name: one.digests for one in found})
+    notes += _twins(found, is_test)
     data = dict(zip(names, map(Path, files), strict=True))
     _write(folder, settings, data, building, law)
     unused = tuple(
-        text for text in left_out(tables[0], guesses) if text not in {g.column for g in guesses}
+        text for text in left_out(first, guesses) if text not in {g.column for g in guesses}
     )
     return Made(tuple(guesses), unused, tuple(notes))
 
@@ -134,14 +134,14 @@ def _parts(
 
 def _with_facts(part: _Part, listed: RunFile, facts: Mapping[str, Facts]) -> RunFile:
     about = facts[part.file]
-    return RunFile(
-        f"data/{part.file}", about.role or listed.role, about.levels, about.labels, part.piece
-    )
+    role = listed.role if listed.role == TEST else about.role or listed.role
+    return RunFile(f"data/{part.file}", role, about.levels, about.labels, part.piece)
 
 
 def _refuse_one_role(runs: Sequence[RunFile]) -> None:
-    roles = {run.role for run in runs}
-    if len(runs) > 1 and roles != {"train", "holdout"} and len(roles) == 1:
+    seen = [run for run in runs if run.role != TEST]
+    roles = {run.role for run in seen}
+    if len(seen) > 1 and roles != {"train", "holdout"} and len(roles) == 1:
         raise StudyError(
             f'all runs have the role "{roles.pop()}": some for training, some held out are right.'
         )
@@ -280,43 +280,33 @@ def _names(files: list[Path]) -> list[str]:
     return out
 
 
-def _roles(names: list[str]) -> tuple[list[RunFile], list[str]]:
-    """Return the runs with their roles, and why: by their names, else every third is held out."""
-    words = [set(re.split(r"[^a-z]+", name.lower())) for name in names]
-    found = ["holdout" if w & _HOLDOUT else "train" if w & _TRAIN else "" for w in words]
-    if len(names) == 1:
-        return [RunFile(f"data/{names[0]}", "train")], [
-            "there is one run: its last 30 % are held out, which is weaker than a separate run"
-        ]
-    if (
-        "holdout" in found
-        and len(set(found) | {"train"}) == 2
-        and found.count("holdout") < len(found)
-    ):
-        roles = [role or "train" for role in found]
-        note = "roles follow the names of the files"
-    else:
-        roles = ["holdout" if k % 3 == 1 else "train" for k in range(len(names))]
-        note = "every third run is held out; change role in study.toml if another choice is better"
-    runs = [RunFile(f"data/{name}", role) for name, role in zip(names, roles, strict=True)]
-    held_out = ", ".join(name for name, role in zip(names, roles, strict=True) if role == "holdout")
-    return runs, [f"{note}. Held out: {held_out}"]
+def _twins(parts: Sequence[_Part], is_test: Mapping[str, bool]) -> list[str]:
+    """Return the sentences that tell which runs are one and the same.
 
-
-def _twins(files: list[str], digests: Mapping[str, list[str]]) -> list[str]:
-    first: dict[str, str] = {}
+    Parameters
+    ----------
+    parts : the runs
+    is_test : whether the runs of a file are test runs, which must be none of the others
+    """
+    first: dict[str, _Part] = {}
     twins = []
-    for file in files:
-        whole = " ".join(digests[file])
-        if whole in first:
-            twins.append((file, first[whole]))
-        first.setdefault(whole, file)
-    if len(files) > 1 and len(first) == 1:
+    for one in parts:
+        whole = " ".join(one.digests)
+        other = first.setdefault(whole, one)
+        if other is one:
+            continue
+        if is_test[one.file] != is_test[other.file]:
+            raise StudyError(
+                f"{one.name} and {other.name} are the same measurement, and one of them is a test "
+                "run: it tests nothing. Use another run, or remove one."
+            )
+        twins.append((one.name, other.name))
+    if len(parts) > 1 and len(first) == 1:
         raise StudyError(
-            f"{files[0]} and the other {len(files) - 1} files hold the same measurement: nothing "
-            "can be held out. Take runs with different motions, or one file alone."
+            f"{parts[0].name} and the other {len(parts) - 1} files hold the same measurement: "
+            "nothing can be held out. Take runs with different motions, or one file alone."
         )
-    return [f"{file} is the same measurement as {other}: remove one" for file, other in twins]
+    return [f"{one} is the same measurement as {other}: remove one" for one, other in twins]
 
 
 def _comment(guess: Guess) -> str:

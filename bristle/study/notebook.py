@@ -9,6 +9,7 @@ from ..draw.figure import DPI
 from ..draw.style import Page, percent, png, short_z
 from ..errors import RecordError
 from .fit_picture import draw_identified
+from .run_file import TEST
 from .staircase import history_steps
 from .staircase_picture import staircase_page
 
@@ -79,7 +80,7 @@ def study_page(study: Study) -> Page:
         return staircase_page(steps)
     from .run_picture import draw_run
 
-    runs = study.read()
+    runs = study.read("train") or study.read("holdout")
     if not runs:
         raise RecordError(f"{study.folder}: there is no run to draw.")
     return draw_run(runs[0])
@@ -95,12 +96,14 @@ def study_html(study: Study) -> str:
         ]
         for step, one in zip(steps, history_steps(steps), strict=True)
     ]  # fmt: skip
-    held_out = len(study.files("holdout"))
+    roles = [run.role for run in settings.runs]
+    held_out, test = roles.count("holdout"), roles.count(TEST)
     verdict = study.verdict()
     return html.fragment(
         settings.title,
         html.paragraphs(
-            f"{study.folder}: {len(settings.runs)} runs, {held_out} of them held out.",
+            f"{study.folder}: {len(settings.runs)} runs, {held_out} of them held out"
+            f"{f', {test} for the test at the end' if test else ''}.",
             f"Verdict: {verdict.get('words')}" if verdict else "",
         ),
         html.table(

@@ -19,7 +19,7 @@ from ..findings import written
 from ..identify.rig import Rig, bench_rig, building_rig
 from ..physics.building import Building
 from ..physics.laws import DEFAULT
-from .comparison import comparer
+from .comparison import compare_study
 from .identification import FitTask, as_model, identify_on_rig, identify_study
 from .identified import Identified
 from .inputs import (
@@ -32,7 +32,7 @@ from .inputs import (
     runs_of,
 )
 from .learning import diagnose_study
-from .run_file import ROLES
+from .run_file import ROLES, TEST
 from .runs import Runs
 from .settings import CUT_OFF
 from .study import Study
@@ -148,8 +148,8 @@ def compare(
         As in `bristle.identify`.
     building : path or Building, optional
         As in `bristle.identify`.
-    role : {"holdout", "train"}
-        Which runs of a study.
+    role : {"holdout", "train", "test"}
+        Which runs of a study. It counts how often its test runs are opened.
 
     Returns
     -------
@@ -184,7 +184,11 @@ def compare(
     if isinstance(given, Study):
         _refuse_of_study(train=train, channels=channels, building=building)
         chosen = _present(given, model, effects)
-        return comparer(given, role).compare(as_model(chosen))
+        return compare_study(given, chosen, role=role)
+    if role == TEST:
+        raise StudyError(
+            f"role is {written(role)}: a study alone has test runs; train or holdout is right."
+        )
     if model is None:
         raise StudyError(
             "compare needs a model besides the runs: what identify returned, a model.toml, or a "

@@ -30,7 +30,8 @@ class RunChoices:
     `levels` patterns such as "I{}A", where {} is the command's level in a file's name; `labels`
     such as "oil=oil{}"; `table` a file with a row per run; `split` how files hold several runs;
     `rate` [Hz] to which faster runs are decimated, None for what a fit needs, 0 for none; `mask`
-    whether isolated spikes count as not measured.
+    whether isolated spikes count as not measured; `test` which files are test runs, by their paths
+    or by patterns of their names.
     """
 
     levels: Sequence[str] = ()
@@ -39,6 +40,7 @@ class RunChoices:
     split: str = ""
     rate: float | None = None
     mask: bool = False
+    test: Sequence[Path | str] = ()
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def facts_of(
     for pattern in choices.labels:
         found = _joined(found, [_matched(file, pattern, level=False) for file in files])
     if choices.table is not None:
-        rows = _rows(choices.table, files)
+        rows = rows_of_table(choices.table, files)
         found = _joined(found, rows)
         named = {name for row in rows for name in (*row.levels, *row.labels)}
         if named:
@@ -217,7 +219,7 @@ def _quantity_or_none(unit: str) -> str:
 # -- a table beside the files
 
 
-def _rows(path: Path, files: Sequence[Path]) -> list[Facts]:
+def rows_of_table(path: Path, files: Sequence[Path]) -> list[Facts]:
     """Return the rows of a table in the order of the files; StudyError for what is not right."""
     try:
         text = path.read_text(encoding="utf-8-sig")

@@ -13,13 +13,16 @@ from ..data.labels import UNITS, Label
 from ..findings import written
 from ..lines import KeyPath
 
-ROLES = ("train", "holdout")
+TEST = "test"
+"""The role of runs that no choice sees: neither a fit nor a verdict reads them."""
+
+ROLES = ("train", "holdout", TEST)
 _RUN_KEYS = ("file", "piece", "role", *DRIVE, *UNITS, "labels")
 
 
 @dataclass(frozen=True)
 class RunFile:
-    """One `[[runs]]`: the file, relative to the study, and its role, "train" or "holdout".
+    """One `[[runs]]`: the file, relative to the study, and its role, one of `ROLES`.
 
     `levels` of a command that the file does not hold, by channel, in its unit; `labels` what else
     is known of the whole run; `piece` its number in a file of several runs, from 1, else 0.
@@ -59,7 +62,7 @@ def read_runs(toml: Toml, folder: Path, split: bool) -> tuple[RunFile, ...]:
         toml.known(keys, table, _RUN_KEYS)
         file, role = toml.text(keys, table, "file"), toml.text(keys, table, "role", "train")
         if role not in ROLES:
-            toml.error((*keys, "role"), f'role = "{role}"; "train" or "holdout" is right.')
+            toml.error((*keys, "role"), f'role = "{role}"; "train", "holdout" or "test" is right.')
         if not file:
             toml.error(keys, 'a run has no file; file = "data/run_1.csv" is right.')
         elif not (folder / file).is_file():

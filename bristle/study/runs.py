@@ -82,12 +82,23 @@ def split_in_time(pieces: list[Measurement]) -> Runs:
 
 def refuse_twins(train: list[Measurement], holdout: list[Measurement]) -> None:
     """Refuse runs that are held out and for training, too; StudyError names both."""
-    first = {one.digest(): one.name for one in train}
-    for one in holdout:
+    _refuse_same(train, holdout, "held out", "which is for training")
+
+
+def refuse_seen(seen: list[Measurement], test: list[Measurement]) -> None:
+    """Refuse test runs that are for training or held out, too; StudyError names both."""
+    _refuse_same(seen, test, "a test run", "which is not")
+
+
+def _refuse_same(
+    others: list[Measurement], judging: list[Measurement], what: str, beside: str
+) -> None:
+    first = {one.digest(): one.name for one in others}
+    for one in judging:
         if one.digest() in first:
             raise StudyError(
-                f"{one.name} is held out and is the same measurement as {first[one.digest()]}, "
-                "which is for training: it tests nothing. Use another run, or remove one."
+                f"{one.name} is {what} and is the same measurement as {first[one.digest()]}, "
+                f"{beside}: it tests nothing. Use another run, or remove one."
             )
 
 

@@ -23,7 +23,7 @@ from ..trust import can_do_without, load
 from .history import History, Step
 from .new import make_folder
 from .reading import read_runs
-from .run_file import ROLES
+from .run_file import ROLES, TEST
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
 from .settings import Settings, read_settings, with_mask
 
@@ -169,7 +169,7 @@ class Study:
         return read_runs(self.folder, self.settings, role)
 
     def runs(self) -> Runs:
-        """Return the measurements for training and those held out.
+        """Return the measurements for training and those held out; test runs are not read.
 
         A single run is split in time, 70 to 30 %.
 
@@ -180,9 +180,9 @@ class Study:
         RecordError
             If a file cannot be read.
         """
-        (train, idle), (holdout, other) = (usable(self.read(role)) for role in ROLES)
+        (train, idle), (holdout, other) = (usable(self.read(role)) for role in ROLES[:2])
         idle = (*idle, *other)
-        if len(self.settings.runs) == 1:
+        if sum(run.role != TEST for run in self.settings.runs) == 1:
             split = split_in_time([*train, *holdout])
             return replace(split, notes=(*split.notes, *idle))
         if not train or not holdout:

@@ -1,0 +1,200 @@
+"""Building and identified damper under a ground motion alone: peaks and RMS, with their error.
+
+A comparison of forces gives the model the measured motion. Here it gets the ground motion and the
+command alone, so that an error of the force acts on the motion that causes the next force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..compare.errors import CLOSE
+from ..data.measurement import Measurement
+from ..data.model import StudyModel, read_model
+from ..errors import StudyError
+from ..findings import command
+from ..progress import tell
+from ..quantity import short_z
+from ..study.openings import count_opening, opened_text, openings, runs_for_test
+from ..study.rig import building_of
+from ..study.run_file import TEST
+from ..study.staircase import history_steps
+from ..study.study import Study
+from .closed_loop_figures import DRAWS, figures_of
+from .closed_loop_result import ClosedLoop, Predicted
+from .closed_loop_runs import Trial, begins_in_motion, trial_of
+from .in_building import House
+
+
+def closed_loop(study: Study, *, role: str = "holdout", draws: int = DRAWS) -> ClosedLoop:
+    """Simulate a study's building with its model, and compare the responses with those measured.
+
+    Parameters
+    ----------
+    study : Study
+        Of a building, with a model that was identified.
+    role : {"holdout", "train", "test"}
+        Whose ground motions; the study counts how often its test runs are opened.
+    draws : int
+        Draws of the parameters for the band; 0 for none.
+
+    Raises
+    ------
+    StudyError
+        If the study is of a bench, a run has no ground motion or does not begin at rest, or the
+        model has no covariance.
+    RunError
+        If the model cannot be simulated.
+    """
+    model = study.model()
+    building = building_of(study, model)
+    if building is None:
+        raise StudyError(
+            f"{study.folder}: the damper was measured on a bench: --closed-loop needs a building, "
+            f"as in  {command('compare', study.name, '--closed-loop', '--in', 'house.toml')}"
+        )
+    _refuse_without_covariance(study, model, draws)
+    runs = study.runs()
+    if role == TEST:
+        runs = runs_for_test(study, runs)
+    chosen = runs.train if role == "train" else runs.holdout
+    trials, notes = _trials(study, chosen, split=role != TEST)
+    house = House(building, study.folder / model.building if model.building else None)
+    found = _predicted(study, model, (house, False), trials, draws)
+    if role == TEST:
+        count_opening(study)
+        notes.append(opened_text(len(openings(study))))
+    return replace(found, role=role, notes=(*found.notes, *notes))
+
+
+def closed_loop_in(
+    study: Study, house: House, trials: Sequence[Trial], *, draws: int = DRAWS
+) -> ClosedLoop:
+    """Predict the responses of a building with a damper that was identified on a bench.
+
+    Parameters
+    ----------
+    study : Study
+        Of a damper on a bench, with a model that was identified.
+    house : House
+        The building, which may never have been measured.
+    trials : sequence of Trial
+        Its ground motions, with responses where there are some; see `bridge.closed_loop_input`.
+    draws : int
+        Draws of the parameters for the band; 0 for none.
+
+    Raises
+    ------
+    StudyError
+        If the study has a building of its own, or the model has no covariance.
+    RunError
+        If the model cannot be simulated.
+    """
+    if study.settings.has_building:
+        raise StudyError(
+            f"{study.folder}: its damper was measured in a building of its own; --in goes with a "
+            "damper on a bench."
+        )
+    model = study.model()
+    _refuse_without_covariance(study, model, draws)
+    found = _predicted(study, model, (house, True), trials, draws)
+    most = max(
+        (float(np.ptp(run["displacement"])) / 2.0 for run in study.runs().train
+         if run.has("displacement")), default=float("inf"),
+    )  # fmt: skip
+    reached = max(found.strokes, default=0.0)
+    notes = list(found.notes)
+    if reached > 1.2 * most:
+        notes.append(
+            f"the damper moves by {1e3 * reached:.3g} mm here, and by {1e3 * most:.3g} mm in the "
+            "training runs: beyond them neither the model nor the band is known"
+        )
+    return replace(found, notes=tuple(notes))
+
+
+def _refuse_without_covariance(study: Study, model: StudyModel, draws: int) -> None:
+    if draws and not _has_covariance(model):
+        raise StudyError(
+            f"{study.folder / 'model.toml'}: no covariance of the parameters, which the 95 % band "
+            f"needs. Identify the model again:  {command('identify', study.folder)}"
+        )
+
+
+def _has_covariance(model: StudyModel) -> bool:
+    names = model.uncertain()
+    return len(names) == 1 or (len(names) > 1 and model.correlation is not None)
+
+
+def _trials(
+    study: Study, chosen: Sequence[Measurement], *, split: bool
+) -> tuple[list[Trial], list[str]]:
+    """Return what can be simulated from rest, and why the rest is left out.
+
+    A single run that is `split` in time is simulated from the begin of its file, and judged on its
+    own part.
+    """
+    single = split and sum(run.role != TEST for run in study.settings.runs) == 1
+    whole = [*study.read("train"), *study.read("holdout")] if single else []
+    trials, notes = [], []
+    for run in chosen:
+        begun = next((one for one in whole if one.time[0] <= run.time[0] <= one.time[-1]), run)
+        trial = trial_of(begun, run.name, (float(run.time[0]), float(run.time[-1])))
+        moving = begins_in_motion(trial)
+        if moving:
+            notes.append(
+                f"{run.name} is left out: {moving} is not at rest when the run begins, and what "
+                "was before is not known"
+            )
+        else:
+            trials.append(trial)
+    if not trials:
+        raise StudyError(f"{study.folder}: no run can be simulated from rest. {'; '.join(notes)}.")
+    return trials, notes
+
+
+def _predicted(
+    study: Study, model: StudyModel, place: tuple[House, bool], trials: Sequence[Trial], draws: int
+) -> ClosedLoop:
+    """Return the prediction of the present model and of that before the last step."""
+    before, step = _before(study)
+    rows: list[Predicted] = []
+    strokes, failed = [], 0
+    for number, trial in enumerate(trials):
+        tell(f"simulating {trial.shaking.name}")
+        now = figures_of(model, place, trial, draws, number)
+        then = None
+        if before is not None:
+            then = figures_of(before, place, trial, draws if _has_covariance(before) else 0, number)
+        rows += now.rows(trial, then)
+        strokes.append(now.stroke)
+        failed += now.failed
+    notes = [f"{failed} of the draws could not be simulated"] if failed else []
+    notes += _doubt(study) if draws else []
+    return ClosedLoop(tuple(rows), draws, step, tuple(notes), tuple(strokes))
+
+
+def _doubt(study: Study) -> list[str]:
+    """Return the note that tells what the band cannot hold, none where noise explains the error."""
+    z = history_steps(study.steps())[-1].z
+    if z is None or z <= CLOSE:
+        return []
+    return [
+        f"on held-out runs the error of the model is {short_z(z)} times the noise; the band does "
+        "not hold what the model misses"
+    ]
+
+
+def _before(study: Study) -> tuple[StudyModel | None, str]:
+    """Return the model before the last step, and what that step was.
+
+    The model that a study begins with is nobody's guess of this damper: then there is none.
+    """
+    numbers = study.history.numbers()
+    if len(numbers) < 3:
+        return None, ""
+    file = study.history.model_file(numbers[-2])
+    model = read_model(file, study.folder)
+    return model.with_drive(study.drive or model.drive), study.history.step(numbers[-1]).what

@@ -1,0 +1,163 @@
+"""A model's damper in a building, simulated as it is and with draws of what is uncertain."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.model import StudyModel
+from ..errors import RunError
+from ..physics.drive import VOLTAGE
+from ..physics.effect import EFFECTS
+from ..physics.forms import split_form
+from ..physics.user import own_effects, own_laws
+from ..scenario.scenario import Scenario, load_scenario
+from ..simulate.coupled import simulate
+from ..units import convert
+from .in_building import House, Parameters, Shaking, loads, write_scenario, write_signals
+from .scenario_files import part_text
+
+Array = NDArray[np.float64]
+Columns = Mapping[str, Array]
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """A model's damper in a building, under one ground motion.
+
+    Parameters
+    ----------
+    model : StudyModel
+        The law with the effects of all sites.
+    house : House
+    bench : bool
+        Whether the model was identified on a bench.
+    shaking : Shaking
+        A built-in damper calls its command a voltage, whatever it is: its numbers are the same.
+    folder : Path
+        An empty folder for the scenario's files.
+    """
+
+    model: StudyModel
+    house: House
+    bench: bool
+    shaking: Shaking
+    folder: Path
+
+    def scenario(self) -> Scenario:
+        """Write the scenario of the model as it is; return it."""
+        own = loads(self.model, self.house.building, self.bench)
+        title = f"{self.model.law} in {self.house.building.name}"
+        quiet = replace(self.shaking, force=None, drive=VOLTAGE)
+        file, _ = write_scenario(
+            self.folder, (title, "# The model's damper in the building."), self.house, quiet,
+            own.structure, self._damper, own.damper,
+        )  # fmt: skip
+        return load_scenario(file)
+
+    def response(self, scenario: Scenario) -> dict[str, Array]:
+        """Return every output (n,) at the samples of the ground motion, in SI."""
+        columns = simulate(scenario)
+        return {name: values[:: self.shaking.fine] for name, values in columns.items()}
+
+    def with_errors(
+        self, scenario: Scenario, models: list[StudyModel], noise: tuple[float, float],
+        generator: np.random.Generator,
+    ) -> Iterator[dict[str, Array] | None]:  # fmt: skip
+        """Yield the responses of other values, with noise on ground and command.
+
+        Parameters
+        ----------
+        scenario : what `scenario` has returned
+        models : the model with other values
+        noise : standard deviations of the ground's acceleration [m/s2] and the command
+        generator : draws the noise
+
+        Yields
+        ------
+        dict or None
+            As `response`; None where the run failed.
+        """
+        shaking, count = self.shaking, len(self.shaking.time)
+        for model in models:
+            ground = shaking.ground + noise[0] * generator.standard_normal(count)
+            command = shaking.command
+            if command is not None:
+                command = command + noise[1] * generator.standard_normal()
+            write_signals(
+                self.folder, replace(shaking, ground=ground, command=command, drive=VOLTAGE)
+            )
+            try:
+                yield self.response(self._with_values(scenario, model))
+            except RunError:
+                yield None
+        write_signals(self.folder, replace(shaking, drive=VOLTAGE))
+
+    def _with_values(self, scenario: Scenario, model: StudyModel) -> Scenario:
+        own = loads(model, self.house.building, self.bench)
+        given = {"structure": own.structure, "damper": {**self._values(model), **own.damper}}
+        parts = [
+            replace(one, parameters={**one.parameters, **given.get(one.name, {})})
+            for one in scenario.components
+        ]
+        return replace(scenario, components=tuple(parts))
+
+    def _values(self, model: StudyModel) -> Parameters:
+        """Return what the damper is given: values and switches of its law and effects."""
+        damper = model.at("damper", self.bench)
+        values = {
+            name: value
+            for name, value in damper.values().items()
+            if "." not in name or name.partition(".")[0] in damper.effects
+        }
+        return {**values, **{f"{effect}.on": True for effect in damper.effects}}
+
+    def _damper(self, moving: Parameters) -> str:
+        """Return the text of the damper."""
+        plain, form, knots = split_form(self.model.base_law)
+        source: dict[str, Any] = {"law": own_laws().get(plain, plain)}
+        source |= {"command": form} if form else {}
+        source |= {"command_knots": list(knots)} if knots else {}
+        effects = self.model.at("damper", self.bench).effects
+        own = [own_effects()[name] for name in effects if EFFECTS[name].own]
+        source |= {"effects": own} if own else {}
+        most = float(
+            np.max(self.shaking.level if self.shaking.command is None else self.shaking.command)
+        )
+        limit = {VOLTAGE.limit: float(ceil(1.05 * most))} if most > VOLTAGE.largest else {}
+        return part_text("damper", source, {**self._values(self.model), **limit, **moving})
+
+
+def drawn_models(model: StudyModel, count: int, generator: np.random.Generator) -> list[StudyModel]:
+    """Return the model with values drawn from the joint covariance of their errors.
+
+    Parameters
+    ----------
+    model : whose identified parameters have a covariance
+    count : how many draws
+    generator : draws
+    """
+    names, covariance = model.covariance()
+    flat = model.flat()
+    best = model.values()
+    own = [(flat[name], model.declared(name).unit) for name in names]
+    low, high = (
+        np.array([convert(getattr(value, end), value.unit, unit) for value, unit in own])
+        for end in ("low", "high")
+    )
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    # Parameters differ by many orders of magnitude: the root is taken of their correlation.
+    power, shapes = np.linalg.eigh(covariance / np.outer(scale, scale))
+    root = scale[:, None] * shapes * np.sqrt(np.maximum(power, 0.0))
+    centre = np.array([best[name] for name in names])
+    draws = centre + generator.standard_normal((count, len(names))) @ root.T
+    return [
+        model.with_values(dict(zip(names, np.clip(row, low, high).tolist(), strict=True)))
+        for row in draws
+    ]

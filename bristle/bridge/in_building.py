@@ -1,0 +1,199 @@
+"""A model's damper in a building under a ground motion, as a scenario."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import ceil
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.files import write_whole
+from ..data.measurement import Measurement
+from ..data.model import StudyModel
+from ..errors import StudyError
+from ..physics.building import Building
+from ..physics.drive import VOLTAGE, Drive, drive_named
+from ..physics.effect import EFFECTS
+from ..physics.laws import LAWS
+from .scenario_files import part_text, scenario_text, signal_file
+
+Array = NDArray[np.float64]
+Parameters = dict[str, float | bool]
+
+STEP = 2e-3
+"""Longest step [s] of a building's scenario."""
+GROUND, COMMAND = "ground.csv", "drive.csv"
+
+
+@dataclass(frozen=True)
+class House:
+    """A building, and the file that describes it; None for the paper's."""
+
+    building: Building
+    file: Path | None = None
+
+
+@dataclass(frozen=True)
+class Shaking:
+    """What drives a building with its damper.
+
+    `time` (n,) s from 0 and the `ground`'s acceleration (n,) m/s2; the `command` (n,) in the unit
+    of the `drive`, None where it stays at `level`; the measured `force` (n,) N, None where there is
+    none.
+    """
+
+    name: str
+    time: Array
+    ground: Array
+    command: Array | None = None
+    level: float = 0.0
+    force: Array | None = None
+    drive: Drive = VOLTAGE
+
+    @property
+    def fine(self) -> int:
+        """Into how many steps the samples' spacing is cut."""
+        return max(1, ceil(self.spacing / STEP - 1e-9))
+
+    @property
+    def spacing(self) -> float:
+        """Spacing of the samples [s]."""
+        return float(np.median(np.diff(self.time)))
+
+
+def shaking_of(measurement: Measurement) -> Shaking:
+    """Return what drives the building in a measurement.
+
+    Raises
+    ------
+    StudyError
+        If the ground's acceleration was not measured.
+    """
+    if not measurement.has("ground_acceleration"):
+        raise StudyError(
+            f"{measurement.name}: no ground_acceleration was measured, which a structure's "
+            "scenario needs."
+        )
+    drive = measurement.drive
+    return Shaking(
+        measurement.name, measurement.time - measurement.time[0],
+        measurement["ground_acceleration"], measurement[drive] if drive else None,
+        force=measurement["force"] if measurement.has("force") else None,
+        drive=drive_named(drive),
+    )  # fmt: skip
+
+
+class Loads(NamedTuple):
+    """Parameters of the structure and of the damper that follow from their joint, and notes."""
+
+    structure: Parameters
+    damper: Parameters
+    notes: tuple[str, ...]
+
+
+def loads(model: StudyModel, building: Building, bench: bool = False) -> Loads:
+    """Return what a model's effects make of the structure, and what the damper has to know of it.
+
+    Parameters
+    ----------
+    model : the damper's law with the effects of all sites
+    building : what the damper acts in
+    bench : whether the model was identified on a bench, where all effects are the damper's
+    """
+    values, layer, own = model.values(), model.at("structure", bench), {}
+    own = {f"{name}.on": True for name in layer.effects}
+    structure: Parameters = {**own, **{n: v for n, v in layer.values().items() if "." in n}}
+    damper: Parameters = {}
+    mass, notes = building.M[0][0], []
+    for name in masses(model.at("damper", bench)):
+        moved = values.get(name, 0.0)
+        if moved > 0.0:
+            structure["attached_mass"] = float(structure.get("attached_mass", 0.0)) + moved
+            damper[name] = 0.0
+            mass += moved
+            notes.append(
+                f"{name} = {moved:g} kg is structure.attached_mass in the scenario: from "
+                "differences of velocity it would diverge near the mass that it moves."
+            )
+    if LAWS[model.base_law].has("sign"):
+        damper["moving_mass"] = mass
+    return Loads(structure, damper, tuple(notes))
+
+
+def masses(damper: StudyModel) -> list[str]:
+    """Return the parameters of a damper's effects that are a mass which moves with the rod."""
+    return [f"{name}.{EFFECTS[name].mass}" for name in damper.effects if EFFECTS[name].mass]
+
+
+def write_scenario(
+    folder: Path, head: tuple[str, str], house: House, shaking: Shaking, structure: Parameters,
+    damper: Callable[[Parameters], str], moving: Parameters,
+) -> tuple[Path, list[Path]]:  # fmt: skip
+    """Write the scenario of a building with its damper under a ground motion, and its files.
+
+    Parameters
+    ----------
+    folder : where they go
+    head : title of the scenario, and the comment above
+    house, shaking : the building, and what drives it
+    structure, moving : parameters of the structure and the damper, see `loads`
+    damper : parameters to the text of the component that is called damper
+
+    Returns
+    -------
+    scenario, files : the path of structure.toml, and of the files that it reads
+    """
+    files, extra = [], {}
+    if house.file is not None:
+        files.append(Path(shutil.copyfile(house.file, folder / "building.toml")))
+        extra = {"building": files[0].name}
+    files += write_signals(folder, shaking)
+    level = house.building.levels()[0]
+    wires = {
+        "structure.ground_acceleration": "ground.ground_acceleration",
+        "structure.damper_force": "damper.force",
+        "damper.displacement": f"structure.{level}_displacement",
+        "damper.velocity": f"structure.{level}_velocity",
+    }
+    if "moving_mass" in moving:
+        wires["damper.holding_force"] = "structure.holding_force"
+    parts = [
+        part_text("ground", {"fmu": "GroundMotion"}, {"record": GROUND}),
+        part_text("structure", {"fmu": "Structure", **extra}, structure),
+    ]
+    own = dict(moving)
+    if shaking.command is None:
+        own[shaking.drive.name] = shaking.level
+    else:
+        parts.append(_signal("drive", COMMAND))
+        wires[f"damper.{shaking.drive.name}"] = "drive.value"
+    if shaking.force is not None:
+        files.append(
+            signal_file(shaking.time, shaking.force, "force", "N", folder / "measured.csv")
+        )
+        parts.append(_signal("measured", "measured.csv"))
+    parts.append(damper(own))
+    step = float(f"{shaking.spacing / shaking.fine:.12g}")
+    stop = float(f"{(len(shaking.time) - 1) * shaking.fine * step:.12g}")
+    scenario = folder / "structure.toml"
+    write_whole(scenario, scenario_text(head, (stop, step), parts, wires))
+    return scenario, files
+
+
+def write_signals(folder: Path, shaking: Shaking) -> list[Path]:
+    """Write the ground motion, and the command where it moves; return the files."""
+    ground = signal_file(shaking.time, shaking.ground, "acceleration", "m/s2", folder / GROUND)
+    if shaking.command is None:
+        return [ground]
+    name, unit = shaking.drive.name, shaking.drive.unit
+    return [ground, signal_file(shaking.time, shaking.command, name, unit, folder / COMMAND)]
+
+
+def _signal(name: str, file: str) -> str:
+    kind: Mapping[str, str] = {"kind": "csv", "file": file}
+    return part_text(name, {"fmu": "SignalSource"}, kind)
