@@ -1,0 +1,165 @@
+"""Which laws go on through the search for effects, and which law with which effects it is.
+
+A law that contains a spring explains a missing spring. So the law with the smallest error is no
+answer by itself: laws that contain nothing go on as well, and what is judged is the pair of a law
+and its effects, by held-out runs, the simpler pair where both explain them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from ..physics.forms import CURVED
+from .candidates import Trial
+from .evidence import Difference, paired
+from .finding import Finding
+from .law_trials import LawTrial
+from .opening import Opening
+from .rule import BENCH, DecisionRule
+
+EXPLAINING = ("none", "effect", "ambiguous")
+"""The kinds of a finding that leave nothing unexplained."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A law with what it lacks: the law's row, what the search found, and what it began with."""
+
+    row: LawTrial
+    finding: Finding
+    opened: Opening | None = None
+
+    @property
+    def after(self) -> Trial:
+        """The trial of the law with its effects; without, where they are not known."""
+        assert self.finding.after is not None
+        return self.finding.after
+
+    @property
+    def fitted(self) -> int:
+        """How many parameters are fitted."""
+        return len(self.after.model.free()) + bool(self.opened and self.opened.problem.free_zero)
+
+    @property
+    def explains(self) -> bool:
+        """Whether the law with its effects leaves nothing unexplained."""
+        return self.finding.kind in EXPLAINING
+
+    @property
+    def order(self) -> tuple[int, int, float]:
+        """What is simpler comes first: fewer parameters, fewer effects, a smaller error."""
+        return self.fitted, len(self.finding.effects), self.after.z
+
+
+def compared(first: Trial, second: Trial, rule: DecisionRule = BENCH) -> Difference | None:
+    """Return by how much the loss of one model is above another's, None for other samples."""
+    if len(first.losses) != len(second.losses):
+        return None
+    return paired(first.losses, second.losses, rule.chance)
+
+
+def clearly_worse(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+    """Return whether a model errs more than another by enough, and beyond chance."""
+    if other.z <= best.z * (1.0 + rule.law_gain):
+        return False
+    apart = compared(other, best, rule)
+    return apart is None or apart.low > 0.0
+
+
+def as_good(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+    """Return whether the data cannot distinguish a model from the best one."""
+    if other.z <= best.z * (1.0 + rule.close):
+        return True
+    apart = compared(other, best, rule)
+    return apart is not None and apart.low <= 0.0
+
+
+def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawTrial]:
+    """Return the laws that go on through the search for effects, `most_laws` at most.
+
+    The best on held-out runs; the best of those that contain no effect, the best of those whose
+    command is a straight line as well; then laws that no simpler one of these surpasses, and those
+    that are not clearly worse than the best, the smallest error first.
+    """
+    ranked = sorted(rows, key=lambda row: row.trial.z)
+    best = ranked[0]
+    plain = [row for row in ranked if not set(row.contains) - {CURVED}]
+    straight = [row for row in plain if CURVED not in row.contains]
+    picked = [best, *plain[:1], *straight[:1]]
+    front = [
+        row
+        for row in straight
+        if not any(o.fitted <= row.fitted and o.trial.z < row.trial.z for o in straight)
+    ]
+    level = [row for row in ranked if not clearly_worse(row.trial, best.trial, rule)]
+    picked += sorted([*front, *level], key=lambda row: row.trial.z)
+    return list({row.law: row for row in picked}.values())[: rule.most_laws]
+
+
+def simplest(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> LawTrial:
+    """Return the simplest law that the best one on held-out runs does not surpass."""
+    best = min(rows, key=lambda row: row.trial.z)
+    level = [row for row in rows if as_good(row.trial, best.trial, rule)]
+    return min(level, key=lambda row: (row.fitted, row.trial.z))
+
+
+def search(
+    rows: Sequence[LawTrial], look: Callable[[LawTrial], Pair], rule: DecisionRule = BENCH
+) -> list[Pair]:
+    """Return the pairs that decide; `look` searches the effects that a law lacks.
+
+    The simplest law that no other surpasses comes first. Where it lacks nothing and contains no
+    effect, no search of another law could end with a simpler answer; a law is left out, too, where
+    one that is as simple by itself explains the runs already.
+
+    Parameters
+    ----------
+    rows : the laws tried
+    look : called with a row; returns what its law lacks
+    rule : the numbers that decide
+    """
+    first = simplest(rows, rule)
+    found = [look(first)]
+    if found[0].finding.kind == "none" and not first.contains:
+        return found
+    others = [row for row in survivors(rows, rule) if row.law != first.law]
+    for row in sorted(others, key=lambda row: (row.fitted, row.trial.z)):
+        known = [p for p in found if p.explains and p.after.z <= rule.complete]
+        # With an effect a law has one parameter more at least.
+        if not any(p.fitted <= row.fitted + 1 for p in known):
+            found.append(look(row))
+    return found
+
+
+def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
+    """Return the pair of law and effects that the runs ask for.
+
+    Of those that explain the runs and that the best one on held-out runs does not surpass, the
+    simplest; where none explains them, the best one.
+    """
+    best = min(pairs, key=lambda pair: pair.after.z)
+    level = [p for p in pairs if p.explains and as_good(p.after, best.after, rule)]
+    return min(level, key=lambda pair: pair.order) if level else best
+
+
+def equivalents(
+    chosen: Pair, pairs: Sequence[Pair], rows: Sequence[LawTrial], rule: DecisionRule = BENCH
+) -> list[tuple[str, tuple[str, ...], float]]:
+    """Return what explains the runs as well as the pair chosen: law, effects, z on held-out runs.
+
+    A law that was not searched counts without an effect.
+    """
+    if not chosen.explains:
+        return []
+    out: dict[tuple[str, tuple[str, ...]], float] = {}
+    for pair in pairs:
+        effects = pair.finding.effects if pair.finding.kind == "effect" else ()
+        sure = pair.finding.kind in ("none", "effect")
+        if pair is not chosen and sure and as_good(pair.after, chosen.after, rule):
+            out[pair.row.law, effects] = pair.after.z
+    searched = {pair.row.law for pair in pairs}
+    for row in rows:
+        if row.law not in searched and as_good(row.trial, chosen.after, rule):
+            out.setdefault((row.law, ()), row.trial.z)
+    return [(law, effects, z) for (law, effects), z in sorted(out.items(), key=lambda i: i[1])]
