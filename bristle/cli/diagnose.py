@@ -101,7 +101,8 @@ def _trials(verdict: Verdict) -> list[str]:
         return []
     lines = ["", f"  {'error / noise (z) of the model':34} {'training':>12} {'held out':>12}"]
     before = at["z_train_before"], at["z_holdout_before"]
-    lines.append(f"  {'present model':34} {before[0]:>12.3f} {before[1]:>12.3f}")
+    model = f"{verdict['law']} alone" if verdict.get("laws") else "present model"
+    lines.append(f"  {model:34} {before[0]:>12.3f} {before[1]:>12.3f}")
     refined = [row for row in rows[:5] if row["refined"]]
     # The order of equals is that of a rounding: one stands for all of them.
     others = sorted(

@@ -8,10 +8,10 @@ and its effects, by held-out runs, the simpler pair where both explain them.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from ..physics.forms import CURVED
-from .candidates import Trial
+from .candidates import Trial, joinable
 from .evidence import Difference, paired
 from .finding import Finding
 from .law_trials import LawTrial
@@ -109,9 +109,10 @@ def search(
 ) -> list[Pair]:
     """Return the pairs that decide; `look` searches the effects that a law lacks.
 
-    The simplest law that no other surpasses comes first. Where it lacks nothing and contains no
-    effect, no search of another law could end with a simpler answer; a law is left out, too, where
-    one that is as simple by itself explains the runs already.
+    Where noise is all that the best law leaves, the simplest that it does not surpass comes first:
+    if that lacks nothing and contains no effect, no other is searched. Then come the simpler ones
+    first: a law is left out where the runs are explained already by no more parameters than it
+    would have with the smallest effect that can join it.
 
     Parameters
     ----------
@@ -119,17 +120,25 @@ def search(
     look : called with a row; returns what its law lacks
     rule : the numbers that decide
     """
-    first = simplest(rows, rule)
-    found = [look(first)]
-    if found[0].finding.kind == "none" and not first.contains:
-        return found
-    others = [row for row in survivors(rows, rule) if row.law != first.law]
+    first, found = simplest(rows, rule), []
+    if first.trial.z <= rule.complete:
+        found.append(look(first))
+        if found[0].finding.kind == "none" and not first.contains:
+            return found
+    searched = {pair.row.law for pair in found}
+    others = [row for row in survivors(rows, rule) if row.law not in searched]
     for row in sorted(others, key=lambda row: (row.fitted, row.trial.z)):
-        known = [p for p in found if p.explains and p.after.z <= rule.complete]
-        # With an effect a law has one parameter more at least.
-        if not any(p.fitted <= row.fitted + 1 for p in known):
+        known = [pair.fitted for pair in found if pair.explains and pair.after.z <= rule.complete]
+        if not known or min(known) > _least_with_effect(row):
             found.append(look(row))
     return found
+
+
+def _least_with_effect(row: LawTrial) -> int:
+    """Return how many parameters a law has with the smallest effect that can join it."""
+    model = row.trial.model
+    joined = [replace(model, effects=(*model.effects, name)) for name in joinable(model)]
+    return min((len(one.free()) for one in joined), default=row.fitted)
 
 
 def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
@@ -148,10 +157,20 @@ def equivalents(
 ) -> list[tuple[str, tuple[str, ...], float]]:
     """Return what explains the runs as well as the pair chosen: law, effects, z on held-out runs.
 
-    A law that was not searched counts without an effect.
+    A law that was not searched counts without an effect. What only gives the chosen law more to
+    fit, a parabola or the part that a variant lacks, is not told: it always does as well.
+
+    Parameters
+    ----------
+    chosen : what the verdict is about
+    pairs : the laws whose effects were searched
+    rows : the laws tried
+    rule : the numbers that decide
     """
     if not chosen.explains:
         return []
+    rows = [row for row in rows if _base(row) != _base(chosen.row)]
+    pairs = [pair for pair in pairs if _base(pair.row) != _base(chosen.row)]
     out: dict[tuple[str, tuple[str, ...]], float] = {}
     for pair in pairs:
         effects = pair.finding.effects if pair.finding.kind == "effect" else ()
@@ -163,3 +182,7 @@ def equivalents(
         if row.law not in searched and as_good(row.trial, chosen.after, rule):
             out.setdefault((row.law, ()), row.trial.z)
     return [(law, effects, z) for (law, effects), z in sorted(out.items(), key=lambda i: i[1])]
+
+
+def _base(row: LawTrial) -> str:
+    return row.trial.model.law_class.base.name

@@ -43,7 +43,7 @@ def law_sentences(verdict: Row) -> list[str]:
     mine = next(row for row in rows if (row["law"], row["command"]) == own)
     z = short_z(mine.get("z_with_effects", mine["z_holdout"]))
     with_what = f" with {joined(mine['effects'])}" if mine.get("kind") == "effect" else ""
-    count = len(rows)
+    count = len({row["law"] for row in rows})
     if verdict.get("kind") == "unknown":
         out = [f"None of {count} laws explains the runs; {law_name(mine)} leaves least, {Z} = {z}."]
     else:
