@@ -16,10 +16,10 @@ MOST_EQUAL = 3
 """Pairs of law and effects that a verdict names as doing as well."""
 
 HEADER = (
-    "law", "command", "fitted", "z, training", "z, held out", "above the best", "training",
-    "held out",
+    "law", "command", "fitted", "z, training", "z, held out", "above the best",
+    "error, training", "error, held out",
 )  # fmt: skip
-"""Columns of the table of laws; the last two are errors of the force."""
+"""Columns of the table of laws; the last two are the RMS errors of the force."""
 
 TABLE_NOTE = (
     "z: error / noise; a true model has 1. Above the best: z less that of the best law, the mean "
