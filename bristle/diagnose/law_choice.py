@@ -78,22 +78,24 @@ def as_good(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
 def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawTrial]:
     """Return the laws that go on through the search for effects, `most_laws` at most.
 
-    The best on held-out runs; the best of those that contain no effect, the best of those whose
-    command is a straight line as well; then laws that no simpler one of these surpasses, and those
-    that are not clearly worse than the best, the smallest error first.
+    The best on held-out runs, and the simplest that is not clearly worse; the best of those that
+    contain no effect, the one with a parabola only where a straight line is clearly worse. Then
+    those of them that no simpler one surpasses, the smallest error first.
     """
     ranked = sorted(rows, key=lambda row: row.trial.z)
     best = ranked[0]
     plain = [row for row in ranked if not set(row.contains) - {CURVED}]
     straight = [row for row in plain if CURVED not in row.contains]
-    picked = [best, *plain[:1], *straight[:1]]
+    level = [row for row in ranked if not clearly_worse(row.trial, best.trial, rule)]
+    picked = [best, *straight[:1], min(level, key=lambda row: (row.fitted, row.trial.z))]
+    if straight and clearly_worse(straight[0].trial, plain[0].trial, rule):
+        picked.insert(1, plain[0])
     front = [
         row
         for row in straight
         if not any(o.fitted <= row.fitted and o.trial.z < row.trial.z for o in straight)
     ]
-    level = [row for row in ranked if not clearly_worse(row.trial, best.trial, rule)]
-    picked += sorted([*front, *level], key=lambda row: row.trial.z)
+    picked += front
     return list({row.law: row for row in picked}.values())[: rule.most_laws]
 
 

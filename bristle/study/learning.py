@@ -250,9 +250,7 @@ def complete(
         if free:
             found = _with_law_taken(study, found, stepped)
         free = False
-        names = found.effects if found.kind == "effect" else ()
-        if found.kind == "unknown" and greedy:
-            names = _best_effect(found)
+        names = _best_effect(found) if greedy else _named(found)
         if found.kind == "unknown" and curves and not names:
             say("learning a curve")
             learned.append(learn_effect(study))
@@ -264,10 +262,14 @@ def complete(
         stepped(add_effects(study, names, why=why, found=found).step)
 
 
+def _named(found: Diagnosis) -> tuple[str, ...]:
+    return found.effects if found.kind == "effect" else ()
+
+
 def _best_effect(found: Diagnosis) -> tuple[str, ...]:
-    """Return the effect that lowers an unknown error most, () where none does so beyond chance."""
+    """Return the effects named, else the one that lowers an unknown error most beyond chance."""
     before = found.before
-    if before is None:
-        return ()
+    if found.kind != "unknown" or before is None:
+        return _named(found)
     gaining = (trial.effects[-1] for trial in found.trials if missing(before, trial))
     return tuple(islice(gaining, 1))
