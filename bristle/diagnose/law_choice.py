@@ -75,6 +75,19 @@ def as_good(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
     return apart is not None and apart.low <= 0.0
 
 
+def best_of(trials: Sequence[Trial], rule: DecisionRule = BENCH) -> Trial:
+    """Return the best of trials on held-out runs, by z.
+
+    Where none explains the runs, a plain error of more than `most_rms` times the smallest one puts
+    a trial out: it serves the many samples near rest at the cost of all others.
+    """
+    able = list(trials)
+    if min(trial.z for trial in able) > rule.clean:
+        least = min(trial.rms for trial in able)
+        able = [trial for trial in able if trial.rms <= rule.most_rms * least]
+    return min(able, key=lambda trial: trial.z)
+
+
 def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawTrial]:
     """Return the laws that go on through the search for effects, `most_laws` at most.
 
@@ -83,7 +96,8 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     those of them that no simpler one surpasses, the smallest error first.
     """
     ranked = sorted(rows, key=lambda row: row.trial.z)
-    best = ranked[0]
+    first = best_of([row.trial for row in rows], rule)
+    best = next(row for row in rows if row.trial is first)
     plain = [row for row in ranked if not set(row.contains) - {CURVED}]
     straight = [row for row in plain if CURVED not in row.contains]
     level = [row for row in ranked if not clearly_worse(row.trial, best.trial, rule)]
@@ -101,8 +115,8 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
 
 def simplest(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> LawTrial:
     """Return the simplest law that the best one on held-out runs does not surpass."""
-    best = min(rows, key=lambda row: row.trial.z)
-    level = [row for row in rows if as_good(row.trial, best.trial, rule)]
+    best = best_of([row.trial for row in rows], rule)
+    level = [row for row in rows if as_good(row.trial, best, rule)]
     return min(level, key=lambda row: (row.fitted, row.trial.z))
 
 
@@ -149,9 +163,11 @@ def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
     Of those that explain the runs and that the best one on held-out runs does not surpass, the
     simplest; where none explains them, the best one.
     """
-    best = min(pairs, key=lambda pair: pair.after.z)
-    level = [p for p in pairs if p.explains and as_good(p.after, best.after, rule)]
-    return min(level, key=lambda pair: pair.order) if level else best
+    best = best_of([pair.after for pair in pairs], rule)
+    level = [pair for pair in pairs if pair.explains and as_good(pair.after, best, rule)]
+    if level:
+        return min(level, key=lambda pair: pair.order)
+    return next(pair for pair in pairs if pair.after is best)
 
 
 def equivalents(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from bristle.diagnose.finding import Finding
 from bristle.diagnose.law_choice import (
     Pair,
     as_good,
+    best_of,
     choose,
     clearly_worse,
     equivalents,
@@ -154,6 +157,14 @@ def test_where_none_explains_the_runs_the_best_is_unknown():
     best, other = pair("tanh", 3.0, "unknown"), pair("lugre", 5.0, "unknown")
     assert choose([other, best]) is best
     assert equivalents(best, [best, other], [best.row, other.row]) == []
+
+
+def test_of_wrong_laws_one_that_serves_rest_alone_is_not_the_best():
+    near_rest, all_over = trial(5.8, "tanh"), trial(6.1, "modified_bouc_wen")
+    near_rest, all_over = replace(near_rest, rms=13.2), replace(all_over, rms=9.1)
+    assert best_of([near_rest, all_over]) is all_over
+    right = replace(trial(1.0, "bingham"), rms=13.2)  # its jumps are a sample off
+    assert best_of([right, all_over]) is right
 
 
 def test_the_simplest_law_is_of_those_that_the_best_does_not_surpass():
