@@ -198,15 +198,12 @@ def _identified(present: Model, problem: Problem) -> Model:
 
 
 class Trials:
-    """The trials of single effects, and those of pairs as far as they are asked for.
-
-    `together` is the best pair of them, None where none was asked for.
-    """
+    """The trials of single effects, and of `pairs` as far as they are asked for."""
 
     def __init__(self, opened: Opening, say: Progress = silent) -> None:
         self.opened, self.say = opened, say
         self.before = opened.before
-        self.together: Trial | None = None
+        self.pairs: list[Trial] = []
         say("trying every effect inside the model")
         self.single = self._all(self.before, None)
 
@@ -219,8 +216,7 @@ class Trials:
         """Return the trials of all effects added to a trial's model."""
         self.say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
         grown = self._all(first, SECONDS)
-        known = [self.together] if self.together is not None else []
-        self.together = min([*grown, *known], key=lambda trial: trial.z, default=None)
+        self.pairs += grown
         return grown
 
     def reduce(self, pair: Trial) -> list[Trial]:

@@ -81,7 +81,9 @@ def _is_identified(model: StudyModel) -> bool:
 
 
 def take_law(study: Study, found: Diagnosis) -> Identified | None:
-    """Identify a study's model with the law of a verdict, as a step; None where it has that law.
+    """Identify a study's model with the law of a verdict, as a step.
+
+    None where it has that law, or the data carry no verdict.
 
     Parameters
     ----------
@@ -89,10 +91,9 @@ def take_law(study: Study, found: Diagnosis) -> Identified | None:
     found : a verdict on a law and its effects
     """
     model = study.model()
-    if found.law in ("", model.law) and _is_identified(model):
+    if not found.law or (found.law == model.law and _is_identified(model)):
         return None
-    changed = with_law(model, found.law or model.law)
-    return identify_study(study, model=changed, table=False)
+    return identify_study(study, model=with_law(model, found.law), table=False)
 
 
 def _with_law_taken(
