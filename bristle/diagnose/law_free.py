@@ -15,7 +15,7 @@ from .damper import look_at_damper
 from .detail import detailed
 from .inconsistent_runs import contradicted
 from .law_choice import Pair, choose, equivalents, search
-from .law_trials import LawTrial, try_laws
+from .law_trials import LawTrial, not_finite, try_laws
 from .law_verdict import LawVerdict
 from .opening import BenchData, Insufficient, Progress, bench_data, opened_with, silent
 from .rule import BENCH, DecisionRule
@@ -58,12 +58,11 @@ def diagnose_laws(
     finding = detailed(contradicted(chosen.finding, chosen.opened), chosen.opened)
     driven = any(run.has(name) for run in (*train, *holdout) for name in DRIVE)
     about = About(sensors=chosen.opened.faults, noise=data.noise, driven=driven)
-    return replace(
-        conclude({DAMPER: finding}, about),
-        laws=LawVerdict(
-            chosen.row, named, rows, tuple(pairs), tuple(equivalents(chosen, pairs, rows, rule))
-        ),
-    )
+    laws = LawVerdict(
+        chosen.row, named, rows, tuple(pairs), tuple(equivalents(chosen, pairs, rows, rule)),
+        tuple(not_finite(data.problem, present)),
+    )  # fmt: skip
+    return replace(conclude({DAMPER: finding}, about), laws=laws)
 
 
 def _look(row: LawTrial, data: BenchData, say: Progress) -> Pair:

@@ -51,6 +51,8 @@ def law_sentences(verdict: Row) -> list[str]:
             f"Of {count} laws it is the simplest that explains the runs: "
             f"{law_name(mine)}{with_what} has {Z} = {z} on held-out runs."
         ]
+    if unfit := [str(name) for name in verdict.get("laws_left_out") or []]:
+        out.append(left_out(unfit))
     equal = [_pair_name(row) for row in verdict.get("equivalent") or []]
     if equal:
         more = f", and {len(equal) - MOST_EQUAL} more" if len(equal) > MOST_EQUAL else ""
@@ -58,6 +60,12 @@ def law_sentences(verdict: Row) -> list[str]:
         text = joined(equal[:MOST_EQUAL]) if not more else ", ".join(equal[:MOST_EQUAL])
         out.append(f"As far as these runs tell, {text}{more} {verb} them as well.")
     return out
+
+
+def left_out(laws: Sequence[str]) -> str:
+    """Return the sentence that tells which laws were not tried, and why."""
+    verb = "are" if len(laws) > 1 else "is"
+    return f"{joined(laws)} {verb} left out: the force is not a number on these runs."
 
 
 def _pair_name(row: Row) -> str:

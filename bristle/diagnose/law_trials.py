@@ -84,6 +84,8 @@ def try_laws(
 ) -> tuple[LawTrial, ...]:
     """Return the trials of all laws and of their variants, the best on held-out runs first.
 
+    Laws that `not_finite` tells are left out.
+
     Parameters
     ----------
     train, held_out : runs to fit to, and those that decide
@@ -91,9 +93,8 @@ def try_laws(
     bends : whether the command has levels enough for a parabola: laws whose form may be chosen
         are then tried with that, too
     """
-    names = law_names()
-    for name in names:  # compiled before threads ask for it
-        train.bench(_model(name, train, present))
+    unfit = not_finite(train, present)  # which compiles all before threads ask for it
+    names = [name for name in law_names() if name not in unfit]
     count = Count("law", len(names))
     with ThreadPoolExecutor(cpu_count()) as pool:
 
@@ -104,6 +105,30 @@ def try_laws(
 
         rows = [row for rows in pool.map(tried, names) for row in rows]
     return tuple(sorted(rows, key=lambda row: row.trial.z))
+
+
+def not_finite(problem: Problem, present: Model) -> list[str]:
+    """Return the laws, a user's own as a rule, whose force is not a number where fits begin.
+
+    Parameters
+    ----------
+    problem : the runs
+    present : the model as it is
+    """
+    models = {name: _model(name, problem, present) for name in law_names()}
+    return [name for name, model in models.items() if not _is_finite(model, problem)]
+
+
+def _is_finite(model: Model, problem: Problem) -> bool:
+    """Return whether the force is a number at the defaults, and with one linear parameter alone."""
+    linear = model.law_class.linear()
+    none = {**model.values, **dict.fromkeys(linear, 0.0)}
+    alone = [replace(model, values={**none, name: 1.0}) for name in linear]
+    return all(
+        bool(np.isfinite(problem.predict(one, run)).all())
+        for one in (model, *alone)
+        for run in problem.runs
+    )
 
 
 def _tried(

@@ -16,7 +16,8 @@ class LawVerdict:
 
     `row` is the law chosen; `before` the law that the model had, "" where nobody chose one; `rows`
     all laws tried, the best first; `pairs` those whose effects were searched; `equivalents` what
-    explains the runs as well: law, effects, z on held-out runs.
+    explains the runs as well: law, effects, z on held-out runs; `left_out` the laws whose force is
+    not a number on these runs.
     """
 
     row: LawTrial
@@ -24,6 +25,7 @@ class LawVerdict:
     rows: tuple[LawTrial, ...]
     pairs: tuple[Pair, ...]
     equivalents: tuple[tuple[str, tuple[str, ...], float], ...] = ()
+    left_out: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -40,6 +42,7 @@ class LawVerdict:
                 {**_named(law), "effects": list(effects), "z_holdout": round(z, 4)}
                 for law, effects, z in self.equivalents
             ],
+            **({"laws_left_out": list(self.left_out)} if self.left_out else {}),
         }  # fmt: skip
 
 

@@ -23,7 +23,7 @@ from ..units import convert
 from .forms import FormError, form_of, forms_asked, in_form
 from .identified import Identified
 from .joining import refuse_left_out
-from .laws import ALL, all_laws, refuse_in_building
+from .laws import ALL, all_laws, left_out_notes, refuse_in_building
 from .rig import rig_of
 from .runs import Runs
 from .study import Study
@@ -152,7 +152,8 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
     """
     if task.laws:
         rows = all_laws(rig, runs, as_model(model))
-        return replace(identify_on_rig(rig, runs, model, replace(task, laws=False)), laws=rows)
+        own = identify_on_rig(rig, runs, model, replace(task, laws=False))
+        return replace(own, laws=rows, notes=(*own.notes, *left_out_notes(rig, as_model(model))))
     if task.command is None:
         return _in_own_form(rig, runs, model, task)
     forms = forms_asked(task.command)

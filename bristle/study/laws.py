@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from ..data.checks.levels import tells_a_bend
 from ..data.model import StudyModel, new_model
-from ..diagnose.law_trials import LawTrial, try_laws
+from ..diagnose.law_text import left_out
+from ..diagnose.law_trials import LawTrial, not_finite, try_laws
 from ..errors import StudyError
 from ..findings import command
 from ..identify.model import Model
@@ -56,6 +57,18 @@ def all_laws(rig: Rig, runs: Runs, present: Model) -> tuple[LawTrial, ...]:
     site = rig.sites(present)[DAMPER]
     held_out = site.train if site.holdout is None else site.holdout
     return try_laws(site.train, held_out, present, bends=tells_a_bend(runs.train))
+
+
+def left_out_notes(rig: Rig, present: Model) -> tuple[str, ...]:
+    """Return the sentence that tells which laws `all_laws` leaves out, none where it tries all.
+
+    Parameters
+    ----------
+    rig : the bench with its runs
+    present : the model as it is
+    """
+    unfit = not_finite(rig.sites(present)[DAMPER].train, present)
+    return (left_out(unfit),) if unfit else ()
 
 
 def with_law(model: StudyModel, law: str) -> StudyModel:

@@ -33,7 +33,7 @@ from .inputs import (
     model_of,
     runs_of,
 )
-from .laws import ALL, all_laws, refuse_in_building, with_law
+from .laws import ALL, all_laws, left_out_notes, refuse_in_building, with_law
 from .learning import diagnose_study
 from .runs import Runs
 from .settings import CUT_OFF, ROLES
@@ -130,7 +130,8 @@ def identify(
         return identify_on_rig(rig, runs, chosen, task)
     rows = all_laws(rig, runs, as_model(chosen))
     found = identify_on_rig(rig, runs, with_law(chosen, simplest(rows).law), task)
-    return replace(found, laws=rows)
+    left_out = left_out_notes(rig, as_model(chosen))
+    return replace(found, laws=rows, notes=(*found.notes, *left_out))
 
 
 def compare(
