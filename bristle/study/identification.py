@@ -152,8 +152,9 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
     """
     if task.laws:
         rows = all_laws(rig, runs, as_model(model))
-        own = identify_on_rig(rig, runs, model, replace(task, laws=False))
-        return replace(own, laws=rows, notes=(*own.notes, *left_out_notes(rig, as_model(model))))
+        alone = identify_on_rig(rig, runs, model, replace(task, laws=False))
+        left_out = left_out_notes(rig, as_model(model))
+        return replace(alone, laws=rows, notes=(*alone.notes, *left_out))
     if task.command is None:
         return _in_own_form(rig, runs, model, task)
     forms = forms_asked(task.command)
