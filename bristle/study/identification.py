@@ -151,10 +151,7 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
         As `identify_study`.
     """
     if task.laws:
-        rows = all_laws(rig, runs, as_model(model))
-        alone = identify_on_rig(rig, runs, model, replace(task, laws=False))
-        left_out = left_out_notes(rig, as_model(model))
-        return replace(alone, laws=rows, notes=(*alone.notes, *left_out))
+        return _with_all_laws(rig, runs, model, task)
     if task.command is None:
         return _in_own_form(rig, runs, model, task)
     forms = forms_asked(task.command)
@@ -164,13 +161,19 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
     found = _in_own_form(rig, runs, models.pop(own), replace(task, present=present))
     if not models:
         return found
-    forms_tried = [_form_error(own, found)]
+    rows = [_form_error(own, found)]
     for form, other in models.items():
         tell(f"identifying with the form {form} of the command")
         alone = replace(task, present=present, table=False, show=_show_nothing)
-        forms_tried.append(_form_error(form, _in_own_form(rig, runs, other, alone)))
-    ranked = sorted(forms_tried, key=lambda row: forms.index(row.form))
-    return replace(found, forms=tuple(ranked))
+        rows.append(_form_error(form, _in_own_form(rig, runs, other, alone)))
+    return replace(found, forms=tuple(sorted(rows, key=lambda row: forms.index(row.form))))
+
+
+def _with_all_laws(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+    rows = all_laws(rig, runs, as_model(model))
+    found = identify_on_rig(rig, runs, model, replace(task, laws=False))
+    notes = (*found.notes, *left_out_notes(rig, as_model(model)))
+    return replace(found, laws=rows, notes=notes)
 
 
 def _form_error(form: str, found: Identified) -> FormError:
