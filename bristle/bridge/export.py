@@ -23,6 +23,7 @@ from ..identify.fit import Problem, Run
 from ..identify.instruments import true_motion
 from ..identify.prepare import prepare
 from ..physics.building import paper_building, read_building
+from ..physics.drive import drive_named, state_for
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..physics.user import own_effects
@@ -119,30 +120,28 @@ def _damper(
         name=_model_name(study.name),
         starts=starts,
         effects=[own[name] for name in effects if EFFECTS[name].own],
+        drive=drive_named(measurement.drive).name,
     )
     return build(what, folder)
 
 
 def _range(measurement: Measurement, notes: list[str]) -> dict[str, float]:
-    """Return v_max [V] and stroke [m] that hold what was measured, where the defaults do not."""
+    """Return the command's limit and stroke [m] that hold what was measured.
+
+    Where the defaults do they are left out.
+    """
     found = {}
-    drive = _drive(measurement)
-    if drive is None:
+    drive = drive_named(measurement.drive)
+    if not measurement.drive:
         notes.append("neither voltage nor current was measured: the scenario holds 0 V.")
-    elif drive == "current":
-        notes.append("the drive is a current [A]: the port voltage takes it, in A.")
-    if drive is not None and float(measurement[drive].max()) > 8.0:
-        found["v_max"] = float(ceil(1.05 * measurement[drive].max()))
+    elif float(measurement[drive.name].max()) > drive.largest:
+        found[drive.limit] = float(ceil(1.05 * measurement[drive.name].max()))
     for channel in ("displacement", "base_displacement"):
         if measurement.has(channel):
             most = float(np.abs(measurement[channel]).max())
             if most > 0.02:
                 found["stroke"] = float(f"{1.05 * most:.3g}")
     return found
-
-
-def _drive(measurement: Measurement) -> str | None:
-    return next((c for c in ("voltage", "current") if measurement.has(c)), None)
 
 
 def _model_name(name: str) -> str:
@@ -169,9 +168,10 @@ def _bench(
     files = [_motion_file(run, fine, folder / "motion.csv")]
     rows = {"measured": ("force", "N", run.force)}
     wires = {"damper.displacement": "rod.displacement", "damper.velocity": "rod.velocity"}
-    if _drive(measurement) is not None:
-        rows["drive"] = ("voltage", "V", run.V)
-        wires["damper.voltage"] = "drive.value"
+    drive = drive_named(measurement.drive)
+    if measurement.drive:
+        rows["drive"] = (drive.name, drive.unit, run.V)
+        wires[f"damper.{drive.name}"] = "drive.value"
     damper = model.at("damper", bench=True)
     effects = [EFFECTS[name] for name in damper.effects]
     if any("a" in effect.needs for effect in effects):
@@ -182,8 +182,8 @@ def _bench(
         files.append(_signal_file(time, values, title, unit, folder / f"{name}.csv"))
         parts.append(_part(name, "SignalSource", {"kind": "csv", "file": files[-1].name}))
     starts = _start_values(damper, run)
-    if "damper.voltage" not in wires:
-        starts["voltage"] = 0.0
+    if not measurement.drive:
+        starts[drive.name] = 0.0
     parts.append(_part("damper", fmu.name, starts))
     text = _scenario(
         f"{study.name}: the model on the bench, motion of {measurement.name}",
@@ -222,10 +222,12 @@ def _signal_file(
 
 def _start_values(damper: StudyModel, run: Run) -> dict[str, float]:
     """Return the start values of states that begin with a signal of the run."""
+    drive = drive_named(run.drive)
     first = {"x": run.x[0], "v": run.v[0], "a": run.a[0], "V": run.V[0]}
     states = dict(LAWS[damper.base_law].starts)
     for name in damper.effects:
-        states |= {f"{name}.{state}": signal for state, signal in EFFECTS[name].starts.items()}
+        own = {state_for(s, drive): signal for s, signal in EFFECTS[name].starts.items()}
+        states |= {f"{name}.{state}": signal for state, signal in own.items()}
     return {f"{name}_0": float(first[s]) for name, s in states.items() if s in first}
 
 
@@ -293,13 +295,14 @@ def _structure(
         _part("ground", "GroundMotion", {"record": "ground.csv"}),
         _part("structure", "Structure", own, extra),
     ]
-    drive = _drive(measurement)
-    if drive is None:
-        damper["voltage"] = 0.0
+    drive = drive_named(measurement.drive)
+    if not measurement.drive:
+        damper[drive.name] = 0.0
     else:
-        files.append(_signal_file(time, measurement[drive], "voltage", "V", folder / "drive.csv"))
+        level_of = measurement[drive.name]
+        files.append(_signal_file(time, level_of, drive.name, drive.unit, folder / "drive.csv"))
         parts.append(_part("drive", "SignalSource", {"kind": "csv", "file": "drive.csv"}))
-        wires["damper.voltage"] = "drive.value"
+        wires[f"damper.{drive.name}"] = "drive.value"
     if measurement.has("force"):
         files.append(
             _signal_file(time, measurement["force"], "force", "N", folder / "measured.csv")

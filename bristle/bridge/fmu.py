@@ -19,6 +19,7 @@ from ..data.read import read_table
 from ..errors import FmuError
 from ..fmu.description import Description, Value, read_description
 from ..units import conversion
+from .doubts import doubts
 from .ports import PortMap, map_ports
 from .signals import DRAWS, Signals, signals_of
 from .stepping import Job, step_through
@@ -82,7 +83,8 @@ def compare_fmu(
     values : mapping
         Parameters and inputs by name, in the FMU's units, as text.
     maps : mapping
-        Inputs and outputs to channels; else by name, by what the name says, by unit.
+        Inputs and outputs to channels, with sign and unit where they are needed, "-force@kN"; else
+        by name, by what the name says, by unit.
     channels : mapping
         Where channels are in the file, in place of the guess.
     timeout : float
@@ -91,6 +93,7 @@ def compare_fmu(
     Raises
     ------
     FmuError, RecordError, RunError
+        The first also where the unit or the sign of a port is in doubt.
     """
     path = Path(fmu)
     description = read_description(path)
@@ -106,7 +109,7 @@ def compare_fmu(
     found = step_through(job, passes, timeout)
     predictions = _predictions(pieces, ports, found, notes)
     outputs = tuple(compare_predictions(runs, seen=None) for runs in predictions.values())
-    notes += _turned(outputs)
+    notes += doubts(outputs, ports, description.name)
     if pieces[0].derived:
         notes.append(f"{', '.join(pieces[0].derived)}: from the other channels of the motion")
     return FmuComparison(str(fmu), str(data), ports, outputs, tuple(dict.fromkeys(notes)))
@@ -127,7 +130,7 @@ def _job(
         turned = {}
         for port in ports.inputs:
             factor, offset = conversion(piece.units[port.signal], port.unit)
-            turned[port.name] = factor * inputs[port.signal] + offset
+            turned[port.name] = port.sign * (factor * inputs[port.signal] + offset)
         passes.append(turned or {"": next(iter(inputs.values()))})
         steps.append(step)
 
@@ -161,7 +164,7 @@ def _predictions(
         for port in ports.outputs:
             si = piece.units[port.signal]
             factor, offset = conversion(port.unit, si)
-            rows = [factor * one[port.name] + offset for one in mine]
+            rows = [port.sign * (factor * one[port.name] + offset) for one in mine]
             out[port.name].append(_one(piece, port.name, port.signal, si, rows, ports, notes))
     return out
 
@@ -194,10 +197,11 @@ def _coordinates(piece: Signals, signal: str, ports: PortMap) -> dict[str, Array
     get = piece.values.get
     prefix = "" if "velocity" in piece.values else "base_"
     force = piece.raw.get("force") if signal != "force" else piece.raw[signal]
+    drive = next((one for one in DRIVE if one in piece.values), DRIVE[0])
     found = coordinates_of(
         piece.dt, get(f"{prefix}displacement"), get(f"{prefix}velocity"),
         get(f"{prefix}acceleration"),
-        get("voltage", get("current")), force if force is not None else piece.raw.get(signal),
+        get(drive), force if force is not None else piece.raw.get(signal), drive,
     )  # fmt: skip
     for port in ports.inputs:
         if not is_channel(port.signal) or port.signal not in (*MOTION, *DRIVE):
@@ -227,20 +231,6 @@ def _typed(description: Description, values: Mapping[str, str]) -> dict[str, Val
                 f"--set {name}={text}: {name} is {kind} in {description.name}."
             ) from None
     return out
-
-
-def _turned(outputs: tuple[Comparison, ...]) -> list[str]:
-    """Say which outputs go against what was measured."""
-    notes = []
-    for one in outputs:
-        y = np.concatenate([run.measured for run in one.predictions])
-        p = np.concatenate([run.predicted for run in one.predictions])
-        if np.std(y) > 0.0 and np.std(p) > 0.0 and float(np.corrcoef(y, p)[0, 1]) < -0.5:
-            notes.append(
-                f"{one.quantity} has the opposite sign of the measured channel; --channel "
-                f"{one.quantity}=-COLUMN@UNIT reverses the measured one"
-            )
-    return notes
 
 
 __all__ = ["FmuComparison", "compare_fmu", "signals_of"]

@@ -4,24 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
-from ..data.channels import meaning
+from ..data.channels import PLAIN, meaning
+from ..data.titles import title, unit_or_none
 from ..errors import FmuError, UnitError
 from ..findings import unknown
 from ..fmu.description import Description, Variable
-from ..units import same_dimension
+from ..units import conversion, same_dimension
 
 PASSED_ON = ("fault",)
+
+_NO_UNITS = ("in", "g", "h", "1")
+"""Endings of names that are words more often than units: `x_in`, `a_g`."""
 
 
 @dataclass(frozen=True)
 class Port:
-    """A port of the FMU and the signal of the measurement that belongs to it, with the reason."""
+    """A port of the FMU and the signal of the measurement that belongs to it, with the reason.
+
+    `unit` is the port's, by the FMU, its name or the user; `sign` -1 where the signal is turned.
+    `unit_given`, `sign_given` tell whether the user said so: then nothing is in doubt.
+    """
 
     name: str
     unit: str
     signal: str
     reason: str
+    sign: int = 1
+    unit_given: bool = False
+    sign_given: bool = False
 
 
 @dataclass(frozen=True)
@@ -35,14 +47,18 @@ class PortMap:
     def lines(self) -> list[str]:
         """Return the mapping in words, a line per port."""
         out = [
-            f"  {one.name} [{one.unit}] is fed from {one.signal}: {one.reason}"
+            f"  {one.name} [{one.unit}] is fed from {_turned(one)}: {one.reason}"
             for one in self.inputs
         ]
         out += [
-            f"  {one.name} [{one.unit}] is compared with {one.signal}: {one.reason}"
+            f"  {one.name} [{one.unit}] is compared with {_turned(one)}: {one.reason}"
             for one in self.outputs
         ]
         return out + [f"  {text}" for text in self.left]
+
+
+def _turned(port: Port) -> str:
+    return f"{port.signal}, reversed" if port.sign < 0 else port.signal
 
 
 def map_ports(
@@ -60,26 +76,28 @@ def map_ports(
     signals : mapping
         Names of what was measured, or follows from it, to SI units.
     maps : mapping
-        Ports to signals, as given; they overrule names and units.
+        Ports to signals, as given, "-CHANNEL@UNIT"; they overrule names and units.
     values : mapping
         What is set by hand; such inputs are fed from nothing.
 
     Raises
     ------
     FmuError
-        If a given port or signal does not exist, units differ, or no output can be judged.
+        If a given port or signal does not exist, units differ or are in doubt, or no output can be
+        judged.
     """
     inputs = {v.name: v for v in description.of("input") if v.kind == "Real"}
     outputs = {
         v.name: v for v in description.of("output") if v.kind == "Real" and v.name not in PASSED_ON
     }
-    _check_given(description, {**inputs, **outputs}, signals, maps, values)
+    given = {name: _given(name, text) for name, text in maps.items()}
+    _check_given(description, {**inputs, **outputs}, signals, given, values)
     into, left = [], []
     for name, variable in inputs.items():
         if name in values:
             left.append(f"{name} is set to {values[name]}")
             continue
-        port = _match(variable, inputs, signals, maps, by_unit=not variable.optional)
+        port = _match(variable, inputs, signals, given, by_unit=not variable.optional)
         if port:
             into.append(port)
         else:
@@ -87,8 +105,9 @@ def map_ports(
     fed = {one.signal for one in into}
     out = []
     for name, variable in outputs.items():
-        rest = {s: u for s, u in signals.items() if s not in fed or s == maps.get(name)}
-        port = _match(variable, outputs, rest, maps, by_unit=True)
+        own = given[name].signal if name in given else ""
+        rest = {s: u for s, u in signals.items() if s not in fed or s == own}
+        port = _match(variable, outputs, rest, given, by_unit=True)
         if port:
             out.append(port)
     other = [v for v in description.of("input") if v.kind != "Real" and v.name not in values]
@@ -101,33 +120,79 @@ def _match(
     variable: Variable,
     ports: Mapping[str, Variable],
     signals: Mapping[str, str],
-    maps: Mapping[str, str],
+    given: Mapping[str, Given],
     *,
     by_unit: bool,
 ) -> Port | None:
     """Return the signal of a port: as given, by name, by what its name means, by unit alone."""
-    name = variable.name
-    if name in maps:
-        return _port(variable, maps[name], "as given", signals)
+    name, unit = variable.name, unit_of(variable)
+    if name in given:
+        return _as_given(variable, given[name], signals)
     lower = {signal.lower(): signal for signal in signals}
     for candidate, reason in ((name, "its name"), (channel_of(variable), "what its name says")):
         signal = lower.get(candidate.lower())
-        if signal and _fits(variable.unit, signals[signal]):
-            return _port(variable, signal, reason, signals)
-    if not by_unit or variable.unit in (None, "1"):
+        if signal and _fits(unit, signals[signal]):
+            return _port(variable, signal, reason)
+    if not by_unit or unit in (None, "1"):
         return None
-    same = [one for one in signals if _fits(variable.unit, signals[one])]
-    rivals = [
-        v for v in ports.values() if v.name not in maps and _fits(variable.unit, v.unit or "")
-    ]
+    same = [one for one in signals if _fits(unit, signals[one])]
+    rivals = [v for v in ports.values() if v.name not in given and _fits(unit, unit_of(v) or "")]
     if len(same) == 1 and len(rivals) == 1:
-        return _port(variable, same[0], "its unit alone, check it", signals)
+        return _port(variable, same[0], "its unit alone, check it")
     return None
+
+
+class Given(NamedTuple):
+    """What `--map PORT=-CHANNEL@UNIT` says; `unit` "" and `sign` 0 where it does not."""
+
+    signal: str
+    unit: str = ""
+    sign: int = 0
+
+
+def _given(name: str, text: str) -> Given:
+    signal, _, unit = text.strip().partition("@")
+    sign = {"-": -1, "+": 1}.get(signal[:1], 0)
+    if unit and unit_or_none(unit) is None:
+        raise FmuError(f'--map {name}={text}: "{unit}" is no unit that is known.')
+    return Given(signal[abs(sign) :].strip(), unit, sign)
+
+
+def _as_given(variable: Variable, given: Given, signals: Mapping[str, str]) -> Port:
+    reason, unit = "as given", given.unit or unit_of(variable) or ""
+    if not unit:
+        unit = signals[given.signal]
+        reason += f"; the FMU gives no unit, taken as {unit}"
+    return Port(
+        variable.name, unit, given.signal, reason, given.sign or 1, bool(given.unit),
+        bool(given.sign),
+    )  # fmt: skip
+
+
+def unit_of(variable: Variable) -> str | None:
+    """Return the unit of a port: the FMU's, else that in its name, as in a title: `v_mm_s`, `F_kN`.
+
+    An ending counts where it is a unit of what the name means; `x_in` and the like go in.
+    """
+    return variable.unit or _named_unit(variable)
+
+
+def _named_unit(variable: Variable) -> str | None:
+    called = title(0, variable.name.rpartition(".")[2])
+    if called.unit is None or called.unit.name in _NO_UNITS:
+        return None
+    meant = meaning(called.name, called.unit.name)
+    if meant is None or meant.quantity not in PLAIN:
+        return None
+    fits = same_dimension(called.unit.name, PLAIN[meant.quantity])
+    return called.unit.name if fits else None
 
 
 def channel_of(variable: Variable) -> str:
     """Return the channel that a port's name means, "" where it means none."""
-    meant = meaning(variable.name.rpartition(".")[2], variable.unit)
+    own = variable.name.rpartition(".")[2]
+    own = title(0, own).name if _named_unit(variable) else own
+    meant = meaning(own, unit_of(variable))
     if meant is None or meant.rank == 0:
         return ""
     if meant.quantity == "drift":
@@ -140,10 +205,29 @@ def channel_of(variable: Variable) -> str:
     return meant.quantity
 
 
-def _port(variable: Variable, signal: str, reason: str, signals: Mapping[str, str]) -> Port:
+def _port(variable: Variable, signal: str, reason: str) -> Port:
+    """Return a port that was found, refused where its unit is in doubt."""
+    name, unit, named = variable.name, unit_of(variable), _named_unit(variable)
+    if not unit:
+        raise FmuError(
+            f"{name}: its unit is in doubt: neither the FMU nor its name gives one. "
+            f"--map {name}={signal}@UNIT says it."
+        )
+    if variable.unit and named and not _same_unit(variable.unit, named):
+        raise FmuError(
+            f"{name}: its unit is in doubt: the FMU says {variable.unit}, and its name {named}. "
+            f"--map {name}={signal}@{variable.unit} or @{named} says which."
+        )
     if not variable.unit:
-        reason += f"; the FMU gives no unit, taken as {signals[signal]}"
-    return Port(variable.name, variable.unit or signals[signal], signal, reason)
+        reason += f"; in {unit} by its name"
+    return Port(name, unit, signal, reason)
+
+
+def _same_unit(first: str, second: str) -> bool:
+    try:
+        return conversion(first, second) == (1.0, 0.0)
+    except UnitError:
+        return False
 
 
 def _fits(unit: str | None, other: str) -> bool:
@@ -177,19 +261,20 @@ def _check_given(
     description: Description,
     ports: Mapping[str, Variable],
     signals: Mapping[str, str],
-    maps: Mapping[str, str],
+    given: Mapping[str, Given],
     values: Mapping[str, object],
 ) -> None:
     wrong = []
-    for name, signal in maps.items():
+    for name, (signal, unit, _) in given.items():
         if name not in ports:
             wrong.append(f"--map {name}={signal}: {unknown('Real input or output', name, ports)}")
-        elif signal not in signals:
+            continue
+        unit = unit or unit_of(ports[name]) or ""
+        if signal not in signals:
             wrong.append(f"--map {name}={signal}: {unknown('channel', signal, signals)}")
-        elif not _fits(ports[name].unit, signals[signal]):
+        elif not _fits(unit, signals[signal]):
             wrong.append(
-                f"--map {name}={signal}: {name} is in {ports[name].unit}, {signal} in "
-                f"{signals[signal]}."
+                f"--map {name}={signal}: {name} is in {unit}, {signal} in {signals[signal]}."
             )
     settable = [
         v.name for v in description.variables.values() if v.causality in ("input", "parameter")
@@ -199,7 +284,7 @@ def _check_given(
         for name in values
         if name not in settable
     ]
-    wrong += [f"{name} is both set and mapped; one of the two." for name in maps if name in values]
+    wrong += [f"{name} is both set and mapped; one of the two." for name in given if name in values]
     if wrong:
         raise FmuError(f"{description.name}: " + "\n  ".join(wrong))
 

@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="maps",
         action="append",
         default=[],
-        metavar="PORT=CHANNEL",
+        metavar="PORT=CHANNEL@UNIT",
         help="with --fmu: the channel for an input, or the channel to compare an output with",
     )
     parser.add_argument(

@@ -53,12 +53,12 @@ SHORT = "  (short search: it gains too little, like all others)"
 
 def text(verdict: Verdict, folder: Path) -> str:
     """Return the content of verdict.json as text, with the next command for a study's folder."""
-    from ..diagnose.verdict_text import about, sentences, separating, untestable
+    from ..diagnose.verdict_text import about, drive_of, sentences, separating, untestable
 
     first, *others = sentences(verdict)
     lines = [first, *(["", " ".join(others)] if others else [])]
     for name in verdict["effects"]:
-        lines += ["", f"  {about(name)}"]
+        lines += ["", f"  {about(name, drive_of(verdict))}"]
     if verdict["sensors"]:
         lines += ["", "Sensors:"]
         lines += [

@@ -54,6 +54,9 @@ def main(arguments: argparse.Namespace) -> int:
 
 def _add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
+    parser.add_argument(
+        "--mask", action="store_true", help="from now on isolated spikes count as not measured"
+    )
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     parser.set_defaults(act=_check)
 
@@ -66,7 +69,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         action="extend",
         required=True,
         metavar="GLOB",
-        help="measurement files, one run each: CSV, Parquet, MAT; quote the pattern: 'lab/*.csv'",
+        help="measurement files, or a folder of them; quote a pattern: 'lab/*.csv'",
     )
     parser.add_argument(
         "--rig",
@@ -91,10 +94,36 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--step", type=float, metavar="S", help="sampling step in s of files without a time"
     )
+    _add_runs(parser)
     parser.add_argument("--law", help="the law that the model begins with; else lugre")
     parser.add_argument("--title", default="", help="the study's title; else its name")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(act=_new)
+
+
+def _add_runs(parser: argparse.ArgumentParser) -> None:
+    """Add what is known of whole runs, and how files hold them."""
+    parser.add_argument(
+        "--level", action="append", default=[], metavar="PATTERN",
+        help="the command's level in the names of files, {} in its place: --level 'I{}A'",
+    )  # fmt: skip
+    parser.add_argument(
+        "--label", action="append", default=[], metavar="NAME=PATTERN",
+        help="what else names tell of a run: --label 'oil=batch{}'",
+    )  # fmt: skip
+    parser.add_argument(
+        "--runs", type=Path, metavar="FILE",
+        help="a table with a row per run: file, role, current [A], temperature [degC], ...",
+    )  # fmt: skip
+    parser.add_argument(
+        "--split", default="", metavar="HOW",
+        help="files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'",
+    )  # fmt: skip
+    parser.add_argument(
+        "--rate", type=float, metavar="HZ",
+        help="decimate faster runs to this rate; 0 keeps all samples; else 500 Hz from 1 kHz on",
+    )  # fmt: skip
+    parser.add_argument("--mask", action="store_true", help="isolated spikes count as not measured")
 
 
 def _new(arguments: argparse.Namespace) -> int:
@@ -103,6 +132,7 @@ def _new(arguments: argparse.Namespace) -> int:
     from ..physics.laws import DEFAULT, law_names
     from ..study.create import create_study
     from ..study.new import parse_channel
+    from ..study.run_facts import RunChoices
 
     law = arguments.law or DEFAULT
     if law not in law_names():
@@ -117,14 +147,19 @@ def _new(arguments: argparse.Namespace) -> int:
         if "time" in channels:
             raise StudyError("--step and --channel time=... exclude each other.")
         channels["time"] = ChannelSpec(step=arguments.step)
+    table = arguments.runs
+    files = [file for file in _files(arguments.data) if table is None or Path(file) != table]
     created = create_study(
         arguments.name,
-        _files(arguments.data),
+        files,
         rig=arguments.rig,
         building=arguments.building,
         channels=channels,
         title=arguments.title,
         law=law,
+        runs=RunChoices(
+            arguments.level, arguments.label, table, arguments.split, arguments.rate, arguments.mask
+        ),
     )
     if arguments.json:
         _print_json(created)
@@ -134,11 +169,15 @@ def _new(arguments: argparse.Namespace) -> int:
 
 
 def _files(patterns: list[str]) -> list[str]:
-    """Return the files that patterns name, each once, in order."""
+    """Return the files that patterns name, or that folders hold, each once, in order."""
+    from ..data.read import files_in
     from ..errors import StudyError
 
     found: list[str] = []
     for pattern in patterns:
+        if Path(pattern).is_dir():
+            found += map(str, files_in(Path(pattern)))
+            continue
         # pathlib takes no pattern that begins at the root.
         matches = sorted(glob(pattern, recursive=True))  # noqa: PTH207
         matches = [pattern] if Path(pattern).is_file() else matches
@@ -195,6 +234,10 @@ def _check(arguments: argparse.Namespace) -> int:
     if arguments.action == _OLD:
         print("`bristle study first-look` is now `bristle study check`.", file=sys.stderr)
     study = Study(arguments.folder)
+    if arguments.mask and not study.settings.mask:
+        study = study.with_mask()
+        if not arguments.json:
+            print(f"{study.folder / 'study.toml'}: mask = true; isolated spikes are masked.\n")
     total = len(study.settings.runs)
     with Progress("checking the data", total, not arguments.json) as progress:
         found = check_data(study, progress.show)

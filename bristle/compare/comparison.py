@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Fit, Model, Problem
+from ..physics.drive import DRIVES, Drive
 from .bands import Spectrum, spectrum
 from .errors import (
     CLOSE,
@@ -22,6 +23,7 @@ from .errors import (
     run_error,
     with_failures,
 )
+from .labels import LabelError, label_errors
 from .patterns import FLIPS, Finder, ResidualPattern
 from .prediction import RunPrediction, run_predictions
 from .regimes import Regime, regimes
@@ -51,7 +53,7 @@ class Comparison:
     spectrum : Spectrum
         The residual's against the noise's.
     regimes : tuple of Regime
-        z in classes of speed and voltage.
+        z in classes of speed and command.
     predictions : tuple of RunPrediction
         The runs themselves, measured and predicted.
     sentences : tuple of str
@@ -61,6 +63,8 @@ class Comparison:
     sites : tuple of SiteError
         The errors of a building's sites, the worst first, of which this is the comparison of one,
         `site`.
+    labels : tuple of LabelError
+        The error by what is known of whole runs, where that differs between them.
 
     Examples
     --------
@@ -87,11 +91,17 @@ class Comparison:
     sentences: tuple[str, ...] = ()
     seen: bool | None = False
     sites: tuple[SiteError, ...] = ()
+    labels: tuple[LabelError, ...] = ()
 
     @property
     def site(self) -> str:
         """The site of a building that is compared, "" on a bench."""
         return self.predictions[0].site
+
+    @property
+    def drive(self) -> Drive:
+        """What commands the damper in these runs."""
+        return DRIVES[self.predictions[0].drive]
 
     @property
     def z(self) -> float:
@@ -150,6 +160,7 @@ class Comparison:
             "second": pattern_dict(self.second) if self.second else None,
             "bands": [asdict(band) for band in self.spectrum.bands],
             "regimes": [one.as_dict() for one in self.regimes],
+            **({"labels": [one.as_dict() for one in self.labels]} if self.labels else {}),
         }
 
 
@@ -222,7 +233,8 @@ def compare_predictions(
     comparison = Comparison(
         predictions[0].quantity, predictions[0].unit, runs, run_error("all runs", predictions),
         interval_of_z(normalised, finder), tuple(found), second, spectrum(predictions),
-        tuple(regimes(normalised, along)), tuple(predictions), seen=seen,
+        tuple(regimes(normalised, along, DRIVES[predictions[0].drive])), tuple(predictions),
+        seen=seen, labels=label_errors(predictions),
     )  # fmt: skip
     if others:
         comparison = replace(comparison, sites=with_failures([site_of(comparison), *others]))

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from ..physics.drive import DRIVES, VOLTAGE
+
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
@@ -29,8 +31,11 @@ SHOWN: dict[str, tuple[float, str]] = {
     "velocity": (1e3, "mm/s"),
     "speed": (1e3, "mm/s"),
     "acceleration": (1.0, "m/s2"),
-    "voltage": (1.0, "V"),
-    "voltage_rate": (1.0, "V/s"),
+    **{one.name: (1.0, one.unit) for one in DRIVES.values()},
+    **{f"{one.name}_rate": (1.0, f"{one.unit}/s") for one in DRIVES.values()},
+    "amplitude": (1e3, "mm"),
+    "temperature": (1.0, "°C"),
+    "frequency": (1.0, "Hz"),
     "direction": (1.0, ""),
     "time": (1.0, "s"),
     "dissipated_energy": (1.0, "J"),
@@ -45,6 +50,7 @@ def coordinates_of(
     a: Array | None,
     V: Array | None,
     force: Array | None,
+    drive: str = VOLTAGE.name,
 ) -> dict[str, Array]:
     """Return the coordinates (n,) of one run in SI that its signals allow.
 
@@ -52,6 +58,7 @@ def coordinates_of(
     ----------
     dt : float, s
     x, v, a, V, force : (n,) m, m/s, m/s2, V, N or None; smoothed, for noise blurs the bins
+    drive : the channel that V holds, in its own unit
     """
     found: dict[str, Array] = {}
     if x is not None:
@@ -64,8 +71,8 @@ def coordinates_of(
     if a is not None:
         found["acceleration"] = a
     if V is not None:
-        found["voltage"] = V
-        found["voltage_rate"] = recent_rate(V, dt)
+        found[drive] = V
+        found[f"{drive}_rate"] = recent_rate(V, dt)
     if v is not None and force is not None:
         found["dissipated_energy"] = np.asarray(np.cumsum(np.abs(force * v)) * dt, dtype=float)
     given = next((y for y in (x, v, a, V, force) if y is not None), np.zeros(0))

@@ -5,8 +5,10 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
+from ..physics.drive import DRIVES
+
 NAMES = {
-    "voltage_rate": "recent changes of the voltage",
+    **{f"{name}_rate": f"recent changes of the {name}" for name in DRIVES},
     "dissipated_energy": "the energy dissipated so far",
     "time_since_reversal": "the time since the last reversal",
     "rest": "the recent time at rest",

@@ -173,12 +173,12 @@ def draw_spectrum(axes: Axes, comparison: Comparison) -> None:
 
 
 def draw_regimes(axes: Axes, comparison: Comparison) -> None:
-    """Draw z in classes of speed and voltage, 1 being what noise explains."""
-    cells = [one for one in comparison.regimes if one.speed or one.voltage]
+    """Draw z in classes of speed and command, 1 being what noise explains."""
+    cells = [one for one in comparison.regimes if one.speed or one.command]
     speeds = _ordered(one.speed for one in cells if one.speed)
-    volts = _ordered(one.voltage for one in cells if one.voltage)
-    pairs = {(one.speed, one.voltage): one.z for one in cells}
-    columns, rows = (volts or [""]), (speeds or [""])
+    levels = _ordered(one.command for one in cells if one.command)
+    pairs = {(one.speed, one.command): one.z for one in cells}
+    columns, rows = (levels or [""]), (speeds or [""])
     values = np.array([[pairs.get((s, V), np.nan) for V in columns] for s in rows])
     shown = np.log10(np.maximum(values, 1.0))
     axes.imshow(shown, cmap="OrRd", vmin=0.0, vmax=1.0, aspect="auto", origin="lower")

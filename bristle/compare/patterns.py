@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.search import z_scale
+from ..physics.drive import DRIVES
 from .coordinates import BINS, FINE, SLOW, Bins, cut
 from .scale import rms
 
@@ -38,9 +39,9 @@ PREFERENCE = (
     "direction",
     "displacement",
     "speed",
-    "voltage",
+    *DRIVES,
     "velocity",
-    "voltage_rate",
+    *(f"{name}_rate" for name in DRIVES),
     "time_since_reversal",
     "rest",
     "acceleration",

@@ -31,7 +31,7 @@ def draw_comparison(comparison: Comparison, title: str = "") -> Page:
 
     Panels: z at every site of a building; the worst stretch of the worst run, measured and
     predicted, with the error under it; the loops of that run; the error along the two most telling
-    coordinates; its spectrum against that of the noise; z in classes of speed and voltage.
+    coordinates; its spectrum against that of the noise; z in classes of speed and command.
     """
     prediction = comparison.worst
     window = worst_window(prediction)

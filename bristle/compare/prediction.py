@@ -8,10 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.labels import Labels
 from ..identify.fit import Model, Problem, Run
 from ..identify.model import LOST
 from ..identify.residuals import over_noise
 from ..identify.structure import StructureRun
+from ..physics.drive import VOLTAGE
 from .coordinates import coordinates_of
 
 Array = NDArray[np.float64]
@@ -28,6 +30,7 @@ class RunPrediction:
     not count, for the model's states begin somewhere, nor do those where `known` (n,) is False:
     they were not measured but filled in. `site` of a building is "damper", "layer", "storey1" ...,
     "" on a bench. `index` (n,) numbers the samples where some were left out, None where none were.
+    `drive` is the channel that commands the damper, `labels` what is known of the whole run.
     """
 
     name: str
@@ -45,6 +48,8 @@ class RunPrediction:
     known: NDArray[np.bool_] | None = None
     site: str = ""
     index: NDArray[np.int64] | None = None
+    drive: str = VOLTAGE.name
+    labels: Labels = field(default_factory=dict)
 
     @property
     def time(self) -> Array:
@@ -96,6 +101,7 @@ def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[Run
                 run.name, run.dt, run.force, predicted + bias, sigma, run.noise, spread,
                 coordinates_of_run(run), finer - predicted, skip=run.skip, known=run.measured,
                 index=run.keep if isinstance(run, StructureRun) else None,
+                drive=run.drive, labels=run.labels,
             )
         )  # fmt: skip
     return out
@@ -105,7 +111,9 @@ def coordinates_of_run(run: Run) -> dict[str, Array]:
     """Return the coordinates (n,) of a run; time and history go on where samples are left out."""
     if isinstance(run, StructureRun) and run.whole is not None:
         return {name: y[run.keep] for name, y in coordinates_of_run(run.whole).items()}
-    return coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force)
+    found = coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force, run.drive)
+    numbers = {name: y for name, y in run.labels.items() if not isinstance(y, str)}
+    return {**{name: np.full(len(run.x), y) for name, y in numbers.items()}, **found}
 
 
 def halved(run: Run) -> Run:

@@ -1,4 +1,4 @@
-"""In which regimes of speed and voltage a model is right within its noise."""
+"""In which regimes of speed and command a model is right within its noise."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.search import z_scale
+from ..physics.drive import VOLTAGE, Drive
 from ..quantity import plain, quantity
 
 Array = NDArray[np.float64]
@@ -22,11 +23,11 @@ _FEWEST = 200  # samples of a regime that says something
 
 @dataclass(frozen=True)
 class Regime:
-    """A part of the samples by speed, voltage or both: `text` as in "at low speed and 0 V"."""
+    """A part of the samples by speed, command or both: `text` as in "at low speed and 0 V"."""
 
     text: str
     speed: str
-    voltage: str
+    command: str
     z: float
     samples: int
 
@@ -38,15 +39,16 @@ class Regime:
     def as_dict(self) -> dict[str, Any]:
         """Return the regime as JSON has it."""
         return {
-            "words": self.text, "speed": self.speed, "voltage": self.voltage, "z": self.z,
+            "words": self.text, "speed": self.speed, "voltage": self.command, "z": self.z,
             "samples": self.samples, "right": self.right,
         }  # fmt: skip
 
 
 def regimes(
-    normalised: Sequence[Array], coordinates: Sequence[Mapping[str, Array]]
-) -> list[Regime]:
-    """Return the regimes with their z: classes of speed, of voltage, and of both together."""
+    normalised: Sequence[Array], coordinates: Sequence[Mapping[str, Array]],
+    drive: Drive = VOLTAGE,
+) -> list[Regime]:  # fmt: skip
+    """Return the regimes with their z: classes of speed, of the command, and of both together."""
     r = np.concatenate(list(normalised))
 
     def joined(name: str) -> Array | None:
@@ -55,9 +57,9 @@ def regimes(
         return np.concatenate([one[name] for one in coordinates])
 
     speeds = speed_classes(joined("speed"))
-    volts = voltage_classes(joined("voltage"))
-    cells = [*((s, None) for s in speeds), *((None, V) for V in volts)]
-    cells += [(s, V) for s in speeds for V in volts]
+    levels = level_classes(joined(drive.name), drive)
+    cells = [*((s, None) for s in speeds), *((None, V) for V in levels)]
+    cells += [(s, V) for s in speeds for V in levels]
     out = []
     for s, V in cells:
         chosen = np.ones(len(r), dtype=bool)
@@ -88,14 +90,14 @@ def speed_classes(speed: Array | None) -> list[tuple[str, Mask]]:
     ]
 
 
-def voltage_classes(V: Array | None) -> list[tuple[str, Mask]]:
-    """Return the voltage off, low and high; nothing where it does not vary."""
+def level_classes(V: Array | None, drive: Drive = VOLTAGE) -> list[tuple[str, Mask]]:
+    """Return a command (n,) off, low and high; nothing where it does not vary."""
     if V is None or not np.ptp(V) > 1e-3 * max(float(np.max(np.abs(V))), 1e-12):
         return []
     top = float(np.quantile(V, 0.98))
     off, middle = 0.05 * top, 0.5 * top
     return [
-        ("at 0 V", off >= V),
-        (f"at low voltage (below {plain(middle, 2)} V)", (off < V) & (middle > V)),
-        (f"at high voltage (above {plain(middle, 2)} V)", middle <= V),
+        (f"at 0 {drive.unit}", off >= V),
+        (f"at low {drive.name} (below {plain(middle, 2)} {drive.unit})", (off < V) & (middle > V)),
+        (f"at high {drive.name} (above {plain(middle, 2)} {drive.unit})", middle <= V),
     ]

@@ -8,8 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.labels import UNITS
+from ..physics.drive import DRIVES
 from ..quantity import plain, quantity, short_z
 from .coordinates import SHOWN
+from .labels import label_sentence
 from .names import joined, name_of, site_name, site_names
 from .patterns import Finder, ResidualPattern
 from .regimes import Regime
@@ -35,8 +38,13 @@ _ALIKE = 0.25  # parts of a pattern's size by which it may differ between voltag
 
 
 def sentences(comparison: Comparison, finder: Finder) -> tuple[str, ...]:
-    """Return three sentences: how wrong, what the error depends on, where it is right."""
-    return (_how_wrong(comparison), _where(comparison, finder), _where_right(comparison))
+    """Return three sentences: how wrong, what the error depends on, where it is right.
+
+    Where runs have labels and the error goes with one, a fourth says so.
+    """
+    three = (_how_wrong(comparison), _where(comparison, finder), _where_right(comparison))
+    of_labels = label_sentence(comparison.labels)
+    return (*three, of_labels) if of_labels else three
 
 
 def _how_wrong(comparison: Comparison) -> str:
@@ -104,9 +112,7 @@ def _where(comparison: Comparison, finder: Finder) -> str:
         names = " and ".join(name_of(name, comparison.site) for name in first.alike[:2])
         also = f" (in these runs {names} show{'s' * (len(first.alike) == 1)} the same)"
     text = f"The error depends mainly on {name_of(first.coordinate, comparison.site)}{also}: "
-    text += _pattern_text(first, comparison.predictions[0]) + _at_voltages(
-        first, comparison, finder
-    )
+    text += _pattern_text(first, comparison.predictions[0]) + _at_levels(first, comparison, finder)
     second = comparison.second
     if second is not None and second.share > 0.03:
         text += (
@@ -122,10 +128,11 @@ def _where_right(comparison: Comparison) -> str:
     )
     right = [one for one in every if one.right]
     if every and len(right) == len(every):
-        kinds = [kind for kind in ("speed", "voltage") if any(getattr(r, kind) for r in every)]
+        named = {"speed": "speed", "command": comparison.drive.name}
+        kinds = [named[kind] for kind in named if any(getattr(r, kind) for r in every)]
         return f"It is right within its noise at every {' and '.join(kinds)} (z {whole})."
     if right:
-        best = max(right, key=lambda one: (not (one.speed and one.voltage), one.samples))
+        best = max(right, key=lambda one: (not (one.speed and one.command), one.samples))
         others = [one for one in right if _beside(one, best)]
         text = f"{begin(best.text)} it is right within its noise (z = {best.z:.2f})"
         if others:
@@ -144,8 +151,8 @@ def _where_right(comparison: Comparison) -> str:
 
 def _beside(one: Regime, best: Regime) -> bool:
     """Return whether a regime is neither the other nor a part of it."""
-    if one.speed and one.voltage and (one.speed == best.speed or one.voltage == best.voltage):
-        return bool(best.speed and best.voltage)
+    if one.speed and one.command and (one.speed == best.speed or one.command == best.command):
+        return bool(best.speed and best.command)
     return one != best
 
 
@@ -270,8 +277,9 @@ def _location(pattern: ResidualPattern, begin: int, end: int) -> str:
     last = len(pattern.mean) - 1
     if name == "direction":
         return "moving outwards (+x)" if pattern.centre[begin] > 0.0 else "moving back (-x)"
-    if name == "voltage_rate":
-        return "just after the voltage has " + ("risen" if pattern.centre[end] > 0.0 else "fallen")
+    if name.removesuffix("_rate") in DRIVES and name.endswith("_rate"):
+        changed = "risen" if pattern.centre[end] > 0.0 else "fallen"
+        return f"just after the {name.removesuffix('_rate')} has {changed}"
     if begin == 0 and end == last:
         return "throughout"
     if name == "time_since_reversal":
@@ -282,7 +290,9 @@ def _location(pattern: ResidualPattern, begin: int, end: int) -> str:
         if begin == 0:
             return f"before {plain(high, 2)} J are dissipated"
         return f"once {plain(low, 2)} J are dissipated"
-    if name == "voltage" and high - low < 0.02 * factor * float(np.ptp(pattern.centre)):
+    if (
+        name in DRIVES or name not in SHOWN or name in UNITS
+    ) and high - low < 0.02 * factor * float(np.ptp(pattern.centre)):
         return f"at {plain(0.5 * (low + high), 2)} {unit}"
     if begin == 0:
         return f"below {plain(high, 2)} {unit}"
@@ -291,13 +301,14 @@ def _location(pattern: ResidualPattern, begin: int, end: int) -> str:
     return f"between {plain(low, 2)} and {plain(high, 2)} {unit}"
 
 
-def _at_voltages(pattern: ResidualPattern, comparison: Comparison, finder: Finder) -> str:
-    """Return whether a pattern is alike at low and high voltage; "" where that cannot be asked."""
-    if "voltage" in pattern.coordinate or "voltage" not in finder.bins:
+def _at_levels(pattern: ResidualPattern, comparison: Comparison, finder: Finder) -> str:
+    """Return whether a pattern is alike at low and high command; "" where that cannot be asked."""
+    drive = comparison.drive
+    if drive.name in pattern.coordinate or drive.name not in finder.bins:
         return ""
     if comparison.site not in ("", "damper"):
         return ""  # it tells how far the damper let a spring move, and nothing of the spring
-    V = np.concatenate([one.along()["voltage"] for one in comparison.predictions])
+    V = np.concatenate([one.along()[drive.name] for one in comparison.predictions])
     middle = 0.5 * float(np.quantile(V, 0.98))
     sizes = [size_of(pattern, finder, chosen) for chosen in (middle > V, middle <= V)]
     if not all(np.isfinite([*low, *high]).all() for low, high in [sizes]):
@@ -305,13 +316,14 @@ def _at_voltages(pattern: ResidualPattern, comparison: Comparison, finder: Finde
     (low, low_std), (high, high_std) = sizes
     doubt = 2.0 * float(np.hypot(low_std, high_std))
     if abs(high - low) <= max(_ALIKE * max(abs(low), abs(high)), doubt):
-        return ", the same at every voltage" if doubt < 0.7 else ""
+        return f", the same at every {drive.name}" if doubt < 0.7 else ""
     peak = float(np.max(np.abs(pattern.mean)))
     one = comparison.predictions[0]
     parts = (
-        f"{_amount(low * peak, one)} below {plain(middle, 2)} V, {_amount(high * peak, one)} above"
+        f"{_amount(low * peak, one)} below {plain(middle, 2)} {drive.unit}, "
+        f"{_amount(high * peak, one)} above"
     )
-    return f", {'more' if high > low else 'less'} at high voltage ({parts})"
+    return f", {'more' if high > low else 'less'} at high {drive.name} ({parts})"
 
 
 def size_of(

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..data.labels import Label, label_text, varying
 from ..draw.style import percent
+from ..physics.drive import DRIVES
 from ..quantity import plain, scale, short_z
+from .labels import known_of
 from .names import name_of, site_name
 from .sentences import FAINT, begin
 
@@ -25,7 +28,9 @@ def comparison_tables(comparison: Comparison) -> list[Table]:
     There are sites of a building only.
     """
     sites = [site_table(comparison)] if comparison.sites else []
-    return [*sites, run_table(comparison), pattern_table(comparison), band_table(comparison)]
+    labels = [label_table(comparison)] if comparison.labels else []
+    rest = [pattern_table(comparison), band_table(comparison)]
+    return [*sites, run_table(comparison), *labels, *rest]
 
 
 def site_table(comparison: Comparison) -> Table:
@@ -54,14 +59,30 @@ def _site(one: SiteError, factor: float) -> list[str]:
 def run_table(comparison: Comparison) -> Table:
     """Return the error on each run and over all, with the numerical error beside it."""
     factor, unit = scale(comparison.unit, comparison.total.signal)
+    known = known_of(comparison.predictions)
+    names = varying(known)
     header = ["run", "z", f"error [{unit}]", "of RMS", "fit", "VAF"]
-    header += [f"noise [{unit}]", "half step [z]"]
-    runs = [*comparison.runs]
-    rows = [_run(one, factor) for one in (runs if len(runs) == 1 else [*runs, comparison.total])]
+    header += [f"noise [{unit}]", "half step [z]", *names]
+    own = [[_label(name, one[name]) for name in names] for one in known]
+    rows = [[*_run(run, factor), *labels] for run, labels in zip(comparison.runs, own, strict=True)]
+    if len(rows) > 1:
+        rows.append([*_run(comparison.total, factor), *["" for _ in names]])
     title = "Error / noise (z), RMS at all frequencies, and the sensitivity to halving the step"
     if comparison.sites:
         title = f"{begin(site_name(comparison.site))}: {title[:1].lower()}{title[1:]}"
     return title, header, rows
+
+
+def _label(name: str, value: Label) -> str:
+    return label_text(name, value, DRIVES[name].unit if name in DRIVES else "")
+
+
+def label_table(comparison: Comparison) -> Table:
+    """Return the error by what is known of whole runs: one row per value of a label."""
+    rows = [
+        [name_of(one.name), one.text, short_z(one.z), str(one.runs)] for one in comparison.labels
+    ]
+    return "Error by what is known of whole runs", ["label", "value", "z", "runs"], rows
 
 
 def _run(run: RunError, factor: float) -> list[str]:

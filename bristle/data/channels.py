@@ -9,6 +9,7 @@ from difflib import get_close_matches
 from typing import NamedTuple
 
 from ..errors import RecordError
+from ..physics.drive import DRIVES
 from ..units import parse as parse_unit
 
 PLAIN = {
@@ -17,8 +18,7 @@ PLAIN = {
     "velocity": "m/s",
     "acceleration": "m/s2",
     "force": "N",
-    "voltage": "V",
-    "current": "A",
+    **{drive.name: drive.unit for drive in DRIVES.values()},
     "ground_acceleration": "m/s2",
     "holding_force": "N",
 }
@@ -28,7 +28,8 @@ _LEVEL = re.compile(r"(base|floor[1-9]\d?)_(displacement|velocity|acceleration_a
 _DRIFT = re.compile(r"drift[1-9]\d?")
 
 MOTION = ("displacement", "velocity", "acceleration")
-DRIVE = ("voltage", "current")
+DRIVE = tuple(DRIVES)
+"""Channels that command a damper, each with its unit in `physics.drive`."""
 
 
 def is_channel(name: str) -> bool:
@@ -74,12 +75,15 @@ class Meaning(NamedTuple):
 _QUANTITIES = {
     "time": "time t zeit tempo temps tiempo timestamp elapsed zeitstempel clock",
     "displacement": "displacement disp displ displac x position pos stroke weg hub lvdt travel "
-    "deslocamento posicao curso auslenkung deflection d y s piston desloc deplacement course",
+    "deslocamento posicao curso auslenkung deflection extension crosshead d y s piston desloc "
+    "deplacement course",
     "velocity": "velocity vel v speed geschwindigkeit velocidade vitesse velo rate vp xdot xd dx",
     "acceleration": "acceleration acc accel a beschleunigung aceleracao acel xddot xdd ddx accn",
     "force": "force f load kraft forca fd last fuerza loadcell effort kraftaufnehmer fdamper",
     "voltage": "voltage volt volts u spannung tensao coilvoltage vcoil uc tension voltaje",
-    "current": "current i strom corrente courant amps amperage icoil corriente",
+    "current": "current i strom corrente courant amp amps ampere amperage icoil corriente",
+    "duty": "duty pwm dutycycle tastgrad",
+    "field": "field flux magnetic fluxdensity feld flussdichte bfield",
     "drift": "drift interstory interstorey",
 }
 _BY_WORD = {word: kind for kind, words in _QUANTITIES.items() for word in words.split()}
@@ -127,7 +131,9 @@ def quantity_of_unit(unit: str | None) -> str | None:
     if unit is None:
         return None
     dimension = parse_unit(unit).dimension
-    for quantity in ("time", *MOTION, "force", *DRIVE):
+    if parse_unit(unit).name == PLAIN["duty"]:
+        return "duty"  # any other number without a unit is no duty cycle
+    for quantity in ("time", *MOTION, "force", "voltage", "current", "field"):
         if parse_unit(PLAIN[quantity]).dimension == dimension:
             return quantity
     return None

@@ -6,7 +6,7 @@ Units are converted here, once. What was done to the samples is in `notes`; no s
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -17,14 +17,34 @@ from numpy.typing import NDArray
 from ..errors import RecordError, UnitError
 from ..units import conversion
 from .channels import DRIVE, ChannelSpec, channel_unit
+from .decimate import decimated
 from .guess import guess_channels, specs
+from .labels import Labels
 from .noise import Noise, estimate_noise
 from .read import read_table
 from .sampling import Sampling, evenly
+from .spikes import Spike, spikes_of, spikes_text
 from .table import Array, Table, table_from_frame
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a run besides its file.
+
+    `name` of the run, "" for that of its file; `levels` of a command that the file does not hold,
+    by channel, in its unit; `labels` what else is known of the whole run; `rate` [Hz] to which
+    faster samples are decimated, 0 for none; `mask` whether isolated spikes count as not measured.
+    """
+
+    name: str = ""
+    levels: Mapping[str, float] = field(default_factory=dict)
+    labels: Labels = field(default_factory=dict)
+    rate: float = 0.0
+    mask: bool = False
+
 
 _ABSURD = 1e15  # in any SI unit; some recorders write 1e30 where a value is missing
 
@@ -47,6 +67,10 @@ class Measurement:
         Standard deviation of each channel in SI; `noise_facts` how it was found, None where given.
     notes : tuple of str
         What was done.
+    labels : mapping
+        What is known of the whole run, by name: a number or a word.
+    spikes : tuple of Spike
+        Isolated spikes in the file that this piece is from, as far as they are not masked.
 
     Examples
     --------
@@ -72,6 +96,8 @@ class Measurement:
     source: str
     notes: tuple[str, ...] = field(default=())
     lost: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    labels: Labels = field(default_factory=dict)
+    spikes: tuple[Spike, ...] = ()
 
     @property
     def step(self) -> float:
@@ -90,6 +116,11 @@ class Measurement:
             if channel in self.lost:
                 valid = valid & ~self.lost[channel]
         return valid
+
+    @property
+    def drive(self) -> str:
+        """The channel that commands the damper, "" where none was measured."""
+        return next((channel for channel in DRIVE if channel in self.channels), "")
 
     def has(self, *channels: str) -> bool:
         """Return whether all of these channels were measured."""
@@ -163,12 +194,22 @@ def measurements_of_frame(
 
 
 def measurements_of(
-    table: Table, channels: Mapping[str, ChannelSpec] | None = None, *, estimate: bool = True
+    table: Table,
+    channels: Mapping[str, ChannelSpec] | None = None,
+    *,
+    estimate: bool = True,
+    known: Known | None = None,
 ) -> list[Measurement]:
     """Return the measurements in a table; see `read_measurements`.
 
-    `estimate` False leaves out noise that is not given.
+    Parameters
+    ----------
+    table : what a file holds
+    channels : where each channel is; None guesses
+    estimate : False leaves out noise that is not given
+    known : what is known of the run besides
     """
+    known = known or Known()
     notes = list(table.notes)
     if channels is None:
         guesses = guess_channels(table)
@@ -183,23 +224,46 @@ def measurements_of(
         values[channel] = _in_si(table, channel, spec)
     if not values:
         raise RecordError(f"{table.source}: no channel besides time is named. There is nothing.")
+    spikes = spikes_of(time, values, mask=known.mask)
+    notes += _masked(spikes) if known.mask else []
     even = evenly(time, values, table.lines, table.source, table.place)
-    notes += even.notes + _what_is_missing(values)
+    notes += even.notes + _what_is_missing([*values, *known.levels])
+    fewer = decimated(even, known.rate)
+    even, notes = fewer.even, [*notes, *fewer.notes]
     out = []
-    stem = _stem(table.source)
+    stem = known.name or stem_of(table.source)
     for number, (piece, parts, measured) in enumerate(even.pieces, 1):
         name = stem if len(even.pieces) == 1 else f"{stem} ({number} of {len(even.pieces)})"
         noise, facts = _noise(table, channels, parts, estimate)
+        for channel, gain in fewer.gain.items():
+            found = fewer.noise[number - 1].get(channel) if facts.get(channel) else None
+            if found is not None:  # behind the filter it is not white, and is told from before
+                facts[channel] = replace(found, std=gain * found.std)
+                noise[channel] = gain * found.std
+            elif channel in facts and facts[channel] is None:
+                noise[channel] *= gain
+        for channel, level in known.levels.items():
+            units[channel], noise[channel], facts[channel] = channel_unit(channel), 0.0, None
+            parts[channel] = np.full(len(piece), level)
         out.append(
             Measurement(
                 name, piece, parts, units, measured, noise, facts, even.sampling, table.source,
-                tuple(notes),
+                tuple(notes), labels=known.labels, spikes=() if known.mask else spikes,
+                lost=fewer.lost[number - 1],
             )
         )  # fmt: skip
     return out
 
 
-def _stem(source: str) -> str:
+def _masked(spikes: tuple[Spike, ...]) -> list[str]:
+    """Say what was masked, a sentence per channel."""
+    named = dict.fromkeys(one.channel for one in spikes)
+    own = [tuple(one for one in spikes if one.channel == name) for name in named]
+    return [f"{spikes_text(one)}: masked, they count as not measured" for one in own]
+
+
+def stem_of(source: str) -> str:
+    """Return the name of a file without its folder and its ending."""
     name = Path(source).name
     return name.removesuffix(".gz").rpartition(".")[0] or name
 
@@ -267,7 +331,7 @@ def _noise(
     return noise, facts
 
 
-def _what_is_missing(values: Mapping[str, Array]) -> list[str]:
+def _what_is_missing(values: Sequence[str]) -> list[str]:
     """Say which channels are absent, for much depends on it."""
     notes = []
     x, v = "displacement" in values, "velocity" in values
@@ -277,5 +341,5 @@ def _what_is_missing(values: Mapping[str, Array]) -> list[str]:
     if bench and v and not x:
         notes.append("no displacement: it follows from the velocity up to where it begins")
     if bench and not any(drive in values for drive in DRIVE):
-        notes.append("no voltage and no current: taken as constant at an unknown level")
+        notes.append("no voltage and no current: the command is constant at an unknown level")
     return notes

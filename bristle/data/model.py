@@ -33,6 +33,7 @@ from typing import Any
 from ..errors import UnitError
 from ..findings import unknown, written
 from ..lines import KeyPath
+from ..physics.drive import DRIVES, VOLTAGE, declared_for, unit_for
 from ..physics.effect import EFFECTS, exclude, laws_joined, plain_name
 from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
 from ..physics.parameter import CHOICES, Parameter, fields_of
@@ -52,7 +53,7 @@ from .model_value import VALUE_KEYS as VALUE_KEYS
 from .model_value import Value as Value
 from .model_value import as_written, waiting_law
 
-_KEYS = ("schema", "law", *FORM_KEYS, "building", "parameters", "effects", "correlation")
+_KEYS = ("schema", "law", *FORM_KEYS, "building", "drive", "parameters", "effects", "correlation")
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,8 @@ class StudyModel:
     `parameters` of the law by name; `effects` name to parameters; `building` the file of the
     structure, relative to the study, "" on a bench; `only_shown` the effects, and the law, whose
     code must not run yet: the model can be shown, not used; `correlation` of the identified
-    parameters' errors, None where none was stored.
+    parameters' errors, None where none was stored; `drive` is the channel that commands the damper,
+    on whose unit those of parameters depend.
     """
 
     law: str
@@ -71,6 +73,7 @@ class StudyModel:
     building: str = ""
     only_shown: tuple[str, ...] = ()
     correlation: Correlation | None = None
+    drive: str = VOLTAGE.name
 
     @property
     def base_law(self) -> str:
@@ -104,7 +107,7 @@ class StudyModel:
         if (effect or self.law) in self.only_shown:
             value = self.effects[effect][own] if effect else self.parameters[own]
             return Parameter(value.value, value.unit, (value.low, value.high), "")
-        return EFFECTS[effect].parameters[own] if effect else _declared(self.law)[name]
+        return _declared(self.law, effect, self.drive)[own]
 
     def with_values(
         self,
@@ -172,7 +175,32 @@ class StudyModel:
 
     def with_effect(self, effect: str) -> StudyModel:
         """Return the model with one more effect, its parameters at their defaults."""
-        return replace(self, effects={**self.effects, effect: _defaults("", effect)})
+        added = _defaults("", effect, self.drive)
+        return replace(self, effects={**self.effects, effect: added})
+
+    def with_drive(self, drive: str) -> StudyModel:
+        """Return the model for another command: the same numbers, per ampere in place of per volt.
+
+        Parameters
+        ----------
+        drive : one of `data.channels.DRIVE`
+        """
+        if drive == self.drive:
+            return self
+        old = DRIVES[self.drive].unit
+
+        def said(value: Value) -> Value:
+            return replace(value, unit=unit_for(value.unit, DRIVES[drive], old))
+
+        return replace(
+            self,
+            drive=drive,
+            parameters={name: said(value) for name, value in self.parameters.items()},
+            effects={
+                effect: {name: said(value) for name, value in values.items()}
+                for effect, values in self.effects.items()
+            },
+        )
 
 
 def _site_of(name: str, bench: bool) -> str:
@@ -180,9 +208,21 @@ def _site_of(name: str, bench: bool) -> str:
     return "damper" if bench and "damper" in effect.sites else effect.site
 
 
-def new_model(law: str = DEFAULT, effects: tuple[str, ...] = (), building: str = "") -> StudyModel:
-    """Return a model with every parameter at its default."""
-    model = StudyModel(law, _defaults(law), {}, building)
+def new_model(
+    law: str = DEFAULT,
+    effects: tuple[str, ...] = (),
+    building: str = "",
+    drive: str = VOLTAGE.name,
+) -> StudyModel:
+    """Return a model with every parameter at its default.
+
+    Parameters
+    ----------
+    law, effects : names of the law and of effects that join it
+    building : file of the structure, relative to the study; "" on a bench
+    drive : the channel that commands the damper
+    """
+    model = StudyModel(law, _defaults(law, "", drive), {}, building, drive=drive)
     for effect in effects:
         model = model.with_effect(effect)
     return model
@@ -216,12 +256,16 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     law = toml.text((), data, "law")
     only_shown = _unusable_law(toml, law, beside / "laws", to_show)
     law = law_in_form(toml, data, law, known=not only_shown)
+    drive = toml.text((), data, "drive", VOLTAGE.name)
+    if drive not in DRIVES:
+        toml.error(("drive",), unknown("drive", drive, DRIVES))
+        drive = VOLTAGE.name
     only_shown = [law] if only_shown else []
     given = toml.table((), data, "parameters")
     if only_shown:
         parameters = as_written(toml, ("parameters",), given)
     else:
-        parameters = _values(toml, ("parameters",), given, law)
+        parameters = _values(toml, ("parameters",), given, (law, ""), drive)
     base = "" if only_shown else base_and_variant(law)[0].name
     effects: dict[str, dict[str, Value]] = {}
     for name, table in toml.table((), data, "effects").items():
@@ -234,14 +278,14 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
             effects[name] = as_written(toml, ("effects", name, "parameters"), own_values)
             only_shown.append(name)
             continue
-        found = _effect(toml, name, table, base, own)
+        found = _effect(toml, name, table, (base, drive), own)
         if found is not None:
             effects[name] = found
     _exclusions(toml, [name for name in effects if name not in only_shown])
     building = toml.text((), data, "building")
     if building and not (beside / building).is_file():
         toml.error(("building",), f"there is no file {beside / building}.")
-    model = StudyModel(law, parameters, effects, building, tuple(only_shown))
+    model = StudyModel(law, parameters, effects, building, tuple(only_shown), drive=drive)
     toml.check()  # else what is wrong with an effect would be said again of its correlation
     correlation = None
     if "correlation" in data:
@@ -265,10 +309,16 @@ def _unusable_law(toml: Toml, law: str, folder: Path, to_show: bool) -> list[str
     return []
 
 
-def _declared(law: str, effect: str = "") -> dict[str, Parameter]:
-    """Return the declarations of an effect's parameters, or of a law's."""
-    if effect:
-        return dict(EFFECTS[effect].parameters)
+def _declared(law: str, effect: str = "", drive: str = VOLTAGE.name) -> dict[str, Parameter]:
+    """Return the declarations of an effect's parameters, or of a law's, for a command."""
+    declared = dict(EFFECTS[effect].parameters) if effect else _of_law(law)
+    if drive == VOLTAGE.name:
+        return declared
+    return {name: declared_for(one, DRIVES[drive]) for name, one in declared.items()}
+
+
+def _of_law(law: str) -> dict[str, Parameter]:
+    """Return the declarations of a law's parameters, with the values of its variant."""
     base, variant = base_and_variant(law)
     declared = dict(base.parameters)
     for name, value in variant.values.items():
@@ -283,7 +333,7 @@ def table_names(law: str, effect: str = "") -> dict[str, tuple[str, ...]]:
     return {name: fields[name] for name in owner.tables}
 
 
-def _defaults(law: str, effect: str = "") -> dict[str, Value]:
+def _defaults(law: str, effect: str = "", drive: str = VOLTAGE.name) -> dict[str, Value]:
     """Return the parameters of an effect, or of a law, at their defaults."""
     if effect:
         fixed: tuple[str, ...] = (*CHOICES, *EFFECTS[effect].assumed)
@@ -292,12 +342,16 @@ def _defaults(law: str, effect: str = "") -> dict[str, Value]:
         fixed = (*base.fixed(), *variant.idle)
     return {
         name: Value(p.value, p.unit, *p.bounds, free=name not in fixed)
-        for name, p in _declared(law, effect).items()
+        for name, p in _declared(law, effect, drive).items()
     }
 
 
-def _effect(toml: Toml, name: str, table: Any, law: str, own_file: Path) -> dict[str, Value] | None:
+def _effect(
+    toml: Toml, name: str, table: Any, joined: tuple[str, str], own_file: Path
+) -> dict[str, Value] | None:
+    """Return the values of an effect; `joined` is the law that it joins, and the model's drive."""
     keys = ("effects", name)
+    law, drive = joined
     if name not in EFFECTS:
         why = why_left_out(own_file)
         toml.error(keys, why or unknown("effect", name, sorted(EFFECTS)))
@@ -310,7 +364,7 @@ def _effect(toml: Toml, name: str, table: Any, law: str, own_file: Path) -> dict
         toml.error(keys, f"{name} cannot join the law {law}; it joins {joins}.")
     toml.known(keys, table, ("parameters",))
     own = toml.table(keys, table, "parameters")
-    return _values(toml, (*keys, "parameters"), own, law, name)
+    return _values(toml, (*keys, "parameters"), own, (law, name), drive)
 
 
 def _exclusions(toml: Toml, effects: list[str]) -> None:
@@ -321,9 +375,11 @@ def _exclusions(toml: Toml, effects: list[str]) -> None:
 
 
 def _values(
-    toml: Toml, keys: KeyPath, table: Mapping[str, Any], law: str, effect: str = ""
+    toml: Toml, keys: KeyPath, table: Mapping[str, Any], owner: tuple[str, str], drive: str
 ) -> dict[str, Value]:
-    declared, out, tables = _declared(law, effect), _defaults(law, effect), table_names(law, effect)
+    """Return the values of an owner, (law, "") or (law, effect), that stand in a table."""
+    declared, out = _declared(*owner, drive), _defaults(*owner, drive)
+    tables = table_names(*owner)
     for name, own in table.items():
         if name in tables:
             out.update(_table(toml, (*keys, name), own, tables[name], declared, out))

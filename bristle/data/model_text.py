@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..physics.drive import VOLTAGE
 from ..physics.forms import split_form
 from .correlation import set_correlation
 from .files import write_whole
@@ -34,6 +35,7 @@ def model_text(model: StudyModel, beside: Path | None = None) -> str:
     _set_or_drop(document, "command", form)
     _set_or_drop(document, "command_knots", list(knots) or "")
     _set_or_drop(document, "building", model.building)
+    _set_or_drop(document, "drive", "" if model.drive == VOLTAGE.name else model.drive)
     for key in ("parameters", "effects"):
         if key not in document:
             document[key] = tomlkit.table(is_super_table=True)

@@ -18,6 +18,13 @@ LARGEST = 256 * 1024**2
 """Largest content that is read, after decompression [bytes]: about 3 million rows of 8 columns."""
 
 
+ENDINGS = (
+    ".csv", ".txt", ".dat", ".asc", ".tsv", ".prn", ".lvm", ".mat", ".parquet", ".xlsx", ".tdms",
+    ".h5", ".hdf5",
+)  # fmt: skip
+"""Endings of the files that a folder of measurements is taken to consist of."""
+
+
 def read_table(path: Path | str) -> Table:
     """Return the table in a file, whatever its format.
 
@@ -31,6 +38,31 @@ def read_table(path: Path | str) -> Table:
     name = str(path)
     content = _content(path, name)
     return formats.read(content, path.suffix.lower(), name)
+
+
+def files_in(folder: Path) -> list[Path]:
+    """Return the measurement files in a folder, told by their endings, in order.
+
+    Raises
+    ------
+    RecordError
+        If there is none.
+    """
+    found = sorted(
+        path
+        for path in folder.iterdir()
+        if path.is_file() and path.name[:1] not in ".~" and _ending(path) in ENDINGS
+    )
+    if not found:
+        raise RecordError(
+            f"{folder}: this folder is no study, and holds no measurement: no file in it ends in "
+            f"{', '.join(ENDINGS)}."
+        )
+    return found
+
+
+def _ending(path: Path) -> str:
+    return Path(path.name.lower().removesuffix(".gz")).suffix
 
 
 def _content(path: Path, name: str) -> bytes:

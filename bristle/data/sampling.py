@@ -201,7 +201,7 @@ def _in_order(
         k = int(back[0])
         raise RecordError(
             f"{name}, {place} {lines[k + 1]}: time goes back, from {time[k]:.9g} s to "
-            f"{time[k + 1]:.9g} s. If the file holds several runs, save each in a file of its own."
+            f"{time[k + 1]:.9g} s. If the file holds several runs, --split restart cuts it there."
         )
     double = np.flatnonzero(spacing == 0.0)
     if not len(double):

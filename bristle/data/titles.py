@@ -12,6 +12,7 @@ from ..units import parse as parse_unit
 from .columns import Column, column
 
 _PARTED = re.compile(r"(?P<name>.*\S)\s*(?:\s/\s|,\s*|:\s*|;\s*|\sin\s)\s*(?P<unit>[^\s,:;]+)\s*")
+_BRACKET = re.compile(r".*[\[(]\s*(?P<unit>[^\])]*?)\s*[\])]")
 _BARE = re.compile(r"[\[(]?\s*(?P<unit>[^\[\]()]*(?:\([^()]*\))?[^\[\]()]*?)\s*[\])]?")
 _NOTHING = ("", "-", "1", "[]", "()", "[-]", "(-)", "[1]", "n/a", "none")
 
@@ -27,7 +28,11 @@ def title(index: int, text: str) -> Column:
         Its title in the file.
     """
     found = column(index, text)
-    if found.unit is None and not found.problem:
+    if found.unit is None and found.problem:
+        bracket = _BRACKET.fullmatch(found.text)
+        unit = unit_or_none(bracket["unit"]) if bracket else None  # "(amp)" is no unit, but meant
+        return found if unit is None else replace(found, unit=unit, problem="")
+    if found.unit is None:
         parted = _PARTED.fullmatch(found.text)
         unit = unit_or_none(parted["unit"]) if parted else None
         if parted and unit is not None:
@@ -86,8 +91,24 @@ _RENAMED = {
     "amp": "A",
     "amps": "A",
     "ampere": "A",
+    "amperes": "A",
+    "milliamp": "mA",
+    "milliamps": "mA",
+    "percent": "%",
+    "per cent": "%",
+    "pct": "%",
+    "tesla": "T",
+    "kilonewton": "kN",
+    "millimeter": "mm",
+    "millimetre": "mm",
+    "millimeters": "mm",
+    "mm/sec": "mm/s",
+    "m/sec": "m/s",
+    "in/sec": "in/s",
+    "hour": "h",
     "newton": "N",
     "newtons": "N",
+    "sec": "s",
     "sec.": "s",
     "secs": "s",
     "second": "s",
@@ -98,6 +119,7 @@ _RENAMED = {
     "kip": "kip",
     "lbs": "lbf",
     "lb": "lbf",
+    "kips": "kip",
     "inch": "in",
     "g's": "g",
     "sekunden": "s",

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.channels import DRIVE
 from ..data.checks.clipping import stands_at_top
 from ..data.measurement import Measurement
 from ..quantity import plain
@@ -22,7 +23,7 @@ BESIDE = 4.0
 def clipped(runs: Sequence[Measurement], rule: DecisionRule = SENSOR) -> list[SensorFault]:
     """Return the channels that repeat an extreme: their range ends before the motion does."""
     found = []
-    for channel in ("force", "displacement", "velocity", "voltage", "current"):
+    for channel in ("force", "displacement", "velocity", *DRIVE):
         limits = [
             limit
             for run in runs

@@ -6,9 +6,13 @@ organised, how well parameters are known, and which run would distinguish altern
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
-from ..identify.fit import intervals_of, multistart_refit
+from ..compare.labels import label_errors, label_sentence, with_levels
+from ..compare.prediction import run_predictions
+from ..data.labels import Labels, varying
+from ..identify.fit import Run, intervals_of, multistart_refit
 from ..identify.search_context import is_rough
 from .candidates import SHOWN, joinable, judge
 from .experiments import separating
@@ -27,7 +31,25 @@ def detailed(found: Finding, opened: Opening) -> Finding:
     found : what the site lacks
     opened : its runs and its model
     """
-    return _with_intervals(_with_patterns(_with_limits(found, opened), opened), opened)
+    found = _with_intervals(_with_patterns(_with_limits(found, opened), opened), opened)
+    return _with_labels(found, opened)
+
+
+def _with_labels(found: Finding, opened: Opening) -> Finding:
+    """Return a finding that says on which runs the present model errs, where a label tells it."""
+    runs = [*opened.problem.runs, *opened.held_out.runs]
+    if found.kind == "none" or not varying(_known(runs)):
+        return found
+    predictions = run_predictions(opened.problem.of(runs), opened.before.model)
+    told = label_sentence(label_errors(predictions))
+    if not told:
+        return found
+    text = f"Of the present model: {told[:1].lower()}{told[1:]}"
+    return replace(found, reasons=(*found.reasons, text))
+
+
+def _known(runs: Sequence[Run]) -> list[Labels]:
+    return with_levels(runs[0].drive, [run.V for run in runs], [run.labels for run in runs])
 
 
 def _with_limits(found: Finding, opened: Opening) -> Finding:

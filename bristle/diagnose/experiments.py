@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
 from ..identify.search_context import Search
+from ..physics.drive import DRIVES, VOLTAGE, Drive
 from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
@@ -23,28 +24,30 @@ ZERO = 0.02
 
 @dataclass(frozen=True)
 class Experiment:
-    """A proposed run: a sine or a chirp under a voltage.
+    """A proposed run: a sine or a chirp under a command.
 
-    `amplitude` m, `low`, `high` Hz (equal for a sine), `voltage` V (low, high: equal where held,
-    else switched every `switch` s), `contrast` the smallest RMS difference between any two rivals'
-    forces, each refitted, in units of the force's noise; `deviations` the same over the whole run,
-    in standard deviations.
+    `amplitude` m, `low`, `high` Hz (equal for a sine), `levels` of the command `drive` in its unit
+    (low, high: equal where held, else switched every `switch` s), `contrast` the
+    smallest RMS difference between any two rivals' forces, each refitted, in units of the force's
+    noise; `deviations` the same over the whole run, in standard deviations.
     """
 
     amplitude: float
     low: float
     high: float
-    voltage: tuple[float, float]
+    levels: tuple[float, float]
     switch: float
     contrast: float = 0.0
     deviations: float = 0.0
+    drive: Drive = VOLTAGE
 
     def sentence(self, rule: DecisionRule = BENCH) -> str:
         """Return the run as a sentence of an experiment's plan."""
         if self.deviations < rule.tells:
             return (
-                "No run within the strokes, speeds and voltages so far would distinguish them: "
-                f"at best the forces differ by {self.deviations:.1f} standard deviations over "
+                "No run within the strokes, speeds and levels of the "
+                f"{self.drive.name} so far would distinguish them: at best the forces "
+                f"differ by {self.deviations:.1f} standard deviations over "
                 f"{LENGTH:g} s. Use a wider range."
             )
         motion = (
@@ -53,11 +56,12 @@ class Experiment:
             else f"a sweep of {1e3 * self.amplitude:.3g} mm from {self.low:.3g} to "
             f"{self.high:.3g} Hz"
         )
-        low, high = self.voltage
+        low, high = self.levels
         drive = (
-            f"at {low:.3g} V"
+            f"at {low:.3g} {self.drive.unit}"
             if low == high
-            else f"with the voltage switched between {low:.3g} and {high:.3g} V every "
+            else f"with the {self.drive.name} switched between {low:.3g} and {high:.3g} "
+            f"{self.drive.unit} every "
             f"{self.switch:.3g} s"
         )
         return (
@@ -74,7 +78,7 @@ class Experiment:
         x = self.amplitude * np.sin(phase)
         v = self.amplitude * speed * np.cos(phase)
         a = self.amplitude * (rate * np.cos(phase) - speed**2 * np.sin(phase))
-        low, high = self.voltage
+        low, high = self.levels
         V = (
             np.where((t // self.switch) % 2 == 0, low, high)
             if low != high
@@ -86,7 +90,7 @@ class Experiment:
 def separating(models: Sequence[Model], problem: Problem) -> Experiment:
     """Return the run that separates rival models best, within what the rig has done already.
 
-    Amplitudes, speeds and voltages stay within those of the runs at hand.
+    Amplitudes, speeds and levels of the command stay within those of the runs at hand.
     """
     rivals = [_Rival(model, problem) for model in models]
     noise = float(np.median([run.noise for run in problem.runs]))
@@ -112,7 +116,8 @@ def _plans(problem: Problem) -> list[Experiment]:
     for amplitude in (x_top, 0.3 * x_top, 0.1 * x_top):
         top = v_top / (2.0 * np.pi * amplitude)
         for low, high in ((0.05 * top, top), (0.1 * top, 0.1 * top), (top, top)):
-            plans += [Experiment(amplitude, low, high, *drive) for drive in drives]
+            kind = DRIVES[problem.runs[0].drive]
+            plans += [Experiment(amplitude, low, high, *drive, drive=kind) for drive in drives]
     return plans
 
 

@@ -59,7 +59,7 @@ def model_based_fault(
     ----------
     before : the model without further effects, fitted to `train` and judged on `held_out`
     train, held_out : runs to fit to, and those that decide
-    drive : {"voltage", "current"}, the channel that is the runs' drive
+    drive : the channel that is the runs' drive, one of `data.channels.DRIVE`
     rule : the numbers that decide
     """
     if before.z < 1.0 + rule.gain:
@@ -133,7 +133,8 @@ def _zero_of_force(
     trial = judge(replace(base, values=plain), right[0], right[1])
     fault = SensorFault(
         "force", "bias", offset, _deviation(_left(trial.model, right[0])),
-        f"Force shows {quantity(offset, 'N')} whatever the motion and the voltage, without the "
+        f"Force shows {quantity(offset, 'N')} whatever the motion and the "
+        f"{train.runs[0].drive}, without the "
         "stiffness of a spring: the zero of the load cell is off, or a preload acts on the rod.",
     )  # fmt: skip
     return ModelBasedFault(fault, right[0], right[1], trial)

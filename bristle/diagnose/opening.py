@@ -99,15 +99,14 @@ class Opening:
 class BenchData:
     """A bench's runs, freed of the faults that channels show of each other, and smoothed.
 
-    `noise` is that of each channel, in SI; `drive` the command's channel; `shown` the channels
-    whose instruments may still have an effect.
+    `noise` is that of each channel, in SI; `shown` the channels whose instruments may still have an
+    effect.
     """
 
     problem: Problem
     held_out: Problem
     faults: tuple[SensorFault, ...]
     noise: Mapping[str, float]
-    drive: str
     shown: tuple[str, ...]
 
 
@@ -137,12 +136,11 @@ def bench_data(
         reasons = ("No run has enough samples that are not clipped.", *words_of(faults))
         return Insufficient(reasons, tuple(faults), noise)
     problem, held_out = bench_rig(left[0], left[1], DRAWS).sites(present)[DAMPER].pair
-    drive = "current" if train[0].has("current") and not train[0].has("voltage") else "voltage"
     redundant = any(
         run.has("displacement", "velocity") and not derived_velocity(run) for run in train
     )
     channels = ("force",) if redundant else ("force", "velocity")
-    return BenchData(problem, held_out, tuple(faults), noise, drive, channels)
+    return BenchData(problem, held_out, tuple(faults), noise, channels)
 
 
 def opening(
@@ -180,7 +178,7 @@ def opened_with(before: Trial, data: BenchData) -> Opening:
     data : the runs
     """
     problem, held_out, faults = data.problem, data.held_out, list(data.faults)
-    shown = model_based_fault(before, problem, held_out, data.drive)
+    shown = model_based_fault(before, problem, held_out, problem.runs[0].drive)
     if shown is not None:
         faults.append(shown.fault)
         problem, held_out, before = shown.train, shown.held_out, shown.trial

@@ -275,15 +275,17 @@ def signs(
                 "The sign of the force, or of the motion, is reversed.",
             )
         )  # fmt: skip
-    drives = [run["voltage"] for run in runs if run.has("voltage")]
-    if drives:
+    for drive in ("voltage", "duty"):  # a current or a field may well be driven both ways
+        drives = [run[drive] for run in runs if run.has(drive)]
+        if not drives:
+            continue
         V = np.concatenate(drives)
         low, high = np.quantile(V, [0.02, 0.98])
         if low < 0.0 and -low > rule.turned * max(high, 0.0):
             found.append(
                 SensorFault(
-                    "voltage", "sign", -1.0, 0.0,
-                    "The voltage is negative nearly always: its sign is reversed.",
+                    drive, "sign", -1.0, 0.0,
+                    f"The {drive} is negative nearly always: its sign is reversed.",
                 )
             )  # fmt: skip
     return found

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..compare.names import joined, name_of, site_name
 from ..identify.rig import DAMPER
+from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
 from ..physics.effect import EFFECTS
 from .law_text import law_name, law_sentences
 from .rule import BENCH, DecisionRule
@@ -130,11 +131,17 @@ def fault_text(fault: Mapping[str, Any]) -> str:
     )
 
 
-def about(effect: str) -> str:
-    """Return what an effect is, as a sentence: the first line of its text."""
+def drive_of(verdict: Verdict) -> Drive:
+    """Return what commands the damper in a verdict's runs."""
+    measured = verdict.get("noise_floor") or {}
+    return next((drive for name, drive in DRIVES.items() if name in measured), VOLTAGE)
+
+
+def about(effect: str, drive: Drive = VOLTAGE) -> str:
+    """Return what an effect is with a command, as a sentence: the first line of its text."""
     if effect not in EFFECTS:
         return f"{effect} is an effect of the user's own."
-    return f"{EFFECTS[effect].first_line().rstrip('.')}."
+    return f"{text_for(EFFECTS[effect].first_line().rstrip('.'), drive)}."
 
 
 def untestable(verdict: Verdict) -> list[str]:

@@ -63,7 +63,7 @@ def zero_fault(
         return None
     if not _significant(problem, model, rule):
         return None
-    return _fault(*zero_of(problem, model), decision)
+    return _fault(*zero_of(problem, model), decision, problem.runs[0].drive)
 
 
 def renewed_zero(opened: Opening, decision: Decision) -> tuple[SensorFault, ...]:
@@ -76,14 +76,15 @@ def renewed_zero(opened: Opening, decision: Decision) -> tuple[SensorFault, ...]
     if not first or not opened.problem.free_zero or has_offset(model):
         return ()
     more, std = zero_of(opened.problem, model)
-    return (_fault(first[0].value + more, std, decision),)
+    drive = opened.problem.runs[0].drive
+    return (_fault(first[0].value + more, std, decision, drive),)
 
 
-def _fault(zero: float, std: float, decision: Decision) -> SensorFault:
+def _fault(zero: float, std: float, decision: Decision, drive: str) -> SensorFault:
     beside = f" beside {' and '.join(decision.effects)}" if decision.kind == "effect" else ""
     return SensorFault(
         "force", "bias", zero, std,
-        f"Force shows {zero:.3g} N{beside} whatever the motion and the voltage: the zero of the "
+        f"Force shows {zero:.3g} N{beside} whatever the motion and the {drive}: the zero of the "
         "load cell is off. A static preload on the rod would look the same.",
     )  # fmt: skip
 

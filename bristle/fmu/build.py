@@ -25,11 +25,13 @@ from typing import Any
 from uuid import UUID, uuid5
 
 from ..errors import BuildError
+from ..physics.drive import VOLTAGE
 from ..physics.forms import split_form
 from ..physics.user import own_laws
 from ..resources import fmus_folder
 from ..trust import require
 from . import catalogue
+from .description import Variable
 from .slave import BAKED
 
 _PACKAGE = Path(__file__).resolve().parent.parent
@@ -106,6 +108,7 @@ def plan(
     starts: Mapping[str, Any] | None = None,
     effects: Iterable[Path] = (),
     controller: Path | None = None,
+    drive: str = VOLTAGE.name,
 ) -> Plan:
     """Return what to build.
 
@@ -125,6 +128,8 @@ def plan(
         Files with effects of the user's own.
     controller : path, optional
         Controller file of a design, for a component that takes one of its kind.
+    drive : str
+        What commands a damper: one of `physics.drive.DRIVES`.
 
     Raises
     ------
@@ -156,18 +161,20 @@ def plan(
     effects = tuple(effects)
     if effects:
         catalogue.describe(component, building, effects=effects)  # refuses what is wrong with them
+    if drive != VOLTAGE.name:
+        baked["drive"] = drive
     if starts:
-        baked["starts"] = _checked_starts(component, building, effects, starts)
+        known = catalogue.describe(component, building, effects=effects, drive=drive).variables
+        baked["starts"] = _checked_starts(component, known, starts)
     law = getattr(kind, "law", "")
     laws = tuple(file for name, file in own_laws().items() if name == split_form(law)[0])
     return Plan(chosen, path, baked, files, effects, laws)
 
 
 def _checked_starts(
-    component: str, building: Path | None, effects: tuple[Path, ...], starts: Mapping[str, Any]
+    component: str, known: Mapping[str, Variable], starts: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Return start values in the types of their variables; BuildError for what cannot be."""
-    known = catalogue.describe(component, building, effects=effects).variables
     kinds = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,), "String": (str,)}
     checked: dict[str, Any] = {}
     for key, value in starts.items():

@@ -165,6 +165,7 @@ def instantiate(
     instance: str = "",
     controller: Path | None = None,
     effects: Iterable[Path] = (),
+    drive: str = "",
 ) -> Slave:
     """Return a component as a Python object, as an FMU's binary would make it.
 
@@ -179,6 +180,8 @@ def instantiate(
         Name of the instance; "": that of the component.
     effects : iterable of path
         Files with effects of a user's own.
+    drive : str
+        What commands a damper; "": its voltage.
 
     Raises
     ------
@@ -189,6 +192,8 @@ def instantiate(
 
     baked: dict[str, Any] = {"building": read_building_data(building)} if building else {}
     kind = component_class(source(name))
+    if drive:
+        baked["drive"] = drive
     own = [load_file(path) for path in effects]
     if own:
         baked["own"] = [effect.name for effect in own]
@@ -258,6 +263,7 @@ def describe(
     building: Path | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
+    drive: str = "",
 ) -> Description:
     """Return the ports and parameters of a built-in component; no FMU is needed for it.
 
@@ -271,6 +277,8 @@ def describe(
         The controller file of a designed controller.
     effects : iterable of path, optional
         Files with effects of a user's own that the component carries too.
+    drive : str, optional
+        What commands a damper; "": its voltage.
 
     Raises
     ------
@@ -278,7 +286,7 @@ def describe(
         If there is no such component; if the controller, the building or an effect is wrong.
     """
     effects = tuple(effects)
-    slave = instantiate(name, building, controller=controller, effects=effects)
+    slave = instantiate(name, building, controller=controller, effects=effects, drive=drive)
     if effects and not isinstance(slave, EffectSlave):
         raise BuildError(f"{name} takes no effects; a damper or a Structure does.")
     variables = {}

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from ..physics.drive import VOLTAGE, declared_for, state_for, text_for, unit_for
 from ..physics.effect import Parameter, effects_of
 from .slave import STEPPING, Slave
 
@@ -14,17 +15,26 @@ from .slave import STEPPING, Slave
 class EffectSlave(Slave):
     """A component that offers the effects of its site, each with a switch and its parameters."""
 
+    drive = VOLTAGE
+    """What commands the damper."""
+
     def add_effects(self, site: str, law: str = "") -> None:
         """Declare `EFFECT.on`, `EFFECT.PARAMETER`, `EFFECT.STATE_0` for the effects of a site."""
         own = self.baked.get("own", [])  # a user's, in this process; an FMU's are its library's
+        self._called: dict[str, str] = {}
         self._effects = tuple(e for e in effects_of(site, law) if not e.own or e.name in own)
         for effect in self._effects:
-            self.add_parameter(effect.name + ".on", False, None, effect.first_line())
+            about = text_for(effect.first_line(), self.drive)
+            self.add_parameter(effect.name + ".on", False, None, about)
             for name, parameter in effect.parameters.items():
-                self.add_physical(effect.name + "." + name, parameter)
+                self.add_physical(f"{effect.name}.{name}", declared_for(parameter, self.drive))
             for name, unit in effect.states.items():
-                text = f"start value of the state {name}"
-                self.add_parameter(f"{effect.name}.{name}_0", 0.0, unit, text)
+                called = state_for(name, self.drive)
+                text = f"start value of the state {called}"
+                start = f"{effect.name}.{called}_0"
+                if called != name:
+                    self._called[start] = f"{effect.name}.{name}_0"
+                self.add_parameter(start, 0.0, unit_for(unit, self.drive), text)
 
     def add_physical(self, name: str, parameter: Parameter) -> None:
         """Declare a parameter of a law or effect."""
@@ -35,9 +45,11 @@ class EffectSlave(Slave):
         return [effect.name for effect in self._effects if self[effect.name + ".on"]]
 
     def numbers(self) -> dict[str, float]:
-        """Return every Real parameter by its full name."""
+        """Return every Real parameter by its full name, as laws and effects know it."""
         names = ((self.vars[index].name, self._values[index]) for index in self._parameters)
-        return {name: value for name, value in names if isinstance(value, float)}
+        return {
+            self._called.get(name, name): value for name, value in names if isinstance(value, float)
+        }
 
 
 class ComponentSlave(EffectSlave):

@@ -5,8 +5,16 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from ..component import HELD, damper
+from ..physics.drive import declared_for, drive_named, text_for, unit_for
 from ..physics.laws import LAWS
 from .component import ComponentSlave
+
+_ABOUT = {
+    "voltage": "voltage of the coil",
+    "current": "current of the coil",
+    "duty": "duty cycle of the amplifier",
+    "field": "flux density in the gap",
+}
 
 
 class DamperSlave(ComponentSlave):
@@ -14,20 +22,21 @@ class DamperSlave(ComponentSlave):
 
     law: ClassVar[str] = ""
     functions: ClassVar[Any] = damper
-    texts: ClassVar[dict[int, str]] = {
-        damper.SATURATED: "the voltage left 0 .. {v_max:g} V; the damper saturates."
-    }
     hidden = 1  # the friction
 
     def declare(self) -> None:
+        drive = self.drive = drive_named(self.baked.get("drive", ""))
+        said = f"the {drive.name} left 0 .. {{{drive.limit}:g}} {drive.unit}; the damper saturates."
+        self.texts = {damper.SATURATED: said}  # type: ignore[misc]
+        self.description = text_for(self.description or "", drive)
         self.add_input("displacement", "m", "displacement of the rod", over_step=HELD)
         self.add_input("velocity", "m/s", "velocity of the rod", over_step=HELD)
-        self.add_input("voltage", "V", "voltage of the coil", over_step=HELD)
+        self.add_input(drive.name, drive.unit, _ABOUT[drive.name], over_step=HELD)
         text = "force that keeps the structure from accelerating; needs moving_mass"
         self.add_input("holding_force", "N", text, over_step=HELD, optional=True)
         text = "acceleration of the rod; else from differences of velocity"
         self.add_input("acceleration", "m/s2", text, over_step=HELD, optional=True)
-        follows = ["displacement", "velocity", "voltage", "holding_force", "acceleration"]
+        follows = ["displacement", "velocity", drive.name, "holding_force", "acceleration"]
         text = "force on the structure, positive against +x"
         self.add_output("force", "N", text, depends=follows, nominal=10.0)
         text = "integral of force times velocity, stored energy included"
@@ -35,20 +44,23 @@ class DamperSlave(ComponentSlave):
         text = "displacement over stroke: beyond 1 the piston would hit its end"
         self.add_output("stroke_ratio", "1", text, depends=["displacement"])
         for name, parameter in LAWS[self.law].parameters.items():
-            self.add_physical(name, parameter)
+            self.add_physical(name, declared_for(parameter, drive))
         self.add_parameter("stroke", 0.02, "m", "from the middle to either end", (1e-6, 1e3))
-        self.add_parameter("v_max", 8.0, "V", "largest voltage; the damper saturates", (0.0, 1e4))
+        text = f"largest {drive.name}; the damper saturates"
+        self.add_parameter(drive.limit, drive.largest, drive.unit, text, (0.0, 1e4))
         text = "mass that the damper moves; 0: no holding force, sliding law"
         self.add_parameter("moving_mass", 0.0, "kg", text, (0.0, 1e9))
         for name, unit in LAWS[self.law].states.items():
             text = f"start value of the {name.replace('_', ' ')}"
-            self.add_parameter(f"{name}_0", 0.0, unit, text)
+            self.add_parameter(f"{name}_0", 0.0, unit_for(unit, drive), text)
         self.add_effects("damper", self.law)
 
     def setup(self) -> tuple[Any, list[float], int]:
         self._acceleration = self._index["acceleration"]
         measured = self._acceleration in self._set
-        return damper.setup(self.law, self.numbers(), self.effects_on(), measured)
+        values = self.numbers()
+        values["v_max"] = values[self.drive.limit]  # what the functions call any limit
+        return damper.setup(self.law, values, self.effects_on(), measured)
 
     def _bind(self) -> None:
         """Take the acceleration for measured from the moment on at which a host sets it."""

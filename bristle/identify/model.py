@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.labels import Label
 from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
 from ..physics.laws import LAWS, Law
 from ..physics.parameter import CHOICES, Parameter
@@ -35,7 +37,8 @@ class Run:
 
     `x`, `v`, `a`, `V`, `force` (n,) in SI, evenly spaced by `dt` [s]; `noise` the force channel's
     standard deviation [N]; `draws` (d, n, 4) draws of the error of x, v, a, V; `measured` (n,)
-    False where a sample was filled in, None if none was.
+    False where a sample was filled in, None if none was. `drive` is the channel that V holds, in
+    its own unit; `labels` what is known of the whole run, such as a temperature.
     """
 
     name: str
@@ -49,6 +52,8 @@ class Run:
     draws: Array
     skip: int = 25
     measured: NDArray[np.bool_] | None = None
+    drive: str = "voltage"
+    labels: Mapping[str, Label] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -148,6 +153,9 @@ class Problem:
     def scaled(self, law: str, name: str) -> float:
         """Return a parameter's default brought to the size of this rig, within its bounds."""
         declared = parameter(law, name)
+        effect = name.partition(".")[0] if "." in name else ""
+        if effect and EFFECTS[effect].of_this_rig():
+            return declared.value
         reference = REFERENCE.get(declared.unit)
         value = declared.value * (self.size(declared.unit) / reference if reference else 1.0)
         return min(max(value, declared.bounds[0]), declared.bounds[1])

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..data.derived import derived_velocity
 from ..data.measurement import Measurement
 from ..errors import RecordError
+from ..physics.drive import VOLTAGE
 from .drive import smooth_drive
 from .fit import Run
 from .smooth import posterior_draws, smooth
@@ -46,8 +47,8 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     ----------
     measurement : Measurement
         With the force, and displacement or velocity or both; a velocity that was computed from the
-        displacement is left out. Voltage may be missing (taken as 0),
-        or stand in as current; both are smoothed, steps kept.
+        displacement is left out. The command, a voltage or another one, may be missing (taken as
+        0); it is smoothed, steps kept.
     draws : int
         How many draws of the motion's and the voltage's error to keep.
 
@@ -67,7 +68,7 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     motion = smooth(x, v, dt, noise)
     error = np.zeros((draws, n, 4))
     error[:, :, :3] = posterior_draws(n, dt, noise, motion.jerk, have, draws, seed, motion)
-    drive = next((c for c in ("voltage", "current") if measurement.has(c)), None)
+    drive = measurement.drive
     V = np.zeros(n)
     if drive:
         V, error[:, :, 3] = smooth_drive(
@@ -75,13 +76,13 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
         )
     # Where one of two channels of the motion is lost, the other one tells it.
     alone = tuple(c for c in ("displacement", "velocity") if measurement.has(c))
-    needed = ("force", drive or "", *(alone if len(alone) == 1 else ()))
+    needed = ("force", drive, *(alone if len(alone) == 1 else ()))
     known = measurement.valid(*needed)
     force = measurement["force"]
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
         _noise_of_force(measurement), error, _begin(motion.x, force, dt),
-        None if known.all() else known,
+        None if known.all() else known, drive or VOLTAGE.name, measurement.labels,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ jump together; their noise is white and known.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import butter, sosfiltfilt
 
+from ..data.labels import Labels
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building, frequencies
@@ -49,7 +50,9 @@ class Response:
     `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper,
     None where it was not measured; `V` (n,) [V]. `noise_a` (levels,), `noise_force`, `noise_ground`
     standard deviations; `std` (levels, 3) what the smoother leaves uncertain of x, v and relative
-    acceleration; `draws` (levels, d, n, 3) draws of that error; `V_left` the noise left on V.
+    acceleration; `draws` (levels, d, n, 3) draws of that error; `V_left` the noise left on V;
+    `drive` the channel that V holds, in its own unit, "" where none was measured; `labels` what is
+    known of the whole run.
     """
 
     name: str
@@ -67,7 +70,13 @@ class Response:
     std: Array
     draws: Array
     V_left: float
-    driven: bool
+    drive: str = ""
+    labels: Labels = field(default_factory=dict)
+
+    @property
+    def driven(self) -> bool:
+        """Whether the damper's command was measured."""
+        return bool(self.drive)
 
 
 def check_channels(measurement: Measurement, building: Building) -> None:
@@ -197,7 +206,7 @@ def _response(
     n = len(m.time)
     a, noise_a = absolute
     own = [level["have"][2] for level in levels]
-    drive = next((c for c in ("voltage", "current") if m.has(c)), None)
+    drive = m.drive
     V, left = np.zeros(n), 0.0
     if drive:
         V, left = smooth_steps(m[drive], m.noise.get(drive, 0.0), m.step)
@@ -208,7 +217,7 @@ def _response(
         a, m["ground_acceleration"], m["force"] if m.has("force") else None, V, noise_a,
         m.noise.get("force", 0.0), m.noise.get("ground_acceleration", 0.0), np.array(own),
         np.array([level["std"] for level in levels]),
-        np.array([error[:, :n] for error in errors]), left, drive is not None,
+        np.array([error[:, :n] for error in errors]), left, drive, m.labels,
     )  # fmt: skip
 
 

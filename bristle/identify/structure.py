@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
+from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.inputs import Inputs
 from ..physics.laws import DEFAULT, base_and_variant
@@ -156,6 +158,13 @@ def structure_run(
     )
 
 
+def _of(response: Response, run: StructureRun) -> StructureRun:
+    """Return a run with what is known of its measurement: its command and its labels."""
+    known: dict[str, Any] = {"drive": response.drive or VOLTAGE.name, "labels": response.labels}
+    whole = None if run.whole is None else replace(run.whole, **known)
+    return replace(run, whole=whole, **known)
+
+
 def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
     """Return the problem with every so many samples: enough to choose among starts."""
     runs: list[Run] = []
@@ -188,7 +197,10 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
         force = force - response.force
         noise = float(np.hypot(noise, response.noise_force))
     a = response.a[level]
-    return structure_run(response.name, response.dt, (x, v, a, response.V), force, noise, error)
+    return _of(
+        response,
+        structure_run(response.name, response.dt, (x, v, a, response.V), force, noise, error),
+    )
 
 
 def layer_run(response: Response, building: Building) -> StructureRun:
@@ -203,10 +215,11 @@ def layer_run(response: Response, building: Building) -> StructureRun:
         )
     force, noise = shear(response, building, 0)
     x, v, a = response.x[0], response.v[0], response.a[0]
-    return structure_run(
+    made = structure_run(
         response.name, response.dt, (x, v, a, response.V), force - response.force,
         float(np.hypot(noise, response.noise_force)), _error(response, 0), sliding(response),
     )  # fmt: skip
+    return _of(response, made)
 
 
 def sliding(response: Response) -> NDArray[np.bool_]:
@@ -240,9 +253,10 @@ def damper_run(
     else:
         force, noise = reconstructed(response, building, linear_storeys)
     keep = sliding(response) if blind_at_rest(law) else None
-    return structure_run(
+    made = structure_run(
         response.name, response.dt, motion, force, noise, _error(response, 0), keep
     )
+    return _of(response, made)
 
 
 def blind_at_rest(law: str) -> bool:

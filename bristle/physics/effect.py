@@ -165,7 +165,8 @@ class Effect:
     start_shares
         The same, for an effect whose scale is what was measured and not a rig of 10 N: one grid or
         more, {parameter: shares} of the largest displacement and speed, the typical force, and
-        what follows from these, by the parameter's unit. Others begin at their defaults.
+        what follows from these, by the parameter's unit. Others begin at their defaults. One empty
+        grid, ({},): the defaults are those of the rig at hand, and nothing scales them.
     start_limits
         {parameter: (low, high)}, as such shares: the search stays between them.
     start_ties
@@ -332,6 +333,11 @@ class Effect:
             return False
         parts = {*cls.acts_on, *(ACTS_ON[hook] for hook in cls.hooks() if hook in ACTS_ON)}
         return all(law.has(part) for part in parts)
+
+    @classmethod
+    def of_this_rig(cls) -> bool:
+        """Return whether the defaults are those of the rig at hand, so that nothing scales them."""
+        return cls.start_shares == ({},)
 
     @classmethod
     def first_line(cls) -> str:

@@ -43,7 +43,10 @@ def commands(study: Study) -> list[str]:
 def _new(study: Study, old: str, new: str) -> str:
     """Return the command that makes the study; its channels are given, not guessed again."""
     settings, first = study.settings, study.history.model_file(0)
-    words = ["study", "new", new, "--data", *(f"{old}/{run.file}" for run in settings.runs)]
+    files = dict.fromkeys(f"{old}/{run.file}" for run in settings.runs)
+    words = ["study", "new", new, "--data", *files]
+    if settings.split:
+        words += ["--split", settings.split]
     if settings.rig != "bench":
         words += ["--rig", settings.rig]
     if first.is_file():

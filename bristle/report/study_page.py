@@ -301,8 +301,8 @@ def _reproduce(content: Content) -> str:
 
     study = content.study
     rows = [
-        [run.file, hashlib.sha256((study.folder / run.file).read_bytes()).hexdigest()[:16]]
-        for run in study.settings.runs
+        [file, hashlib.sha256((study.folder / file).read_bytes()).hexdigest()[:16]]
+        for file in dict.fromkeys(run.file for run in study.settings.runs)
     ]
     versions = (
         f"bristle {__version__}, Python {platform.python_version()}, numpy {numpy.__version__}, "

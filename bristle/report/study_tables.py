@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..compare.tables import run_table
+from ..data.labels import label_text
 from ..draw.style import MINUS, percent
 from ..quantity import plain, quantity, times_ten
 
@@ -81,9 +82,11 @@ def _at_bound(value: Value) -> bool:
 
 def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str], list[list[str]]]:
     """Return header and rows: a line per run, or per piece where gaps have cut it."""
-    roles = {run.file.rpartition("/")[2]: run.role for run in study.settings.runs}
+    roles = {run.name.rpartition("/")[2]: run.role for run in study.settings.runs}
+    labelled = any(run.labels or run.levels for run in study.settings.runs)
     single = len(study.settings.runs) == 1
     header = ["run", "role", "duration [s]", "rate [Hz]", "samples", "channels"]
+    header += ["known"] if labelled else []
     rows = []
     for run in measured:
         file = run.source.replace("\\", "/").rpartition("/")[2]
@@ -92,9 +95,18 @@ def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str]
             [
                 run.name, "held out" if role == "holdout" else role, plain(run.duration, 4),
                 plain(run.sampling.rate, 5), str(len(run.time)), ", ".join(run.channels),
+                *([_known(study, run)] if labelled else []),
             ]
         )  # fmt: skip
     return header, rows
+
+
+def _known(study: Study, run: Measurement) -> str:
+    """Return what is known of a whole run: "current 1 A, temperature 40 °C"."""
+    levels = {name for one in study.settings.runs for name in one.levels}
+    own = {name: float(run[name][0]) for name in sorted(levels) if run.has(name)}
+    texts = [f"{name} {label_text(name, level, run.units[name])}" for name, level in own.items()]
+    return ", ".join([*texts, *(f"{n} {label_text(n, y)}" for n, y in run.labels.items())])
 
 
 def data_words(measured: Sequence[Measurement]) -> tuple[list[str], list[list[str]]]:

@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from ..data.channels import channel_unit, is_channel
 from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
-from ..diagnose.verdict_text import HEADINGS, Verdict, about, sentences, separating, untestable
+from ..diagnose.verdict_text import (
+    HEADINGS,
+    Verdict,
+    about,
+    drive_of,
+    sentences,
+    separating,
+    untestable,
+)
 from ..draw import html
 from ..findings import command
+from ..physics.drive import text_for
 from ..physics.effect import EFFECTS
 from ..quantity import quantity
 from .study_tables import ranking_table
@@ -23,7 +32,7 @@ def verdict_section(verdict: Verdict | None, name: str) -> str:
         kind, texts = str(verdict["kind"]), sentences(verdict)
         heading = HEADINGS[kind]
         if kind in ("effect", "ambiguous"):
-            texts[1:1] = [about(str(one)) for one in verdict["effects"]]
+            texts[1:1] = [about(str(one), drive_of(verdict)) for one in verdict["effects"]]
     inner = [
         f'<div class="verdict" style="--tone: var(--{_TONES.get(kind, "soft")})">',
         f'<div class="kind">{html.escape(heading)}</div>',
@@ -70,11 +79,12 @@ def noise_floor(verdict: Verdict | None) -> str:
 
 def untestable_rows(verdict: Verdict | None) -> list[list[str]]:
     """Return rows of the effects that could not be tested: name, what it does and would show."""
-    rows = []
+    rows, drive = [], drive_of(verdict or {})
     for told in untestable(verdict or {}):
         name = told.partition(" ")[0]
         effect = EFFECTS.get(name)
-        rows.append([told, about(name), effect.expect if effect else "-"])
+        expect = text_for(effect.expect, drive) if effect else "-"
+        rows.append([told, about(name, drive), expect])
     return rows
 
 

@@ -11,13 +11,14 @@ from math import sqrt
 
 from ..errors import BristleError, PhysicsError
 from ..findings import Findings
+from ..physics.drive import DRIVES, Drive
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, laws_of
 from .connections import Wire
 from .library import Library
 from .parts import Part, Run
 
-_DAMPER_PORTS = frozenset(("displacement", "velocity", "voltage", "force"))
+_DAMPER_PORTS = frozenset(("displacement", "velocity", "force"))  # and that of its command
 _STRUCTURE_PORTS = frozenset(("ground_acceleration", "damper_force"))
 _FORCES = ("damper_force", "extra_force")
 _RELATIVE = 1e-3
@@ -86,9 +87,9 @@ def advise(
     _order(run, network, findings)
     _loops(network, findings)
     _designs(network, library, findings)
-    for damper in network.with_ports(_DAMPER_PORTS):
+    for damper, drive in dampers_of(network):
         _holding(damper, network, findings)
-        _voltage(damper, network, findings)
+        _limits(damper, drive, network, findings)
     for structure in network.with_ports(_STRUCTURE_PORTS):
         _coupling(run, structure, network, library, findings)
 
@@ -207,34 +208,44 @@ def _holding(damper: Part, network: Network, findings: Findings) -> None:
         )
 
 
-def voltage_range(damper: Part, network: Network) -> tuple[float, float] | None:
-    """Return the lowest and highest voltage [V] that a damper is asked for, None if unknown."""
-    if "voltage" in damper.parameters:
-        level = damper.real("voltage")
+def dampers_of(network: Network) -> list[tuple[Part, Drive]]:
+    """Return the dampers among the components, each with what commands it."""
+    return [
+        (damper, drive)
+        for drive in DRIVES.values()
+        for damper in network.with_ports(_DAMPER_PORTS | {drive.name})
+    ]
+
+
+def asked_range(damper: Part, drive: Drive, network: Network) -> tuple[float, float] | None:
+    """Return the lowest and highest command that a damper is asked for, None if unknown."""
+    if drive.name in damper.parameters:
+        level = damper.real(drive.name)
         return None if level is None else (level, level)
-    source = network.source(damper, "voltage")
+    source = network.source(damper, drive.name)
     if source is None or (source[0].value("kind") or "constant") != "constant":
         return None
     level = source[0].real("level")
     return None if level is None else (level, level)
 
 
-def _voltage(damper: Part, network: Network, findings: Findings) -> None:
-    asked, most = voltage_range(damper, network), damper.real("v_max")
+def _limits(damper: Part, drive: Drive, network: Network, findings: Findings) -> None:
+    asked, most = asked_range(damper, drive, network), damper.real(drive.limit)
     if asked is None or most is None or 0.0 <= asked[0] <= asked[1] <= most:
         return
-    source = network.source(damper, "voltage")
-    path = damper.places.get("voltage", damper.path)
+    source = network.source(damper, drive.name)
+    path = damper.places.get(drive.name, damper.path)
     if source:
         path = source[0].places.get("level", source[0].path)
     findings.warning(
         path,
-        f"{damper.name}.voltage = {asked[0]:g} V lies outside 0 to {most:g} V (v_max): the damper "
-        f"saturates and feels {min(max(asked[0], 0.0), most):g} V.",
+        f"{damper.name}.{drive.name} = {asked[0]:g} {drive.unit} lies outside 0 to {most:g} "
+        f"{drive.unit} ({drive.limit}): the damper saturates and feels "
+        f"{min(max(asked[0], 0.0), most):g} {drive.unit}.",
     )
 
 
-def slopes(damper: Part, voltage: float) -> tuple[float, float]:
+def slopes(damper: Part, level: float) -> tuple[float, float]:
     """Return the slopes of a damper's force as v -> 0: over velocity [N.s/m], over travel [N/m].
 
     Of the law whose parameters the damper has, its jump aside; (0, 0) where that is none we know.
@@ -243,7 +254,7 @@ def slopes(damper: Part, voltage: float) -> tuple[float, float]:
         values = {name: damper.real(name) for name in law.parameters}
         given = {name: value for name, value in values.items() if value is not None}
         if given and all(name in given for name in law.linear()):
-            return law.slopes_at_rest(given, voltage)
+            return law.slopes_at_rest(given, level)
     return 0.0, 0.0
 
 
@@ -273,8 +284,8 @@ def _coupling(
 ) -> None:
     """Warn where a damper's mass terms or the step make the explicit coupling unstable."""
     dampers = [
-        damper
-        for damper in network.with_ports(_DAMPER_PORTS)
+        (damper, drive)
+        for damper, drive in dampers_of(network)
         if network.driven_by(damper) is structure
     ]
     if not dampers or structure.fmu != "Structure":
@@ -284,10 +295,10 @@ def _coupling(
     except BristleError:
         return  # the component's own check has said what is wrong with the building
     c, k = 0.0, 0.0
-    for damper in dampers:
+    for damper, drive in dampers:
         _mass_terms(damper, mass, findings)
-        most = damper.real("v_max") or 0.0
-        asked = voltage_range(damper, network)
+        most = damper.real(drive.limit) or 0.0
+        asked = asked_range(damper, drive, network)
         each = slopes(damper, min(max(asked[1], 0.0), most) if asked else most)
         c, k = c + each[0], k + each[1]
     if run.step is None or c <= 0.0:
@@ -297,7 +308,7 @@ def _coupling(
         findings.warning(
             ("run", "step"),
             f"[run] step = {1e3 * run.step:g} ms lies above about {1e3 * limit:.3g} ms, where the "
-            f"{run.algorithm} coupling of {', '.join(damper.name for damper in dampers)} with "
+            f"{run.algorithm} coupling of {', '.join(damper.name for damper, _ in dampers)} with "
             f"{structure.name} becomes unstable ({mass:.4g} kg, {c:.4g} N.s/m, {k:.4g} N/m); a "
             f"shorter step{' or gauss-seidel' if run.algorithm == 'jacobi' else ''} is right.",
         )

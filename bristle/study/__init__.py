@@ -7,8 +7,9 @@ from ..data.model_text import write_model
 from ..errors import StudyError
 from .create import Created, create_study
 from .history import Step
+from .run_file import RunFile
 from .runs import Runs
-from .settings import RunFile, Settings
+from .settings import Settings
 from .study import Study
 
 __all__ = [

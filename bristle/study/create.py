@@ -10,6 +10,7 @@ from ..data.channels import ChannelSpec
 from ..data.guess import Guess
 from ..physics.laws import DEFAULT
 from .new import make_folder
+from .run_facts import RunChoices
 from .study import Study
 
 
@@ -32,6 +33,7 @@ def create_study(
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
     law: str = DEFAULT,
+    runs: RunChoices | None = None,
 ) -> Created:
     """Make a study's folder from files; it appears when it is whole.
 
@@ -49,6 +51,8 @@ def create_study(
         Channels that are known; the others are guessed from the first file.
     title, law : str
         Title of the study, and the law that its model begins with.
+    runs : RunChoices
+        What is known of whole runs, and how files hold them.
 
     Raises
     ------
@@ -58,6 +62,7 @@ def create_study(
         If a file cannot be read.
     """
     made = make_folder(
-        Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law
-    )
+        Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law,
+        runs=runs,
+    )  # fmt: skip
     return Created(Study(folder), made.guesses, made.unused, made.notes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
@@ -140,6 +141,8 @@ def learn_effect(
     for why in study.usable_effects():
         tell(f"left out: {why}")
     name = name or _free_name(study)
+    if not name.isidentifier() or iskeyword(name):
+        raise StudyError(f'the name "{name}" is no word of letters, digits and _, as worn_bore is.')
     if name in EFFECTS or (study.effects_folder / f"{name}.py").exists():
         raise StudyError(f'an effect is named "{name}" already. Another name is right.')
     opened = _opened(study)

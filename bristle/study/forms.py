@@ -15,6 +15,7 @@ from ..data.model import StudyModel, new_model
 from ..errors import PhysicsError, StudyError
 from ..findings import unknown
 from ..physics.command import MOST_KNOTS
+from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS
 from ..physics.forms import FORMS, LINEAR_FORM, TABLE_FORM, joined_form, split_form
 from ..physics.laws import base_and_variant
@@ -101,7 +102,7 @@ def knots_of(runs: Sequence[Measurement]) -> tuple[float, ...]:
         low, high = np.quantile(values, (_TAIL, 1.0 - _TAIL))
         return _rounded(np.linspace(max(float(low), 0.0), float(high), _MOVING_KNOTS))
     if len(levels) < LEAST_LEVELS:
-        unit = "A" if drives[0][1] == "current" else "V"
+        unit = DRIVES[drives[0][1]].unit
         at = " and ".join(f"{level:.3g} {unit}" for level in levels)
         raise StudyError(
             f"the training runs hold the command at {at} alone: that tells a straight line at "
@@ -150,7 +151,7 @@ def in_form(model: StudyModel, form: str, runs: Sequence[Measurement]) -> StudyM
             f"{', '.join(unfit)} bends the command already, and a {form} would do so once more: "
             "undo that step first."
         )
-    other = replace(new_model(name, (), model.building), effects=dict(model.effects))
+    other = replace(new_model(name, (), model.building, model.drive), effects=dict(model.effects))
     return _carried(model, other)
 
 

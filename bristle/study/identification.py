@@ -257,7 +257,7 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
         raise StudyError(f'law "{law}"; there are: {", ".join(law_names())}.')
     from ..physics.effect import EFFECTS
 
-    other = new_model(law, (), model.building)
+    other = new_model(law, (), model.building, model.drive)
     base, _ = base_and_variant(law)
     unfit = [
         name

@@ -15,7 +15,7 @@ from ..data.channels import ChannelSpec, channel_unit, is_channel
 from ..data.guess import Guess, guess_channels, specs
 from ..data.measurement import Measurement, measurements_of
 from ..data.model import StudyModel, new_model, read_model
-from ..data.read import read_table
+from ..data.read import files_in, read_table
 from ..data.table import Table, from_arrays, table_from_frame
 from ..errors import RecordError, StudyError
 from ..findings import unknown, written
@@ -240,10 +240,7 @@ def _files(given: str | Path) -> list[Path]:
     """Return the file, or the files of a pattern in order."""
     path = Path(given)
     if path.is_dir():
-        raise RecordError(
-            f"{path}: this is a folder and no study. Its files are given by a pattern, as in "
-            f'"{path / "*.csv"}".'
-        )
+        return files_in(path)
     if path.exists() or not glob.has_magic(str(given)):
         return [path]
     # Path.glob takes no absolute pattern.

@@ -85,7 +85,7 @@ def with_law(model: StudyModel, law: str) -> StudyModel:
         for name, values in model.effects.items()
         if base.site not in EFFECTS[name].sites or EFFECTS[name].joins(base)
     }
-    return replace(new_model(law, (), model.building), effects=kept)
+    return replace(new_model(law, (), model.building, model.drive), effects=kept)
 
 
 def law_command(folder: object, law: str, *others: str) -> str:

@@ -9,19 +9,25 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..data.channels import ChannelSpec, channel_unit
+from ..data.channels import DRIVE, ChannelSpec, channel_unit
+from ..data.decimate import FAST, RATE
 from ..data.guess import Guess, guess_channels, left_out
 from ..data.measurement import measurements_of
 from ..data.model import new_model
 from ..data.model_text import model_text
+from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import BristleError, StudyError, UnitError
 from ..physics.building import read_building
+from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
+from ..quantity import plain
 from ..units import canonical
 from .history import History, Step
-from .settings import RunFile, Settings, write_settings
+from .run_facts import Facts, RunChoices, facts_of
+from .run_file import RunFile
+from .settings import Settings, write_settings
 
 _WORDS = {
     "train": "train training ident identification fit estimation est calibration cal",
@@ -49,12 +55,14 @@ def make_folder(
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
     law: str = DEFAULT,
+    runs: RunChoices | None = None,
 ) -> Made:
     """Make a study's folder from files.
 
     Parameters
     ----------
-    folder, files, rig, building, channels, title, law : see `bristle.study.create.create_study`
+    folder, files, rig, building, channels, title, law, runs : see
+        `bristle.study.create.create_study`
 
     Raises
     ------
@@ -65,6 +73,7 @@ def make_folder(
         raise StudyError(f"{folder}: is there already. Take another name, or remove it.")
     if not files:
         raise StudyError("a study needs measurements: --data 'lab/*.csv' names their files.")
+    choices = runs or RunChoices()
     levels = _levels(rig, building)
     tables = [read_table(Path(file)) for file in files]
     guesses = _chosen(tables[0], guess_channels(tables[0], rig, levels), channels or {})
@@ -72,21 +81,84 @@ def make_folder(
     specs = {
         guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses
     } | {name: spec for name, spec in (channels or {}).items() if spec.step is not None}
-    digests = {}
-    for file, table in zip(files, tables, strict=True):
+    for table in tables:
         _refuse_other_columns(table, guesses, tables[0])
-        pieces = measurements_of(table, specs, estimate=False)
-        digests[str(file)] = [piece.digest() for piece in pieces]
     names = _names([Path(file) for file in files])
-    runs, notes = _roles(names)
-    notes += _twins([str(file) for file in files], digests)
-    comments = {guess.channel: _comment(guess) for guess in guesses}
-    settings = Settings(title or folder.name, rig, tuple(runs), specs, comments=comments)
-    _write(folder, settings, dict(zip(names, map(Path, files), strict=True)), building, law)
+    about, notes = facts_of([Path(file) for file in files], choices, bool({*DRIVE} & {*specs}))
+    found = _parts(names, tables, specs, choices.split)
+    listed, said = _roles([one.name for one in found])
+    of_file = dict(zip(names, about, strict=True))
+    settings = Settings(
+        title or folder.name, rig,
+        tuple(_with_facts(a, b, of_file) for a, b in zip(found, listed, strict=True)),
+        specs, comments={guess.channel: _comment(guess) for guess in guesses},
+        mask=choices.mask, split=choices.split, rate=_rate(found, choices, notes),
+    )  # fmt: skip
+    _refuse_one_role(settings.runs)
+    notes += said if not any(one.role for one in about) else []
+    notes += _twins([one.name for one in found], {one.name: one.digests for one in found})
+    data = dict(zip(names, map(Path, files), strict=True))
+    _write(folder, settings, data, building, law)
     unused = tuple(
         text for text in left_out(tables[0], guesses) if text not in {g.column for g in guesses}
     )
     return Made(tuple(guesses), unused, tuple(notes))
+
+
+@dataclass(frozen=True)
+class _Part:
+    """A run of a new study: its file in data/, its number there or 0, digests, samples per s."""
+
+    file: str
+    piece: int
+    digests: list[str]
+    rate: float
+
+    @property
+    def name(self) -> str:
+        return f"{self.file}, run {self.piece}" if self.piece else self.file
+
+
+def _parts(
+    names: Sequence[str], tables: Sequence[Table], specs: Mapping[str, ChannelSpec], split: str
+) -> list[_Part]:
+    """Return the runs in the files, each read once, so that what is wrong is told now."""
+    out = []
+    for name, table in zip(names, tables, strict=True):
+        for number, piece in enumerate(pieces_of(table, split, specs) if split else [table], 1):
+            read = measurements_of(piece, specs, estimate=False)
+            digests = [one.digest() for one in read]
+            out.append(_Part(name, number if split else 0, digests, read[0].sampling.rate))
+    return out
+
+
+def _with_facts(part: _Part, listed: RunFile, facts: Mapping[str, Facts]) -> RunFile:
+    about = facts[part.file]
+    return RunFile(
+        f"data/{part.file}", about.role or listed.role, about.levels, about.labels, part.piece
+    )
+
+
+def _refuse_one_role(runs: Sequence[RunFile]) -> None:
+    roles = {run.role for run in runs}
+    if len(runs) > 1 and roles != {"train", "holdout"} and len(roles) == 1:
+        raise StudyError(
+            f'all runs have the role "{roles.pop()}": some for training, some held out are right.'
+        )
+
+
+def _rate(parts: Sequence[_Part], choices: RunChoices, notes: list[str]) -> float:
+    """Return the rate to which runs are decimated, 0 where none is fast enough."""
+    fastest = max(part.rate for part in parts)
+    rate = RATE if choices.rate is None else choices.rate
+    if rate <= 0.0 or fastest < FAST * rate * (1.0 - 1e-6):
+        return 0.0
+    notes.append(
+        f"the files hold {plain(fastest, 4)} samples per second: runs are decimated to about "
+        f"{plain(rate, 4)} Hz behind an anti-alias filter, which a fit needs; rate in study.toml "
+        "changes that, and rate = 0 keeps all"
+    )
+    return rate
 
 
 def parse_channel(text: str) -> tuple[str, ChannelSpec]:
@@ -267,7 +339,7 @@ def _write(
             (draft / sub).mkdir()
         for name, source in data.items():
             shutil.copyfile(source, draft / "data" / name)
-        model = new_model(law)
+        model = new_model(law, drive=settings.drive or VOLTAGE.name)
         if building is not None:
             shutil.copyfile(building, draft / Path(building).name)
             model = replace(model, building=Path(building).name)

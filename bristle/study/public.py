@@ -35,8 +35,9 @@ from .inputs import (
 )
 from .laws import ALL, all_laws, left_out_notes, refuse_in_building, with_law
 from .learning import diagnose_study
+from .run_file import ROLES
 from .runs import Runs
-from .settings import CUT_OFF, ROLES
+from .settings import CUT_OFF
 from .study import Study
 
 
@@ -125,6 +126,8 @@ def identify(
     refuse_in_building(ALL if free else None, house is not None)
     runs = _runs(given, holdout, channels, house)
     rig = _rig(runs, house)
+    drives = [run.drive for run in runs.all if run.drive]
+    chosen = chosen.with_drive(drives[0] if drives else chosen.drive)
     task = FitTask(CUT_OFF, table=table, command=command)
     if not free:
         return identify_on_rig(rig, runs, chosen, task)
@@ -320,7 +323,7 @@ def _present(study: Study, model: Given | None, effects: str | Sequence[str]) ->
     """Return a study's model, or the one that was given, with the study's building."""
     own = study.model()
     chosen = model_of(own if model is None else model, effects, own.law)
-    return replace(chosen, building=own.building)
+    return replace(chosen.with_drive(own.drive), building=own.building)
 
 
 def _runs(

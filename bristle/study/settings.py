@@ -7,33 +7,30 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..data.channels import PLAIN, ChannelSpec, channel_unit, is_channel
+from ..data.channels import DRIVE, PLAIN, ChannelSpec, channel_unit, is_channel
 from ..data.files import Toml, write_whole
+from ..data.pieces import wrong_split
 from ..errors import RecordError, UnitError
 from ..findings import unknown, written
 from ..units import same_dimension
+from .run_file import RunFile, check_levels, read_runs, run_as_toml
 
 RIGS = ("bench", "structure")
-ROLES = ("train", "holdout")
 CUT_OFF = 18.0
 """Low-pass of measured and predicted force [Hz], as in Shirazi et al. (2012), section III-C."""
-_KEYS = ("schema", "title", "notes", "rig", "cut_off", "runs", "channels")
+_KEYS = (
+    "schema", "title", "notes", "rig", "cut_off", "rate", "mask", "split", "runs", "channels",
+)  # fmt: skip
 _CHANNEL_KEYS = ("column", "unit", "sign", "noise", "step")
-
-
-@dataclass(frozen=True)
-class RunFile:
-    """One `[[runs]]`: the file, relative to the study, and its role, "train" or "holdout"."""
-
-    file: str
-    role: str = "train"
 
 
 @dataclass(frozen=True)
 class Settings:
     """The content of study.toml.
 
-    `cut_off` [Hz] of the low-pass on measured and predicted force, 0 for none.
+    `cut_off` [Hz] of the low-pass on measured and predicted force, 0 for none; `rate` [Hz] to which
+    runs that are sampled faster are decimated, 0 for none; `mask` whether isolated spikes count as
+    not measured; `split` how files hold several runs, "" where they hold one (`data.pieces`).
     """
 
     title: str
@@ -43,6 +40,15 @@ class Settings:
     notes: str = ""
     cut_off: float = CUT_OFF
     comments: dict[str, str] = field(default_factory=dict)
+    rate: float = 0.0
+    mask: bool = False
+    split: str = ""
+
+    @property
+    def drive(self) -> str:
+        """The channel that commands the damper, "" where none was measured."""
+        there = {*self.channels, *(name for run in self.runs for name in run.levels)}
+        return next((name for name in DRIVE if name in there), "")
 
     @property
     def has_building(self) -> bool:
@@ -68,15 +74,28 @@ def read_settings(path: Path) -> Settings:
     cut_off = toml.number((), data, "cut_off")
     if cut_off is not None and cut_off < 0.0:
         toml.error(("cut_off",), f"cut_off = {cut_off} Hz; 0 for none, or a positive number.")
-    runs = _runs(toml, path.parent)
+    rate = toml.number((), data, "rate")
+    if rate is not None and rate < 0.0:
+        toml.error(("rate",), f"rate = {rate} Hz; 0 for none, or a positive number.")
+    mask = data.get("mask", False)
+    if not isinstance(mask, bool):
+        toml.error(("mask",), f"mask = {written(mask)}; true or false is right.")
+    split = toml.text((), data, "split")
+    if split and (wrong := wrong_split(split)):
+        toml.error(("split",), f"split = {written(split)}; {wrong}")
+    runs = read_runs(toml, path.parent, bool(split))
     channels = {
         name: _channel(toml, name, table)
         for name, table in toml.table((), data, "channels").items()
         if _is_right(toml, name, table)
     }
     title, notes = toml.text((), data, "title", path.parent.name), toml.text((), data, "notes")
+    check_levels(toml, runs, channels)
     toml.check()
-    return Settings(title, rig, runs, channels, notes, CUT_OFF if cut_off is None else cut_off)
+    return Settings(
+        title, rig, runs, channels, notes, CUT_OFF if cut_off is None else cut_off,
+        rate=rate or 0.0, mask=bool(mask), split=split,
+    )  # fmt: skip
 
 
 def write_settings(path: Path, settings: Settings) -> None:
@@ -91,11 +110,17 @@ def write_settings(path: Path, settings: Settings) -> None:
     document.add("rig", tomlkit.item(settings.rig))
     document.add("cut_off", tomlkit.item(settings.cut_off))
     document["cut_off"].comment("Hz, low-pass on measured and predicted force; 0 for none")
+    if settings.rate:
+        document.add("rate", tomlkit.item(settings.rate))
+        document["rate"].comment("Hz, faster runs are decimated to it; 0 for none")
+    if settings.mask:
+        document.add("mask", tomlkit.item(True))
+        document["mask"].comment("isolated spikes count as not measured")
+    if settings.split:
+        document.add("split", tomlkit.item(settings.split))
     runs = tomlkit.aot()
     for run in settings.runs:
-        table = tomlkit.table()
-        table.update({"file": run.file, "role": run.role})
-        runs.append(table)
+        runs.append(run_as_toml(run))
     document.add("runs", runs)
     channels = tomlkit.table(is_super_table=True)
     for name, spec in settings.channels.items():
@@ -108,6 +133,20 @@ def write_settings(path: Path, settings: Settings) -> None:
     write_whole(path, tomlkit.dumps(document))
 
 
+def with_mask(text: str) -> str:
+    """Return the text of a study.toml with `mask = true`, all else as it was."""
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    if "mask" in document:
+        document["mask"] = True
+        return tomlkit.dumps(document)
+    lines = text.split("\n")
+    first = next((k for k, line in enumerate(lines) if line.lstrip().startswith("[")), len(lines))
+    line = "mask = true # isolated spikes count as not measured"
+    return "\n".join([*lines[:first], line, "", *lines[first:]])
+
+
 def _as_toml(spec: ChannelSpec) -> dict[str, Any]:
     if spec.step is not None:
         return {"step": spec.step}
@@ -115,31 +154,6 @@ def _as_toml(spec: ChannelSpec) -> dict[str, Any]:
     if spec.noise is not None:
         found["noise"] = spec.noise
     return found
-
-
-def _runs(toml: Toml, folder: Path) -> tuple[RunFile, ...]:
-    listed = toml.data.get("runs", [])
-    if not isinstance(listed, list) or not listed:
-        toml.error(("runs",), 'there are no runs; add [[runs]] with file = "data/run_1.csv".')
-        return ()
-    out: list[RunFile] = []
-    for index, table in enumerate(listed):
-        keys = ("runs", index)
-        if not isinstance(table, dict):
-            toml.error(keys, f"a run is {written(table)}; a table is right.")
-            continue
-        toml.known(keys, table, ("file", "role"))
-        file, role = toml.text(keys, table, "file"), toml.text(keys, table, "role", "train")
-        if role not in ROLES:
-            toml.error((*keys, "role"), f'role = "{role}"; "train" or "holdout" is right.')
-        if not file:
-            toml.error(keys, 'a run has no file; file = "data/run_1.csv" is right.')
-        elif not (folder / file).is_file():
-            toml.error((*keys, "file"), f"there is no file {folder / file}.")
-        if any(file == run.file for run in out):
-            toml.error((*keys, "file"), f"{file} is listed twice: one of the two must go.")
-        out.append(RunFile(file, role))
-    return tuple(out)
 
 
 def _is_right(toml: Toml, name: str, table: Any) -> bool:

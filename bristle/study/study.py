@@ -13,7 +13,7 @@ from filelock import FileLock, Timeout
 
 from .. import __version__
 from ..data.files import read_json, write_json, write_whole
-from ..data.measurement import Measurement, read_measurements
+from ..data.measurement import Measurement
 from ..data.model import StudyModel, read_model
 from ..data.model_text import model_text
 from ..errors import StudyError
@@ -22,8 +22,10 @@ from ..physics.user import Loaded, waiting
 from ..trust import can_do_without, load
 from .history import History, Step
 from .new import make_folder
+from .reading import read_runs
+from .run_file import ROLES
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
-from .settings import ROLES, Settings, read_settings
+from .settings import Settings, read_settings, with_mask
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -153,7 +155,8 @@ class Study:
 
     def files(self, role: str | None = None) -> list[Path]:
         """Return the files of the runs, all or those of one role."""
-        return [self.folder / run.file for run in self.settings.runs if role in (None, run.role)]
+        own = [run.file for run in self.settings.runs if role in (None, run.role)]
+        return [self.folder / file for file in dict.fromkeys(own)]
 
     def read(self, role: str | None = None) -> list[Measurement]:
         """Return the measurements as they are in the files, without a look at what they are for.
@@ -163,7 +166,7 @@ class Study:
         RecordError
             If a file cannot be read.
         """
-        return read_measurements(self.files(role), self.settings.channels)
+        return read_runs(self.folder, self.settings, role)
 
     def runs(self) -> Runs:
         """Return the measurements for training and those held out.
@@ -213,7 +216,12 @@ class Study:
         except StudyError as error:
             raise StudyError(f"{error}{self._other_version()}") from None
         self._seen = self._state()
-        return model
+        return model.with_drive(self.drive or model.drive)
+
+    @property
+    def drive(self) -> str:
+        """The channel that commands the damper, "" where none was measured."""
+        return self.settings.drive
 
     def _other_version(self) -> str:
         """Return that another version of bristle wrote the present model, "" where this one did."""
@@ -279,6 +287,13 @@ class Study:
             self._set_aside(step.number)
             self._seen = self._state()
         return step
+
+    def with_mask(self) -> Study:
+        """Write `mask = true` into study.toml, and return the study as it is then."""
+        path = self.folder / "study.toml"
+        with self.writing():
+            write_whole(path, with_mask(path.read_text(encoding="utf-8-sig")))
+        return Study(self.folder)
 
     def verdict(self) -> dict[str, Any] | None:
         """Return the verdict on the present model in the present schema, None if there is none.

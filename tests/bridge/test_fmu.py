@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -11,9 +12,11 @@ import numpy as np
 import pytest
 
 from bristle.bridge.fmu import compare_fmu
+from bristle.bridge.ports import map_ports
 from bristle.cli import main
 from bristle.errors import FmuError, RecordError, RunError
 from bristle.fmu.build import ensure
+from bristle.fmu.description import Description, Variable
 from bristle.identify.bench import Bench
 
 DT = 0.002
@@ -160,10 +163,77 @@ def test_units_that_differ_are_refused(lugre, rig):
         compare_fmu(lugre, rig, maps={"voltage": "force"})
 
 
-def test_an_fmu_of_the_other_sign_is_told(toys, tmp_path):
+def test_a_sign_in_doubt_is_refused_until_it_is_said(toys, tmp_path):
     data = gain_data(tmp_path, factor=-2.0)
-    found = compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "flow"})
-    assert any("has the opposite sign of the measured channel" in note for note in found.notes)
+    with pytest.raises(FmuError, match=r"has the opposite sign of flow.*--map y=-flow reverses"):
+        compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "flow"})
+    found = compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "-flow"})
+    assert found.outputs[0].z == pytest.approx(1.0, abs=0.15)
+    assert any("is compared with flow, reversed" in line for line in found.mapping_lines())
+    (turned,) = compare_fmu(toys["Gain"], data, maps={"u": "-pressure", "y": "flow"}).outputs
+    assert turned.z == pytest.approx(1.0, abs=0.15)
+    found = compare_fmu(toys["Gain"], data, maps={"u": "pressure", "y": "+flow"})
+    assert any("has the opposite sign of flow" in note for note in found.notes)
+
+
+def test_a_unit_in_doubt_is_refused_until_it_is_said(toys, tmp_path):
+    t = np.arange(2000) * 0.01
+    u = np.sin(3.0 * t)
+    y = 2000.0 * u + 20.0 * np.random.default_rng(2).standard_normal(2000)
+    data = write(tmp_path / "n.csv", {"time [s]": t, "suction [Pa]": u, "force [N]": y})
+    maps = {"u": "suction", "y": "force"}
+    with pytest.raises(FmuError, match=r"y is 1000 times too small: kN\? --map y=force@kN"):
+        compare_fmu(toys["Gain"], data, maps=maps)
+    (force,) = compare_fmu(toys["Gain"], data, maps={**maps, "y": "force@kN"}).outputs
+    assert force.z == pytest.approx(1.0, abs=0.15)
+    found = compare_fmu(toys["Gain"], data, maps={**maps, "y": "force@N"})
+    assert any("1000 times too small" in note for note in found.notes)
+    with pytest.raises(FmuError, match='"kilo" is no unit'):
+        compare_fmu(toys["Gain"], data, maps={**maps, "y": "force@kilo"})
+    with pytest.raises(FmuError, match="y is in mm, force in N"):
+        compare_fmu(toys["Gain"], data, maps={**maps, "y": "force@mm"})
+
+
+def port(name, unit=None, causality="input"):
+    return Variable(name, "Real", causality, "continuous", 1, unit, 0.0)
+
+
+def described(*ports):
+    named = {one.name: one for one in ports}
+    return Description("Rig", "0", "Rig", "", named, {})
+
+
+SIGNALS = {"displacement": "m", "velocity": "m/s", "force": "N", "current": "A"}
+
+
+def test_ports_are_read_as_titles_are():
+    ports = map_ports(
+        described(
+            port("x_mm"), port("v_mm_s"), port("rod.I_mA"), port("F_kN", causality="output")
+        ),
+        SIGNALS, {}, {},
+    )  # fmt: skip
+    assert [(one.name, one.signal, one.unit) for one in (*ports.inputs, *ports.outputs)] == [
+        ("x_mm", "displacement", "mm"), ("v_mm_s", "velocity", "mm/s"),
+        ("rod.I_mA", "current", "mA"), ("F_kN", "force", "kN"),
+    ]  # fmt: skip
+    assert "in mm/s by its name" in ports.inputs[1].reason
+
+
+@pytest.mark.parametrize(
+    ("own", "text"),
+    [
+        (port("velocity"), "neither the FMU nor its name gives one. --map velocity=velocity@UNIT"),
+        (port("v_in"), "neither the FMU nor its name gives one"),
+        (port("v_mm_s", "m/s"), "the FMU says m/s, and its name mm/s"),
+    ],
+)
+def test_a_port_whose_unit_is_in_doubt_is_refused(own, text):
+    out = port("force", "N", "output")
+    with pytest.raises(FmuError, match=re.escape(text)):
+        map_ports(described(own, out), SIGNALS, {}, {})
+    found = map_ports(described(own, out), SIGNALS, {own.name: "velocity@mm/s"}, {})
+    assert (found.inputs[0].unit, found.inputs[0].unit_given) == ("mm/s", True)
 
 
 def test_data_without_noise_are_judged_by_a_stated_floor(toys, tmp_path):

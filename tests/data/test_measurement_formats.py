@@ -179,13 +179,6 @@ def test_mat_vectors_structures_and_sampling_rate(tmp_path: Path) -> None:
     assert any("few" in note for note in table.notes)
 
 
-def test_mat_of_version_7_3_is_refused_by_name(tmp_path: Path) -> None:
-    with pytest.raises(RecordError, match=r"7\.3.*-v7"):
-        read(tmp_path, b"MATLAB 7.3 MAT-file" + bytes(600), "run.mat")
-    with pytest.raises(RecordError, match="no MAT file"):
-        read(tmp_path, b"something else entirely" * 30, "run.mat")
-
-
 def test_frame_with_units_in_attrs() -> None:
     frame = pd.DataFrame({"damper.force": FORCE}, index=pd.Index(TIME, name="time"))
     frame.attrs["units"] = {"time": "s", "damper.force": "N"}

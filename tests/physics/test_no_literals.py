@@ -20,6 +20,8 @@ KINDS = {
     "laws": {*law_names("damper"), *law_names("structure")},
 }
 ELSEWHERE = {
+    ("compare/coordinates.py", "temperature"): "a label of a run",
+    ("data/labels.py", "temperature"): "a label of a run",
     ("data/checks/motion.py", "delay"): "a kind of finding: a channel that comes late",
     ("diagnose/corrected.py", "delay"): "a kind of sensor fault",
     ("diagnose/load_cell.py", "delay"): "a kind of sensor fault",

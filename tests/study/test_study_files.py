@@ -12,7 +12,8 @@ from made import write_runs
 from bristle.data.channels import ChannelSpec
 from bristle.data.files import read_json, write_json, write_whole
 from bristle.study import StudyError, create_study, new_model, read_model, write_model
-from bristle.study.settings import RunFile, Settings, read_settings, write_settings
+from bristle.study.run_file import RunFile
+from bristle.study.settings import Settings, read_settings, write_settings
 
 STUDY = """schema = 1
 title = "rig A"

@@ -10,6 +10,7 @@ from ...quantity import plain
 from ..channels import DRIVE
 from ..measurement import Measurement
 from ..noise import Noise, is_switched
+from ..spikes import spikes_text
 from ..table import Array
 from .clipping import clipped_share
 from .finding import Finding, Level
@@ -35,6 +36,7 @@ def check_channels(run: Measurement, velocity: Array | None) -> Iterator[Finding
     """
     for note in run.notes:
         yield Finding("reading", "note", note, run=run.name)
+    yield from _spikes(run)
     for channel, values in run.channels.items():
         if np.ptp(values) == 0.0:
             yield from _still(run, channel, values)
@@ -46,6 +48,21 @@ def check_channels(run: Measurement, velocity: Array | None) -> Iterator[Finding
         yield from _drift(run, run["displacement"], velocity)
     if "force" in run.channels and velocity is not None and np.ptp(velocity) > 0.0:
         yield from _force_offset(run, run["force"], velocity)
+
+
+def _spikes(run: Measurement) -> Iterator[Finding]:
+    for channel in dict.fromkeys(spike.channel for spike in run.spikes):
+        own = tuple(spike for spike in run.spikes if spike.channel == channel)
+        yield Finding(
+            "spikes",
+            "warning",
+            f"{spikes_text(own)}.",
+            "`bristle study check FOLDER --mask` takes them for not measured. Look for a loose "
+            "cable.",
+            run.name,
+            channel,
+            float(len(own)),
+        )
 
 
 def _still(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..channels import DRIVE
 from ..measurement import Measurement
 from .runs import drive_levels
 
@@ -18,8 +17,7 @@ _APART = 0.02  # of the largest level: closer ones are one
 
 def drives_of(runs: Sequence[Measurement]) -> list[tuple[Measurement, str]]:
     """Return the runs that have a command, each with the name of its channel."""
-    named = [(run, next((name for name in DRIVE if run.has(name)), "")) for run in runs]
-    return [(run, name) for run, name in named if name]
+    return [(run, run.drive) for run in runs if run.drive]
 
 
 def command_levels(runs: Sequence[Measurement]) -> list[float] | None:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from ...physics.drive import DRIVES
 from ...quantity import plain, quantity
-from ..channels import DRIVE
 from ..measurement import Measurement
 from ..noise import is_switched
 from ..table import Array
@@ -32,9 +32,10 @@ class Excitation:
     """What a run excites.
 
     `stroke` peak to peak [m], `speed` the 99th percentile [m/s], `band` the frequencies between
-    which 90 % of the velocity's power lies [Hz], `cycles` of the motion; `drive` "voltage",
-    "current" or ""; `levels` pairs of level [V or A] and seconds there, empty where it moves
-    continuously; `range` its lowest and highest; `resisting` the mean force along the path [N].
+    which 90 % of the velocity's power lies [Hz], `cycles` of the motion; `drive` the
+    channel that commands the damper, or ""; `levels` pairs of its level and seconds there, empty
+    where it moves continuously; `range` its lowest and highest; `resisting` the mean force
+    along the path [N].
     """
 
     run: str
@@ -50,7 +51,7 @@ class Excitation:
 
     @property
     def constant(self) -> bool:
-        """Whether the voltage keeps to one level."""
+        """Whether the command keeps to one level."""
         return len(self.levels) == 1
 
 
@@ -58,7 +59,7 @@ def excitation_of(run: Measurement, level: str = "") -> Excitation:
     """Return what a run excites, seen from its damper (`level` "base" on a structure)."""
     velocity = velocity_of_run(run, level)
     displacement = run.channels.get(f"{level}_displacement" if level else "displacement")
-    drive = next((one for one in DRIVE if one in run.channels), "")
+    drive = run.drive
     levels = drive_levels(run[drive], run.step, run.noise[drive]) if drive else ()
     lowest, highest = (float(run[drive].min()), float(run[drive].max())) if drive else (0.0, 0.0)
     if velocity is None:
@@ -165,8 +166,8 @@ def _drive(runs: list[Excitation]) -> Iterator[Finding]:
             "Record the coil's voltage or current.",
         )
         return
-    unit = "V" if driven[0].drive == "voltage" else "A"
     name = driven[0].drive
+    unit = DRIVES[name].unit
     constant = [run for run in driven if run.constant]
     if len(constant) < len(driven):
         yield from _moving_drive([run for run in driven if not run.constant], name, unit)
@@ -222,8 +223,9 @@ def _beyond(train: list[Excitation], holdout: list[Excitation], parts: bool) -> 
     checks: list[Check] = [
         ("speed", lambda run: run.speed, "m/s", 1.0),
         ("stroke", lambda run: run.stroke, "mm", 1e3),
-        ("voltage", lambda run: run.range[1], "V or A", 1.0),
     ]
+    for drive in dict.fromkeys(run.drive for run in train if run.drive):
+        checks.append((drive, lambda run: run.range[1], DRIVES[drive].unit, 1.0))
     for name, value, unit, factor in checks:
         known = max(map(value, train))
         for run in holdout:
@@ -291,8 +293,8 @@ def _two_rigs(runs: list[Excitation]) -> Iterator[Finding]:
                 "two rigs",
                 "warning",
                 f"force resists with {quantity(own, 'N', 4, usual)} on average, and with "
-                f"{quantity(usual, 'N', 4)} in the middle one of {len(alike)} runs of like voltage "
-                "and speed.",
+                f"{quantity(usual, 'N', 4)} in the middle one of {len(alike)} runs of like "
+                f"{known[0].drive or 'command'} and speed.",
                 "Is it of another damper, or in another unit? Then use a separate study.",
                 run.run,
                 "force",

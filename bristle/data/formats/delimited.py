@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import replace
-from datetime import datetime
 from itertools import islice
 
 import numpy as np
@@ -20,6 +19,7 @@ from ...units import parse as parse_unit
 from ..columns import Column
 from ..table import Table
 from ..titles import is_unit_row, titles
+from ._instants import seconds_of
 from ._rows import Body, Layout, is_comment, read_fast, read_slow, state_of
 
 ORDER = 2
@@ -50,6 +50,7 @@ def read(content: bytes, name: str) -> Table:
     layout = _find_layout(lines, name)
     first = next(k for k, line in enumerate(lines) if _is_data(line, layout))
     columns = _header(lines[:first], layout, name, first, notes)
+    lines = _without_repeated(lines, first, layout, notes)
     body = read_fast(lines, first, layout) or read_slow(lines, first, layout, name)
     columns, body = _without_empty(columns, body)
     if any("bristle results" in line for line in lines[:1]) and any(
@@ -87,6 +88,8 @@ def _is_data(line: str, layout: Layout) -> bool:
 def _find_layout(lines: list[str], name: str) -> Layout:
     """Return how the rows in the middle of a text are laid out."""
     full = [k for k, line in enumerate(lines) if line.strip() and not is_comment(line)]
+    if not full:
+        raise RecordError(f"{name}: there is no row of numbers. {_RIGHT}")
     middle = [lines[k].strip() for k in islice(full, len(full) // 2, len(full) // 2 + 60)]
     if len(middle) > 3:
         middle.pop()  # the last line of a file may be cut
@@ -185,6 +188,30 @@ def _header(
     return titles([""] * wide)
 
 
+def _without_repeated(lines: list[str], first: int, layout: Layout, notes: list[str]) -> list[str]:
+    """Return the lines without titles that come again, with what stands above and below them.
+
+    Test machines write their header before every block of a test.
+    """
+    above = next((k for k in range(first - 1, -1, -1) if lines[k].strip()), -1)
+    while above > 0 and is_unit_row(_title_fields(lines[above], layout, len(layout.numeric))):
+        above -= 1
+    title = lines[above].strip() if above >= 0 else ""
+    if not title or is_comment(title):
+        return lines
+    again = [k for k in range(first, len(lines)) if lines[k].strip() == title]
+    out = list(lines)
+    for k in again:
+        for step in (-1, 1):
+            at = k
+            while first <= at < len(lines) and not _is_data(lines[at], layout):
+                out[at] = ""
+                at += step
+    if again:
+        notes.append(f"the titles come again in {len(again)} places, such as line {again[0] + 1}")
+    return out
+
+
 def _title_fields(line: str, layout: Layout, wide: int) -> list[str]:
     """Return the titles in a line; there may be one less or more than numbers, left empty."""
     stripped = line.strip("\n\r ")
@@ -220,15 +247,13 @@ def _instants(
     out = list(columns)
     for index in list(body.not_numeric):
         try:
-            instants = [
-                datetime.fromisoformat(layout.split(lines[line - 1].strip())[index].strip('" '))
-                for line in body.lines
-            ]
-        except (ValueError, IndexError):
+            texts = [layout.split(lines[line - 1].strip())[index] for line in body.lines]
+        except IndexError:
             continue
-        body.values[index] = np.array(
-            [(instant - instants[0]).total_seconds() for instant in instants]
-        )
+        seconds = seconds_of(texts)
+        if seconds is None:
+            continue
+        body.values[index] = seconds
         del body.not_numeric[index]
         out[index] = replace(columns[index], unit=parse_unit("s"))
         body.notes.append(f'"{columns[index].text}" holds instants: taken as s since the first')

@@ -1,19 +1,16 @@
-"""MAT files up to version 7: vectors, columns of matrices, fields of structures."""
+"""MAT files up to version 7 (7.3 is HDF5): vectors, columns of matrices, fields of structures."""
 
 from __future__ import annotations
 
 import io
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ...errors import RecordError
-from ..table import Table, from_arrays
-
-_STEPS = ("dt", "ts", "tsample", "t_s", "sampletime", "sample_time", "delta_t", "step")
-_RATES = ("fs", "rate", "samplerate", "sample_rate", "sampling_rate", "fsample", "f_s")
+from ..table import Table
+from ._vectors import columns_of, table_of
 
 
 def recognises(content: bytes, suffix: str) -> bool:
@@ -31,13 +28,8 @@ def read(content: bytes, name: str) -> Table:
     Raises
     ------
     RecordError
-        If the file is of version 7.3, damaged, or holds no vector.
+        If the file is damaged, or holds no vector.
     """
-    if content.startswith((b"MATLAB 7.3", b"\x89HDF")):
-        raise RecordError(
-            f"{name}: this is a MAT file of version 7.3, which is HDF5. Save it as version 7: "
-            "save('run.mat', 't', 'F', '-v7')."
-        )
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
@@ -55,17 +47,7 @@ def read(content: bytes, name: str) -> Table:
         if not key.startswith("__")
         for pair in _arrays(key, value)
     ]
-    lengths = Counter(len(array) for _, array in found if array.ndim and len(array) > 1)
-    if not lengths:
-        raise RecordError(f"{name}: the file holds no vector of numbers.")
-    size = max(lengths, key=lambda length: (lengths[length], length))
-    data = {key: array for key, array in found if array.ndim and len(array) == size}
-    others = sorted({key for key, array in found if array.ndim and len(array) not in (1, size)})
-    notes = []
-    if others:
-        notes.append(f"left out, because their length is not {size}: {', '.join(others)}")
-    _add_time(data, {key: array for key, array in found if array.size == 1}, size, notes)
-    return from_arrays(data, name, notes=tuple(notes))
+    return table_of(found, name)
 
 
 def _arrays(key: str, value: Any) -> Iterator[tuple[str, np.ndarray[Any, np.dtype[Any]]]]:
@@ -84,35 +66,4 @@ def _arrays(key: str, value: Any) -> Iterator[tuple[str, np.ndarray[Any, np.dtyp
             if hasattr(item, "_fieldnames"):
                 yield from _arrays(f"{key}({index})", item)
         return
-    if array.dtype.kind not in "fiub" or not array.size:
-        return
-    if array.ndim == 2:
-        columns = array.T if array.shape[0] >= array.shape[1] else array
-        for index, column in enumerate(columns, 1):
-            yield f"{key}_{index}", column
-    elif array.ndim < 2:
-        yield key, array
-
-
-def _add_time(
-    data: dict[str, np.ndarray[Any, np.dtype[Any]]],
-    scalars: dict[str, np.ndarray[Any, np.dtype[Any]]],
-    size: int,
-    notes: list[str],
-) -> None:
-    """Make a time from a sampling step or rate where no vector can be one."""
-    if any(_short(key) in ("t", "time", "x.time") or "time" in _short(key) for key in data):
-        return
-    for key, array in scalars.items():
-        value = float(array.ravel()[0])
-        short = _short(key)
-        if value <= 0.0 or short not in (*_STEPS, *_RATES):
-            continue
-        step = value if short in _STEPS else 1.0 / value
-        data["time_s"] = np.arange(size) * step
-        notes.append(f"the time is made from {key} = {value:g} {'s' if short in _STEPS else 'Hz'}")
-        return
-
-
-def _short(key: str) -> str:
-    return key.rpartition(".")[2].lower()
+    yield from columns_of(key, array)

@@ -9,12 +9,9 @@ from ...errors import RecordError
 ORDER = 1
 
 MARKS = {
-    b"\x89HDF\r\n\x1a\n": (
-        "this is HDF5. Save the measurement as CSV, Parquet or MAT (version 7)."
-    ),
-    b"PK\x03\x04": "this is a zip or an Excel workbook. Save the sheet as CSV.",
-    b"\xd0\xcf\x11\xe0": "this is an old Excel workbook. Save the sheet as CSV.",
-    b"TDSm": "this is TDMS. Export the channels as CSV.",
+    b"PK\x03\x04": "this is a zip archive and no Excel workbook. Unpack it.",
+    b"\xd0\xcf\x11\xe0": "this is an old Excel workbook. Save it as .xlsx, or the sheet as CSV.",
+    b"PK\x05\x06": "this is an empty zip archive.",
 }
 """The first bytes of a format, and what a user is told."""
 

@@ -14,6 +14,9 @@ from ..relation import derivative_relation, power_factor
 from ..table import Array
 from .candidates import Candidate, Search, usable, velocity_of
 
+_SHOWN = 3  # columns of many that are told
+_ALIKE = 0.05  # shares of dissipated power that differ by less are of like forces
+
 
 def bench_guesses(search: Search, candidates: list[Candidate]) -> dict[str, Candidate]:
     """Return the best candidate of each channel of a damper on a bench."""
@@ -36,8 +39,14 @@ def _best(fitting: list[Candidate]) -> Candidate:
     best = max(fitting, key=lambda one: one.rank)
     rivals = [one.column.text for one in fitting if one.rank == best.rank and one is not best]
     if rivals:
-        best = replace(best, doubt=f"so could be {', '.join(map(_quoted, rivals))}")
+        best = replace(best, doubt=f"so could be {_listed(rivals)}")
     return best
+
+
+def _listed(texts: list[str]) -> str:
+    """Return titles in quotation marks, the first few of many."""
+    shown = ", ".join(map(_quoted, texts[:_SHOWN]))
+    return shown if len(texts) <= _SHOWN else f"{shown} and {len(texts) - _SHOWN} more"
 
 
 def _quoted(text: str) -> str:
@@ -56,13 +65,17 @@ def _best_force(search: Search, forces: list[Candidate], chosen: dict[str, Candi
         one.column.text: power_factor(search.column(one.column.text), velocity)[0] for one in forces
     }
     by_power = max(forces, key=lambda one: abs(share[one.column.text]))
+    rest = [one for one in forces if one is not best]
     others = ", ".join(
-        f'"{one.column.text}" {abs(share[one.column.text]):.2f}'
-        for one in forces
-        if one is not best
-    )
-    reason = f"{best.reason}; its share of dissipated power is {abs(share[best.column.text]):.2f}"
+        f'"{one.column.text}" {abs(share[one.column.text]):.2f}' for one in rest[:_SHOWN]
+    ) + (f" and {len(rest) - _SHOWN} more" if len(rest) > _SHOWN else "")
+    own = abs(share[best.column.text])
+    reason = f"{best.reason}; its share of dissipated power is {own:.2f}"
+    alike = [one.column.text for one in rest if one.rank == best.rank
+             and abs(abs(share[one.column.text]) - own) < _ALIKE]  # fmt: skip
     doubt = ""
+    if alike:
+        doubt = f"so could be {_listed(alike)}; --channel force=COLUMN says which"
     if by_power is not best and abs(share[by_power.column.text]) > 0.1:
         doubt = f'"{by_power.column.text}" dissipates more'
     return replace(best, reason=f"{reason} ({others})", doubt=doubt)

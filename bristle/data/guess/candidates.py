@@ -63,7 +63,7 @@ def candidate_of(search: Search, column: Column, time: str) -> Candidate | None:
     meant = meaning(column.name, unit or None)
     by_unit = quantity_of_unit(unit) if unit else None
     if meant is None:
-        if by_unit in (None, "time"):
+        if by_unit in (None, "time", "duty"):  # a share in per cent can be one of anything
             return None
         return Candidate(column, str(by_unit), unit, 1, f"its unit, {unit}")
     return _by_name(column, meant, unit, by_unit)
@@ -72,7 +72,7 @@ def candidate_of(search: Search, column: Column, time: str) -> Candidate | None:
 def _by_name(column: Column, meant: Meaning, unit: str, by_unit: str | None) -> Candidate | None:
     quantity, doubt = meant.quantity, ""
     wanted = "displacement" if quantity == "drift" else quantity
-    if unit and by_unit not in (wanted, None, "time") and len(column.name) == 1:
+    if unit and by_unit not in (wanted, None, "time", "duty") and len(column.name) == 1:
         return Candidate(column, str(by_unit), unit, 1, f"its unit, {unit}")  # a letter says little
     if unit and by_unit != wanted:
         if "[" in column.text or "(" in column.text or by_unit is None:

@@ -81,7 +81,14 @@ class Along:
 
 
 def faded(signal: Array, dt: float, tau: float, begin: float) -> Array:
-    """Return a signal (n,) behind a first-order lag of a time constant [s]."""
+    """Return a signal (n,) behind a first-order lag.
+
+    Parameters
+    ----------
+    signal : (n,) in its unit
+    dt, tau : sampling step and time constant [s]
+    begin : what the lag shows at the first sample
+    """
     keep = float(np.exp(-dt / tau))
     middle = np.append(signal[:1], 0.5 * (signal[1:] + signal[:-1]))
     out = lfilter([1.0 - keep], [1.0, -keep], middle[1:], zi=[keep * begin])[0]

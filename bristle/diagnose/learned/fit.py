@@ -91,11 +91,16 @@ def learn(
         return LearnedCurve(name, None, (), before, None, (), why)
     fitted = _fitted(chosen, name, before.model, train, held_out)
     best, curve = fitted[0], fitted[0].curve
-    refused = ""
+    refused, told = "", f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
     if not missing(before, best.trial, rule):
         refused = (
             f"The best curve, {curve.words()}, does not lower the error on held-out runs beyond "
-            f"chance (z {before.z:.2f} before, {best.trial.z:.2f} with it)."
+            f"chance {told}."
+        )
+    elif rule.excess(best.trial.z) > (1.0 - rule.first) * rule.excess(before.z):
+        refused = (
+            f"The best curve, {curve.words()}, explains too little of the error on held-out runs "
+            f"{told}."
         )
     return LearnedCurve(name, curve, best.std, before, best.trial, tuple(fitted[1:]), refused)
 
@@ -156,9 +161,13 @@ def _fitted(
             curve = one.curve
             values = {f"{own}.curve[{k}]": value for k, value in enumerate(curve.values, 1)}
             values |= {f"{own}.{n}": value for n, value in curve.memory}
-            start = replace(base, effects=(*base.effects, own), values={**base.values, **values})
-            model = refine(start, train, SWEEPS)
-            trial = judge(model, train, held_out)
+            joined = replace(base, effects=(*base.effects, own))
+            ends = [
+                refine(replace(joined, values={**law, **values}), train, SWEEPS)
+                for law in _laws(base, train)
+            ]
+            trial = min((judge(end, train, held_out) for end in ends), key=lambda one: one.train)
+            model = trial.model
             std = intervals_of(train, model).std
             entries = [f"{own}.curve[{k + 1}]" for k in range(len(curve.knots))]
             fitted = replace(
@@ -174,6 +183,18 @@ def _fitted(
             )  # fmt: skip
             count.done(curve.words())
     return sorted(out, key=lambda one: one.loss)
+
+
+def _laws(base: Model, train: Problem) -> list[dict[str, float]]:
+    """Return the values of the law from which a fit begins.
+
+    Without what is missing, a fit may have driven the part that falls with speed to a bound, from
+    which no small step leads back: so it also begins anew at the size of the rig.
+    """
+    falling, over = base.law_class.falling()
+    names = [name for name in (*falling, over) if name and name not in base.fixed]
+    usual = {name: train.scaled(base.law, name) for name in names}
+    return [base.values, {**base.values, **usual}] if usual else [base.values]
 
 
 def _renamed(trial: Trial, own: str, name: str) -> Trial:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from bristle.diagnose.learned.along import ALONG
 from bristle.diagnose.learned.closed import closed_forms, formula_of
 from bristle.diagnose.learned.curve import PARTS, Curve, effect_text, may_change
 from bristle.errors import PhysicsError
-from bristle.identify.fit import Run
+from bristle.identify.fit import Problem, Run
 from bristle.physics.effect import EFFECTS, Q
 from bristle.physics.user import defined
 
@@ -119,3 +121,16 @@ def test_a_text_that_is_not_right_leaves_nothing_behind():
     ):
         pass
     assert set(EFFECTS) == before
+
+
+def test_the_values_of_a_learned_effect_are_not_scaled_to_the_rig():
+    large = replace(run(), force=500.0 * np.sin(9.0 * T))  # N; defaults are for a rig of 10 N
+    curve = curve_of("force", "displacement", 300.0)
+    with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
+        problem = Problem([large])
+        assert problem.scaled("bingham", "learned_9.curve[2]") == pytest.approx(60.0)
+        assert (
+            problem.scaled("bingham", "gas_spring.k")
+            > 1e3
+            > EFFECTS["gas_spring"].parameters["k"].value
+        )

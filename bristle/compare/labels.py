@@ -1,0 +1,129 @@
+"""How the error goes with what is known of whole runs: the level of the command, a temperature."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.labels import Label, Labels, label_text, varying
+from ..identify.search import z_scale
+from ..physics.drive import DRIVES
+from ..quantity import short_z
+from .errors import CLOSE
+from .names import joined, name_of
+from .prediction import RunPrediction
+
+Array = NDArray[np.float64]
+
+STEADY = 1e-3
+"""Share of its largest value by which a command varies in a run that keeps to one level."""
+
+APART = 1.5
+"""By what factor z with one value of a label exceeds that with the others to be worth a word."""
+
+_DIGITS = 4  # of a level, to which runs have the same
+
+
+@dataclass(frozen=True)
+class LabelError:
+    """The error of the runs that share the value of a label: `z` of them all, and how many.
+
+    `unit` is that of a command's level, else "": labels know their own.
+    """
+
+    name: str
+    value: Label
+    z: float
+    runs: int
+    unit: str = ""
+
+    @property
+    def text(self) -> str:
+        """The value as people write it."""
+        return label_text(self.name, self.value, self.unit)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as JSON has it."""
+        return {"label": self.name, "value": self.value, "z": self.z, "runs": self.runs}
+
+
+def known_of(predictions: Sequence[RunPrediction]) -> list[Labels]:
+    """Return what is known of each run: its labels, and the level of a command that is steady."""
+    drive = predictions[0].drive
+    return with_levels(
+        drive, [one.coordinates.get(drive) for one in predictions], [p.labels for p in predictions]
+    )
+
+
+def with_levels(
+    drive: str, commands: Sequence[Array | None], labels: Sequence[Labels]
+) -> list[Labels]:
+    """Return the labels of runs, with the level of the command where it is steady.
+
+    Parameters
+    ----------
+    drive : the channel that commands the damper
+    commands : (n,) of each run in its unit, None where there is none
+    labels : of each run
+    """
+    top = max((float(np.max(np.abs(y))) for y in commands if y is not None), default=0.0)
+    out: list[Labels] = []
+    for own, level in zip(labels, commands, strict=True):
+        if level is None or float(np.ptp(level)) > STEADY * top:
+            out.append(dict(own))
+        else:
+            out.append({**own, drive: float(f"{float(np.mean(level)):.{_DIGITS}g}")})
+    return out
+
+
+def label_errors(predictions: Sequence[RunPrediction]) -> tuple[LabelError, ...]:
+    """Return the error for each value of each label that differs between runs."""
+    known = known_of(predictions)
+    found = []
+    for name in varying(known):
+        values = {one[name] for one in known}
+        for value in sorted(values, key=lambda one: (isinstance(one, str), one)):
+            own = [p for p, one in zip(predictions, known, strict=True) if one[name] == value]
+            z = z_scale(np.concatenate([one.normalised for one in own]))
+            unit = DRIVES[name].unit if name in DRIVES else ""
+            found.append(LabelError(name, value, z, len(own), unit))
+    return tuple(found)
+
+
+def label_sentence(errors: Sequence[LabelError]) -> str:
+    """Return on which runs a model errs, by the label that tells it best; "" where none does."""
+    best: tuple[float, str] | None = None
+    for name in dict.fromkeys(one.name for one in errors):
+        own = sorted((one for one in errors if one.name == name), key=lambda one: -one.z)
+        split = _split(own)
+        if split and (best is None or split > best[0]):
+            best = split, name
+    if best is None:
+        return ""
+    own = sorted((one for one in errors if one.name == best[1]), key=lambda one: -one.z)
+    far = [one for one in own if one.z > CLOSE and one.z * APART > own[0].z]
+    rest = [one for one in own if one not in far]
+    where = joined([one.text for one in far])
+    label = "" if far[0].unit else f"{name_of(far[0].name)} "
+    others = f"z = {short_z(rest[0].z)} at most at {joined([one.text for one in rest])}"
+    if rest[0].z <= CLOSE:
+        return f"Only the runs at {label}{where} are wrong: z = {short_z(own[0].z)}, and {others}."
+    return f"It is worst in the runs at {label}{where}: z = {short_z(own[0].z)}, and {others}."
+
+
+def _split(own: Sequence[LabelError]) -> float:
+    """Return how far the values of a label part the runs, 0 where they do not.
+
+    Parameters
+    ----------
+    own : the errors for the values of one label, the largest first
+    """
+    far = [one for one in own if one.z > CLOSE and one.z * APART > own[0].z]
+    rest = [one for one in own if one not in far]
+    if not far or not rest or own[0].z < APART * rest[0].z:
+        return 0.0
+    return min(one.z for one in far) / rest[0].z

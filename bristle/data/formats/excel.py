@@ -1,0 +1,183 @@
+"""Excel workbooks (.xlsx, .xlsm): the values of one sheet. Nothing in them is executed.
+
+A sheet is read as the text that it would be saved as, so that preambles, titles, rows of units and
+instants are found as in any other text.
+"""
+
+from __future__ import annotations
+
+import io
+import re
+import zipfile
+from datetime import date, datetime, time
+from typing import Any
+from xml.etree import ElementTree
+
+from ...errors import RecordError
+from ..table import Table
+from . import delimited
+from ._extra import library
+
+ENTRY = "xl/workbook.xml"
+LARGEST = 512 * 1024**2
+"""Largest content of a workbook that is unpacked [bytes]."""
+
+_MERGED = re.compile(rb'<mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
+_CELL = re.compile(rb"<c [^>]*[^>/]>.*?</c>", re.DOTALL)
+_ANY_FORMULA = re.compile(rb"<f[ >/]")
+_VALUE = re.compile(rb"<v(?: [^>/]*)?>[^<]")
+_PLACE = re.compile(rb'r="([A-Z]+\d+)"')
+
+
+def recognises(content: bytes, suffix: str) -> bool:
+    """Return whether a file is a workbook, by what its zip archive holds."""
+    if not content.startswith(b"PK\x03\x04"):
+        return False
+    try:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            return ENTRY in archive.namelist()
+    except (zipfile.BadZipFile, ValueError, OSError):
+        return suffix in (".xlsx", ".xlsm")
+
+
+def read(content: bytes, name: str) -> Table:
+    """Return the table in a workbook: the values of its first sheet that holds rows of numbers.
+
+    Of formulas the values count that were stored with them. Macros are not run.
+
+    Raises
+    ------
+    RecordError
+        If openpyxl is not installed, the file is damaged, no sheet holds rows of numbers, cells of
+        the table are merged, or formulas have no stored values.
+    """
+    openpyxl = library("openpyxl", name, "an Excel workbook")
+    try:
+        _refuse_large(content, name)
+        macros = _has_macros(content)
+        book = openpyxl.load_workbook(io.BytesIO(content), read_only=True, data_only=True)
+        sheets = [sheet for sheet in book.worksheets if sheet.sheet_state == "visible"]
+        texts = [(sheet, _text(sheet)) for sheet in sheets]
+        parts = _parts(content, book)
+    # A damaged file surfaces as any of these from the library's own parsing.
+    except (
+        zipfile.BadZipFile, ElementTree.ParseError, ValueError, KeyError, TypeError, OSError,
+        IndexError, AttributeError, MemoryError, EOFError,
+    ) as error:  # fmt: skip
+        raise RecordError(f"{name}: no Excel workbook, or damaged ({error}).") from None
+    notes = ["the workbook holds macros, which are not run"] if macros else []
+    reasons = []
+    for sheet, text in texts:
+        part = parts.get(sheet.title, b"")
+        where = f'{name}, sheet "{sheet.title}"'
+        _refuse_without_values(part, where)
+        try:
+            table = delimited.read(text.encode(), where)
+        except RecordError as error:
+            reasons.append(str(error))
+            continue
+        return _with_notes(table, part, where, notes, [one.title for one, _ in texts], sheet.title)
+    first = reasons[0] if len(reasons) == 1 else f"{name}: no sheet holds rows of numbers."
+    raise RecordError(first)
+
+
+def _with_notes(
+    table: Table, part: bytes, where: str, notes: list[str], titles: list[str], own: str
+) -> Table:
+    """Return a sheet's table with what is to be known of it; refuse merged cells in it.
+
+    Parameters
+    ----------
+    table : as read from the sheet's text
+    part : the sheet's XML
+    where : the file and the sheet, for messages
+    notes : of the workbook
+    titles, own : of all sheets, and of this one
+    """
+    from dataclasses import replace
+
+    _refuse_merged(part, table, where)
+    formulas = len(_formulas(part))
+    if formulas:
+        notes = [*notes, f"{formulas} cells hold formulas: their stored values are taken"]
+    others = [title for title in titles if title != own]
+    if others:
+        notes = [*notes, f'sheet "{own}" is read, and not {", ".join(others)}']
+    return replace(table, notes=(*notes, *table.notes), place="row")
+
+
+def _refuse_large(content: bytes, name: str) -> None:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        size = sum(one.file_size for one in archive.infolist())
+    if size > LARGEST:
+        raise RecordError(
+            f"{name}: {size / 1024**2:.0f} MB unpacked are more than the limit of "
+            f"{LARGEST // 1024**2} MB. Save the sheet as CSV, or cut it."
+        )
+
+
+def _has_macros(content: bytes) -> bool:
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return any(one.endswith("vbaProject.bin") for one in archive.namelist())
+
+
+def _parts(content: bytes, book: Any) -> dict[str, bytes]:
+    """Return the XML of the sheets by their titles: the library's fast way tells less."""
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        return {
+            sheet.title: archive.read(sheet._worksheet_path.lstrip("/"))
+            for sheet in book.worksheets
+        }
+
+
+def _text(sheet: Any) -> str:
+    """Return a sheet as text, cells parted by tabs, a line per row."""
+    sheet.reset_dimensions()  # what some programs write there is wrong
+    rows = [[_cell(value) for value in row] for row in sheet.iter_rows(values_only=True)]
+    while rows and not any(rows[-1]):
+        rows.pop()
+    wide = max((max((k + 1 for k, one in enumerate(r) if one), default=0) for r in rows), default=0)
+    return "\n".join("\t".join((row + [""] * wide)[:wide]) for row in rows) + "\n"
+
+
+def _cell(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(int(value))
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, datetime | date | time):
+        return value.isoformat(sep=" ") if isinstance(value, datetime) else value.isoformat()
+    return " ".join(str(value).split())
+
+
+def _formulas(part: bytes) -> list[bytes]:
+    """Return the cells of a sheet's XML that hold formulas."""
+    if not _ANY_FORMULA.search(part):
+        return []
+    return [cell for cell in _CELL.findall(part) if _ANY_FORMULA.search(cell)]
+
+
+def _refuse_without_values(part: bytes, where: str) -> None:
+    """Refuse formulas that were never computed: nothing here computes them."""
+    for cell in _formulas(part):
+        if not _VALUE.search(cell):
+            place = _PLACE.search(cell)
+            at = f", cell {place.group(1).decode()}" if place else ""
+            raise RecordError(
+                f"{where}{at}: the formula has no stored value, and formulas are not computed "
+                "here. Open the workbook in a spreadsheet and save it, or paste values."
+            )
+
+
+def _refuse_merged(part: bytes, table: Table, where: str) -> None:
+    """Refuse merged cells in the table or in the row above it; elsewhere they do no harm."""
+    first = int(table.lines[0]) - 2  # titles, and a row of units below
+    for match in _MERGED.finditer(part):
+        left, top, right, bottom = (one.decode() for one in match.groups())
+        if int(bottom) >= first and (left != right or int(bottom) > int(top)):
+            raise RecordError(
+                f"{where}: cells {left}{top}:{right}{bottom} are merged, so that a title or a "
+                "value stands for several. Unmerge them, and fill each cell."
+            )

@@ -1,0 +1,42 @@
+"""What is known of a run as a whole: its temperature, frequency, amplitude, the batch of oil.
+
+A label is a number or a word. Those with a name that is known have a unit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TypeAlias
+
+from ..quantity import plain, quantity
+
+Label: TypeAlias = float | str
+Labels: TypeAlias = Mapping[str, Label]
+
+UNITS = {"temperature": "degC", "frequency": "Hz", "amplitude": "m"}
+"""Labels that have a unit, in which study.toml gives them."""
+
+
+def label_text(name: str, value: Label, unit: str = "") -> str:
+    """Return a label's value as people write it: "40 °C", "10 mm", "batch B".
+
+    Parameters
+    ----------
+    name : of the label
+    value : its value
+    unit : its unit, where it is none of `UNITS`: that of a command's level
+    """
+    if isinstance(value, str):
+        return value
+    unit = unit or UNITS.get(name, "")
+    if unit == "degC":
+        return f"{plain(value, 4)} °C"
+    return quantity(value, unit or "1", 4)
+
+
+def varying(labels: Sequence[Labels]) -> list[str]:
+    """Return the labels that every one has, and that are not the same for all."""
+    if not labels:
+        return []
+    shared = [name for name in labels[0] if all(name in one for one in labels)]
+    return [name for name in shared if len({one[name] for one in labels}) > 1]

@@ -1,0 +1,110 @@
+"""A file that holds several runs, cut into them: where time restarts, by a column, or at rests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordError
+from .channels import ChannelSpec
+from .noise import SHORTEST
+from .table import Array, Table
+
+RIGHT = '"restart", "rests" or "column TITLE" is right.'
+
+STANDS = 0.01
+"""Share of the usual top speed below which a rig rests."""
+
+RESTS = 1.0
+"""Time [s] for which it does between two runs."""
+
+
+def wrong_split(split: str) -> str:
+    """Return what is wrong with how files are to be cut, "" where nothing is."""
+    kind, _, title = split.partition(" ")
+    right = title.strip() if kind == "column" else kind in ("restart", "rests") and not title
+    return "" if right else RIGHT
+
+
+def pieces_of(table: Table, split: str, channels: Mapping[str, ChannelSpec]) -> list[Table]:
+    """Return the runs in a file, each a table of its own, in the order of the file.
+
+    Stretches of fewer than 60 samples, such as a single line between two runs, are left out.
+
+    Parameters
+    ----------
+    table : the whole file
+    split : "restart" where time goes back, "column TITLE" where the number in a column changes,
+        "rests" in the middle of rests of a second or more
+    channels : where channels are; the time is needed, and for rests a motion
+
+    Raises
+    ------
+    RecordError
+        If nothing separates runs, or a column that is needed is not there.
+    """
+    if wrong_split(split):
+        raise RecordError(f"{table.source}: split = {split!r}; {RIGHT}")
+    kind, _, title = split.partition(" ")
+    if kind == "restart":
+        cuts = np.flatnonzero(np.diff(_values(table, "time", channels)) < 0.0) + 1
+    elif kind == "column":
+        number = table.values[table.find(title.strip()).text]
+        known = np.isfinite(number)
+        filled = number[np.maximum.accumulate(np.where(known, np.arange(len(number)), 0))]
+        cuts = np.flatnonzero(np.diff(filled) != 0.0) + 1
+    else:
+        cuts = _rests(table, channels)
+    parts = [part for part in np.split(np.arange(table.rows), cuts) if len(part) >= SHORTEST]
+    if len(parts) < 2:
+        why = {
+            "restart": "its time never goes back",
+            "column": f'"{title.strip()}" never changes',
+            "rests": f"nothing rests for {RESTS:g} s between two motions",
+        }[kind]
+        raise RecordError(f"{table.source}: {why}: the file holds one run. Leave split out.")
+    return [_rows(table, part, number) for number, part in enumerate(parts, 1)]
+
+
+def _values(table: Table, channel: str, channels: Mapping[str, ChannelSpec]) -> Array:
+    spec = channels.get(channel)
+    if spec is None or not spec.column:
+        raise RecordError(
+            f"{table.source}: no column is the {channel}, which tells its runs apart."
+        )
+    return table.values[table.find(spec.column).text]
+
+
+def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> NDArray[np.int64]:
+    """Return the middles of rests between two motions."""
+    motion = "velocity" if "velocity" in channels else "displacement"
+    y, time = _values(table, motion, channels), _values(table, "time", channels)
+    step = float(np.median(np.diff(time)))
+    every = np.arange(len(y))
+    good = np.isfinite(y)
+    y = np.interp(every, every[good], y[good])
+    window = max(1, round(0.1 * RESTS / step)) if step > 0.0 else 1
+    smooth = np.convolve(y, np.ones(window) / window, mode="same")
+    speed = np.abs(smooth) if motion == "velocity" else np.abs(np.gradient(smooth))
+    speed[: 2 * window], speed[-2 * window :] = speed[2 * window], speed[-2 * window - 1]
+    still = speed < STANDS * float(np.quantile(speed, 0.98))
+    # Turning points are no rests: they are short.
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
+    found = [
+        (a + b) // 2
+        for a, b in edges.reshape(-1, 2).tolist()
+        if a > 0 and b < len(y) and (b - a) * step >= RESTS
+    ]
+    return np.array(found, dtype=np.int64)
+
+
+def _rows(table: Table, part: NDArray[np.int64], number: int) -> Table:
+    return replace(
+        table,
+        source=f"{table.source}, run {number}",
+        values={name: values[part] for name, values in table.values.items()},
+        lines=table.lines[part],
+    )

@@ -1,0 +1,86 @@
+"""What commands a damper: the voltage of its coil, its current, a duty cycle or a flux density.
+
+Laws and effects are declared for a voltage [V]. With another drive the same numbers are per ampere,
+per cent or per tesla: `declared_for` says a parameter so. No value changes by that.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import NamedTuple
+
+from .parameter import Parameter
+
+
+class Drive(NamedTuple):
+    """A kind of command.
+
+    Attributes
+    ----------
+    name : str
+        Of the channel, and of the damper's input in an FMU.
+    unit : str
+        In which all of bristle has it, and FMUs as well.
+    word : str
+        That unit in words, as in "yield force per volt".
+    limit : str
+        The FMU's parameter for the largest value.
+    largest : float
+        Its default.
+    """
+
+    name: str
+    unit: str
+    word: str
+    limit: str
+    largest: float
+
+
+VOLTAGE = Drive("voltage", "V", "volt", "v_max", 8.0)
+
+DRIVES = {
+    one.name: one
+    for one in (
+        VOLTAGE,
+        Drive("current", "A", "ampere", "current_max", 8.0),
+        Drive("duty", "%", "per cent of duty", "duty_max", 100.0),
+        Drive("field", "T", "tesla", "field_max", 8.0),
+    )
+}
+"""All kinds of commands by name; the first is that for which laws are declared."""
+
+
+def drive_named(name: str) -> Drive:
+    """Return a kind of command; without a name that for which laws are declared."""
+    return DRIVES[name] if name else VOLTAGE
+
+
+def unit_for(unit: str, drive: Drive, declared: str = VOLTAGE.unit) -> str:
+    """Return a unit of a law or effect as it is with a command: `N/V` is `N/A` with a current.
+
+    Parameters
+    ----------
+    unit : as it is with a command in the unit `declared`
+    drive : the command
+    """
+    return re.sub(rf"(?<![A-Za-z%]){re.escape(declared)}(?![A-Za-z%])", drive.unit, unit)
+
+
+def text_for(text: str, drive: Drive) -> str:
+    """Return a text of a law or effect as it is with a command: "per ampere", "the current"."""
+    if drive.name == VOLTAGE.name:
+        return text
+    text = re.sub(r"\bvolts?\b", drive.word, re.sub(r"\bvoltage\b", drive.name, text))
+    return re.sub(r"\bV\b", drive.unit, text.replace("Voltage", drive.name.capitalize()))
+
+
+def state_for(name: str, drive: Drive) -> str:
+    """Return how a state of an effect is called with a command: a held voltage, a held current."""
+    return drive.name if name == VOLTAGE.name else name
+
+
+def declared_for(parameter: Parameter, drive: Drive) -> Parameter:
+    """Return a parameter of a law or effect with unit and text for a command."""
+    return parameter._replace(
+        unit=unit_for(parameter.unit, drive), text=text_for(parameter.text, drive)
+    )

@@ -1,0 +1,57 @@
+"""The runs of a study as measurements, each with what study.toml knows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..data.measurement import Known, Measurement, measurements_of, stem_of
+from ..data.pieces import pieces_of
+from ..data.read import read_table
+from ..data.table import Table
+from ..errors import StudyError
+from .run_file import RunFile
+from .settings import Settings
+
+
+def read_runs(folder: Path, settings: Settings, role: str | None = None) -> list[Measurement]:
+    """Return the measurements of a study's runs; a file of several runs is read once.
+
+    Parameters
+    ----------
+    folder : the study's
+    settings : the content of its study.toml
+    role : the role of the runs; None for all
+
+    Raises
+    ------
+    RecordError
+        If a file cannot be read.
+    StudyError
+        If a run is none of those in its file.
+    """
+    tables: dict[str, Sequence[Table]] = {}
+    found: list[Measurement] = []
+    for run in settings.runs:
+        if role not in (None, run.role):
+            continue
+        if run.file not in tables:
+            table = read_table(folder / run.file)
+            split = settings.split
+            tables[run.file] = pieces_of(table, split, settings.channels) if split else [table]
+        found += _measured(folder, settings, run, tables[run.file])
+    return found
+
+
+def _measured(
+    folder: Path, settings: Settings, run: RunFile, tables: Sequence[Table]
+) -> list[Measurement]:
+    """Return the measurements of a run among those of its file."""
+    if run.piece > len(tables):
+        raise StudyError(
+            f"{folder / 'study.toml'}: {run.file} holds {len(tables)} runs, and "
+            f"piece = {run.piece} is none of them."
+        )
+    name = f"{stem_of(run.file)} run {run.piece}" if run.piece else ""
+    known = Known(name, run.levels, run.labels, settings.rate, settings.mask)
+    return measurements_of(tables[max(run.piece, 1) - 1], settings.channels, known=known)

@@ -1,0 +1,287 @@
+"""What is known of whole runs: from the names of their files, or from a table beside them."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from ..data.channels import DRIVE, PLAIN
+from ..data.labels import UNITS, Label, label_text
+from ..data.titles import title, unit_or_none
+from ..errors import StudyError, UnitError
+from ..findings import written
+from ..units import convert, same_dimension
+from .run_file import ROLES
+
+_NUMBER = r"\d+(?:[.,p]\d+)?"  # "1p5" stands for 1.5 where a point would end a name
+_UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|C"
+_TOKEN = re.compile(rf"(?<![\d.])({_NUMBER})[ ]?({_UNITS_IN_NAMES})(?![A-Za-z])")
+_SPELLED = {"pct": "%", "percent": "%", "C": "degC"}
+_FILE = ("file", "run", "name", "datei", "filename")
+
+
+@dataclass(frozen=True)
+class RunChoices:
+    """What a user says of all runs of a new study.
+
+    `levels` patterns such as "I{}A", where {} is the command's level in a file's name; `labels`
+    such as "oil=oil{}"; `table` a file with a row per run; `split` how files hold several runs;
+    `rate` [Hz] to which faster runs are decimated, None for what a fit needs, 0 for none; `mask`
+    whether isolated spikes count as not measured.
+    """
+
+    levels: Sequence[str] = ()
+    labels: Sequence[str] = ()
+    table: Path | None = None
+    split: str = ""
+    rate: float | None = None
+    mask: bool = False
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known of one run: levels of its command, labels, and its role, "" where not said."""
+
+    levels: Mapping[str, float] = field(default_factory=dict)
+    labels: Mapping[str, Label] = field(default_factory=dict)
+    role: str = ""
+
+    def and_(self, other: Facts) -> Facts:
+        """Return these facts with others, which count where both say something."""
+        return Facts(
+            {**self.levels, **other.levels}, {**self.labels, **other.labels},
+            other.role or self.role,
+        )  # fmt: skip
+
+
+def facts_of(
+    files: Sequence[Path], choices: RunChoices, commanded: bool
+) -> tuple[list[Facts], list[str]]:
+    """Return what is known of each file's run, and where it is from, in sentences.
+
+    Parameters
+    ----------
+    files : one run or more each
+    choices : patterns and table that were given
+    commanded : whether the files hold a channel of the command: then names give no level unasked
+
+    Raises
+    ------
+    StudyError
+        If a pattern fits no name, two sources differ, or the table cannot be read.
+    """
+    found, notes = _offered(files, choices, commanded)
+    for pattern in choices.levels:
+        found = _joined(found, [_matched(file, pattern, level=True) for file in files])
+    for pattern in choices.labels:
+        found = _joined(found, [_matched(file, pattern, level=False) for file in files])
+    if choices.table is not None:
+        rows = _rows(choices.table, files)
+        found = _joined(found, rows)
+        named = {name for row in rows for name in (*row.levels, *row.labels)}
+        if named:
+            notes.append(f"{', '.join(sorted(named))} of each run: from {choices.table}")
+    asked = {name for one in found for name in one.levels}
+    if commanded and asked:
+        raise StudyError(
+            f"{', '.join(sorted(asked))}: a level of each run, and a channel of the command as "
+            "well. One of the two: leave the level out, or the channel with --channel."
+        )
+    if len(asked) > 1:
+        raise StudyError(f"{' and '.join(sorted(asked))} both as levels; one command is right.")
+    return found, notes
+
+
+def _joined(first: list[Facts], more: list[Facts]) -> list[Facts]:
+    return [one.and_(other) for one, other in zip(first, more, strict=True)]
+
+
+# -- names
+
+
+def _offered(
+    files: Sequence[Path], choices: RunChoices, commanded: bool
+) -> tuple[list[Facts], list[str]]:
+    """Return what all names tell without being asked, and the sentences that say so."""
+    tokens = [_tokens(file) for file in files]
+    shared = [name for name in tokens[0] if all(name in one for one in tokens)] if tokens else []
+    given = {pattern.partition("=")[0] for pattern in choices.labels}
+    found, notes = [Facts() for _ in files], []
+    for name in shared:
+        drive = name in DRIVE
+        if (drive and (commanded or choices.levels or choices.table)) or name in given:
+            continue
+        values = [one[name][0] for one in tokens]
+        if drive and _counts(values):
+            pattern = tokens[0][name][2]
+            notes.append(
+                f'"{tokens[0][name][1]}" and the like in the names may count the files; '
+                f"--level '{pattern}' takes them for the {name}"
+            )
+            continue
+        unit = PLAIN[name] if drive else ""
+        levels = ", ".join(label_text(name, value, unit) for value in sorted(set(values)))
+        seen = tokens[0][name][1]
+        text = f'{name} of each run: from the names of the files, as in "{seen}": {levels}'
+        if drive:
+            text += f". No column holds a command. --level '{tokens[0][name][2]}' says the same"
+        notes.append(text)
+        for k, value in enumerate(values):
+            more = Facts(levels={name: value}) if drive else Facts(labels={name: value})
+            found[k] = found[k].and_(more)
+    return found, notes
+
+
+def _counts(values: Sequence[float]) -> bool:
+    """Return whether numbers only count the files: 1, 2, 3 ..., each once."""
+    return len(values) > 2 and sorted(values) == [float(k) for k in range(1, len(values) + 1)]
+
+
+def _tokens(file: Path) -> dict[str, tuple[float, str, str]]:
+    """Return what a name tells: quantity to value, the text that tells it, and its pattern.
+
+    What is told twice tells nothing.
+    """
+    out: dict[str, tuple[float, str, str]] = {}
+    twice = set()
+    for match in _TOKEN.finditer(file.stem):
+        number, spelled = match.groups()
+        unit = _SPELLED.get(spelled, spelled)
+        name = _quantity(unit)
+        letter = re.search(r"[A-Za-z]*$", file.stem[: match.start()])
+        before = letter.group() if letter else ""
+        if name in out:
+            twice.add(name)
+        target = PLAIN.get(name) or UNITS[name]
+        value = convert(_number(number), unit, target)
+        out[name] = value, before + match.group(), f"{before}{{}}{spelled}"
+    return {name: found for name, found in out.items() if name not in twice}
+
+
+def _quantity(unit: str) -> str:
+    """Return the command or the label that a unit in a name tells."""
+    for name in (*DRIVE, *UNITS):
+        if same_dimension(unit, PLAIN.get(name) or UNITS[name]):
+            return name
+    raise UnitError(f'unit "{unit}" tells neither a command nor a label.')
+
+
+def _number(text: str) -> float:
+    return float(text.replace(",", ".").replace("p", "."))
+
+
+def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
+    """Return what a pattern such as "I{}A" or "oil=batch{}" finds in a name."""
+    option = "--level" if level else "--label"
+    named, _, rest = pattern.rpartition("=")
+    right = "--level 'I{}A', or --level 'current=run{}_', is right"
+    right = right if level else "--label 'oil=batch{}' is right"
+    if rest.count("{}") != 1 or (not level and not named):
+        raise StudyError(f"{option} {written(pattern)}: {right}, where {{}} is the value.")
+    before, after = rest.split("{}")
+    spelled = re.match(r"[A-Za-z%]*", after)
+    unit = _SPELLED.get(spelled.group(), spelled.group()) if spelled else ""
+    known = unit_or_none(unit) if unit else None
+    if level:
+        named = named or (_quantity_or_none(known.name) if known else "")
+        if named not in DRIVE:
+            raise StudyError(
+                f"{option} {written(pattern)}: a unit must follow {{}}, A or V or %, or the "
+                f"channel stand before it: {right}."
+            )
+    target = PLAIN.get(named) or UNITS.get(named, "")
+    number = target != "" or known is not None
+    wanted = rf"[-+]?{_NUMBER}" if number else r"[A-Za-z0-9.]+"
+    match = re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}", file.stem + "_")
+    match = match or re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}$", file.stem)
+    if match is None:
+        raise StudyError(f'{option} {written(pattern)}: it fits no part of "{file.name}".')
+    if not number:
+        return Facts(labels={named: match.group(1)})
+    value = _number(match.group(1))
+    if known is not None and target and same_dimension(known.name, target):
+        value = convert(value, known.name, target)
+    return Facts(levels={named: value}) if level else Facts(labels={named: value})
+
+
+def _quantity_or_none(unit: str) -> str:
+    try:
+        return _quantity(unit)
+    except UnitError:
+        return ""
+
+
+# -- a table beside the files
+
+
+def _rows(path: Path, files: Sequence[Path]) -> list[Facts]:
+    """Return the rows of a table in the order of the files; StudyError for what is not right."""
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise StudyError(f"--runs {path}: cannot be read ({error}).") from None
+    lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] != "#"]
+    if len(lines) < 2:
+        raise StudyError(f"--runs {path}: a line of titles and a line per run are right.")
+    delimiter = max(",;\t", key=lines[0].count)
+    header, *rows = csv.reader(lines, delimiter=delimiter)
+    at = [k for k, name in enumerate(header) if name.strip().lower() in _FILE]
+    if not at:
+        raise StudyError(
+            f'--runs {path}: no column is called "file"; there are {", ".join(header)}.'
+        )
+    found: dict[str, Facts] = {}
+    for number, row in enumerate(rows, 2):
+        where = f"--runs {path}, row {number}"
+        if len(row) != len(header):
+            raise StudyError(f"{where}: {len(row)} fields under {len(header)} titles.")
+        found[Path(row[at[0]].strip()).name] = _facts(header, row, at[0], where)
+    return [_row_of(file, found, path) for file in files]
+
+
+def _row_of(file: Path, rows: Mapping[str, Facts], path: Path) -> Facts:
+    for name in (file.name, file.stem):
+        if name in rows:
+            return rows[name]
+    raise StudyError(f"--runs {path}: no row is of {file.name}; every run needs one.")
+
+
+def _facts(header: Sequence[str], row: Sequence[str], file: int, where: str) -> Facts:
+    """Return what a row says: numbers in the unit of their title, words as they are."""
+    found = Facts()
+    for k, (text, field_text) in enumerate(zip(header, row, strict=True)):
+        value = field_text.strip()
+        if k == file or not value:
+            continue
+        column = title(k, text)
+        name = column.name.strip().lower().replace(" ", "_")
+        if name == "role":
+            if value not in ROLES:
+                raise StudyError(f'{where}: role is "{value}"; {" or ".join(ROLES)} is right.')
+            found = replace(found, role=value)
+            continue
+        target = PLAIN.get(name, "") if name in DRIVE else UNITS.get(name, "")
+        number = _number_or_none(value)
+        if number is None and target:
+            raise StudyError(f'{where}: {name} is "{value}"; a number is right.')
+        if number is None:
+            found = found.and_(Facts(labels={name: value}))
+            continue
+        if target and column.unit is not None:
+            try:
+                number = convert(number, column.unit.name, target)
+            except UnitError as error:
+                raise StudyError(f"{where}: {name}: {error}") from None
+        more = Facts(levels={name: number}) if name in DRIVE else Facts(labels={name: number})
+        found = found.and_(more)
+    return found
+
+
+def _number_or_none(text: str) -> float | None:
+    try:
+        return float(text.replace(",", "."))
+    except ValueError:
+        return None

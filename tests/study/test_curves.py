@@ -1,0 +1,134 @@
+"""`bristle learn`: what a study's library has no name for becomes an effect of the study."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from bristle.cli import main
+from bristle.diagnose.candidates import Trial
+from bristle.diagnose.learned.curve import Curve
+from bristle.diagnose.learned.fit import LearnedCurve
+from bristle.errors import StudyError
+from bristle.identify.fit import Model
+from bristle.study import curves
+from bristle.study.curves import learn_effect
+from bristle.study.identification import identify_study
+from bristle.study.learning import add_effects
+from bristle.study.study import Study
+
+KNOTS = np.linspace(-0.015, 0.015, 13)  # m
+NONE = np.zeros(0)
+
+
+def trial(z: float) -> Trial:
+    return Trial(Model("bingham"), z, z, 0.1 * z, NONE, NONE)
+
+
+def found_of(refused: str = "") -> LearnedCurve:
+    """Return a spring of 300 N/m that was learned, or refused."""
+    curve = Curve("force", "displacement", (), tuple(KNOTS), tuple(300.0 * KNOTS))
+    return LearnedCurve(
+        "learned_1", curve, (0.05,) * 13, trial(6.0), trial(1.02), (), refused
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """Return the folder of a study of a bench whose bore is worn at mid-stroke."""
+    folder = tmp_path_factory.mktemp("curves") / "rig"
+    assert main(["example", "bench", str(folder), "--effect", "worn_bore", "--quiet"]) == 0
+    return folder
+
+
+@pytest.fixture
+def study(made, tmp_path):
+    return Study(shutil.copytree(made, tmp_path / "rig"))
+
+
+@pytest.fixture
+def learned(monkeypatch):
+    """Let nothing be fitted: what was learned is given."""
+
+    def given(refused: str = "") -> None:
+        monkeypatch.setattr(curves, "_opened", lambda study: None)
+        monkeypatch.setattr(curves, "learn", lambda *_, **__: found_of(refused))
+        monkeypatch.setattr(curves, "fit_closed", lambda *_: None)
+
+    return given
+
+
+def test_a_learned_curve_is_an_effect_of_the_study(study, learned):
+    learned()
+    found = learn_effect(study)
+    assert found.file == study.effects_folder / "learned_1.py"
+    assert "KNOTS" in found.file.read_text()
+    assert found.picture is not None
+    assert found.picture.read_bytes().startswith(b"\x89PNG")
+    first, second = found.sentences()
+    assert "from 6.00 to 1.02" in first
+    assert "a spring of 300 N/m" in second
+    # bristle made the file here: its text needs no consent, and the next one has another name.
+    assert study.usable_effects() == []
+    assert json.loads(json.dumps(found.as_dict()))["forms"][0]["name"] == "line"
+    again = learn_effect(study)
+    assert again.file is not None
+    assert again.file.name == "learned_2.py"
+
+
+def test_what_is_refused_leaves_the_study_as_it_was(study, learned):
+    learned("The best curve does not lower the error.")
+    before = sorted(path.name for path in study.folder.rglob("*"))
+    found = learn_effect(study)
+    assert found.file is None
+    assert found.sentences() == ["Nothing was learned. The best curve does not lower the error."]
+    assert sorted(path.name for path in study.folder.rglob("*")) == before
+
+
+def test_a_dry_run_writes_no_effect(study, learned):
+    learned()
+    assert learn_effect(study, write=False).file is None
+    assert not (study.effects_folder / "learned_1.py").exists()
+
+
+def test_a_name_that_is_taken_is_refused(study, learned):
+    learned()
+    with pytest.raises(StudyError, match="gas_spring"):
+        learn_effect(study, name="gas_spring")
+
+
+@pytest.mark.parametrize("name", ["two words", "1st", "../outside", "class"])
+def test_a_name_that_is_no_word_is_refused(study, learned, name):
+    learned()
+    with pytest.raises(StudyError, match="name"):
+        learn_effect(study, name=name)
+    assert not list(study.folder.parent.glob("outside*"))
+
+
+@pytest.mark.parametrize(("option", "value"), [("--along", "speeds"), ("--as", "yields")])
+def test_a_signal_or_part_that_there_is_not_is_told(study, capsys, option, value):
+    assert main(["learn", str(study.folder), option, value]) == 2
+    told = capsys.readouterr().err
+    assert value in told
+    assert "Did you mean" in told
+
+
+@pytest.mark.slow
+def test_the_hidden_formula_comes_back_and_the_study_goes_on_with_it(study):
+    identify_study(study, table=False)
+    found = learn_effect(Study(study.folder))
+    assert found.closed is not None
+    assert found.closed.form.name == "bell"
+    assert found.closed.trial.z < 1.05
+    values = {name: value for name, value, _ in found.closed.formula.parameters}
+    assert values["m"] == pytest.approx(-0.4714, rel=5e-3)  # sealed/answer.txt of this seed
+    assert values["d"] == pytest.approx(5.201e-3, rel=5e-3)  # m
+    added = add_effects(Study(study.folder), ["learned_1"])
+    assert added.identified.after["z_holdout"] < 1.05
+    # Nothing is left: a second curve is refused.
+    again = learn_effect(Study(study.folder))
+    assert again.file is None
+    assert "Nothing was learned" in again.sentences()[0]
