@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from ..findings import command
@@ -20,6 +22,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle diagnose`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
+        "--law",
+        help="all: try every law, and name the law together with the effects that it misses; else "
+        "the model's law is kept",
+    )
+    parser.add_argument(
         "--dry-run", action="store_true", help="show the verdict; do not change verdict.json"
     )
     add_trust(parser)
@@ -32,7 +39,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    found = diagnose_study(study, write=not arguments.dry_run)
+    found = diagnose_study(study, law=arguments.law, write=not arguments.dry_run)
     verdict = verdict_of(study, found)
     if arguments.json:
         print(json.dumps(verdict, indent=2, ensure_ascii=False))
@@ -60,12 +67,30 @@ def text(verdict: Verdict, folder: Path) -> str:
         ]
     for note in verdict.get("notes", ()):
         lines += ["", f"Note: {note.rstrip('.')}."]
+    if verdict.get("laws"):
+        lines += ["", *law_lines(verdict["laws"])]
     lines += _trials(verdict)
     if hidden := untestable(verdict):
         lines += ["", f"Not testable with these runs: {', '.join(hidden)}."]
     if separating(verdict):
         lines += ["", f"To distinguish them: {separating(verdict)}"]
     return "\n".join([*lines, "", f"Next:  {_next(verdict, folder)}"])
+
+
+def law_lines(rows: Sequence[Verdict]) -> list[str]:
+    """Return the table of laws as text, from its rows as verdict.json has them."""
+    from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
+
+    table = [list(HEADER), *law_table(rows)]
+    wide = [max(len(cells[k]) for cells in table) for k in range(len(HEADER))]
+    lines = [
+        "  " + "  ".join(
+            cell.ljust(width) if k < 2 else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(cells, wide, strict=True))
+        )
+        for cells in table
+    ]  # fmt: skip
+    return [*lines, *wrap(TABLE_NOTE, 98, initial_indent="  ", subsequent_indent="  ")]
 
 
 def _trials(verdict: Verdict) -> list[str]:
@@ -76,7 +101,8 @@ def _trials(verdict: Verdict) -> list[str]:
         return []
     lines = ["", f"  {'error / noise (z) of the model':34} {'training':>12} {'held out':>12}"]
     before = at["z_train_before"], at["z_holdout_before"]
-    lines.append(f"  {'present model':34} {before[0]:>12.3f} {before[1]:>12.3f}")
+    model = f"{verdict['law']} alone" if verdict.get("laws") else "present model"
+    lines.append(f"  {model:34} {before[0]:>12.3f} {before[1]:>12.3f}")
     refined = [row for row in rows[:5] if row["refined"]]
     # The order of equals is that of a rounding: one stands for all of them.
     others = sorted(
@@ -91,14 +117,39 @@ def _trials(verdict: Verdict) -> list[str]:
 
 
 def _next(verdict: Verdict, folder: Path) -> str:
-    """Return the command that follows from a verdict."""
+    """Return the command that follows from a verdict; two where it asks for another law."""
+    if not verdict.get("laws"):
+        return _then(verdict, folder)
+    from ..physics.forms import joined_form
+    from ..study.laws import law_command
+
+    law = joined_form(verdict["law"], verdict["command"])
+    if law == verdict["law_before"]:
+        return _then(verdict, folder)
+    return f"{law_command(folder, law)} , then:  {_then(verdict, folder)}"
+
+
+def _then(verdict: Verdict, folder: Path) -> str:
     if verdict["kind"] in ("effect", "ambiguous"):
         count = len(verdict["effects"]) if verdict["kind"] == "effect" else 1
         return command("add", folder, *verdict["effects"][:count])
     if verdict["kind"] == "unknown":
-        return (
+        return _gaining(verdict, folder) + (
             f"{command('learn', folder)} , which learns what is missing;  "
             f"{command('compare', folder)} , which shows where the residual is;  "
             "bristle effects new NAME  starts your own effect."
         )
     return command("report", folder)
+
+
+def _gaining(verdict: Verdict, folder: Path) -> str:
+    """Return the command that adds what gains most where nothing explains the error; "" if none."""
+    gains = verdict.get("gains") or []
+    if not gains:
+        return ""
+    best = max(gains, key=lambda row: row["gain"])
+    return (
+        f"{command('add', folder, *best['effects'])} , which lowers the error by "
+        f"{best['gain']:.0%};  {command('study', 'auto', folder, '--greedy')} , which adds effects "
+        "as long as one gains;  "
+    )

@@ -24,7 +24,11 @@ BETTER = 0.9
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle identify`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
-    parser.add_argument("--law", help="another law than the model's: bingham, lugre, ..._standard")
+    parser.add_argument(
+        "--law",
+        help="another law than the model's: bingham, lugre, ..._standard; all: keep the model's, "
+        "and show how every law does",
+    )
     parser.add_argument(
         "--command",
         dest="form",
@@ -104,6 +108,8 @@ def text(found: Identified, folder: Path) -> str:
     if found.unidentified:
         lines += ["", f"The data do not identify: {', '.join(found.unidentified)}."]
     lines += ["", *_errors(found)]
+    if found.laws:
+        lines += ["", *_every_law(found, folder)]
     if found.forms:
         lines += ["", *_forms(found, folder)]
     if found.table:
@@ -169,6 +175,15 @@ def _forms(found: Identified, folder: Path) -> list[str]:
             f"{command('identify', folder, '--command', best.form)}"
         )
     return [*lines, "  Each form identified with all effects of the model, on the same runs."]
+
+
+def _every_law(found: Identified, folder: Path) -> list[str]:
+    """Return the table of all laws, and the command that seeks the law with its effects."""
+    from ..diagnose.law_verdict import rows_of
+    from .diagnose import law_lines
+
+    free = command("diagnose", folder, "--law", "all")
+    return [*law_lines(rows_of(found.laws)), f"  To seek the law with its effects:  {free}"]
 
 
 def _laws(found: Identified, folder: Path) -> list[str]:

@@ -34,6 +34,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--learn", action="store_true",
         help="where no known effect explains the error, learn a curve and go on",
     )  # fmt: skip
+    auto.add_argument(
+        "--law", help="all: seek the law together with its effects; a name: take that law first"
+    )
+    auto.add_argument(
+        "--greedy", action="store_true",
+        help="where no effect explains the error, add the one that lowers it most, and go on",
+    )  # fmt: skip
     add_trust(auto)
     auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
     auto.set_defaults(act=_auto)
@@ -254,7 +261,9 @@ def _auto(arguments: argparse.Namespace) -> int:
         print(f"\n{staircase(steps, cut_off=low)}\n", flush=True)
         shown.append(len(steps))
 
-    done = complete(study, curves=arguments.learn, on_step=show)
+    done = complete(
+        study, law=arguments.law, greedy=arguments.greedy, curves=arguments.learn, on_step=show
+    )
     if arguments.json:
         import json
 

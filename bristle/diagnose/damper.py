@@ -41,7 +41,9 @@ def look_at_damper(opened: Opening, say: Progress = silent) -> tuple[Finding, Op
             before = opened.before
     if not decision.effects:
         decision = _rare(before, made.single, rule) or decision
-    found = replace(of_decision(decision, before, tuple(made.single)), sensors=sensors)
+    found = of_decision(decision, before, tuple(made.single))
+    best_pair = min(made.pairs, key=lambda pair: pair.z, default=None)
+    found = replace(found, sensors=sensors, together=best_pair)
     patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
     return replace(found, patterns=patterns), opened
 

@@ -30,7 +30,7 @@ class Finding:
     `std` is by parameter [SI], of what the data identify; `patterns` those of the residual;
     `untestable` the effects that the site's runs do not show; `experiment` the run that would
     distinguish alternatives, where the rig's motion can be chosen; `sensors` are faults that only
-    the model with the named effects shows.
+    the model with the named effects shows; `together` is the best pair of effects that was tried.
     """
 
     site: str
@@ -51,6 +51,7 @@ class Finding:
     untestable: tuple[str, ...] = ()
     experiment: Experiment | None = None
     sensors: tuple[SensorFault, ...] = ()
+    together: Trial | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return what verdict.json holds of the site."""

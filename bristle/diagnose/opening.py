@@ -95,6 +95,54 @@ class Opening:
         return self.part or self.problem
 
 
+@dataclass(frozen=True)
+class BenchData:
+    """A bench's runs, freed of the faults that channels show of each other, and smoothed.
+
+    `noise` is that of each channel, in SI; `shown` the channels whose instruments may still have an
+    effect.
+    """
+
+    problem: Problem
+    held_out: Problem
+    faults: tuple[SensorFault, ...]
+    noise: Mapping[str, float]
+    shown: tuple[str, ...]
+
+
+def bench_data(
+    train: Sequence[Measurement],
+    holdout: Sequence[Measurement],
+    present: Model,
+    say: Progress = silent,
+) -> BenchData | Insufficient:
+    """Return a bench's runs as every model is held against them, or why they carry no verdict.
+
+    Parameters
+    ----------
+    train, holdout : runs to fit to, and those that decide
+    present : the model as it is, whose effects must act on a bench
+    say : is told what is being done
+    """
+    say("looking for sensor faults")
+    faults = sensor_faults([*train, *holdout])
+    lacking = _lacking([*train, *holdout], faults)
+    noise = median_noise([*train, *holdout])
+    if lacking:
+        return Insufficient(tuple(lacking), tuple(faults), noise)
+    say("smoothing the motion")
+    left = [_left(corrected(runs, faults)) for runs in (train, holdout)]
+    if not all(left):
+        reasons = ("No run has enough samples that are not clipped.", *words_of(faults))
+        return Insufficient(reasons, tuple(faults), noise)
+    problem, held_out = bench_rig(left[0], left[1], DRAWS).sites(present)[DAMPER].pair
+    redundant = any(
+        run.has("displacement", "velocity") and not derived_velocity(run) for run in train
+    )
+    channels = ("force",) if redundant else ("force", "velocity")
+    return BenchData(problem, held_out, tuple(faults), noise, channels)
+
+
 def opening(
     train: Sequence[Measurement],
     holdout: Sequence[Measurement],
@@ -112,21 +160,24 @@ def opening(
     identified : whether its values were fitted before: they are then refined, not sought anew
     say : is told what is being done
     """
-    say("looking for sensor faults")
-    faults = sensor_faults([*train, *holdout])
-    lacking = _lacking([*train, *holdout], faults)
-    noise = median_noise([*train, *holdout])
-    if lacking:
-        return Insufficient(tuple(lacking), tuple(faults), noise)
-    say("smoothing the motion")
-    left = [_left(corrected(runs, faults)) for runs in (train, holdout)]
-    if not all(left):
-        reasons = ("No run has enough samples that are not clipped.", *words_of(faults))
-        return Insufficient(reasons, tuple(faults), noise)
-    problem, held_out = bench_rig(left[0], left[1], DRAWS).sites(present)[DAMPER].pair
+    data = bench_data(train, holdout, present, say)
+    if isinstance(data, Insufficient):
+        return data
     say("fitting the present model")
+    problem = data.problem
     base = refine(present, problem) if identified else _identified(present, problem)
-    before = judge(base, problem, held_out)
+    return opened_with(judge(base, problem, data.held_out), data)
+
+
+def opened_with(before: Trial, data: BenchData) -> Opening:
+    """Return what a diagnosis begins with: the runs freed of what a model shows of channels.
+
+    Parameters
+    ----------
+    before : the trial of a model that was fitted to these runs
+    data : the runs
+    """
+    problem, held_out, faults = data.problem, data.held_out, list(data.faults)
     shown = model_based_fault(before, problem, held_out, problem.runs[0].drive)
     if shown is not None:
         faults.append(shown.fault)
@@ -134,11 +185,7 @@ def opening(
         if shown.fault.fault == "bias":  # found without the effects that are tried next
             problem, held_out = problem.with_free_zero(), held_out.with_free_zero()
             before = judge(before.model, problem, held_out)
-    redundant = any(
-        run.has("displacement", "velocity") and not derived_velocity(run) for run in train
-    )
-    channels = ("force",) if redundant else ("force", "velocity")
-    return Opening(before, problem, held_out, tuple(faults), noise, channels)
+    return Opening(before, problem, held_out, tuple(faults), data.noise, data.shown)
 
 
 def _identified(present: Model, problem: Problem) -> Model:
@@ -149,11 +196,12 @@ def _identified(present: Model, problem: Problem) -> Model:
 
 
 class Trials:
-    """The trials of single effects, and those of pairs as far as they are asked for."""
+    """The trials of single effects, and of `pairs` as far as they are asked for."""
 
     def __init__(self, opened: Opening, say: Progress = silent) -> None:
         self.opened, self.say = opened, say
         self.before = opened.before
+        self.pairs: list[Trial] = []
         say("trying every effect inside the model")
         self.single = self._all(self.before, None)
 
@@ -165,7 +213,9 @@ class Trials:
     def grow(self, first: Trial) -> list[Trial]:
         """Return the trials of all effects added to a trial's model."""
         self.say(f"no single effect suffices: adding a second one to {first.effects[-1]}")
-        return self._all(first, SECONDS)
+        grown = self._all(first, SECONDS)
+        self.pairs += grown
+        return grown
 
     def reduce(self, pair: Trial) -> list[Trial]:
         """Return the trials of a pair's members alone."""

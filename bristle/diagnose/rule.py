@@ -4,10 +4,8 @@ z is RMS(residual)/noise expected. The excess z^2 - 1 is the part of a residual'
 does not account for. "Found" says how a value came about. "blind seeds": it was set by hand on
 cases of the independent generator whose answer was known, on other seeds than those that are
 reported. "the method": it follows from how a quantity is computed. `python -m benchmarks calibrate`
-measures what a value trades.
-
-The evaluations of a search, step sizes and lengths of blocks decide nothing by themselves: they
-stay where they are used.
+measures what a value trades. Evaluations of a search, step sizes and lengths of blocks decide
+nothing by themselves and stay where they are used.
 """
 
 # Longer than 300 lines: one number after the other, each with its reason.
@@ -30,8 +28,7 @@ class DecisionRule:
     gain: float = 0.02
     """Smallest share by which an effect, or a fault, must lower z on held-out runs to count.
 
-    Trades: if higher, weak effects are missed; if lower, chance gains are named. Found: blind
-    seeds.
+    Trades: if higher, weak effects are missed; if lower, chance is named. Found: blind seeds.
     """
 
     chance: float = 0.01
@@ -72,9 +69,8 @@ class DecisionRule:
     likelihood: float = 40.0
     """Gain of the log-likelihood that counts as beyond chance if the model is adequate.
 
-    Resampling of blocks does not show what happens in a few samples, such as a single contact with
-    a stop. Trades: if higher, rare contacts are missed; if lower, outliers are named. Found: blind
-    seeds.
+    Resampling of blocks does not show what happens in a few samples, such as one contact with a
+    stop. Trades: if higher, rare contacts are missed; if lower, outliers count. Found: blind seeds.
     """
 
     # --- how well an effect must do
@@ -122,6 +118,15 @@ class DecisionRule:
 
     Trades: if higher, the right name is one of many; if lower, it may be left out. Found: stated.
     """
+
+    law_gain: float = 0.02
+    """Share by which a law's z must exceed the best one's, beyond chance, to be clearly worse.
+
+    Trades and found: as `gain`.
+    """
+
+    most_laws: int = 4
+    """Largest number of laws whose effects are searched. Trades: computing time. Found: stated."""
 
     # --- two effects
 
@@ -171,16 +176,14 @@ class DecisionRule:
     cut: float = 0.2
     """Share of samples at the limit of the force's range above which there is no verdict.
 
-    Trades: if higher, verdicts on saturated channels; if lower, usable data are refused. Found:
-    stated.
+    Trades: if higher, verdicts on saturated channels; if lower, good data refused. Found: stated.
     """
 
     trained: float = 1.1
     """z on the training runs up to which "unknown" becomes "insufficient".
 
     The held-out runs then differ in something that no channel shows. Trades: if higher, missing
-    effects read as insufficient data; if lower, data that differ read as missing effects. Found:
-    blind seeds.
+    effects read as insufficient data; if lower, other data read as effects. Found: blind seeds.
     """
 
     misfit: float = 1.15
@@ -193,8 +196,7 @@ class DecisionRule:
     most_groups: int = 3
     """Largest number of groups of runs, each with its own values, that count as rigs.
 
-    Trades: if higher, changes between runs read as rigs; if lower, three rigs give unknown. Found:
-    stated.
+    Trades: if higher, changes read as rigs; if lower, three rigs give unknown. Found: stated.
     """
 
     # --- what the data could show, and what would tell more
@@ -215,8 +217,7 @@ class DecisionRule:
     tells: float = 4.0
     """Standard deviations between rivals below which a proposed run separates them only by luck.
 
-    Trades: if higher, useful runs are not proposed; if lower, useless runs are proposed. Found:
-    blind seeds.
+    Trades: if higher, useful runs are not proposed; if lower, useless ones are. Found: blind seeds.
     """
 
     clear: float = 0.3
@@ -305,8 +306,7 @@ class DecisionRule:
     share_when_clean: float = 0.75
     """Smallest share explained if a fault brings z below `clean`; it is uncertain for a small z.
 
-    Trades: if higher, small faults read as effects; if lower, effects read as faults. Found: blind
-    seeds.
+    Trades: if higher, faults read as effects; if lower, effects read as faults. Found: blind seeds.
     """
 
     margin: float = 0.02

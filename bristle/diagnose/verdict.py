@@ -17,6 +17,8 @@ from .candidates import Trial
 from .experiments import Experiment
 from .faults import SensorFault
 from .finding import Finding
+from .gains import gains_of
+from .law_verdict import LawVerdict
 from .verdict_file import SCHEMA
 
 OF_WORST = (
@@ -57,6 +59,8 @@ class Diagnosis:
         "measured" or "reconstructed".
     noise : mapping of float
         Noise of each channel, as far as it was asked for, in SI.
+    laws : LawVerdict or None
+        How all laws do, where laws and effects were sought together.
 
     Examples
     --------
@@ -77,6 +81,12 @@ class Diagnosis:
     alternatives: tuple[str, ...] = ()
     force: str = "measured"
     noise: Mapping[str, float] = field(default_factory=dict)
+    laws: LawVerdict | None = None
+
+    @property
+    def law(self) -> str:
+        """The law that the runs prefer, "" where the law was given."""
+        return self.laws.name if self.laws is not None else ""
 
     @property
     def words(self) -> str:
@@ -200,6 +210,10 @@ class Diagnosis:
             out["detectable"] = round(self.detectable, 5)
         if self.coordinate:
             out["coordinate"] = self.coordinate
+        if self.laws is not None:
+            out |= self.laws.as_dict()
+        if self.worst is not None and (gains := gains_of(self.worst)):
+            out["gains"] = gains
         return out | {"words": " ".join(verdict_text.sentences(out))}
 
     def _ranking(self) -> list[dict[str, Any]]:

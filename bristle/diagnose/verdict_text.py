@@ -12,6 +12,7 @@ from ..compare.names import joined, name_of, site_name
 from ..identify.rig import DAMPER
 from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
 from ..physics.effect import EFFECTS
+from .law_text import law_name, law_sentences
 from .rule import BENCH, DecisionRule
 
 Verdict = Mapping[str, Any]
@@ -33,7 +34,8 @@ def sentences(verdict: Verdict) -> list[str]:
     if reasons is None and verdict.get("words"):  # schema 1 has the reasons in one text
         out.append(str(verdict["words"]))
     else:
-        out += [*(reasons or []), *_besides(verdict), *_limits(verdict), *_remaining(verdict)]
+        out += [*law_sentences(verdict), *(reasons or []), *_besides(verdict), *_limits(verdict)]
+        out += [*_remaining(verdict), *_gains(verdict)]
     told = " ".join(out)
     out += [text for text in map(fault_text, verdict.get("sensors") or []) if text not in told]
     return list(dict.fromkeys(text for text in out if text))
@@ -42,15 +44,17 @@ def sentences(verdict: Verdict) -> list[str]:
 def headline(verdict: Verdict) -> str:
     """Return the verdict in one sentence."""
     kind, effects = verdict.get("kind"), effects_at(verdict)
+    model = f"the law {law_name(verdict)}" if verdict.get("laws") else "the model"
+    misses = f"{model[:1].upper()}{model[1:]} misses"
     if kind == "effect":
-        return f"The model misses {joined(effects)}."
+        return f"{misses} {joined(effects)}."
     if kind == "ambiguous":
         which = f"either {' or '.join(effects)}" if len(effects) == 2 else _one_of(effects)
-        return f"The model misses {which}. The data cannot distinguish them."
+        return f"{misses} {which}. The data cannot distinguish them."
     if kind == "unknown":
-        return "The model misses something that no known effect explains."
+        return f"{misses} something that no known effect explains."
     if kind == "none":
-        return "These data show nothing that the model misses."
+        return f"These data show nothing that {model} misses."
     return "These data do not allow a verdict."
 
 
@@ -65,6 +69,25 @@ def effects_at(verdict: Verdict) -> list[str]:
     at = {one: [found["site"] for found in findings if one in found["effects"]] for one in names}
     places = {one: at[one] if len(at[one]) > 1 else [sites[one]] for one in names if one in sites}
     return [f"{one} ({', '.join(places[one])})" if one in places else one for one in names]
+
+
+def _gains(verdict: Verdict) -> list[str]:
+    """Return what known effects gain, where none of them explains what is missing."""
+    rows = verdict.get("gains") or []
+    alone = [row for row in rows if len(row["effects"]) == 1]
+    out = []
+    if alone:
+        first, *others = alone
+        texts = [f"{first['effects'][0]} lowers the error by {100.0 * first['gain']:.0f} %"]
+        texts += [f"{row['effects'][0]} by {100.0 * row['gain']:.0f} %" for row in others]
+        each = ", each added alone" if others else ""
+        out.append(f"Still, {joined(texts)}{each}.")
+    out += [
+        f"{joined(row['effects'])} together lower it by {100.0 * row['gain']:.0f} %."
+        for row in rows
+        if len(row["effects"]) > 1
+    ]
+    return out
 
 
 def _one_of(effects: Sequence[str]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..data.channels import channel_unit, is_channel
+from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
 from ..diagnose.verdict_text import (
     HEADINGS,
     Verdict,
@@ -39,6 +40,10 @@ def verdict_section(verdict: Verdict | None, name: str) -> str:
         html.paragraphs(*texts[1:]),
         "</div>",
     ]
+    if verdict and verdict.get("laws"):
+        inner.append("<h3>The laws</h3>")
+        inner.append(html.paragraphs(TABLE_NOTE, kind="soft"))
+        inner.append(html.table(list(HEADER), law_table(verdict["laws"]), numbers=range(2, 8)))
     rows = ranking_table(verdict)
     if rows:
         header, cells, strong = rows

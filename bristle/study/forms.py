@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..data.checks.runs import drive_levels
+from ..data.checks.levels import LEAST_LEVELS, command_levels, drives_of
 from ..data.measurement import Measurement
 from ..data.model import StudyModel, new_model
 from ..errors import PhysicsError, StudyError
@@ -24,12 +24,8 @@ from ..units import convert
 ALL = "all"
 """The word for all forms."""
 
-LEAST_LEVELS = 3
-"""Levels of the command that tell more than a straight line."""
-
 _MOVING_KNOTS = 5  # of a table where the command moves continuously
 _TAIL = 0.005  # share of the samples beyond either end of such a table
-_APART = 0.02  # of the largest level: closer ones are one
 _DIGITS = 4  # of a knot
 
 
@@ -94,18 +90,17 @@ def knots_of(runs: Sequence[Measurement]) -> tuple[float, ...]:
     StudyError
         If the command keeps to fewer than `LEAST_LEVELS`.
     """
-    drives = [(run, run.drive) for run in runs if run.drive]
+    drives = drives_of(runs)
     if not drives:
         raise StudyError(
             "neither voltage nor current was measured: what depends on the command cannot be told. "
             f"--command {LINEAR_FORM} is right."
         )
-    found = [drive_levels(run[name], run.step, run.noise[name]) for run, name in drives]
-    if not all(found):
+    levels = command_levels(runs)
+    if levels is None:
         values = np.concatenate([run[name] for run, name in drives])
         low, high = np.quantile(values, (_TAIL, 1.0 - _TAIL))
         return _rounded(np.linspace(max(float(low), 0.0), float(high), _MOVING_KNOTS))
-    levels = _merged(sorted(level for one in found for level, _ in one))
     if len(levels) < LEAST_LEVELS:
         unit = DRIVES[drives[0][1]].unit
         at = " and ".join(f"{level:.3g} {unit}" for level in levels)
@@ -118,18 +113,6 @@ def knots_of(runs: Sequence[Measurement]) -> tuple[float, ...]:
         picked = np.round(np.linspace(0, len(levels) - 1, MOST_KNOTS)).astype(int)
         levels = [levels[k] for k in picked]
     return _rounded(levels)
-
-
-def _merged(levels: list[float]) -> list[float]:
-    """Return levels that differ, each the mean of those that are nearly one."""
-    apart = _APART * max(map(abs, levels))
-    groups: list[list[float]] = [[levels[0]]]
-    for level in levels[1:]:
-        if level - groups[-1][0] > apart:
-            groups.append([level])
-        else:
-            groups[-1].append(level)
-    return [float(np.mean(group)) for group in groups]
 
 
 def _rounded(levels: Any) -> tuple[float, ...]:

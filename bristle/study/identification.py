@@ -23,6 +23,7 @@ from ..units import convert
 from .forms import FormError, form_of, forms_asked, in_form
 from .identified import Identified
 from .joining import refuse_left_out
+from .laws import ALL, all_laws, left_out_notes, refuse_in_building
 from .rig import rig_of
 from .runs import Runs
 from .study import Study
@@ -55,7 +56,8 @@ def identify_study(
     Parameters
     ----------
     study : the folder, opened
-    law : another law to take than the model's; its effects stay where they can join it
+    law : another law to take than the model's; its effects stay where they can join it. With
+        "all" the model keeps its law, and `laws` of the result tells how every law does
     command : the form in which the command enters, one of `physics.forms.FORMS`; several, or
         "all", are compared, and the model keeps its own if it is among them, else the first
     model : a model to take in place of the present one
@@ -68,18 +70,21 @@ def identify_study(
     Raises
     ------
     StudyError
-        If the law is not known, the data cannot carry an identification, or the study cannot be
-        written.
+        If the law is not known, the data cannot carry an identification, the study cannot be
+        written, or all laws are asked for in a building.
     RecordError
         If a file cannot be read, or a channel that is needed is missing.
     """
     if starts < 1:
         raise StudyError(f"starts = {starts}; 1 or more is right.")
+    refuse_in_building(law, study.settings.has_building)
+    all_of_them, law = law == ALL, None if law == ALL else law
     if law is not None:
         refuse_left_out(study.laws_folder / f"{law}.py")
     model = _of_law(model or study.model(), law)
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
+    task = replace(task, laws=all_of_them)
     found = identify_model(study, model, task)
     if not write:
         return found
@@ -101,8 +106,8 @@ class FitTask:
     `cutoff` [Hz] of the low-pass for the table of errors; `starts` how many starting points are
     tried; `table` whether to compare the laws; `present` the model whose errors are those before,
     None for the one that is identified; `command` the form or forms of the command, None for the
-    model's; `begin` values in SI by name from which one more fit
-    begins, the better one counts; `show` is told how many of `STAGES` are done.
+    model's; `laws` whether every law is tried as well; `begin` values in SI by name from which one
+    more fit begins, the better one counts; `show` is told how many of `STAGES` are done.
     """
 
     cutoff: float
@@ -112,6 +117,7 @@ class FitTask:
     begin: Mapping[str, float] = field(default_factory=dict)
     command: str | Sequence[str] | None = None
     show: Show = _show_nothing
+    laws: bool = False
 
 
 def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified:
@@ -144,6 +150,8 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
     StudyError, RecordError
         As `identify_study`.
     """
+    if task.laws:
+        return _with_all_laws(rig, runs, model, task)
     if task.command is None:
         return _in_own_form(rig, runs, model, task)
     forms = forms_asked(task.command)
@@ -159,6 +167,13 @@ def identify_on_rig(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> I
         alone = replace(task, present=present, table=False, show=_show_nothing)
         rows.append(_form_error(form, _in_own_form(rig, runs, other, alone)))
     return replace(found, forms=tuple(sorted(rows, key=lambda row: forms.index(row.form))))
+
+
+def _with_all_laws(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Identified:
+    rows = all_laws(rig, runs, as_model(model))
+    found = identify_on_rig(rig, runs, model, replace(task, laws=False))
+    notes = (*found.notes, *left_out_notes(rig, as_model(model)))
+    return replace(found, laws=rows, notes=notes)
 
 
 def _form_error(form: str, found: Identified) -> FormError:

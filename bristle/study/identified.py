@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..data.model import StudyModel
+from ..diagnose.law_trials import LawTrial
+from ..diagnose.law_verdict import rows_of
 from ..identify.fit import Fit, Problem
 from ..identify.rig_fit import SiteModel
 from ..identify.table import LawError
@@ -40,6 +42,8 @@ class Identified:
         The history's new step, None where nothing was written.
     forms : tuple of FormError
         Errors of the forms of the command, where several were asked for.
+    laws : tuple of LawTrial
+        How every law does, the best on held-out runs first, where all were asked for.
     at : SiteModel
         The site that a picture shows, with the part of the model that predicts its runs.
 
@@ -65,6 +69,7 @@ class Identified:
     step: Step | None
     at: SiteModel
     forms: tuple[FormError, ...] = ()
+    laws: tuple[LawTrial, ...] = ()
 
     @property
     def train(self) -> Problem:
@@ -112,6 +117,7 @@ class Identified:
             "after": self.after,
             "table": [row.as_dict() for row in self.table],
             "forms": [row.as_dict() for row in self.forms],
+            **({"laws": rows_of(self.laws)} if self.laws else {}),
             "notes": list(self.notes),
             "step": self.step.number if self.step else None,
         }

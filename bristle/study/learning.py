@@ -5,16 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Any
 
+from ..data.model import StudyModel
 from ..diagnose import Diagnosis, diagnose_rig
+from ..diagnose.decision import missing
 from ..diagnose.faults import SensorFault
+from ..diagnose.law_free import diagnose_laws
+from ..errors import StudyError
+from ..findings import command
 from ..progress import tell, telling
 from .curves import LearnedEffect, learn_effect
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified
 from .joining import as_named_here, refuse_effect, refuse_left_out
+from .laws import ALL, law_command, refuse_in_building, with_law
 from .rig import building_of
 from .study import Study
 
@@ -24,32 +31,81 @@ MOST_EFFECTS = 4
 """Effects that `complete` adds at the most: a model that asks for more is the wrong model."""
 
 
-def diagnose_study(study: Study, *, write: bool = True, say: Say = tell) -> Diagnosis:
+def diagnose_study(
+    study: Study, *, law: str | None = None, write: bool = True, say: Say = tell
+) -> Diagnosis:
     """Return what the present model of a study is missing; write verdict.json.
 
     Parameters
     ----------
+    study : the folder, opened
+    law : "all" seeks the law together with its effects; None, or the model's own, keeps it
+    write : whether to write verdict.json
     say : called with a few words at each stage
 
     Raises
     ------
     StudyError
-        If the model was not identified before, or the study cannot be written.
+        If the model was not identified before, the study cannot be written, all laws are asked for
+        in a building, or another law than the model's.
     RecordError
         If a file cannot be read, or a channel that is needed is missing.
     """
+    refuse_in_building(law, study.settings.has_building)
     for why in study.usable_effects():
         say(f"left out: {why}")
     model, runs = study.model(), study.runs()
-    known = any(value.origin == "identified" for value in model.flat().values())
+    if law not in (None, ALL, model.law):
+        raise StudyError(
+            f"the study's model has the law {model.law}. To take another one:  "
+            f"{law_command(study.folder, str(law))} ; to compare all of them:  "
+            f"{command('diagnose', study.folder, '--law', ALL)}"
+        )
     with telling(say) if say is not tell else nullcontext():
-        found = diagnose_rig(
-            runs.train, runs.holdout, as_model(model), building_of(study, model),
-            identified=known, say=say,
-        )  # fmt: skip
+        if law == ALL:
+            present = as_model(model)
+            found = diagnose_laws(runs.train, runs.holdout, present, named=model.law, say=say)
+        else:
+            found = diagnose_rig(
+                runs.train, runs.holdout, as_model(model), building_of(study, model),
+                identified=_is_identified(model), say=say,
+            )  # fmt: skip
     found = replace(found, sensors=(*found.sensors, *_turned(study)))
     if write:
         study.write_verdict(verdict_of(study, found))
+    return found
+
+
+def _is_identified(model: StudyModel) -> bool:
+    return any(value.origin == "identified" for value in model.flat().values())
+
+
+def take_law(study: Study, found: Diagnosis) -> Identified | None:
+    """Identify a study's model with the law of a verdict, as a step.
+
+    None where it has that law, or the data carry no verdict.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    found : a verdict on a law and its effects
+    """
+    model = study.model()
+    if not found.law or (found.law == model.law and _is_identified(model)):
+        return None
+    return identify_study(study, model=with_law(model, found.law), table=False)
+
+
+def _with_law_taken(
+    study: Study, found: Diagnosis, stepped: Callable[[Step | None], None]
+) -> Diagnosis:
+    """Take the law of a verdict; return the verdict as one on the model that the study then has."""
+    taken = take_law(study, found)
+    if taken is None or found.laws is None:
+        return found
+    stepped(taken.step)
+    found = replace(found, laws=replace(found.laws, before=found.law))
+    study.write_verdict(verdict_of(study, found))
     return found
 
 
@@ -156,6 +212,8 @@ class Completed:
 def complete(
     study: Study,
     *,
+    law: str | None = None,
+    greedy: bool = False,
     curves: bool = False,
     say: Say = tell,
     on_step: Callable[[], None] | None = None,
@@ -167,6 +225,9 @@ def complete(
     Parameters
     ----------
     study : the folder, opened
+    law : "all" first seeks the law together with its effects; another name is taken first
+    greedy : whether to go on where the verdict is unknown, by the effect that lowers the held-out
+        error most, as long as one does so by enough and beyond chance
     curves : whether to go on where the verdict is unknown, by learning a curve
     say : called with a few words at each stage
     on_step : called after each new step of the history
@@ -180,17 +241,36 @@ def complete(
             if on_step is not None:
                 on_step()
 
-    if not any(value.origin == "identified" for value in study.model().flat().values()):
+    free = law == ALL
+    other = None if law in (ALL, study.model().law) else law
+    if not free and (other or not _is_identified(study.model())):
         say("identifying the model")
-        stepped(identify_study(study, table=False).step)
+        stepped(identify_study(study, law=other, table=False).step)
     while True:
-        found = diagnose_study(study, say=say)
-        names = found.effects if found.kind == "effect" else ()
-        if found.kind == "unknown" and curves:
+        found = diagnose_study(study, law=ALL if free else None, say=say)
+        if free:
+            found = _with_law_taken(study, found, stepped)
+        free = False
+        names = _best_effect(found) if greedy else _named(found)
+        if found.kind == "unknown" and curves and not names:
             say("learning a curve")
             learned.append(learn_effect(study))
             names = (learned[-1].name,) if learned[-1].file is not None else ()
         if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
             return Completed(found, tuple(steps), tuple(learned))
         say("adding " + " and ".join(names))
-        stepped(add_effects(study, names, found=found).step)
+        why = f"verdict: {found.kind}"
+        stepped(add_effects(study, names, why=why, found=found).step)
+
+
+def _named(found: Diagnosis) -> tuple[str, ...]:
+    return found.effects if found.kind == "effect" else ()
+
+
+def _best_effect(found: Diagnosis) -> tuple[str, ...]:
+    """Return the effects named, else the one that lowers an unknown error most beyond chance."""
+    before = found.before
+    if found.kind != "unknown" or before is None:
+        return _named(found)
+    gaining = (trial.effects[-1] for trial in found.trials if missing(before, trial))
+    return tuple(islice(gaining, 1))

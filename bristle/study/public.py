@@ -14,6 +14,8 @@ from ..compare.comparison import Comparison
 from ..compare.rig import RigComparer
 from ..data.model import StudyModel
 from ..diagnose import Diagnosis, diagnose_rig
+from ..diagnose.law_choice import simplest
+from ..diagnose.law_free import diagnose_laws
 from ..errors import StudyError
 from ..findings import written
 from ..identify.rig import Rig, bench_rig, building_rig
@@ -31,6 +33,7 @@ from .inputs import (
     model_of,
     runs_of,
 )
+from .laws import ALL, all_laws, left_out_notes, refuse_in_building, with_law
 from .learning import diagnose_study
 from .run_file import ROLES, TEST
 from .runs import Runs
@@ -59,7 +62,9 @@ def identify(
         `displacement`, `velocity`, `voltage` or `current`, `force`, with the unit in brackets,
         "force [kN]", or in SI. Other names are guessed, and `notes` of the result tell how.
     model : str, path, StudyModel or Identified, optional
-        The law, such as "bingham", or a model to begin with; else the study's, else "lugre".
+        The law, such as "bingham", or a model to begin with; else the study's, else "lugre". With
+        "all", on a test bench, `laws` of the result tells how every law does, and the model has
+        the study's, else the simplest that no other surpasses on held-out runs.
     effects : str or list of str
         Effects that the model has on top.
     command : str or list of str, optional
@@ -108,17 +113,28 @@ def identify(
     >>> figure = found.plot()  # a notebook shows `found` itself: table and picture
     """
     given = _opened(data)
+    free, model = _is_all(model), None if _is_all(model) else model
     if isinstance(given, Study):
         _refuse_of_study(holdout=holdout, channels=channels, building=building)
         begin = None if model is None and not effects else _present(given, model, effects)
-        return identify_study(given, model=begin, command=command, table=table, write=write)
+        return identify_study(
+            given, law=ALL if free else None, model=begin, command=command, table=table,
+            write=write,
+        )  # fmt: skip
     chosen = model_of(model, effects, DEFAULT)
     house = building_from(building)
+    refuse_in_building(ALL if free else None, house is not None)
     runs = _runs(given, holdout, channels, house)
     rig = _rig(runs, house)
     drives = [run.drive for run in runs.all if run.drive]
     chosen = chosen.with_drive(drives[0] if drives else chosen.drive)
-    return identify_on_rig(rig, runs, chosen, FitTask(CUT_OFF, table=table, command=command))
+    task = FitTask(CUT_OFF, table=table, command=command)
+    if not free:
+        return identify_on_rig(rig, runs, chosen, task)
+    rows = all_laws(rig, runs, as_model(chosen))
+    found = identify_on_rig(rig, runs, with_law(chosen, simplest(rows).law), task)
+    left_out = left_out_notes(rig, as_model(chosen))
+    return replace(found, laws=rows, notes=(*found.notes, *left_out))
 
 
 def compare(
@@ -221,7 +237,8 @@ def diagnose(
         The runs, see `bristle.identify`; or a study, or its folder.
     model : str, path, StudyModel or Identified, optional
         What `identify` returned, or a law, which is then identified on the way; else the study's,
-        else "lugre".
+        else "lugre". With "all", on a test bench, the law is sought together with the effects:
+        `law` of the result is the one that the verdict is about, `laws` tells how all do.
     effects : str or list of str
         Effects that the model has on top.
     holdout : as data, optional
@@ -242,7 +259,8 @@ def diagnose(
     Raises
     ------
     StudyError
-        If a law or an effect is not known, or of a study nothing was identified before.
+        If a law or an effect is not known, of a study nothing was identified before, or all laws
+        are asked for in a building.
     RecordError, PhysicsError
         If a file cannot be read, a channel is missing, or a run is too short; if the building's
         file is wrong.
@@ -267,17 +285,25 @@ def diagnose(
     given = _opened(data)
     if isinstance(given, Study):
         _refuse_of_study(holdout=holdout, channels=channels, building=building)
-        if model is None and not effects:
-            return diagnose_study(given, write=write)
+        if (model is None or _is_all(model)) and not effects:
+            return diagnose_study(given, law=ALL if _is_all(model) else None, write=write)
         raise StudyError(
             "diagnose uses the present model of a study: identify the other one first, with "
             "bristle.identify(study, ...)."
         )
-    chosen = model_of(model, effects, DEFAULT)
+    chosen = model_of(None if _is_all(model) else model, effects, DEFAULT)
     house = building_from(building)
+    refuse_in_building(ALL if _is_all(model) else None, house is not None)
     runs = _runs(given, holdout, channels, house)
+    if _is_all(model):
+        return diagnose_laws(runs.train, runs.holdout, as_model(chosen))
     known = any(value.origin == "identified" for value in chosen.flat().values())
     return diagnose_rig(runs.train, runs.holdout, as_model(chosen), house, identified=known)
+
+
+def _is_all(model: Given | None) -> bool:
+    """Return whether all laws were asked for."""
+    return isinstance(model, str) and model == ALL
 
 
 def _opened(data: Data | Study) -> Data | Study:

@@ -1,0 +1,206 @@
+"""Which laws go on through the search for effects, and which law with which effects it is.
+
+A law that contains a spring explains a missing spring. So the law with the smallest error is no
+answer by itself: laws that contain nothing go on as well, and what is judged is the pair of a law
+and its effects, by held-out runs, the simpler pair where both explain them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from ..physics.forms import CURVED
+from .candidates import Trial, joinable
+from .evidence import Difference, paired
+from .finding import Finding
+from .law_trials import LawTrial
+from .opening import Opening
+from .rule import BENCH, DecisionRule
+
+EXPLAINING = ("none", "effect", "ambiguous")
+"""The kinds of a finding that leave nothing unexplained."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A law with what it lacks: the law's row, what the search found, and what it began with."""
+
+    row: LawTrial
+    finding: Finding
+    opened: Opening | None = None
+
+    @property
+    def after(self) -> Trial:
+        """The trial of the law with its effects; without, where they are not known."""
+        assert self.finding.after is not None
+        return self.finding.after
+
+    @property
+    def fitted(self) -> int:
+        """How many parameters are fitted."""
+        return len(self.after.model.free()) + bool(self.opened and self.opened.problem.free_zero)
+
+    @property
+    def explains(self) -> bool:
+        """Whether the law with its effects leaves nothing unexplained."""
+        return self.finding.kind in EXPLAINING
+
+    @property
+    def order(self) -> tuple[int, int, float]:
+        """What is simpler comes first: fewer parameters, fewer effects, a smaller error."""
+        return self.fitted, len(self.finding.effects), self.after.z
+
+
+def compared(first: Trial, second: Trial, rule: DecisionRule = BENCH) -> Difference | None:
+    """Return by how much the loss of one model is above another's, None for other samples."""
+    if len(first.losses) != len(second.losses):
+        return None
+    return paired(first.losses, second.losses, rule.chance)
+
+
+def clearly_worse(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+    """Return whether a model errs more than another by enough, and beyond chance."""
+    if other.z <= best.z * (1.0 + rule.law_gain):
+        return False
+    apart = compared(other, best, rule)
+    return apart is None or apart.low > 0.0
+
+
+def as_good(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+    """Return whether the data cannot distinguish a model from the best one."""
+    if other.z <= best.z * (1.0 + rule.close):
+        return True
+    apart = compared(other, best, rule)
+    return apart is not None and apart.low <= 0.0
+
+
+def best_of(trials: Sequence[Trial], rule: DecisionRule = BENCH) -> Trial:
+    """Return the best of trials on held-out runs, by z.
+
+    Where none explains the runs, a plain error of more than `most_rms` times the smallest one puts
+    a trial out: it serves the many samples near rest at the cost of all others.
+    """
+    able = list(trials)
+    if min(trial.z for trial in able) > rule.clean:
+        least = min(trial.rms for trial in able)
+        able = [trial for trial in able if trial.rms <= rule.most_rms * least]
+    return min(able, key=lambda trial: trial.z)
+
+
+def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawTrial]:
+    """Return the laws that go on through the search for effects, `most_laws` at most.
+
+    The best on held-out runs, and the simplest that is not clearly worse; the best of those that
+    contain no effect, the one with a parabola only where a straight line is clearly worse. Then
+    those of them that no simpler one surpasses, the smallest error first.
+    """
+    ranked = sorted(rows, key=lambda row: row.trial.z)
+    first = best_of([row.trial for row in rows], rule)
+    best = next(row for row in rows if row.trial is first)
+    plain = [row for row in ranked if not set(row.contains) - {CURVED}]
+    straight = [row for row in plain if CURVED not in row.contains]
+    level = [row for row in ranked if not clearly_worse(row.trial, best.trial, rule)]
+    picked = [best, *straight[:1], min(level, key=lambda row: (row.fitted, row.trial.z))]
+    if straight and clearly_worse(straight[0].trial, plain[0].trial, rule):
+        picked.insert(1, plain[0])
+    front = [
+        row
+        for row in straight
+        if not any(o.fitted <= row.fitted and o.trial.z < row.trial.z for o in straight)
+    ]
+    picked += front
+    return list({row.law: row for row in picked}.values())[: rule.most_laws]
+
+
+def simplest(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> LawTrial:
+    """Return the simplest law that the best one on held-out runs does not surpass."""
+    best = best_of([row.trial for row in rows], rule)
+    level = [row for row in rows if as_good(row.trial, best, rule)]
+    return min(level, key=lambda row: (row.fitted, row.trial.z))
+
+
+def search(
+    rows: Sequence[LawTrial], look: Callable[[LawTrial], Pair], rule: DecisionRule = BENCH
+) -> list[Pair]:
+    """Return the pairs that decide; `look` searches the effects that a law lacks.
+
+    Where noise is all that the best law leaves, the simplest that it does not surpass comes first:
+    if that lacks nothing and contains no effect, no other is searched. Then come the simpler ones
+    first: a law is left out where the runs are explained already by no more parameters than it
+    would have with the smallest effect that can join it.
+
+    Parameters
+    ----------
+    rows : the laws tried
+    look : called with a row; returns what its law lacks
+    rule : the numbers that decide
+    """
+    first, found = simplest(rows, rule), []
+    if first.trial.z <= rule.complete:
+        found.append(look(first))
+        if found[0].finding.kind == "none" and not first.contains:
+            return found
+    searched = {pair.row.law for pair in found}
+    others = [row for row in survivors(rows, rule) if row.law not in searched]
+    for row in sorted(others, key=lambda row: (row.fitted, row.trial.z)):
+        known = [pair.fitted for pair in found if pair.explains and pair.after.z <= rule.complete]
+        if not known or min(known) > _least_with_effect(row):
+            found.append(look(row))
+    return found
+
+
+def _least_with_effect(row: LawTrial) -> int:
+    """Return how many parameters a law has with the smallest effect that can join it."""
+    model = row.trial.model
+    joined = [replace(model, effects=(*model.effects, name)) for name in joinable(model)]
+    return min((len(one.free()) for one in joined), default=row.fitted)
+
+
+def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
+    """Return the pair of law and effects that the runs ask for.
+
+    Of those that explain the runs and that the best one on held-out runs does not surpass, the
+    simplest; where none explains them, the best one.
+    """
+    best = best_of([pair.after for pair in pairs], rule)
+    level = [pair for pair in pairs if pair.explains and as_good(pair.after, best, rule)]
+    if level:
+        return min(level, key=lambda pair: pair.order)
+    return next(pair for pair in pairs if pair.after is best)
+
+
+def equivalents(
+    chosen: Pair, pairs: Sequence[Pair], rows: Sequence[LawTrial], rule: DecisionRule = BENCH
+) -> list[tuple[str, tuple[str, ...], float]]:
+    """Return what explains the runs as well as the pair chosen: law, effects, z on held-out runs.
+
+    A law that was not searched counts without an effect. What only gives the chosen law more to
+    fit, a parabola or the part that a variant lacks, is not told: it always does as well.
+
+    Parameters
+    ----------
+    chosen : what the verdict is about
+    pairs : the laws whose effects were searched
+    rows : the laws tried
+    rule : the numbers that decide
+    """
+    if not chosen.explains:
+        return []
+    rows = [row for row in rows if _base(row) != _base(chosen.row)]
+    pairs = [pair for pair in pairs if _base(pair.row) != _base(chosen.row)]
+    out: dict[tuple[str, tuple[str, ...]], float] = {}
+    for pair in pairs:
+        effects = pair.finding.effects if pair.finding.kind == "effect" else ()
+        sure = pair.finding.kind in ("none", "effect")
+        if pair is not chosen and sure and as_good(pair.after, chosen.after, rule):
+            out[pair.row.law, effects] = pair.after.z
+    searched = {pair.row.law for pair in pairs}
+    for row in rows:
+        if row.law not in searched and as_good(row.trial, chosen.after, rule):
+            out.setdefault((row.law, ()), row.trial.z)
+    return [(law, effects, z) for (law, effects), z in sorted(out.items(), key=lambda i: i[1])]
+
+
+def _base(row: LawTrial) -> str:
+    return row.trial.model.law_class.base.name

@@ -1,0 +1,185 @@
+"""Every registered law of a damper fitted to the same runs, and judged on the same others."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from os import cpu_count
+from typing import Any
+
+import numpy as np
+from scipy.stats import t as student
+
+from ..identify.fit import Model, Problem
+from ..identify.model import steady, without
+from ..identify.residuals import errors
+from ..identify.search import z_scale
+from ..identify.search_context import Search, refine
+from ..identify.starts import start_models
+from ..physics.effect import EFFECTS
+from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
+from ..physics.laws import base_and_variant, law_names
+from ..progress import Count
+from .candidates import Trial, judge
+
+STARTS = 2
+"""Starting points of each law."""
+
+JACOBIANS = 12
+"""Jacobians of the search from each of them."""
+
+WITHIN = 0.95
+"""Probability of the intervals over runs."""
+
+
+@dataclass(frozen=True)
+class LawTrial:
+    """A law tried: fitted on the training runs, judged on the held-out ones.
+
+    `law` is its name with variant and form, such as "lugre_standard[quadratic]"; `rms_train` the
+    plain error [N] on the training runs; `z_runs` (r,) z of each held-out run.
+    """
+
+    law: str
+    trial: Trial
+    rms_train: float
+    z_runs: tuple[float, ...]
+
+    @property
+    def fitted(self) -> int:
+        """How many parameters are fitted."""
+        return len(self.trial.model.free())
+
+    @property
+    def contains(self) -> tuple[str, ...]:
+        """The kinds of effects that the law has in it."""
+        return self.trial.model.law_class.contains
+
+    def above(self, best: LawTrial) -> tuple[float, float]:
+        """Return by how much z is above that of another law, and half the interval of that.
+
+        Paired by held-out runs, of which two or more are needed: else the half is NaN.
+        """
+        apart = np.array(self.z_runs) - np.array(best.z_runs)
+        if len(apart) < 2:
+            return float(np.mean(apart)), float("nan")
+        wide = float(student.ppf(0.5 + 0.5 * WITHIN, len(apart) - 1))
+        return float(np.mean(apart)), wide * float(np.std(apart, ddof=1)) / float(len(apart)) ** 0.5
+
+    def as_dict(self, best: LawTrial) -> dict[str, Any]:
+        """Return what json can hold, the law compared with the best one."""
+        plain, form, _ = split_form(self.law)
+        above, half = self.above(best)
+        return {
+            "law": plain, "command": form or LINEAR_FORM, "fitted": self.fitted,
+            "z_train": round(self.trial.train, 4), "z_holdout": round(self.trial.z, 4),
+            "rms_train": self.rms_train, "rms_holdout": self.trial.rms,
+            "z_above_best": round(above, 4),
+            "interval95": round(half, 4) if np.isfinite(half) else None,
+        }  # fmt: skip
+
+
+def try_laws(
+    train: Problem, held_out: Problem, present: Model, *, bends: bool
+) -> tuple[LawTrial, ...]:
+    """Return the trials of all laws and of their variants, the best on held-out runs first.
+
+    Laws that `not_finite` tells are left out.
+
+    Parameters
+    ----------
+    train, held_out : runs to fit to, and those that decide
+    present : the model as it is; each law has those of its effects that can join it
+    bends : whether the command has levels enough for a parabola: laws whose form may be chosen
+        are then tried with that, too
+    """
+    unfit = not_finite(train, present)  # which compiles all before threads ask for it
+    names = [name for name in law_names() if name not in unfit]
+    count = Count("law", len(names))
+    with ThreadPoolExecutor(cpu_count()) as pool:
+
+        def tried(name: str) -> list[LawTrial]:
+            found = _tried(name, train, held_out, present, bends)
+            count.done(name)
+            return found
+
+        rows = [row for rows in pool.map(tried, names) for row in rows]
+    return tuple(sorted(rows, key=lambda row: row.trial.z))
+
+
+def not_finite(problem: Problem, present: Model) -> list[str]:
+    """Return the laws, a user's own as a rule, whose force is not a number where fits begin.
+
+    Parameters
+    ----------
+    problem : the runs
+    present : the model as it is
+    """
+    models = {name: _model(name, problem, present) for name in law_names()}
+    return [name for name, model in models.items() if not _is_finite(model, problem)]
+
+
+def _is_finite(model: Model, problem: Problem) -> bool:
+    """Return whether the force is a number at the defaults, and with one linear parameter alone."""
+    linear = model.law_class.linear()
+    none = {**model.values, **dict.fromkeys(linear, 0.0)}
+    alone = [replace(model, values={**none, name: 1.0}) for name in linear]
+    return all(
+        bool(np.isfinite(problem.predict(one, run)).all())
+        for one in (model, *alone)
+        for run in problem.runs
+    )
+
+
+def _tried(
+    name: str, train: Problem, held_out: Problem, present: Model, bends: bool
+) -> list[LawTrial]:
+    model = _model(name, train, present)
+    starts = start_models(train, model, STARTS)
+    expected = train.expectation(starts[0])
+    ends = [Search(train, one, expected, one.free()).run(JACOBIANS) for one in starts]
+    best, _ = min(ends, key=lambda end: end[1].cost)
+    fitted = [(name, refine(best, train, JACOBIANS))]
+    if bends and choosable(model.law_class):
+        bent = joined_form(name, QUADRATIC_FORM)
+        begin = replace(
+            _model(bent, train, present), values=fitted[0][1].values, fixed=fitted[0][1].fixed
+        )
+        if set(begin.effects) == set(model.effects):
+            fitted.append((bent, refine(begin, train, JACOBIANS)))
+    return [_row(law, one, train, held_out) for law, one in fitted]
+
+
+def _model(name: str, problem: Problem, present: Model) -> Model:
+    """Return a law with the present effects that can join it, where its fit begins."""
+    base, variant = base_and_variant(name)
+    effects = tuple(one for one in present.effects if _joins(one, base.name))
+    own = {name for name in present.values if name.partition(".")[0] in effects}
+    values = {
+        f"{effect}.{part}": problem.scaled(base.name, f"{effect}.{part}")
+        for effect in effects
+        for part in EFFECTS[effect].parameters
+    }
+    values |= {name: present.values[name] for name in own}
+    kept = {n for n in (*present.fixed, *present.limits) if n.partition(".")[0] in effects}
+    model = Model(
+        base.name, effects, {**values, **variant.values},
+        tuple(n for n in present.fixed if n in kept),
+        {n: pair for n, pair in present.limits.items() if n in kept},
+    )  # fmt: skip
+    return without(model, base.driven()) if steady(problem) else model
+
+
+def _joins(effect: str, law: str) -> bool:
+    """Return whether an effect acts elsewhere than in the damper, or can join its law."""
+    known = EFFECTS[effect]
+    return "damper" not in known.sites or known.joins(base_and_variant(law)[0])
+
+
+def _row(law: str, model: Model, train: Problem, held_out: Problem) -> LawTrial:
+    expected = train.expectation(model), held_out.expectation(model)
+    trial = replace(judge(model, train, held_out, expected), refined=True)
+    raw = np.concatenate(errors(train, model, expected[0]))
+    edges = np.cumsum([len(run.force) - run.skip for run in held_out.runs])[:-1]
+    z_runs = tuple(z_scale(part) for part in np.split(trial.residual, edges))
+    return LawTrial(law, trial, float(np.sqrt(np.mean(raw**2))), z_runs)

@@ -1,0 +1,95 @@
+"""All laws against the runs of a study: how each does, and a model brought to another law."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from ..data.checks.levels import tells_a_bend
+from ..data.model import StudyModel, new_model
+from ..diagnose.law_text import left_out
+from ..diagnose.law_trials import LawTrial, not_finite, try_laws
+from ..errors import StudyError
+from ..findings import command
+from ..identify.model import Model
+from ..identify.rig import DAMPER, Rig
+from ..physics.effect import EFFECTS
+from ..physics.forms import LINEAR_FORM, split_form
+from ..physics.laws import base_and_variant
+from ..progress import tell
+from .runs import Runs
+
+ALL = "all"
+"""The word for all laws."""
+
+
+def refuse_in_building(law: str | None, in_building: bool) -> None:
+    """Refuse to compare all laws on a rig that is no test bench.
+
+    Raises
+    ------
+    StudyError
+        If all laws were asked for and the damper is in a building.
+    """
+    if law == ALL and in_building:
+        raise StudyError(
+            "all laws are compared on a test bench alone: in a building the law decides which "
+            "samples of the damper's force count. Name one law, or measure the damper on a bench."
+        )
+
+
+def all_laws(rig: Rig, runs: Runs, present: Model) -> tuple[LawTrial, ...]:
+    """Return how every law does on a bench, the best on held-out runs first.
+
+    Parameters
+    ----------
+    rig : the bench with its runs
+    runs : the measurements that it was made of, whose command decides on quadratic forms
+    present : the model as it is; each law has those of its effects that can join it
+
+    Raises
+    ------
+    StudyError
+        If the rig is a building.
+    """
+    refuse_in_building(ALL, rig.building is not None)
+    tell("trying every law")
+    site = rig.sites(present)[DAMPER]
+    held_out = site.train if site.holdout is None else site.holdout
+    return try_laws(site.train, held_out, present, bends=tells_a_bend(runs.train))
+
+
+def left_out_notes(rig: Rig, present: Model) -> tuple[str, ...]:
+    """Return the sentence that tells which laws `all_laws` leaves out, none where it tries all.
+
+    Parameters
+    ----------
+    rig : the bench with its runs
+    present : the model as it is
+    """
+    unfit = not_finite(rig.sites(present)[DAMPER].train, present)
+    return (left_out(unfit),) if unfit else ()
+
+
+def with_law(model: StudyModel, law: str) -> StudyModel:
+    """Return a model with another law, such as "lugre[quadratic]", and the effects that can join.
+
+    Raises
+    ------
+    PhysicsError
+        If there is no such law.
+    """
+    base, _ = base_and_variant(law)
+    kept = {
+        name: values
+        for name, values in model.effects.items()
+        if base.site not in EFFECTS[name].sites or EFFECTS[name].joins(base)
+    }
+    return replace(new_model(law, (), model.building, model.drive), effects=kept)
+
+
+def law_command(folder: object, law: str, *others: str) -> str:
+    """Return the command that identifies a study's model with a law, in the law's form."""
+    plain, form, _ = split_form(law)
+    words: Sequence[str] = ("--command", form) if form not in ("", LINEAR_FORM) else ()
+    return command("identify", folder, "--law", plain, *words, *others)

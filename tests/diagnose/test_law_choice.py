@@ -1,0 +1,205 @@
+"""Which laws are searched for effects, and which pair of law and effects is named: made trials."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bristle.diagnose.candidates import Trial
+from bristle.diagnose.finding import Finding
+from bristle.diagnose.law_choice import (
+    Pair,
+    as_good,
+    best_of,
+    choose,
+    clearly_worse,
+    equivalents,
+    search,
+    simplest,
+    survivors,
+)
+from bristle.diagnose.law_text import law_sentences, law_table
+from bristle.diagnose.law_trials import LawTrial
+from bristle.diagnose.law_verdict import LawVerdict, rows_of
+from bristle.diagnose.rule import BENCH
+from bristle.diagnose.verdict_text import headline
+from bristle.identify.fit import Model
+from bristle.physics.laws import base_and_variant
+
+SAMPLES = 6000
+NOISE = np.random.default_rng(1).standard_normal(SAMPLES) ** 2
+
+
+def trial(z, law, effects=(), spread=0.0, seed=0):
+    """Return a trial whose losses have the mean z^2; `spread` makes blocks of them differ."""
+    blocks = np.repeat(np.random.default_rng(seed).standard_normal(SAMPLES // 250), 250)
+    losses = NOISE / NOISE.mean() * z**2 + spread * blocks
+    base, variant = base_and_variant(law)
+    model = Model(base.name, tuple(effects), dict(variant.values))
+    return Trial(model, z, z, z, losses, np.sqrt(NOISE))
+
+
+def row(law, z, **choices):
+    return LawTrial(law, trial(z, law, **choices), z, (z, z, z))
+
+
+def pair(law, z_alone, kind="none", effects=(), z=None, **choices):
+    """Return a law with what it lacks."""
+    first = row(law, z_alone)
+    after = trial(z if z is not None else z_alone, law, effects, **choices)
+    gone = Finding("damper", kind, tuple(effects), z_alone, after.z, 0.0, float("nan"), after=after)
+    return Pair(first, gone)
+
+
+def looker(*pairs):
+    """Return what looks up a law's pair, and the laws that were asked for."""
+    known = {one.row.law: one for one in pairs}
+    asked = []
+
+    def look(one):
+        asked.append(one.law)
+        return known[one.law]
+
+    return look, asked
+
+
+def test_a_law_is_clearly_worse_by_enough_and_beyond_chance_alone():
+    best = trial(1.0, "dahl")
+    assert not clearly_worse(trial(1.0 + 0.5 * BENCH.law_gain, "bingham"), best)
+    assert clearly_worse(trial(1.0 + 2.0 * BENCH.law_gain, "bingham"), best)
+    assert not clearly_worse(trial(1.0 + 2.0 * BENCH.law_gain, "bingham", spread=1.0), best)
+
+
+def test_other_samples_are_compared_by_z_alone():
+    best, other = trial(1.0, "dahl"), trial(1.05, "bingham")
+    fewer = Trial(other.model, 1.05, 1.05, 1.05, other.losses[:-5], other.residual[:-5])
+    assert clearly_worse(fewer, best)
+    assert not as_good(fewer, best)
+
+
+MIMICS = [
+    row("modified_bouc_wen", 4.91), row("tanh", 4.92), row("tanh[quadratic]", 4.92),
+    row("bouc_wen", 5.1), row("lugre", 6.6), row("bingham", 6.7), row("lugre[quadratic]", 6.8),
+    row("lugre_standard", 6.9), row("bingham_standard", 7.0), row("dahl", 7.1),
+]  # fmt: skip
+"""Laws without an effect on runs of a Bingham damper with a gas spring."""
+
+
+def test_the_best_law_and_those_that_contain_nothing_go_on():
+    found = [one.law for one in survivors(MIMICS)]
+    assert found == ["modified_bouc_wen", "lugre", "tanh", "bingham"]
+    assert len(found) == BENCH.most_laws
+
+
+def test_a_parabola_goes_on_where_a_straight_line_is_clearly_worse():
+    rows = [*MIMICS, row("dahl[quadratic]", 5.5)]
+    assert "dahl[quadratic]" in [one.law for one in survivors(rows)]
+    assert "lugre" in [one.law for one in survivors(rows)]
+
+
+def test_nothing_more_is_searched_where_a_plain_law_lacks_nothing():
+    rows = [row("dahl", 1.0), row("lugre", 1.0), row("bouc_wen", 1.0), row("bingham", 4.0)]
+    look, asked = looker(pair("dahl", 1.0))
+    (found,) = search(rows, look)
+    assert asked == ["dahl"]
+    assert choose([found]) is found
+
+
+def test_a_law_that_contains_the_missing_effect_does_not_end_the_search():
+    rows = [row("bouc_wen", 1.02), row("dahl", 6.0)]
+    true = pair("dahl", 6.0, "effect", ("duffing",), 1.0)
+    look, asked = looker(pair("bouc_wen", 1.02), true)
+    found = search(rows, look)
+    assert asked == ["bouc_wen", "dahl"]
+    assert choose(found) is true
+
+
+def test_a_law_is_left_out_where_fewer_parameters_explain_the_runs_already():
+    rows = [row("bouc_wen", 3.0), row("bingham", 6.0)]
+    true = pair("bingham", 6.0, "effect", ("gas_spring",), 1.0)
+    look, asked = looker(pair("bouc_wen", 3.0, "unknown"), true)
+    search(rows, look)
+    assert asked == ["bingham"]
+
+
+def test_laws_are_searched_on_where_a_simple_one_explains_nothing():
+    rows = [row("bouc_wen", 3.0), row("bingham", 6.0)]
+    look, asked = looker(pair("bouc_wen", 3.0, "unknown"), pair("bingham", 6.0, "unknown"))
+    assert len(search(rows, look)) == 2
+    assert asked == ["bingham", "bouc_wen"]
+
+
+def test_the_simpler_of_two_that_explain_the_runs_is_named_and_the_other_told():
+    simple, rich = pair("dahl", 1.001), pair("lugre", 1.0)
+    assert choose([rich, simple]) is simple
+    other = row("bouc_wen", 1.002)
+    bent = row("dahl[quadratic]", 1.0)  # does as well as dahl by itself: nothing to tell
+    told = equivalents(simple, [rich, simple], [simple.row, bent, rich.row, other])
+    assert [(law, effects) for law, effects, _ in told] == [("lugre", ()), ("bouc_wen", ())]
+
+
+def test_a_law_with_nothing_missing_is_preferred_to_an_effect_at_equal_size():
+    effect = pair("dahl", 6.0, "effect", ("quadratic_damping",), 1.0)
+    none = pair("lugre", 1.0)
+    assert effect.fitted == none.fitted
+    assert choose([effect, none]) is none
+
+
+def test_an_effect_is_not_named_for_what_a_better_law_explains():
+    mimic = pair("bingham", 6.0, "effect", ("gas_spring",), 1.06)
+    law = pair("bouc_wen", 1.0)
+    assert choose([mimic, law]) is law
+
+
+def test_where_none_explains_the_runs_the_best_is_unknown():
+    best, other = pair("tanh", 3.0, "unknown"), pair("lugre", 5.0, "unknown")
+    assert choose([other, best]) is best
+    assert equivalents(best, [best, other], [best.row, other.row]) == []
+
+
+def test_of_wrong_laws_one_that_serves_rest_alone_is_not_the_best():
+    near_rest, all_over = trial(5.8, "tanh"), trial(6.1, "modified_bouc_wen")
+    near_rest, all_over = replace(near_rest, rms=13.2), replace(all_over, rms=9.1)
+    assert best_of([near_rest, all_over]) is all_over
+    right = replace(trial(1.0, "bingham"), rms=13.2)  # its jumps are a sample off
+    assert best_of([right, all_over]) is right
+
+
+def test_the_simplest_law_is_of_those_that_the_best_does_not_surpass():
+    rows = [row("lugre", 1.0), row("dahl", 1.002), row("bingham_standard", 1.2)]
+    assert simplest(rows).law == "dahl"
+
+
+def test_an_interval_over_runs_needs_two_of_them():
+    best = LawTrial("dahl", trial(1.0, "dahl"), 1.0, (1.0, 1.0, 1.1))
+    other = LawTrial("bingham", trial(2.0, "bingham"), 2.0, (2.0, 2.2, 2.1))
+    above, half = other.above(best)
+    assert above == pytest.approx(1.0667, abs=1e-3)
+    # t(0.975; 2) = 4.303 of Student's tables; standard deviation of 1.0, 1.2, 1.0 by sqrt(3)
+    assert half == pytest.approx(4.303 * 0.11547 / 3**0.5, rel=1e-3)
+    alone = [LawTrial(one.law, one.trial, 1.0, one.z_runs[:1]) for one in (other, best)]
+    assert np.isnan(alone[0].above(alone[1])[1])
+    assert rows_of((alone[1], alone[0]))[1]["interval95"] is None
+
+
+def test_the_verdict_tells_law_table_and_what_does_as_well():
+    true = pair("bingham", 6.0, "effect", ("gas_spring",), 1.0)
+    best = pair("bouc_wen", 1.003)
+    rows = (best.row, true.row, row("lugre[quadratic]", 7.0))
+    verdict = LawVerdict(true.row, "lugre", rows, (true, best), (("bouc_wen", (), 1.003),))
+    told = {"kind": "effect", "effects": ["gas_spring"], **verdict.as_dict()}
+    assert (told["law"], told["command"], told["law_before"]) == ("bingham", "linear", "lugre")
+    assert headline(told) == "The law bingham misses gas_spring."
+    first, second = law_sentences(told)
+    assert "bingham with gas_spring has error / noise (z) = 1.00" in first
+    assert "bouc_wen with nothing missing explains them as well" in second
+    table = law_table(told["laws"])
+    assert [cells[:2] for cells in table][-1] == ["lugre", "quadratic"]
+    assert table[0][5] == "-"
+
+
+def test_a_verdict_on_a_law_given_says_nothing_of_laws():
+    assert law_sentences({"kind": "none", "effects": []}) == []
+    assert headline({"kind": "effect", "effects": ["drift"]}) == "The model misses drift."

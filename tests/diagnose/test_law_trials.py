@@ -1,0 +1,81 @@
+"""Laws fitted to the same runs: what is tried, and what a law that fails does to the others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bristle.data.checks.levels import tells_a_bend
+from bristle.diagnose import law_trials
+from bristle.diagnose.law_text import left_out
+from bristle.diagnose.law_trials import not_finite, try_laws
+from bristle.identify.fit import Model, Problem
+from bristle.identify.rig import bench_rig
+from bristle.study.inputs import measurements
+from tests.study.made import bench_run
+
+FEW = ("bingham_standard", "dahl")
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Return the runs for training and the held-out one of a tanh-like damper at four levels."""
+    found = measurements([bench_run(k, seconds=2.0) for k in (1, 2, 3)])
+    return found[:2], found[2:]
+
+
+@pytest.fixture(scope="module")
+def problems(runs):
+    return bench_rig(*runs).sites(Model("lugre"))["damper"].pair
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Let there be two laws alone."""
+    monkeypatch.setattr(law_trials, "law_names", lambda: FEW)
+
+
+def test_each_law_is_tried_with_a_parabola_where_the_command_has_levels(runs, problems, few):
+    assert tells_a_bend(runs[0])
+    rows = try_laws(*problems, Model("lugre"), bends=True)
+    assert {row.law for row in rows} == {*FEW, *(f"{name}[quadratic]" for name in FEW)}
+    assert [row.trial.z for row in rows] == sorted(row.trial.z for row in rows)
+    by_name = {row.law: row for row in rows}
+    assert by_name["bingham_standard"].fitted == 4  # f_c, f_v, c_0, c_v
+    assert by_name["bingham_standard[quadratic]"].fitted == 6
+    (z,) = rows[0].z_runs  # one held-out run
+    assert z == pytest.approx(rows[0].trial.z)
+    straight = try_laws(*problems, Model("lugre"), bends=False)
+    assert {row.law for row in straight} == set(FEW)
+
+
+def test_laws_have_those_of_the_present_effects_that_can_join_them(problems, few):
+    present = Model("lugre", ("gas_spring",), {"gas_spring.k": 80.0}, ("gas_spring.k", "sigma_1"))
+    (first, *_) = try_laws(*problems, present, bends=False)
+    assert first.trial.effects == ("gas_spring",)
+    assert first.trial.model.fixed == ("gas_spring.k",)  # what was held of another law is not
+    assert first.trial.model.value("gas_spring.k") == 80.0
+
+
+class Broken(Problem):
+    """Runs on which Dahl's law has no number for a force."""
+
+    def predict(self, model, run, draw=None):
+        found = super().predict(model, run, draw)
+        return np.full_like(found, np.nan) if model.law == "dahl" else found
+
+
+def test_a_law_whose_force_is_not_a_number_is_left_out_and_told(problems, few):
+    train, held_out = (Broken(one.runs) for one in problems)
+    assert not_finite(train, Model("lugre")) == ["dahl"]
+    (row,) = try_laws(train, held_out, Model("lugre"), bends=False)
+    assert row.law == "bingham_standard"
+    assert left_out(["dahl"]) == "dahl is left out: the force is not a number on these runs."
+
+
+def test_two_levels_or_a_command_that_was_not_measured_tell_no_bend(runs):
+    two = bench_run(4, seconds=2.0)
+    two["U [V]"] = np.where(two["U [V]"] > 2.0, 4.0, 0.0)
+    assert not tells_a_bend(measurements([two]))
+    del two["U [V]"]
+    assert not tells_a_bend(measurements([two]))

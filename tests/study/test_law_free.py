@@ -1,0 +1,158 @@
+"""A law and its effects sought together, and unknown errors lowered effect by effect."""
+
+from __future__ import annotations
+
+import json
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from bristle.cli import main
+from bristle.data.model import new_model
+from bristle.diagnose.candidates import Trial
+from bristle.errors import StudyError
+from bristle.identify.fit import Model
+from bristle.physics.building import paper_building
+from bristle.study import learning
+from bristle.study.laws import law_command, with_law
+from bristle.study.learning import MOST_EFFECTS, complete, diagnose_study
+from bristle.study.public import diagnose, identify
+from bristle.study.study import Study
+from tests.independent.generate import make_case
+from tests.study.made import bench_run
+from tests.study.test_learning import UNITS, study_of
+
+NOISE = np.random.default_rng(1).standard_normal(6000) ** 2
+NAMES = ("gas_spring", "stribeck", "coil_lag", "saturation", "drift", "asymmetry")
+
+
+def trial(z, *effects):
+    losses = NOISE / NOISE.mean() * z**2
+    return Trial(Model("bingham", effects), z, z, z, losses, np.sqrt(NOISE))
+
+
+def verdict(kind, z, *gains):
+    """Return a diagnosis of a model with this z; `gains` are z with one more effect."""
+    tried = tuple(trial(after, name) for name, after in gains)
+    return SimpleNamespace(kind=kind, effects=(), before=trial(z), trials=tried)
+
+
+class Folder:
+    """A study in name alone: it counts the effects of its model."""
+
+    def __init__(self):
+        self.names = []
+
+    def model(self):
+        found = new_model("bingham").with_values({"f_c": 1.0})
+        return SimpleNamespace(law="bingham", flat=found.flat, effects=list(self.names))
+
+
+@pytest.fixture
+def folder(monkeypatch):
+    """Return a folder to which `add_effects` adds, without any fit."""
+    made = Folder()
+
+    def add(study, names, **_given):
+        study.names += names
+        return SimpleNamespace(step=f"add {names[0]}")
+
+    monkeypatch.setattr(learning, "add_effects", add)
+    return made
+
+
+def told(monkeypatch, answers):
+    """Let the diagnoses be these, one after the other."""
+    found = iter(answers)
+    monkeypatch.setattr(learning, "diagnose_study", lambda _study, **_given: next(found))
+
+
+def test_greedy_adds_what_gains_most_until_nothing_gains(folder, monkeypatch):
+    answers = [
+        verdict("unknown", 6.0, ("stribeck", 4.0), ("coil_lag", 5.0)),
+        verdict("unknown", 4.0, ("coil_lag", 3.0)),
+        verdict("unknown", 3.0, ("drift", 2.99)),
+    ]
+    told(monkeypatch, answers)
+    done = complete(folder, greedy=True, say=print)
+    assert folder.names == ["stribeck", "coil_lag"]
+    assert done.verdict is answers[-1]
+    assert len(done.steps) == 2
+
+
+def test_without_greedy_an_unknown_error_ends_it(folder, monkeypatch):
+    told(monkeypatch, [verdict("unknown", 6.0, ("stribeck", 4.0))])
+    assert complete(folder, say=print).steps == ()
+    assert folder.names == []
+
+
+def test_greedy_stops_at_the_largest_number_of_effects(folder, monkeypatch):
+    told(monkeypatch, [verdict("unknown", 9.0 - k, (NAMES[k], 8.0 - k)) for k in range(6)])
+    complete(folder, greedy=True, say=print)
+    assert len(folder.names) == MOST_EFFECTS
+
+
+def test_all_laws_in_a_building_are_refused():
+    run = bench_run(1, seconds=2.0)
+    with pytest.raises(StudyError, match="on a test bench alone"):
+        diagnose(run, "all", building=paper_building())
+    with pytest.raises(StudyError, match="Name one law"):
+        identify(run, "all", building=paper_building())
+
+
+def test_a_model_takes_another_law_with_the_effects_that_can_join_it():
+    model = new_model("bingham", ("gas_spring", "stribeck"))
+    assert list(with_law(model, "dahl[quadratic]").effects) == ["gas_spring", "stribeck"]
+    assert list(with_law(model, "bouc_wen").effects) == ["stribeck"]  # it has a spring
+    assert law_command("rig", "lugre_standard[quadratic]").split()[1:] == [
+        "identify", "rig", "--law", "lugre_standard", "--command", "quadratic",
+    ]  # fmt: skip
+    assert law_command("rig", "dahl").endswith("rig --law dahl")
+
+
+@pytest.fixture(scope="module")
+def hidden(tmp_path_factory):
+    """Return the folder of a study of a Bingham damper with a hidden gas spring, begun as LuGre."""
+    case = make_case(1, "gas_spring", strength=0.15, duration=4.0)
+    study = study_of(case, tmp_path_factory.mktemp("law_free"))
+    study.add_step("begin", "by hand", new_model("lugre"), {}, {})
+    return study.folder
+
+
+@pytest.mark.slow
+def test_the_pair_of_law_and_effect_is_found(hidden, capsys):
+    assert main(["diagnose", str(hidden), "--law", "all"]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("The law bingham misses gas_spring.")
+    assert "--law bingham , then:  bristle add" in shown
+    found = json.loads((hidden / "verdict.json").read_text())
+    assert (found["schema"], found["kind"], found["effects"]) == (2, "effect", ["gas_spring"])
+    assert (found["law"], found["command"], found["law_before"]) == ("bingham", "linear", "lugre")
+    best = found["laws"][0]
+    assert best["law"] not in ("bingham", "lugre")  # a law with a spring stands for the missing one
+    assert found["z_holdout_after"] < 1.1 < best["z_holdout"]
+    with pytest.raises(StudyError, match="has the law lugre"):
+        diagnose_study(Study(hidden), law="dahl")
+
+
+@pytest.mark.slow
+def test_auto_takes_the_law_and_adds_the_effect(hidden):
+    study = Study(hidden)
+    done = complete(study, law="all", say=print)
+    assert (study.model().law, list(study.model().effects)) == ("bingham", ["gas_spring"])
+    assert done.verdict.kind == "none"
+    assert [step.what for step in done.steps] == ["identify bingham", "add gas_spring"]
+
+
+@pytest.mark.slow
+def test_no_effect_is_named_where_a_law_explains_the_runs():
+    case = make_case(2, "none", duration=4.0)
+    runs = [{name: run[name] for name in UNITS} for run in case.runs]
+    held_out = [runs[k] for k, run in enumerate(case.runs) if run["role"] == "holdout"]
+    train = [runs[k] for k, run in enumerate(case.runs) if run["role"] == "train"]
+    found = diagnose(train, "all", holdout=held_out)
+    assert (found.kind, found.effects, found.law) == ("none", (), "bingham")
+    fitted = identify(train, "all", holdout=held_out)
+    assert fitted.model.law.startswith("bingham")
+    assert len(fitted.as_dict()["laws"]) == len(fitted.laws) > 8
