@@ -23,8 +23,8 @@ def told(word: str, cls: Any) -> str:
     word : "effect" or "law"
     cls : the class, with `name`
     """
-    at_home = cls.__module__.partition(".")[0] == __name__.partition(".")[0]
-    where = f" ({cls.__module__}.{cls.__qualname__})" if at_home else ""
+    own = cls.__module__.startswith("bristle_own_")  # user.PACKAGE: the file is told already
+    where = "" if own else f" ({cls.__module__}.{cls.__qualname__})"
     return f"{word} {cls.name!r}{where}"
 
 
