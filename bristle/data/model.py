@@ -33,10 +33,10 @@ from typing import Any
 from ..errors import UnitError
 from ..findings import unknown, written
 from ..lines import KeyPath
-from ..physics.drive import DRIVES, VOLTAGE, declared_for, unit_for
+from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import EFFECTS, exclude, laws_joined, plain_name
 from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
-from ..physics.parameter import CHOICES, Parameter, fields_of
+from ..physics.parameter import Parameter
 from ..physics.user import waiting, why_left_out
 from ..units import convert
 from .command_form import FORM_KEYS, law_in_form
@@ -47,6 +47,8 @@ from .correlation import (
     covariance_of,
     read_correlation,
 )
+from .declared import declared_of, defaults_of
+from .declared import table_names as table_names
 from .files import Toml
 from .model_value import ORIGINS as ORIGINS
 from .model_value import VALUE_KEYS as VALUE_KEYS
@@ -107,7 +109,7 @@ class StudyModel:
         if (effect or self.law) in self.only_shown:
             value = self.effects[effect][own] if effect else self.parameters[own]
             return Parameter(value.value, value.unit, (value.low, value.high), "")
-        return _declared(self.law, effect, self.drive)[own]
+        return declared_of(self.law, effect, self.drive)[own]
 
     def with_values(
         self,
@@ -175,7 +177,7 @@ class StudyModel:
 
     def with_effect(self, effect: str) -> StudyModel:
         """Return the model with one more effect, its parameters at their defaults."""
-        added = _defaults("", effect, self.drive)
+        added = defaults_of("", effect, self.drive)
         return replace(self, effects={**self.effects, effect: added})
 
     def with_drive(self, drive: str) -> StudyModel:
@@ -222,7 +224,7 @@ def new_model(
     building : file of the structure, relative to the study; "" on a bench
     drive : the channel that commands the damper
     """
-    model = StudyModel(law, _defaults(law, "", drive), {}, building, drive=drive)
+    model = StudyModel(law, defaults_of(law, "", drive), {}, building, drive=drive)
     for effect in effects:
         model = model.with_effect(effect)
     return model
@@ -309,43 +311,6 @@ def _unusable_law(toml: Toml, law: str, folder: Path, to_show: bool) -> list[str
     return []
 
 
-def _declared(law: str, effect: str = "", drive: str = VOLTAGE.name) -> dict[str, Parameter]:
-    """Return the declarations of an effect's parameters, or of a law's, for a command."""
-    declared = dict(EFFECTS[effect].parameters) if effect else _of_law(law)
-    if drive == VOLTAGE.name:
-        return declared
-    return {name: declared_for(one, DRIVES[drive]) for name, one in declared.items()}
-
-
-def _of_law(law: str) -> dict[str, Parameter]:
-    """Return the declarations of a law's parameters, with the values of its variant."""
-    base, variant = base_and_variant(law)
-    declared = dict(base.parameters)
-    for name, value in variant.values.items():
-        declared[name] = declared[name]._replace(value=value)
-    return declared
-
-
-def table_names(law: str, effect: str = "") -> dict[str, tuple[str, ...]]:
-    """Return the tables of an effect, or of a law: name to the parameters that it lists."""
-    owner = EFFECTS[effect] if effect else base_and_variant(law)[0]
-    fields = fields_of(owner.parameters, owner.tables)
-    return {name: fields[name] for name in owner.tables}
-
-
-def _defaults(law: str, effect: str = "", drive: str = VOLTAGE.name) -> dict[str, Value]:
-    """Return the parameters of an effect, or of a law, at their defaults."""
-    if effect:
-        fixed: tuple[str, ...] = (*CHOICES, *EFFECTS[effect].assumed)
-    else:
-        base, variant = base_and_variant(law)
-        fixed = (*base.fixed(), *variant.idle)
-    return {
-        name: Value(p.value, p.unit, *p.bounds, free=name not in fixed)
-        for name, p in _declared(law, effect, drive).items()
-    }
-
-
 def _effect(
     toml: Toml, name: str, table: Any, joined: tuple[str, str], own_file: Path
 ) -> dict[str, Value] | None:
@@ -378,7 +343,7 @@ def _values(
     toml: Toml, keys: KeyPath, table: Mapping[str, Any], owner: tuple[str, str], drive: str
 ) -> dict[str, Value]:
     """Return the values of an owner, (law, "") or (law, effect), that stand in a table."""
-    declared, out = _declared(*owner, drive), _defaults(*owner, drive)
+    declared, out = declared_of(*owner, drive), defaults_of(*owner, drive)
     tables = table_names(*owner)
     for name, own in table.items():
         if name in tables:
