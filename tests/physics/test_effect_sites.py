@@ -252,7 +252,9 @@ def simulated(tmp_path, name, engine="compiled", step=0.0005, **text):
 
 
 @pytest.mark.parametrize(("effect", "least"), [(STOP, 0.05), (RUBS, 0.05)], ids=["stop", "rubs"])
-@pytest.mark.parametrize("damper", ["LuGreDamper", "BinghamDamper"])
+@pytest.mark.parametrize(
+    "damper", [pytest.param("LuGreDamper", marks=pytest.mark.slow), "BinghamDamper"]
+)
 def test_in_the_layer_and_in_the_damper_a_building_moves_alike(
     tmp_path, damper: str, effect: str, least: float
 ) -> None:
