@@ -134,8 +134,9 @@ def _then(verdict: Verdict, folder: Path) -> str:
         count = len(verdict["effects"]) if verdict["kind"] == "effect" else 1
         return command("add", folder, *verdict["effects"][:count])
     if verdict["kind"] == "unknown":
-        return _gaining(verdict, folder) + (
+        return (
             f"{command('learn', folder)} , which learns what is missing;  "
+            f"{_gaining(verdict, folder)}"
             f"{command('compare', folder)} , which shows where the residual is;  "
             "bristle effects new NAME  starts your own effect."
         )
@@ -150,6 +151,6 @@ def _gaining(verdict: Verdict, folder: Path) -> str:
     best = max(gains, key=lambda row: row["gain"])
     return (
         f"{command('add', folder, *best['effects'])} , which lowers the error by "
-        f"{best['gain']:.0%};  {command('study', 'auto', folder, '--greedy')} , which adds effects "
+        f"{100.0 * best['gain']:.0f} %;  {command('study', 'auto', folder, '--greedy')} , which adds effects "
         "as long as one gains;  "
     )
