@@ -151,6 +151,6 @@ def _gaining(verdict: Verdict, folder: Path) -> str:
     best = max(gains, key=lambda row: row["gain"])
     return (
         f"{command('add', folder, *best['effects'])} , which lowers the error by "
-        f"{100.0 * best['gain']:.0f} %;  {command('study', 'auto', folder, '--greedy')} , which adds effects "
-        "as long as one gains;  "
+        f"{100.0 * best['gain']:.0f} %;  {command('study', 'auto', folder, '--greedy')} , "
+        "which adds effects as long as one gains;  "
     )
