@@ -81,5 +81,6 @@ def _listed(text: str, known: Collection[str], option: str) -> list[str]:
     names = [name.strip() for name in text.split(",") if name.strip()]
     for name in names:
         if name not in known:
-            raise StudyError(f"{option}: {unknown('signal or part', name, known)}")
+            what = "signal" if option == "--along" else "part"
+            raise StudyError(f"{option}: {unknown(what, name, known)}")
     return names

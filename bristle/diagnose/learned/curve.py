@@ -167,7 +167,9 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     functions = [name for name in MATH if f"{name}(" in "\n".join(body)]
     parameters = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
     if formula:
-        parameters += [(*given, "of the formula") for given in formula.parameters]
+        parameters += [
+            (n, value, unit, f"{n} in g = {formula.text}") for n, value, unit in formula.parameters
+        ]
     kinds = [
         *(["Parameter"] if parameters else []), *([] if formula else ["Table", "interpolate"]),
     ]  # fmt: skip

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from ...identify.fit import Model, Problem, intervals_of
+from ...identify.residuals import residuals
+from ...identify.search import z_scale
 from ...identify.search_context import refine
 from ...physics.user import defined
 from ...progress import Count
@@ -134,7 +136,7 @@ def fit_closed(opened: Opening, found: LearnedCurve, form: ClosedForm) -> Closed
         held_out = opened.held_out.of(opened.held_out.runs)
         model = refine(replace(base, values=values), train, SWEEPS)
         trial = judge(model, train, held_out)
-        if trial.train > AS_GOOD * found.after.train:
+        if trial.train > AS_GOOD * found.after.train or not missing(found.before, trial):
             return None
         std = intervals_of(train, model).std
         given = tuple(
@@ -166,8 +168,8 @@ def _fitted(
                 refine(replace(joined, values={**law, **values}), train, SWEEPS)
                 for law in _laws(base, train)
             ]
-            trial = min((judge(end, train, held_out) for end in ends), key=lambda one: one.train)
-            model = trial.model
+            model = min(ends, key=lambda end: _error(train, end))
+            trial = judge(model, train, held_out)
             std = intervals_of(train, model).std
             entries = [f"{own}.curve[{k + 1}]" for k in range(len(curve.knots))]
             fitted = replace(
@@ -195,6 +197,11 @@ def _laws(base: Model, train: Problem) -> list[dict[str, float]]:
     names = [name for name in (*falling, over) if name and name not in base.fixed]
     usual = {name: train.scaled(base.law, name) for name in names}
     return [base.values, {**base.values, **usual}] if usual else [base.values]
+
+
+def _error(train: Problem, model: Model) -> float:
+    """Return z of a model on the runs that it was fitted to."""
+    return z_scale(residuals(train, model, train.expectation(model)))
 
 
 def _renamed(trial: Trial, own: str, name: str) -> Trial:
