@@ -18,11 +18,9 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import traceback
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,9 +29,9 @@ from bristle.diagnose import diagnose, diagnose_rig
 from bristle.identify.model import Model
 from bristle.physics.building import Building
 from bristle.physics.effect import EFFECTS
-from bristle.resources import cache_folder
 from tests.independent.rigs import LAWS
 
+from ._answers import Answer, Answers
 from ._blind import building, cases, score, work
 from ._blind.plan import BUILDINGS, Task, make_plan, make_structure_plan
 from ._blind.subject import measurements, packed
@@ -51,12 +49,10 @@ GONE = tuple(
 )
 GOALS = {"left out": 0.9, "zero": 0.9, "masses": 1.0}
 
-Answer = dict[str, Any]
-
 
 def run() -> list[Row]:
     """Return the rows of what has been made so far."""
-    return rows(_kept())
+    return rows(Answers("instruments").kept())
 
 
 def main(given: list[str]) -> int:
@@ -65,14 +61,8 @@ def main(given: list[str]) -> int:
     for name in GOALS:
         parser.add_argument(f"--{name.replace(' ', '-')}", type=int, default=0, metavar="CASES")
     chosen = parser.parse_args(given)
-    done = _kept()
-    for figure, job in _jobs(chosen):
-        key = json.dumps([figure, *job])
-        if key not in done:
-            done[key] = answer = _answered(figure, *job)
-            with _path().open("a", encoding="utf-8") as file:
-                file.write(json.dumps({"key": key, **answer}) + "\n")
-            print("right" if answer["right"] else "wrong", key, answer["said"], file=sys.stderr)
+    jobs = ((figure, *job) for figure, job in _jobs(chosen))
+    done = Answers("instruments").complete(jobs, _answered)
     for row in rows(done):
         print(f"{row.name}: {row.measured} (goal {row.goal})")
     return 0
@@ -159,17 +149,3 @@ def _of_building(case: cases.Recorded, file: Building, gone: str = "") -> dict[s
     channels = tuple(channel for channel in case.channels if channel != gone)
     train, held_out = (measurements(case.part(role), channels) for role in ("train", "holdout"))
     return packed(diagnose_rig(train, held_out, Model(case.task.law), file).as_dict())
-
-
-def _path() -> Path:
-    """Return the record of this code's answers."""
-    digest = work.digests()["diagnosis"]
-    folder = cache_folder() / "instruments"
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder / f"{digest}.jsonl"
-
-
-def _kept() -> dict[str, Answer]:
-    path = _path()
-    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-    return {one.pop("key"): one for one in map(json.loads, lines)}

@@ -14,11 +14,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import traceback
 from collections.abc import Iterator
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -26,9 +23,9 @@ from bristle.diagnose.learned.closed import GOOD, closed_forms
 from bristle.diagnose.learned.fit import fit_closed, learn
 from bristle.diagnose.opening import Insufficient, opening
 from bristle.identify.model import Model
-from bristle.resources import cache_folder
 
-from ._blind import cases, work
+from ._answers import Answer, Answers
+from ._blind import cases
 from ._blind.plan import make_plan
 from ._blind.subject import measurements
 from ._rows import Row
@@ -49,12 +46,10 @@ RIGHT = {
 }
 """Signal and closed forms that name a hidden form; a fixture's resonance is no curve."""
 
-Answer = dict[str, Any]
-
 
 def run() -> list[Row]:
     """Return the rows of what has been made so far."""
-    return rows(_kept())
+    return rows(Answers("learned").kept())
 
 
 def main(given: list[str]) -> int:
@@ -63,14 +58,7 @@ def main(given: list[str]) -> int:
     for name in ("outside", "none"):
         parser.add_argument(f"--{name}", type=int, default=0, metavar="CASES")
     chosen = parser.parse_args(given)
-    done = _kept()
-    for kind, number in _jobs(chosen):
-        key = json.dumps([kind, number])
-        if key not in done:
-            done[key] = answer = _answered(kind, number)
-            with _path().open("a", encoding="utf-8") as file:
-                file.write(json.dumps({"key": key, **answer}) + "\n")
-            print(key, answer, file=sys.stderr)
+    done = Answers("learned").complete(_jobs(chosen), _answered)
     for row in rows(done):
         print(f"{row.name}: {row.measured} (goal {row.goal})")
     return 0
@@ -143,17 +131,3 @@ def _learned(case: cases.Recorded, law: str) -> Answer:
         signal, names = RIGHT.get(case.task.form, ("", set()))
         out["named"] = best.left <= GOOD and curve.along == signal and best.name in names
     return before | out | {"z": z}
-
-
-def _path() -> Path:
-    """Return the record of this code's answers."""
-    digest = work.digests()["diagnosis"]
-    folder = cache_folder() / "learned"
-    folder.mkdir(parents=True, exist_ok=True)
-    return folder / f"{digest}.jsonl"
-
-
-def _kept() -> dict[str, Answer]:
-    path = _path()
-    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-    return {one.pop("key"): one for one in map(json.loads, lines)}

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..findings import command
+from ..physics.drive import DRIVES
 from ..quantity import plain, quantity, short_z
 from ._consent import add_trust
 
@@ -102,9 +103,17 @@ def main(arguments: argparse.Namespace) -> int:
 
 def text(found: Identified, folder: Path) -> str:
     """Return the tables as text."""
-    title = " + ".join([found.model.law, *found.model.effects])
+    from ..physics.forms import shown_law, split_form
+
+    title = " + ".join([shown_law(found.model.law), *found.model.effects])
     lines = [f"{title}, {found.fit.agreed} of {found.fit.starts} starts agree", ""]
     lines += _parameters(found)
+    if knots := split_form(found.model.law)[2]:
+        unit = DRIVES[found.model.drive].unit
+        lines.append(
+            f"  Knots of the command: {', '.join(map(plain, knots))} {unit}. [1] is the value at "
+            "the first one, each other the rise from the knot before."
+        )
     if found.unidentified:
         lines += ["", f"The data do not identify: {', '.join(found.unidentified)}."]
     lines += ["", *_errors(found)]
@@ -112,7 +121,7 @@ def text(found: Identified, folder: Path) -> str:
         lines += ["", *_every_law(found, folder)]
     if found.forms:
         lines += ["", *_forms(found, folder)]
-    if found.table:
+    if found.table and not found.laws:  # which are told as they do with effects
         lines += ["", *_laws(found, folder)]
     for note in found.notes:
         lines += ["", f"Note: {note}"]
@@ -188,6 +197,7 @@ def _every_law(found: Identified, folder: Path) -> list[str]:
 
 def _laws(found: Identified, folder: Path) -> list[str]:
     """Return the table of laws, as a section of the paper has it, and which one would do better."""
+    from ..physics.forms import shown_law
     from ..physics.laws import base_and_variant
 
     lines = [
@@ -199,15 +209,16 @@ def _laws(found: Identified, folder: Path) -> list[str]:
         cells = [quantity(one, "N", 4, size) for one in (row.train, row.holdout, row.moving)]
         held_out = cells[1] if row.holdout == row.holdout else "-"
         lines.append(
-            f"  {row.law:18} {cells[0]:>11} {held_out:>11} {row.share:>9.1%} {cells[2]:>13} "
-            f"{row.agreed:>3} of {row.starts}"
+            f"  {shown_law(row.law):18} {cells[0]:>11} {held_out:>11} {row.share:>9.1%} "
+            f"{cells[2]:>13} {row.agreed:>3} of {row.starts}"
         )
     own = {row.law: row.holdout if row.holdout == row.holdout else row.train for row in found.table}
     for name in own:
         base, variant = base_and_variant(name)
         if variant.lacks and own[name] and base.name in own:
             gain = 1.0 - own[base.name] / own[name]
-            lines.append(f"  {base.name}: {variant.lacks} lowers the error by {gain:.1%}.")
+            way = "lowers" if gain >= 0.0 else "raises"
+            lines.append(f"  {base.name}: {variant.lacks} {way} the error by {abs(gain):.1%}.")
     mine, best = found.model.law, min(own, key=lambda law: own[law])
     if mine in own and own[best] < BETTER * own[mine]:
         lines.append(_better_law(mine, best, 1.0 - own[best] / own[mine], folder))
@@ -216,10 +227,12 @@ def _laws(found: Identified, folder: Path) -> list[str]:
 
 def _better_law(mine: str, best: str, gain: float, folder: Path) -> str:
     """Return the line about a law that errs less; one that holds more may stand for an effect."""
+    from ..physics.forms import shown_law
     from ..physics.laws import base_and_variant
 
     has, holds = (set(base_and_variant(law)[0].contains) for law in (mine, best))
-    line = f"  The error of {best} is {gain:.0%} smaller than that of the model's law, {mine}."
+    line = f"  The error of {best} is {gain:.0%} smaller than that of the model's law, "
+    line += f"{shown_law(mine)}."
     if more := sorted(holds - has):
         return (
             f"{line} It contains a {' and a '.join(more)}, which may replace a missing effect. "

@@ -65,6 +65,12 @@ def joined_form(plain: str, form: str, knots: tuple[float, ...] = ()) -> str:
     return f"{plain}[{' '.join([form, *(f'{knot:.6g}' for knot in knots)])}]"
 
 
+def shown_law(name: str) -> str:
+    """Return a law's name for a reader, without the knots of its form: "lugre[table]"."""
+    plain, form, _ = split_form(name)
+    return f"{plain}[{form}]" if form else plain
+
+
 def _checked(
     where: str, plain: str, form: str, knots: tuple[float, ...]
 ) -> tuple[str, str, tuple[float, ...]]:

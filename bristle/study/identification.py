@@ -16,6 +16,7 @@ from ..identify.residuals import robust_z
 from ..identify.rig import DAMPER, Rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
 from ..identify.table import LawError, error_table
+from ..physics.forms import shown_law
 from ..physics.laws import base_and_variant, law_names
 from ..progress import tell
 from ..quantity import plain
@@ -89,7 +90,7 @@ def identify_study(
     if not write:
         return found
     step = study.add_step(
-        f"identify {found.model.law}" + "".join(f" + {e}" for e in found.model.effects),
+        f"identify {shown_law(found.model.law)}" + "".join(f" + {e}" for e in found.model.effects),
         _why(found), found.model, found.before, found.after,
     )  # fmt: skip
     return replace(found, step=step)

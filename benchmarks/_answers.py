@@ -1,0 +1,54 @@
+"""Answers of a benchmark that takes long: kept line by line, by the digest of the code."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+from bristle.resources import cache_folder
+
+from ._blind import work
+
+Answer = dict[str, Any]
+
+
+class Answers:
+    """The record of one benchmark in the cache folder; answers of other code are not in it."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def path(self) -> Path:
+        """Return the file of this code's answers."""
+        folder = cache_folder() / self.name
+        folder.mkdir(parents=True, exist_ok=True)
+        return folder / f"{work.digests()['diagnosis']}.jsonl"
+
+    def kept(self) -> dict[str, Answer]:
+        """Return the answers that are there, by key."""
+        path = self.path()
+        lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+        return {one.pop("key"): one for one in map(json.loads, lines)}
+
+    def complete(
+        self, jobs: Iterable[tuple[Any, ...]], answer: Callable[..., Answer]
+    ) -> dict[str, Answer]:
+        """Return the answers to all jobs; those that are missing are made, told and kept.
+
+        Parameters
+        ----------
+        jobs : a job is what `answer` is called with, and what JSON can hold
+        answer : returns what is found
+        """
+        done = self.kept()
+        for job in jobs:
+            key = json.dumps(job)
+            if key not in done:
+                done[key] = found = answer(*job)
+                with self.path().open("a", encoding="utf-8") as file:
+                    file.write(json.dumps({"key": key, **found}) + "\n")
+                print(key, found, file=sys.stderr)
+        return done
