@@ -19,7 +19,7 @@ from __future__ import annotations
 import argparse
 import json
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -91,8 +91,11 @@ def _jobs(chosen: argparse.Namespace) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 def _answered(figure: str, *job: Any) -> Answer:
     """Return whether a case is answered rightly and what was said; an error is wrong."""
+    asked: dict[str, Callable[..., Answer]] = {
+        "left out": _left_out, "zero": _zero, "masses": _masses,
+    }  # fmt: skip
     try:
-        return {"left out": _left_out, "zero": _zero, "masses": _masses}[figure](*job)
+        return asked[figure](*job)
     except Exception:  # whatever it is, it is the method's failure on this case
         return {"right": False, "said": [], "error": traceback.format_exc()}
 

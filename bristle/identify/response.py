@@ -1,8 +1,6 @@
 """The response of a building, as measured: one motion per level, and what its inertia says.
 
-Every level's displacement, velocity and acceleration are joined by a Kalman smoother with white
-jerk. Where dry friction lets the acceleration jump, the jerk is given that jump: else the velocity
-would be smoothed across it, and a yield force would be held against the wrong side of v = 0.
+Every level's motion is smoothed by itself.
 
 A level whose displacement was not measured integrates its velocity, and drifts. What is slow is
 therefore taken from the nearest level that has a displacement, and the storeys between by their
@@ -19,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 from scipy.signal import butter, sosfiltfilt
 
 from ..data.labels import Labels
@@ -27,14 +24,10 @@ from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building, frequencies
 from .drive import smooth_steps
-from .kalman import Samples, kalman_smooth, room
+from .level import corrected, level_draws, smoothed_level
 from .prepare import SHORTEST
-from .smooth import random_motion
 
 Array = NDArray[np.float64]
-
-JUMP = 6.0
-"""A change of acceleration that is so many times what is usual from sample to sample is a jump."""
 
 SLOW = 0.3
 """Share of the first natural frequency below which a displacement that was not measured is taken
@@ -132,7 +125,7 @@ def responses(
 
     The smoother's jerk is each run's own, times `looser`: likeliest is not without bias, and a
     looser smoother trades a little noise for much of that. The draws of its error are made once per
-    level.
+    level; those of a level without an accelerometer from each run's own motion.
 
     Parameters
     ----------
@@ -148,17 +141,26 @@ def responses(
     """
     for measurement in measurements:
         check_channels(measurement, building)
-    smoothed = [[_level(m, name, looser) for name in building.levels()] for m in measurements]
+    smoothed = [
+        [smoothed_level(m, name, looser) for name in building.levels()] for m in measurements
+    ]
     corner = SLOW * frequencies(building)[0]
     longest = max(len(m.time) for m in measurements)
     made: dict[tuple[int, tuple[bool, ...]], Array] = {}
     for i in range(building.size):
         for have in dict.fromkeys(_instruments(run[i]) for run in smoothed):
             alike = [run[i] for run in smoothed if _instruments(run[i]) == have]
-            made[i, have] = _draws(longest, alike, measurements[0].step, draws, seed + i)
+            if have[2]:
+                made[i, have] = level_draws(longest, alike, measurements[0].step, draws, seed + i)
     out = []
     for m, levels in zip(measurements, smoothed, strict=True):
-        errors = [made[i, _instruments(one)] for i, one in enumerate(levels)]
+        errors = []
+        for i, one in enumerate(levels):
+            if one["have"][2]:
+                errors.append(made[i, _instruments(one)])
+            else:
+                levels[i], error = corrected(one, m.step, draws, seed + i)
+                errors.append(error)
         a, noise_a = _accelerations(m, building, levels)
         levels, errors = _anchored(levels, errors, _deflected(building, a), m.step, corner)
         out.append(_response(m, levels, errors, (a, noise_a)))
@@ -221,48 +223,6 @@ def _response(
     )  # fmt: skip
 
 
-def _level(m: Measurement, name: str, looser: float) -> dict[str, Any]:
-    """Return the smoothed motion of one level: state (n, 3), std (3,), jerk, noise, have."""
-    n, dt = len(m.time), m.step
-    y, r, have = np.zeros((n, 3)), np.zeros(3), np.zeros(3, dtype=np.bool_)
-    for i, what in enumerate(("displacement", "velocity")):
-        channel = f"{name}_{what}"
-        if m.has(channel):
-            y[:, i], have[i] = m[channel], True
-            r[i] = m.noise.get(channel, 0.0) ** 2
-    channel = f"{name}_acceleration_absolute"
-    if m.has(channel):
-        y[:, 2], have[2] = m[channel] - m["ground_acceleration"], True
-        r[2] = m.noise.get(channel, 0.0) ** 2 + m.noise.get("ground_acceleration", 0.0) ** 2
-    # A channel without any noise still is no better than its last digits.
-    r = np.maximum(r, (1e-7 * np.std(y, axis=0)) ** 2 + 1e-30)
-    added = jumps(y[:, 2], dt) if have[2] else np.zeros(n)
-    jerk = looser * _likeliest(y, r, have, dt, added)
-    out = room(n)
-    kalman_smooth(_samples(y, r, have, dt), jerk + added, out)
-    std = np.sqrt(np.maximum(out.cov, 0.0))
-    return {"state": out.state, "std": std, "jerk": jerk, "r": r, "have": have}
-
-
-def _samples(y: Array, r: Array, have: NDArray[np.bool_], dt: float) -> Samples:
-    """Return a level's channels (n, 3) of variances r (3,), with a wide guess of the beginning.
-
-    Where a channel is missing, the fastest change of the one below it says how large it is.
-    """
-    n, largest = len(y), np.max(np.abs(y), axis=0)
-    fastest = float(np.max(np.abs(np.diff(y[:, 0])), initial=0.0)) / dt
-    wide = max(largest[0], largest[1] * dt, largest[2] * dt * dt) + 1e-12
-    speed, rise = wide / dt / np.sqrt(n), wide / dt**2 / np.sqrt(n)
-    if have[0] and not have[1]:
-        speed = 2.0 * fastest + 1e-12
-    if not have[2]:
-        rise = 2.0 * (largest[1] if have[1] else fastest) / dt + 1e-12
-    cov = np.zeros(6)
-    for c, (at, size) in enumerate(((0, wide), (3, speed), (5, rise))):
-        cov[at] = 4.0 * r[c] if have[c] else size**2
-    return Samples(y, r, have, dt, np.where(have, y[0], 0.0), cov)
-
-
 def _anchored(
     levels: list[dict[str, Any]], errors: list[Array], deflected: Array, dt: float, corner: float
 ) -> tuple[list[dict[str, Any]], list[Array]]:
@@ -270,7 +230,7 @@ def _anchored(
 
     Parameters
     ----------
-    levels, errors : per level what `_level` and `_draws` return
+    levels, errors : per level what `smoothed_level` and `level_draws` return
     deflected : (levels, n) how far the springs deflect [m]; see `_deflected`
     dt, corner : sampling step [s]; frequency below which a displacement is not the level's own [Hz]
     """
@@ -298,59 +258,6 @@ def _anchored(
         std[0] = np.hypot(min(std[0], drift), levels[near]["std"][0])
         levels[i], errors[i] = {**level, "state": state, "std": std}, error
     return levels, errors
-
-
-def jumps(a: Array, dt: float) -> Array:
-    """Return the jerk [m2/s5] that accounts for the jumps of an acceleration (n,) [m/s2]."""
-    change = np.abs(np.diff(a, prepend=a[0]))
-    usual = float(np.median(change)) / 0.6745
-    return np.where(change > JUMP * usual, change**2 / dt, 0.0)
-
-
-def _likeliest(
-    y: Array, r: Array, have: NDArray[np.bool_], dt: float, added: Array, most: int = 4000
-) -> float:
-    """Return the intensity of the white jerk that makes the strongest stretch likeliest."""
-    n = len(y)
-    if n > most:
-        power = np.convolve(np.abs(y[:, int(np.argmax(have))]), np.ones(most), mode="valid")
-        begin = int(np.argmax(power))
-        y, added = y[begin : begin + most], added[begin : begin + most]
-    samples = _samples(y, r, have, dt)
-    highest = int(np.flatnonzero(have)[-1])
-    third = np.diff(y[:, highest], n=3 - highest) / dt ** (3 - highest)
-    top = np.log10(np.var(third) * dt + 1e-30)
-
-    def cost(exponent: float) -> float:
-        return kalman_smooth(samples, 10.0**exponent + added)
-
-    grid = np.arange(top - 12.0, top + 2.1, 1.5)
-    best = grid[int(np.argmin([cost(exponent) for exponent in grid]))]
-    found = minimize_scalar(
-        cost, bounds=(best - 1.5, best + 1.5), method="bounded", options={"xatol": 0.1}
-    )
-    return float(10.0**found.x)
-
-
-def _draws(n: int, runs: list[dict[str, Any]], dt: float, draws: int, seed: int) -> Array:
-    """Return draws (d, n, 3) of the smoother's error at the median jerk and noise of the runs.
-
-    The runs have the same instruments.
-    """
-    generator = np.random.default_rng(seed)
-    jerk = float(np.median([run["jerk"] for run in runs]))
-    r = np.median([run["r"] for run in runs], axis=0)
-    have = runs[0]["have"]
-    lead = min(200, n)
-    total = n + 2 * lead
-    out = np.zeros((draws, n, 3))
-    smoothed = room(total)
-    for d in range(draws):
-        path = random_motion(generator, total, dt, jerk)
-        y = path + generator.standard_normal((total, 3)) * np.sqrt(r)
-        kalman_smooth(_samples(y, r, have, dt), np.full(total, jerk), smoothed)
-        out[d] = (path - smoothed.state)[lead : lead + n]
-    return out
 
 
 def shear(response: Response, building: Building, level: int) -> tuple[Array, float]:

@@ -9,9 +9,10 @@ import pytest
 from shaken import building, friction, measured, shake
 
 from bristle.errors import RecordError
+from bristle.identify.level import jumps
 from bristle.identify.line import at_bound, fit_line
 from bristle.identify.model import Model
-from bristle.identify.response import base_equilibrium, jumps, respond, responses, shear
+from bristle.identify.response import base_equilibrium, respond, responses, shear
 from bristle.identify.rig import Site
 from bristle.identify.rig_fit import RigFit
 from bristle.identify.structure import (
@@ -52,6 +53,18 @@ def test_a_jump_of_the_acceleration_is_no_noise():
     assert not np.any(jumps(smooth + np.random.default_rng(0).normal(size=400), 0.002))
     stepped = 1e-3 * np.random.default_rng(1).normal(size=400) + (np.arange(400) >= 200)
     assert np.flatnonzero(jumps(stepped, 0.002)).tolist() == [200]
+
+
+def test_accelerations_of_floors_without_accelerometers_err_as_much_as_they_say(truth):
+    b, clean, _ = truth
+    floors = ("floor1_acceleration_absolute", "floor2_acceleration_absolute")
+    response = respond(measured(clean, 11, without=floors), b)
+    for i, channel in enumerate(floors, start=1):
+        error = np.std((response.a[i] - clean[channel])[50:-50])
+        # Friction kicks the floors, which a smooth motion does not hold whole.
+        assert 0.8 * response.noise_a[i] < error < 1.5 * response.noise_a[i]
+        drawn = np.std(response.draws[i, :, 50:-50, 2])
+        assert drawn == pytest.approx(response.std[i, 2], rel=0.05)
 
 
 def test_both_equilibria_give_the_force_and_their_noise(truth):
