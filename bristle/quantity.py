@@ -42,12 +42,20 @@ def times_ten(power: int) -> str:
 
 def tick(value: float) -> str:
     """Return a number at a mark of a logarithmic axis: 0.01, 1, 100, and 10⁻⁵ for 1e-05."""
+    if isfinite(value) and value < 0.0:
+        return f"-{tick(-value)}"
     if not value > 0.0 or 1e-4 <= value < 1e5:
         return plain(value)
     power = floor(log10(value) + 1e-9)  # 1e-05 is one decade, whatever the logarithm rounds to
     share = plain(value / 10.0**power, 2)
     raised = times_ten(power)
     return raised.rpartition(" ")[2] if share == "1" else f"{share}{raised}"
+
+
+def typed(value: float) -> str:
+    """Return a number as one would type it, 1000000; 10⁹ where zeros would have to be counted."""
+    few_zeros = value == 0.0 or 1e-6 <= abs(value) < 1e7
+    return plain(value, 6) if few_zeros else tick(value)
 
 
 def scale(unit: str, size: float) -> tuple[float, str]:

@@ -9,7 +9,7 @@ import pytest
 from study.made import bench_run, write
 
 from bristle.cli import main
-from bristle.quantity import plain, quantity, scale, short_z, tick
+from bristle.quantity import plain, quantity, scale, short_z, tick, typed
 from bristle.study import create_study
 
 POWER = re.compile(r"\d[eE][+-]?\d")
@@ -83,3 +83,21 @@ def test_marks_of_a_logarithmic_axis() -> None:
     shown = ["10⁻⁹", "2 × 10⁻⁶", "10⁻⁵", "0.0001", "0.01", "1", "100", "10000", "10⁵", "3 × 10⁷"]  # noqa: RUF001
     assert [tick(mark) for mark in marks] == shown
     assert tick(0.0) == "0"
+    assert tick(-1e10) == "-10¹⁰"
+
+
+def test_a_number_to_type_has_its_zeros_until_they_must_be_counted() -> None:
+    assert [typed(value) for value in (1e6, 0.02, -415.0, 123456.7)] == [
+        "1000000", "0.02", "-415", "123457",
+    ]  # fmt: skip
+    assert [typed(value) for value in (1e9, -1e10, 1e-7)] == ["10⁹", "-10¹⁰", "10⁻⁷"]
+
+
+@pytest.mark.parametrize(
+    "line", ["list ports LuGreDamper", "list ports Structure", "effects", "laws"]
+)
+def test_no_list_shows_a_power_of_ten(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(line.split()) == 0
+    told = capsys.readouterr().out
+    assert told
+    assert not POWER.search(told), told

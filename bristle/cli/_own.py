@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..quantity import tick, typed
 from ._consent import add_trust
 
 WITHIN = 300.0
@@ -223,21 +224,15 @@ def parameter_lines(found: dict[str, Any], begin: str) -> list[str]:
     """Return a line per parameter: value, unit, bounds, meaning."""
     lines = []
     for name, about in found["parameters"].items():
-        low, high = (_bound(bound) for bound in about["bounds"])
-        value = f"{about['value']:g} {about['unit']}" if about["unit"] != "1" else about["value"]
+        low, high = (tick(bound) for bound in about["bounds"])
+        value = f"{typed(about['value'])} {about['unit']}".removesuffix(" 1")
         lines.append(f"  {begin}{name} = {value}  ({low} to {high}): {about['text']}")
     return lines
-
-
-def _bound(value: float) -> str:
-    from ..quantity import tick
-
-    return f"-{tick(-value)}" if value < 0.0 else tick(value)
 
 
 def shortly(row: dict[str, Any]) -> list[str]:
     """Return name, value and unit of each parameter."""
     return [
-        f"{name} = {about['value']:g}" + (f" {about['unit']}" if about["unit"] != "1" else "")
+        f"{name} = {typed(about['value'])}" + (f" {about['unit']}" if about["unit"] != "1" else "")
         for name, about in row["parameters"].items()
     ]

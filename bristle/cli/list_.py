@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..quantity import typed
+
 if TYPE_CHECKING:
     from ..fmu.description import Description, Variable
 
@@ -169,4 +171,4 @@ def _print(title: str, rows: Rows) -> None:
 def _cell(value: Any) -> str:
     if value is None:
         return ""
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return typed(value) if isinstance(value, float) else str(value)
