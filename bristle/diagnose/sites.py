@@ -86,10 +86,15 @@ def try_effect(
 
 
 def shortened(problem: StructureProblem, seconds: float) -> StructureProblem:
-    """Return the problem with the first so many seconds of each run, itself if none is longer."""
+    """Return the problem with the first so many seconds of each run, itself if none is longer.
+
+    A run whose base does not move within that time is left out.
+    """
     if all(len(_whole(run).x) * run.dt <= seconds for run in problem.runs):
         return problem
-    return problem.of([_first_samples(run, round(seconds / run.dt)) for run in problem.runs])
+    cut = [_first_samples(run, round(seconds / run.dt)) for run in problem.runs]
+    moving: list[Run] = [run for run in cut if len(run.force)]
+    return problem.of(moving) if moving else problem
 
 
 def _whole(run: Run) -> Run:

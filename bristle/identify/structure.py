@@ -309,13 +309,15 @@ def structure_problems(
     Returns
     -------
     dict
-        "storey1", "storey2", ...; "layer", where the base is isolated and the damper's force was
-        measured in every run; "damper", where a voltage, a current or the force was measured.
+        "storey1", "storey2", ...; "layer", where the base is isolated and moves, and the damper's
+        force was measured in every run; "damper", where a voltage, a current or the force was
+        measured.
 
     Raises
     ------
     RecordError
-        If a channel is missing, or the building has other levels than were measured.
+        If a channel is missing, or the building has other levels than were measured, or a law of
+        dry friction is asked for and the base moves in no run.
     """
     found = responses([*train, *holdout], building)
     return problems_of(found[: len(train)], found[len(train) :], building, law)
@@ -346,12 +348,25 @@ def problems_of(
             StructureProblem(p, storey, damped=damping_below(building, level)) for p in parts
         )
     if building.isolated and (measured or not damped):
-        parts = [[layer_run(_unloaded(r), building) for r in part] for part in both]
-        problems["layer"] = tuple(layer_problem(p, building) for p in parts)
+        parts = [_moving([layer_run(_unloaded(r), building) for r in part]) for part in both]
+        if all(moving or not part for moving, part in zip(parts, both, strict=True)):
+            problems["layer"] = tuple(layer_problem(p, building) for p in parts)
     if damped:
-        parts = [[damper_run(r, building, law, linear_storeys) for r in part] for part in both]
+        made = [[damper_run(r, building, law, linear_storeys) for r in part] for part in both]
+        parts = [_moving(part, needed=True) for part in made]
         problems["damper"] = tuple(StructureProblem(p, 0, not measured) for p in parts)
     return problems  # type: ignore[return-value]
+
+
+def _moving(runs: list[StructureRun], needed: bool = False) -> list[StructureRun]:
+    """Return the runs in which the base moves at some time; a RecordError if `needed` and none."""
+    able = [run for run in runs if len(run.force)]
+    if needed and runs and not able:
+        raise RecordError(
+            f"{', '.join(run.name for run in runs)}: the base does not move beyond the noise of "
+            "its velocity. Add a run with a stronger ground motion."
+        )
+    return able
 
 
 def layer_problem(runs: Sequence[Run], building: Building) -> StructureProblem:

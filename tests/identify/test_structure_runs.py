@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
+from bristle.diagnose.sites import shortened
 from bristle.errors import RecordError
 from bristle.identify.level import jumps
 from bristle.identify.line import at_bound, fit_line
@@ -19,6 +20,7 @@ from bristle.identify.structure import (
     damper_run,
     damping_below,
     layer_run,
+    problems_of,
     reconstructed,
     sliding,
     storey_run,
@@ -107,6 +109,31 @@ def test_where_the_base_may_be_held_is_left_out(truth):
     assert len(run.whole.force) == len(moves)
     assert len(damper_run(response, b, "lugre").force) == len(moves)
     assert len(damper_run(response, b, "bingham").force) == len(run.force)
+
+
+def test_a_run_in_which_the_base_is_held_throughout_is_left_out(truth):
+    b, _, response = truth
+    held = np.ones((b.size, 1))
+    held[0] = 1e-9
+    still = replace(response, name="still", v=response.v * held)
+    problem, held_out = problems_of([still, response], [response], b, "bingham")["damper"]
+    assert [run.name for run in problem.runs] == [run.name for run in held_out.runs] == ["run"]
+    only_still = problems_of([still], [response], b, "lugre")
+    assert len(only_still["damper"][0].runs) == 1
+    assert "layer" not in only_still
+    with pytest.raises(RecordError, match=r"still: the base does not move .* stronger ground"):
+        problems_of([still], [response], b, "bingham")
+
+
+def test_a_run_that_moves_late_is_left_out_of_the_search(truth):
+    b, _, response = truth
+    v = response.v.copy()
+    v[0, :4000] = 0.0
+    late = replace(response, name="late", v=v)
+    problem, _ = problems_of([response, late], [response], b, "bingham")["damper"]
+    first = 1500 * response.dt
+    assert [run.name for run in shortened(problem, first).runs] == ["run"]
+    assert shortened(problem.of([problem.runs[1]]), first).runs[0].name == "late"
 
 
 def test_effects_of_the_structure_are_predicted_from_their_source(truth):

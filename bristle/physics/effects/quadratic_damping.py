@@ -10,8 +10,10 @@ class QuadraticDamping(Effect):
 
         F = c_2 V_r^2 (|v|/V_r)^shape sgn(v),   V_r = 0.1 m/s
 
-    Leaves out the laminar range below and cavitation above: doubt it when the force jumps or
-    breaks off at the highest speeds.
+    With the exponent 1 it is the dashpot of a second load path, c_2 V_r [N s/m]; only a law without
+    a constant viscous part, such as the modified Bingham law, can tell that from its own. Leaves
+    out the laminar range below and cavitation above: doubt it when the force jumps or breaks off at
+    the highest speeds.
     """
 
     name = "quadratic_damping"
@@ -26,7 +28,7 @@ class QuadraticDamping(Effect):
     expect = "missing force in the direction of motion that grows steeply with speed"
     parameters = {
         "c_2": Parameter(100.0, "N.s2/m2", (0.0, 1e7), "coefficient, at V_r for every shape"),
-        "shape": Parameter(2.0, "1", (1.3, 3.5), "exponent: 2 turbulent, 1.75 smooth gap"),
+        "shape": Parameter(2.0, "1", (1.0, 3.5), "exponent: 2 turbulent, 1 a dashpot"),
     }
     start_grid = {"shape": (0.875, 1.0, 1.25)}
 
