@@ -56,7 +56,7 @@ def _with_limits(found: Finding, opened: Opening) -> Finding:
     """Return a finding with what the data could not show, and what would tell more."""
     problem, model, rule = opened.searched, opened.before.model, opened.rule
     expected = problem.expectation(model)
-    visible = detectable(problem, expected, rule)
+    visible = detectable(problem, expected, rule, found.z_after)
     hidden = untestable(model, problem, expected, visible, rule, _able(found, opened))
     experiment = None
     if found.kind == "ambiguous" and opened.scope.choose_motion:

@@ -18,11 +18,25 @@ from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
 
+BELOW = 0.9
+"""A z below this is no chance: the noise expected was too large, as of a base that has friction and
+no accelerometer, where room is left for jumps."""
 
-def detectable(problem: Problem, expected: Expected, rule: DecisionRule = BENCH) -> float:
+
+def detectable(
+    problem: Problem, expected: Expected, rule: DecisionRule = BENCH, z: float = 1.0
+) -> float:
     """Return the smallest share of the force RMS that a missing effect must leave to be seen.
 
     It is what raises z by `rule.gain` over the noise expected of a true model.
+
+    Parameters
+    ----------
+    problem : the runs
+    expected : what a true model would show on each run; see `Problem.expectation`
+    rule : the numbers that decide
+    z : error over noise of the model; where it is below `BELOW`, the expected noise is too large
+        and hides more
     """
     force = np.concatenate([run.force[run.skip :] for run in problem.runs])
     weight = np.concatenate(
@@ -30,7 +44,9 @@ def detectable(problem: Problem, expected: Expected, rule: DecisionRule = BENCH)
     )
     # Noise as the residual sees it: a residual of share s has the excess s^2 mean(F^2/sigma^2).
     ratio = float(np.sqrt(np.mean(force**2) * np.mean(weight**2)))
-    return float(np.sqrt((1.0 + rule.gain) ** 2 - 1.0) / ratio) if ratio > 0.0 else float("inf")
+    noise = z if z < BELOW else 1.0
+    left = float(np.sqrt((1.0 + rule.gain) ** 2 - noise**2))
+    return left / ratio if ratio > 0.0 else float("inf")
 
 
 def untestable(

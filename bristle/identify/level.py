@@ -121,9 +121,9 @@ def level_draws(n: int, runs: list[dict[str, Any]], dt: float, draws: int, seed:
 def corrected(
     level: dict[str, Any], dt: float, draws: int, seed: int
 ) -> tuple[dict[str, Any], Array]:
-    """Return a level that has no accelerometer without its known error, and draws of the rest.
+    """Return a floor that has no accelerometer without its known error, and draws of the rest.
 
-    A level's motion is smoother than white jerk: the smoother lets noise pass where nothing moves,
+    A floor's motion is smoother than white jerk: the smoother lets noise pass where nothing moves,
     and takes some motion for noise. Most of the acceleration's error is known therefore from the
     motion found (three quarters of it on the buildings of the tests), and taken off.
     """

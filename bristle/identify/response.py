@@ -125,7 +125,7 @@ def responses(
 
     The smoother's jerk is each run's own, times `looser`: likeliest is not without bias, and a
     looser smoother trades a little noise for much of that. The draws of its error are made once per
-    level; those of a level without an accelerometer from each run's own motion.
+    level; those of a floor without an accelerometer from each run's own motion.
 
     Parameters
     ----------
@@ -150,17 +150,17 @@ def responses(
     for i in range(building.size):
         for have in dict.fromkeys(_instruments(run[i]) for run in smoothed):
             alike = [run[i] for run in smoothed if _instruments(run[i]) == have]
-            if have[2]:
+            if not _is_smooth(i, have):
                 made[i, have] = level_draws(longest, alike, measurements[0].step, draws, seed + i)
     out = []
     for m, levels in zip(measurements, smoothed, strict=True):
         errors = []
         for i, one in enumerate(levels):
-            if one["have"][2]:
-                errors.append(made[i, _instruments(one)])
-            else:
+            if _is_smooth(i, _instruments(one)):
                 levels[i], error = corrected(one, m.step, draws, seed + i)
                 errors.append(error)
+            else:
+                errors.append(made[i, _instruments(one)])
         a, noise_a = _accelerations(m, building, levels)
         levels, errors = _anchored(levels, errors, _deflected(building, a), m.step, corner)
         out.append(_response(m, levels, errors, (a, noise_a)))
@@ -170,6 +170,14 @@ def responses(
 def _instruments(level: dict[str, Any]) -> tuple[bool, ...]:
     """Return which of displacement, velocity and acceleration of a level were measured."""
     return tuple(bool(one) for one in level["have"])
+
+
+def _is_smooth(level: int, have: tuple[bool, ...]) -> bool:
+    """Return whether a level's acceleration is smoothed, and does not jump.
+
+    Dry friction and end stops act on the first level; those above have a storey between.
+    """
+    return level > 0 and not have[2]
 
 
 def _accelerations(

@@ -76,6 +76,16 @@ def test_the_share_is_what_raises_z_by_the_smallest_gain():
     assert np.sqrt(1.0 + (missing / sigma) ** 2) == pytest.approx(1.0 + BENCH.gain, rel=1e-9)
 
 
+def test_where_the_expected_noise_is_too_large_more_is_hidden():
+    problem = problem_of(steps)
+    expected = white(problem, 0.05)
+    right = detectable(problem, expected)
+    assert detectable(problem, expected, z=0.95) == right  # by chance
+    gain = BENCH.gain
+    share = np.sqrt(((1.0 + gain) ** 2 - 0.25) / ((1.0 + gain) ** 2 - 1.0))
+    assert detectable(problem, expected, z=0.5) == pytest.approx(share * right)
+
+
 def test_less_noise_on_all_channels_shows_less():
     shares = []
     for noise in (0.01, 0.03):
