@@ -18,7 +18,7 @@ from ..errors import RecordError, UnitError
 from ..units import conversion
 from .channels import DRIVE, ChannelSpec, channel_unit
 from .decimate import decimated
-from .guess import guess_channels, specs
+from .guess import guess_channels, specs, why_no_time
 from .labels import Labels
 from .noise import Noise, estimate_noise
 from .read import read_table
@@ -275,7 +275,7 @@ def _time(table: Table, spec: ChannelSpec | None) -> Array:
         return np.arange(table.rows, dtype=np.float64) * spec.step
     if spec is None:
         raise RecordError(
-            f"{table.source}: no column is the time. Name one in [channels.time], or give the "
+            f"{table.source}: {why_no_time(table)}. Name one in [channels.time], or give the "
             "sampling step there: step = 0.002  # s"
         )
     return _in_si(table, "time", spec)
