@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +16,7 @@ from bristle import trust
 from bristle.physics.user import unload_effects
 
 _STATUS = pytest.StashKey[int]()
+_AHEAD = pytest.StashKey["subprocess.Popen[bytes]"]()
 
 # Whether the suite passes must not hang on the day's dice.
 # HYPOTHESIS_PROFILE=default looks further.
@@ -22,8 +24,24 @@ settings.register_profile("steady", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
 
 
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Where the whole suite runs on several workers, compile once what each would compile."""
+    config = session.config
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    if whole and config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        script = Path(__file__).with_name("compile_ahead.py")
+        path = os.pathsep.join([str(script.parents[1]), os.environ.get("PYTHONPATH", "")])
+        config.stash[_AHEAD] = subprocess.Popen(
+            [sys.executable, str(script)], env={**os.environ, "PYTHONPATH": path},
+            stdout=subprocess.DEVNULL,
+        )  # fmt: skip
+
+
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     session.config.stash[_STATUS] = int(exitstatus)
+    if ahead := session.config.stash.get(_AHEAD, None):
+        ahead.kill()  # it has ended long since, unless the run was stopped
+        ahead.wait()
 
 
 @pytest.hookimpl(trylast=True)
