@@ -92,20 +92,8 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     else:
         parameters = _values(toml, ("parameters",), given, (law, ""), drive)
     base = "" if only_shown else base_and_variant(law)[0].name
-    effects: dict[str, dict[str, Value]] = {}
-    for name, table in toml.table((), data, "effects").items():
-        own = beside / "effects" / f"{name}.py"
-        untrusted = waiting(own) if name not in EFFECTS else None
-        if untrusted and not to_show:
-            raise untrusted
-        if untrusted:
-            own_values = table.get("parameters") if isinstance(table, dict) else None
-            effects[name] = as_written(toml, ("effects", name, "parameters"), own_values)
-            only_shown.append(name)
-            continue
-        found = _effect(toml, name, table, (base, drive), own)
-        if found is not None:
-            effects[name] = found
+    effects, untrusted = _effects(toml, (base, drive), beside / "effects", to_show)
+    only_shown += untrusted
     _exclusions(toml, [name for name in effects if name not in only_shown])
     building = toml.text((), data, "building")
     if building and not (beside / building).is_file():
@@ -132,6 +120,36 @@ def _unusable_law(toml: Toml, law: str, folder: Path, to_show: bool) -> list[str
     toml.error(("law",), why or unknown("law", law, law_names()))
     toml.check()
     return []
+
+
+def _effects(
+    toml: Toml, joined: tuple[str, str], folder: Path, to_show: bool
+) -> tuple[dict[str, dict[str, Value]], list[str]]:
+    """Return the values of all effects, and the names of those whose code must not run yet.
+
+    Parameters
+    ----------
+    toml : the file
+    joined : the law that they join, and the model's drive
+    folder : where the user's own effects are
+    to_show : whether those that must not run are there as well, else TrustError is raised
+    """
+    effects: dict[str, dict[str, Value]] = {}
+    only_shown = []
+    for name, table in toml.table((), toml.data, "effects").items():
+        own = folder / f"{name}.py"
+        untrusted = waiting(own) if name not in EFFECTS else None
+        if untrusted and not to_show:
+            raise untrusted
+        if untrusted:
+            own_values = table.get("parameters") if isinstance(table, dict) else None
+            effects[name] = as_written(toml, ("effects", name, "parameters"), own_values)
+            only_shown.append(name)
+            continue
+        found = _effect(toml, name, table, joined, own)
+        if found is not None:
+            effects[name] = found
+    return effects, only_shown
 
 
 def _effect(
@@ -219,6 +237,8 @@ def _value(
         toml.error(keys, f"{name}: {low:g} to {high:g} leaves what is physical, {allowed}.")
     if not low <= value <= high:
         toml.error((*keys, "value"), f"{name} = {value:g} is outside {low:g} to {high:g} {unit}.")
+    if given["std"] is not None and given["std"] < 0.0:
+        toml.error((*keys, "std"), f"std = {given['std']:g}; 0 or a positive number is right.")
     free = table.get("free", default.free)
     if not isinstance(free, bool):
         toml.error((*keys, "free"), f"free = {written(free)}; true or false is right.")

@@ -201,6 +201,8 @@ def test_what_cannot_be_is_refused(
         (["--draws", "3"], "--draws needs --closed-loop"),
         (["--closed-loop", "--level", "3"], "--level needs --in"),
         (["--closed-loop", "--draws", "-1"], "0 or a positive whole number"),
+        (["--closed-loop", "--in", "house.toml", "--role", "test"], "does not go with --in"),
+        (["--closed-loop", "--in", "house.toml", "--level", "nan"], "a finite number is right"),
         (["--closed-loop", "--out", "a.png"], "there is no picture"),
         (["--closed-loop", "--in", str(house(made)), "--ground", "el_centro_1940_ns"],
          "in a building of its own"),
