@@ -18,7 +18,7 @@ from ..errors import RecordError, UnitError
 from ..units import conversion
 from .channels import DRIVE, ChannelSpec, channel_unit
 from .decimate import decimated
-from .guess import guess_channels, specs, why_no_time
+from .guess import guess_channels, specs, too_few_rows
 from .labels import Labels
 from .noise import Noise, estimate_noise
 from .read import read_table
@@ -235,7 +235,8 @@ def measurements_of(
     for number, (piece, parts, measured) in enumerate(even.pieces, 1):
         name = stem if len(even.pieces) == 1 else f"{stem} ({number} of {len(even.pieces)})"
         noise, facts = _noise(table, channels, parts, estimate)
-        _behind_filter(fewer.gain, fewer.noise[number - 1], noise, facts)
+        if fewer.gain:
+            _behind_filter(fewer.gain, fewer.noise[number - 1], noise, facts)
         for channel, level in known.levels.items():
             units[channel], noise[channel], facts[channel] = channel_unit(channel), 0.0, None
             parts[channel] = np.full(len(piece), level)
@@ -268,9 +269,10 @@ def _time(table: Table, spec: ChannelSpec | None) -> Array:
             raise RecordError(f"{table.source}: time: step = {spec.step!r} s must be positive.")
         return np.arange(table.rows, dtype=np.float64) * spec.step
     if spec is None:
+        why = too_few_rows(table) or "no column is the time"
         raise RecordError(
-            f"{table.source}: {why_no_time(table)}. Name one in [channels.time], or give the "
-            "sampling step there: step = 0.002  # s"
+            f"{table.source}: {why}. Name one in [channels.time], or give the sampling step there: "
+            "step = 0.002  # s"
         )
     return _in_si(table, "time", spec)
 

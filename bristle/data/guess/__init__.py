@@ -84,12 +84,12 @@ def specs(table: Table, guesses: list[Guess]) -> dict[str, ChannelSpec]:
     return {guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses}
 
 
-def why_no_time(table: Table) -> str:
-    """Return why no column is taken for the time: too few rows, or none that is like one."""
-    if table.rows < FEWEST:
-        rows = "one row" if table.rows == 1 else f"{table.rows} rows"
-        return f"{rows} of numbers: no column can be recognised as the time in fewer than {FEWEST}"
-    return "no column can be the time"
+def too_few_rows(table: Table) -> str:
+    """Return that no column is taken for the time in so few rows, "" where there are enough."""
+    if table.rows >= FEWEST:
+        return ""
+    rows = "one row" if table.rows == 1 else f"{table.rows} rows"
+    return f"{rows} of numbers: no column can be recognised as the time in fewer than {FEWEST}"
 
 
 def _find_time(table: Table) -> tuple[Guess | None, float]:
