@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -22,6 +24,12 @@ _AHEAD = pytest.StashKey["subprocess.Popen[bytes]"]()
 # HYPOTHESIS_PROFILE=default looks further.
 settings.register_profile("steady", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
+
+# The processes that tests start, hundreds of them, read what they import from bytecode, beside the
+# checkout. The workers of a run inherit the folder.
+_BYTECODE = "" if "PYTHONPYCACHEPREFIX" in os.environ else tempfile.mkdtemp(prefix="bristle-pyc-")
+os.environ.setdefault("PYTHONPYCACHEPREFIX", _BYTECODE)
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
@@ -51,6 +59,8 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     The binary that PythonFMU builds reads freed memory when a process ends with it loaded: one in
     some hundred processes then aborts after its last test has passed.
     """
+    if _BYTECODE:
+        shutil.rmtree(_BYTECODE, ignore_errors=True)
     if _STATUS in config.stash:
         sys.stdout.flush()
         sys.stderr.flush()
