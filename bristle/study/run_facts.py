@@ -238,6 +238,10 @@ def rows_of_table(path: Path, files: Sequence[Path]) -> list[Facts]:
         raise StudyError(
             f'--runs {path}: no column is called "file"; there are {", ".join(header)}.'
         )
+    named = [name.strip() for name in header if name.strip()]
+    twice = next((name for name in named if named.count(name) > 1), "")
+    if twice:
+        raise StudyError(f'--runs {path}: {named.count(twice)} columns are called "{twice}".')
     found: dict[str, Facts] = {}
     for number, row in enumerate(rows, 2):
         where = f"--runs {path}, row {number}"

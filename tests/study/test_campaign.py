@@ -186,6 +186,7 @@ def test_what_is_wrong_with_a_pattern_is_one_clear_word(lab, tmp_path, choices, 
 @pytest.mark.parametrize(
     ("rows", "what"),
     [
+        ("# a comment", "a line of titles and a line per run are right"),
         ("a.csv,1\nlab/a.csv,2", "row 3: there is a row of a.csv above; one is right"),
         ("a.csv,nan", 'row 2: current is "nan"; a finite number is right'),
     ],
@@ -194,6 +195,13 @@ def test_a_row_that_cannot_count_is_refused(tmp_path, rows, what) -> None:
     table = tmp_path / "runs.csv"
     table.write_text(f"file,current [A]\n{rows}\n")
     with pytest.raises(StudyError, match=re.escape(what)):
+        rows_of_table(table, [Path("a.csv")])
+
+
+def test_a_table_of_runs_with_two_columns_of_one_name_is_refused(tmp_path) -> None:
+    table = tmp_path / "runs.csv"
+    table.write_text("file;current [A];current [A]\na.csv;1;2\n")
+    with pytest.raises(StudyError, match=r'2 columns are called "current \[A\]"'):
         rows_of_table(table, [Path("a.csv")])
 
 
