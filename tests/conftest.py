@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import shutil
+import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,15 +18,38 @@ from bristle import trust
 from bristle.physics.user import unload_effects
 
 _STATUS = pytest.StashKey[int]()
+_AHEAD = pytest.StashKey["subprocess.Popen[bytes]"]()
 
 # Whether the suite passes must not hang on the day's dice.
 # HYPOTHESIS_PROFILE=default looks further.
 settings.register_profile("steady", derandomize=True, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "steady"))
 
+# The processes that tests start, hundreds of them, read what they import from bytecode, beside the
+# checkout. The workers of a run inherit the folder.
+_BYTECODE = "" if "PYTHONPYCACHEPREFIX" in os.environ else tempfile.mkdtemp(prefix="bristle-pyc-")
+os.environ.setdefault("PYTHONPYCACHEPREFIX", _BYTECODE)
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Where the whole suite runs on several workers, compile once what each would compile."""
+    config = session.config
+    whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    if whole and config.getoption("numprocesses", None) and not hasattr(config, "workerinput"):
+        script = Path(__file__).with_name("compile_ahead.py")
+        path = os.pathsep.join([str(script.parents[1]), os.environ.get("PYTHONPATH", "")])
+        config.stash[_AHEAD] = subprocess.Popen(
+            [sys.executable, str(script)], env={**os.environ, "PYTHONPATH": path},
+            stdout=subprocess.DEVNULL,
+        )  # fmt: skip
+
 
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     session.config.stash[_STATUS] = int(exitstatus)
+    if ahead := session.config.stash.get(_AHEAD, None):
+        ahead.kill()  # it has ended long since, unless the run was stopped
+        ahead.wait()
 
 
 @pytest.hookimpl(trylast=True)
@@ -33,6 +59,8 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     The binary that PythonFMU builds reads freed memory when a process ends with it loaded: one in
     some hundred processes then aborts after its last test has passed.
     """
+    if _BYTECODE:
+        shutil.rmtree(_BYTECODE, ignore_errors=True)
     if _STATUS in config.stash:
         sys.stdout.flush()
         sys.stderr.flush()

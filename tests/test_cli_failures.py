@@ -33,6 +33,12 @@ def digests(folder: Path) -> dict[str, str]:
     }
 
 
+def test_a_channel_that_is_given_twice_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["compare", "--fmu", "a.fmu", "--data", "run.csv"]
+    assert main([*asked, "--channel", "force=a", "--channel", "force=b"]) == 2
+    assert "--channel force is given twice; once is right" in capsys.readouterr().err
+
+
 def test_an_error_that_nobody_foresaw_is_one_line_with_a_file(
     rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

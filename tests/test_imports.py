@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from bristle.fmu.build import _library_files
+from bristle.fmu.plan import library_files
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = ROOT / "bristle"
@@ -168,10 +168,10 @@ def test_the_laws_import_the_standard_library_alone(part: str) -> None:
 
 
 def test_what_fmus_carry_imports_pythonfmu_and_the_standard_library() -> None:
-    for name, _ in _library_files():
+    for name, _ in library_files():
         for module in imported(PACKAGE / name, types=True):
             inside = module.removeprefix(PACKAGE.name + ".")
-            bundled = [file.removesuffix(".py").replace("/", ".") for file, _ in _library_files()]
+            bundled = [file.removesuffix(".py").replace("/", ".") for file, _ in library_files()]
             if inside != module:
                 assert any(
                     file.removesuffix(".__init__") == inside or file == inside for file in bundled
@@ -182,7 +182,7 @@ def test_what_fmus_carry_imports_pythonfmu_and_the_standard_library() -> None:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "components").glob("*.py")), ids=lambda p: p.stem)
 def test_components_lean_on_what_fmus_carry(path: Path) -> None:
-    names = [name.removesuffix(".py") for name, _ in _library_files()]
+    names = [name.removesuffix(".py") for name, _ in library_files()]
     files = [name.removesuffix("/__init__").replace("/", ".") for name in names]
     carried = {f"{PACKAGE.name}.{file}" for file in files}
     for name in imported(path):
@@ -190,7 +190,7 @@ def test_components_lean_on_what_fmus_carry(path: Path) -> None:
 
 
 def test_what_fmus_carry_is_python_3_9() -> None:
-    carried = [path for _, path in _library_files()] + sorted((ROOT / "components").glob("*.py"))
+    carried = [path for _, path in library_files()] + sorted((ROOT / "components").glob("*.py"))
     assert len(carried) > 20
     for path in carried:
         ast.parse(path.read_text(encoding="utf-8"), str(path), feature_version=(3, 9))

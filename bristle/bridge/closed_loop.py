@@ -89,7 +89,8 @@ def closed_loop_in(
     Raises
     ------
     StudyError
-        If the study has a building of its own, or the model has no covariance.
+        If the study has a building of its own, the command is another one than the model's, or the
+        model has no covariance.
     RunError
         If the model cannot be simulated.
     """
@@ -100,6 +101,7 @@ def closed_loop_in(
         )
     model = study.model()
     _refuse_without_covariance(study, model, draws)
+    _refuse_other_command(study, trials)
     found = _predicted(study, model, (house, True), trials, draws)
     most = max(
         (float(np.ptp(run["displacement"])) / 2.0 for run in study.runs().train
@@ -121,6 +123,17 @@ def _refuse_without_covariance(study: Study, model: StudyModel, draws: int) -> N
             f"{study.folder / 'model.toml'}: no covariance of the parameters, which the 95 % band "
             f"needs. Identify the model again:  {command('identify', study.folder)}"
         )
+
+
+def _refuse_other_command(study: Study, trials: Sequence[Trial]) -> None:
+    """Refuse a command in another unit than the one that the damper was identified with."""
+    for trial in trials:
+        given = trial.shaking.drive.name
+        if study.drive and trial.shaking.command is not None and given != study.drive:
+            raise StudyError(
+                f"{trial.shaking.name}: its command is a {given}, and the damper was identified "
+                f"with a {study.drive}. Measurements with a {study.drive} are right."
+            )
 
 
 def _has_covariance(model: StudyModel) -> bool:

@@ -101,7 +101,9 @@ class Simulator:
 
     def _with_values(self, scenario: Scenario, model: StudyModel) -> Scenario:
         own = loads(model, self.house.building, self.bench)
-        given = {"structure": own.structure, "damper": {**self._values(model), **own.damper}}
+        # A mass that is drawn as zero is in no load, and must not stay what it is in the scenario.
+        structure = {"attached_mass": 0.0, **own.structure}
+        given = {"structure": structure, "damper": {**self._values(model), **own.damper}}
         parts = [
             replace(one, parameters={**one.parameters, **given.get(one.name, {})})
             for one in scenario.components

@@ -56,6 +56,7 @@ def export_study(study: Study, out: Path | None = None) -> Exported:
 
     Parameters
     ----------
+    study : the folder, opened, with a model
     out : the folder, made if it is not there; None takes export/ in the study
 
     Raises

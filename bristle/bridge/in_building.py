@@ -105,7 +105,7 @@ def loads(model: StudyModel, building: Building, bench: bool = False) -> Loads:
     building : what the damper acts in
     bench : whether the model was identified on a bench, where all effects are the damper's
     """
-    values, layer, own = model.values(), model.at("structure", bench), {}
+    values, layer = model.values(), model.at("structure", bench)
     own = {f"{name}.on": True for name in layer.effects}
     structure: Parameters = {**own, **{n: v for n, v in layer.values().items() if "." in n}}
     damper: Parameters = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,7 +41,7 @@ def add_closed_loop(parser: argparse.ArgumentParser) -> None:
 
 
 def refuse_alone(arguments: argparse.Namespace) -> None:
-    """Refuse options of a closed loop without --closed-loop, and those of --in without --in."""
+    """Refuse options that need --closed-loop or --in, those that go with neither, bad numbers."""
     from ..errors import StudyError
 
     foreign = [name for name in ("fmu", "out") if getattr(arguments, name) is not None]
@@ -57,6 +58,10 @@ def refuse_alone(arguments: argparse.Namespace) -> None:
         raise StudyError(
             f"--{alone[0]} needs --in: a study of a building has ground motions of its own."
         )
+    if arguments.house is not None and arguments.role != "holdout":
+        raise StudyError("--role does not go with --in: the runs are those of the building.")
+    if arguments.level is not None and not isfinite(arguments.level):
+        raise StudyError(f"--level {arguments.level}: a finite number is right.")
     if arguments.draws is not None and arguments.draws < 0:
         raise StudyError(f"--draws {arguments.draws}: 0 or a positive whole number is right.")
 

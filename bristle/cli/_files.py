@@ -1,10 +1,14 @@
-"""The measurement files that patterns on the command line name."""
+"""The measurement files that patterns on the command line name, and the channels in them."""
 
 from __future__ import annotations
 
 from fnmatch import fnmatchcase
 from glob import glob
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..data.channels import ChannelSpec
 
 
 def test_files(patterns: list[str], files: list[str]) -> list[str]:
@@ -22,6 +26,20 @@ def test_files(patterns: list[str], files: list[str]) -> list[str]:
             )
         found += matches
     return list(dict.fromkeys(found))
+
+
+def channels_of(texts: list[str]) -> dict[str, ChannelSpec]:
+    """Return where channels are, as --channel says; StudyError where one is given twice."""
+    from ..errors import StudyError
+    from ..study.new import parse_channel
+
+    channels: dict[str, ChannelSpec] = {}
+    for text in texts:
+        name, spec = parse_channel(text)
+        if name in channels:
+            raise StudyError(f"--channel {name} is given twice; once is right.")
+        channels[name] = spec
+    return channels
 
 
 def _matches(pattern: str) -> list[str]:

@@ -14,6 +14,7 @@ from ._closed_loop import (
     refuse_alone,
 )
 from ._consent import add_trust
+from ._files import channels_of
 from ._table import print_tables
 
 if TYPE_CHECKING:
@@ -43,6 +44,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--runs", dest="role", choices=("holdout", "train"), default=argparse.SUPPRESS,
         help=argparse.SUPPRESS,
     )  # fmt: skip
+    _add_fmu(parser)
+    add_closed_loop(parser)
+    parser.add_argument("--out", type=Path, metavar="FILE", help="where the picture goes")
+    add_trust(parser)
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def _add_fmu(parser: argparse.ArgumentParser) -> None:
+    """Add what goes with an FMU."""
     parser.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="an FMU, anybody's")
     parser.add_argument(
         "--data", type=Path, metavar="FILE", help="with --fmu or --in: the measurement"
@@ -77,10 +87,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="with --fmu: limit of the run in s",
     )
-    add_closed_loop(parser)
-    parser.add_argument("--out", type=Path, metavar="FILE", help="where the picture goes")
-    add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:
@@ -162,14 +168,13 @@ def _opened(study: Study) -> dict[str, Any]:
 def _of_fmu(arguments: argparse.Namespace) -> int:
     from ..bridge.fmu import compare_fmu
     from ..compare.picture import draw_comparison
-    from ..study.new import parse_channel
 
     found: FmuComparison = compare_fmu(
         arguments.fmu,
         arguments.data,
         values=_pairs(arguments.values, "--set"),
         maps=_pairs(arguments.maps, "--map"),
-        channels=dict(parse_channel(text) for text in arguments.channel),
+        channels=channels_of(arguments.channel),
         timeout=arguments.timeout,
     )
     picture = arguments.out or Path(f"{arguments.fmu.stem}_{arguments.data.stem}.png")

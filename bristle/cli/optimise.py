@@ -18,6 +18,21 @@ HELP = "find the best constant voltage for a set of ground motions"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle optimise`."""
     parser.add_argument("what", choices=("passive",), help="what is optimised")
+    _add_problem(parser)
+    parser.add_argument(
+        "--out",
+        type=Path,
+        default=Path("results", "optimise"),
+        metavar="FOLDER",
+        help="where passive.csv and passive.png go; else results/optimise/",
+    )
+    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    add_trust(parser)
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def _add_problem(parser: argparse.ArgumentParser) -> None:
+    """Add what is optimised: scenario, ground motions, the output and its statistic."""
     parser.add_argument(
         "--scenario",
         default="el_centro_0p6g_constant_voltage",
@@ -58,16 +73,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=VALUE",
         help="take a value in place of the scenario's, e.g. --set damper.sigma_a=600",
     )
-    parser.add_argument(
-        "--out",
-        type=Path,
-        default=Path("results", "optimise"),
-        metavar="FOLDER",
-        help="where passive.csv and passive.png go; else results/optimise/",
-    )
-    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
-    add_trust(parser)
-    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:

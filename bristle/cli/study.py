@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ._common import add_common_to_actions
 from ._consent import add_trust
-from ._files import files_of, test_files
+from ._files import channels_of, files_of, test_files
 
 if TYPE_CHECKING:
     from ..study.create import Created
@@ -64,13 +64,9 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
 def _add_new(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", type=Path, metavar="NAME", help="the folder to make")
     parser.add_argument(
-        "--data",
-        nargs="+",
-        action="extend",
-        required=True,
-        metavar="GLOB",
+        "--data", nargs="+", action="extend", required=True, metavar="GLOB",
         help="measurement files, or a folder of them; quote a pattern: 'lab/*.csv'",
-    )
+    )  # fmt: skip
     parser.add_argument(
         "--rig",
         choices=("bench", "structure"),
@@ -107,14 +103,12 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 def _add_runs(parser: argparse.ArgumentParser) -> None:
     """Add what is known of whole runs, and how files hold them."""
-    parser.add_argument(
-        "--level", action="append", default=[], metavar="PATTERN",
-        help="the command's level in the names of files, {} in its place: --level 'I{}A'",
-    )  # fmt: skip
-    parser.add_argument(
-        "--label", action="append", default=[], metavar="NAME=PATTERN",
-        help="what else names tell of a run: --label 'oil=batch{}'",
-    )  # fmt: skip
+    for option, value, text in (
+        ("--level", "PATTERN", "the command's level in the names of files, {} in its place: "
+         "--level 'I{}A'"),
+        ("--label", "NAME=PATTERN", "what else names tell of a run: --label 'oil=batch{}'"),
+    ):  # fmt: skip
+        parser.add_argument(option, action="append", default=[], metavar=value, help=text)
     parser.add_argument(
         "--runs", type=Path, metavar="FILE",
         help="a table with a row per run: file, role, current [A], temperature [degC], ...",
@@ -135,18 +129,12 @@ def _new(arguments: argparse.Namespace) -> int:
     from ..errors import StudyError
     from ..physics.laws import DEFAULT, law_names
     from ..study.create import create_study
-    from ..study.new import parse_channel
     from ..study.run_facts import RunChoices
 
     law = arguments.law or DEFAULT
     if law not in law_names():
         raise StudyError(f'--law "{law}"; there are: {", ".join(law_names())}.')
-    channels = {}
-    for text in arguments.channel:
-        name, spec = parse_channel(text)
-        if name in channels:
-            raise StudyError(f"--channel {name} is given twice; once is right.")
-        channels[name] = spec
+    channels = channels_of(arguments.channel)
     if arguments.step is not None:
         if "time" in channels:
             raise StudyError("--step and --channel time=... exclude each other.")

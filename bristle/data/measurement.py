@@ -18,7 +18,7 @@ from ..errors import RecordError, UnitError
 from ..units import conversion
 from .channels import DRIVE, ChannelSpec, channel_unit
 from .decimate import decimated
-from .guess import guess_channels, specs
+from .guess import guess_channels, specs, too_few_rows
 from .labels import Labels
 from .noise import Noise, estimate_noise
 from .read import read_table
@@ -235,13 +235,8 @@ def measurements_of(
     for number, (piece, parts, measured) in enumerate(even.pieces, 1):
         name = stem if len(even.pieces) == 1 else f"{stem} ({number} of {len(even.pieces)})"
         noise, facts = _noise(table, channels, parts, estimate)
-        for channel, gain in fewer.gain.items():
-            found = fewer.noise[number - 1].get(channel) if facts.get(channel) else None
-            if found is not None:  # behind the filter it is not white, and is told from before
-                facts[channel] = replace(found, std=gain * found.std)
-                noise[channel] = gain * found.std
-            elif channel in facts and facts[channel] is None:
-                noise[channel] *= gain
+        if fewer.gain:
+            _behind_filter(fewer.gain, fewer.noise[number - 1], noise, facts)
         for channel, level in known.levels.items():
             units[channel], noise[channel], facts[channel] = channel_unit(channel), 0.0, None
             parts[channel] = np.full(len(piece), level)
@@ -274,9 +269,10 @@ def _time(table: Table, spec: ChannelSpec | None) -> Array:
             raise RecordError(f"{table.source}: time: step = {spec.step!r} s must be positive.")
         return np.arange(table.rows, dtype=np.float64) * spec.step
     if spec is None:
+        why = too_few_rows(table) or "no column is the time"
         raise RecordError(
-            f"{table.source}: no column is the time. Name one in [channels.time], or give the "
-            "sampling step there: step = 0.002  # s"
+            f"{table.source}: {why}. Name one in [channels.time], or give the sampling step there: "
+            "step = 0.002  # s"
         )
     return _in_si(table, "time", spec)
 
@@ -329,6 +325,27 @@ def _noise(
             found = estimate_noise(values)
             noise[channel], facts[channel] = found.std, found
     return noise, facts
+
+
+def _behind_filter(
+    gains: Mapping[str, float], before: Mapping[str, Noise],
+    noise: dict[str, float], facts: dict[str, Noise | None],
+) -> None:  # fmt: skip
+    """Change the noise of decimated channels into that behind the anti-alias filter.
+
+    Parameters
+    ----------
+    gains : by channel, what the filter leaves of white noise
+    before : by channel, the noise before the filter, where it was estimated
+    noise, facts : of the channels as they are now, changed in place
+    """
+    for channel, gain in gains.items():
+        found = before.get(channel) if facts.get(channel) else None
+        if found is not None:  # behind the filter it is not white, and is told from before
+            facts[channel] = replace(found, std=gain * found.std)
+            noise[channel] = gain * found.std
+        elif channel in facts and facts[channel] is None:
+            noise[channel] *= gain
 
 
 def _what_is_missing(values: Sequence[str]) -> list[str]:

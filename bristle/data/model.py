@@ -19,34 +19,27 @@ rows = [[1.0], [-0.42, 1.0]]
 `command = "quadratic"`, or `command = "table"` with `command_knots = [0.0, 1.5, 3.0]` [V], beside
 the law is a form that was chosen (`physics.forms`); `StudyModel.law` names both together.
 `correlation` is how the errors of identified parameters go together (`data.correlation`); files
-without it open as before. `data.model_text` writes the file.
+without it open as before. `data.study_model` is what is read, `data.model_text` writes the file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from math import isfinite
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import UnitError
 from ..findings import unknown, written
 from ..lines import KeyPath
-from ..physics.drive import DRIVES, VOLTAGE, unit_for
+from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.effect import EFFECTS, exclude, laws_joined, plain_name
-from ..physics.laws import DEFAULT, LAWS, base_and_variant, law_names
+from ..physics.laws import LAWS, base_and_variant, law_names
 from ..physics.parameter import Parameter
 from ..physics.user import waiting, why_left_out
 from ..units import convert
 from .command_form import FORM_KEYS, law_in_form
-from .correlation import (
-    Array,
-    Correlation,
-    correlation_of_covariance,
-    covariance_of,
-    read_correlation,
-)
+from .correlation import read_correlation
 from .declared import declared_of, defaults_of
 from .declared import table_names as table_names
 from .files import Toml
@@ -54,180 +47,10 @@ from .model_value import ORIGINS as ORIGINS
 from .model_value import VALUE_KEYS as VALUE_KEYS
 from .model_value import Value as Value
 from .model_value import as_written, waiting_law
+from .study_model import StudyModel as StudyModel
+from .study_model import new_model as new_model
 
 _KEYS = ("schema", "law", *FORM_KEYS, "building", "drive", "parameters", "effects", "correlation")
-
-
-@dataclass(frozen=True)
-class StudyModel:
-    """The content of a model.toml; all parameters of the law and its effects are there.
-
-    `parameters` of the law by name; `effects` name to parameters; `building` the file of the
-    structure, relative to the study, "" on a bench; `only_shown` the effects, and the law, whose
-    code must not run yet: the model can be shown, not used; `correlation` of the identified
-    parameters' errors, None where none was stored; `drive` is the channel that commands the damper,
-    on whose unit those of parameters depend.
-    """
-
-    law: str
-    parameters: dict[str, Value]
-    effects: dict[str, dict[str, Value]] = field(default_factory=dict)
-    building: str = ""
-    only_shown: tuple[str, ...] = ()
-    correlation: Correlation | None = None
-    drive: str = VOLTAGE.name
-
-    @property
-    def base_law(self) -> str:
-        """The law without its variant: "bingham" of "bingham_standard"."""
-        return base_and_variant(self.law)[0].name
-
-    def flat(self) -> dict[str, Value]:
-        """Return all parameters by the names of FMUs: "f_c", "gas_spring.k"."""
-        out = dict(self.parameters)
-        for effect, values in self.effects.items():
-            out.update({f"{effect}.{name}": value for name, value in values.items()})
-        return out
-
-    def values(self) -> dict[str, float]:
-        """Return all values in SI by the names of FMUs."""
-        return {
-            name: convert(value.value, value.unit, self.declared(name).unit)
-            for name, value in self.flat().items()
-        }
-
-    def free(self) -> list[str]:
-        """Return the names of the parameters that a fit may move."""
-        return [name for name, value in self.flat().items() if value.free]
-
-    def declared(self, name: str) -> Parameter:
-        """Return the declaration of a parameter: default, SI unit, bounds, text.
-
-        Of an effect or law that is only shown the file tells what there is.
-        """
-        effect, _, own = name.rpartition(".")
-        if (effect or self.law) in self.only_shown:
-            value = self.effects[effect][own] if effect else self.parameters[own]
-            return Parameter(value.value, value.unit, (value.low, value.high), "")
-        return declared_of(self.law, effect, self.drive)[own]
-
-    def with_values(
-        self,
-        values: Mapping[str, float],
-        std: Mapping[str, float] | None = None,
-        origin: str = "identified",
-    ) -> StudyModel:
-        """Return the model with values in SI, and their standard deviations, put in its units."""
-        std = std or {}
-        flat = self.flat()
-        for name, value in values.items():
-            unit = self.declared(name).unit
-            own = flat[name].unit
-            spread = convert(std[name], unit, own) if name in std else None
-            flat[name] = replace(
-                flat[name], value=convert(value, unit, own), std=spread, origin=origin
-            )
-        # Errors of other values say nothing of these.
-        kept = (
-            self.correlation.of([n for n in flat if n not in values]) if self.correlation else None
-        )
-        return replace(
-            self,
-            parameters={name: flat[name] for name in self.parameters},
-            effects={
-                effect: {own: flat[f"{effect}.{own}"] for own in named}
-                for effect, named in self.effects.items()
-            },
-            correlation=kept,
-        )
-
-    def with_covariance(self, names: Sequence[str], covariance: Array) -> StudyModel:
-        """Return the model with how the errors of these parameters go together.
-
-        Parameters
-        ----------
-        names : parameters, whose standard deviations the model has
-        covariance : (p, p) of their errors, in SI
-        """
-        return replace(self, correlation=correlation_of_covariance(names, covariance))
-
-    def uncertain(self) -> list[str]:
-        """Return the names of the parameters that have a standard deviation."""
-        return [n for n, v in self.flat().items() if v.std is not None and isfinite(v.std)]
-
-    def covariance(self) -> tuple[tuple[str, ...], Array]:
-        """Return the identified parameters and the covariance (p, p) of their errors in SI.
-
-        Without a stored correlation errors count as independent.
-        """
-        names, flat = self.uncertain(), self.flat()
-        own = [(flat[name].std or 0.0, flat[name].unit, self.declared(name).unit) for name in names]
-        return tuple(names), covariance_of(names, [convert(*one) for one in own], self.correlation)
-
-    def at(self, site: str, bench: bool) -> StudyModel:
-        """Return the model with the effects of one site alone, by their plain names.
-
-        Parameters
-        ----------
-        site : one of `physics.effect.SITES`
-        bench : whether the model is of a damper on a bench, whose effects are all the damper's
-        """
-        own = [name for name in self.effects if _site_of(name, bench) == site]
-        return replace(self, effects={plain_name(name): self.effects[name] for name in own})
-
-    def with_effect(self, effect: str) -> StudyModel:
-        """Return the model with one more effect, its parameters at their defaults."""
-        added = defaults_of("", effect, self.drive)
-        return replace(self, effects={**self.effects, effect: added})
-
-    def with_drive(self, drive: str) -> StudyModel:
-        """Return the model for another command: the same numbers, per ampere in place of per volt.
-
-        Parameters
-        ----------
-        drive : one of `data.channels.DRIVE`
-        """
-        if drive == self.drive:
-            return self
-        old = DRIVES[self.drive].unit
-
-        def said(value: Value) -> Value:
-            return replace(value, unit=unit_for(value.unit, DRIVES[drive], old))
-
-        return replace(
-            self,
-            drive=drive,
-            parameters={name: said(value) for name, value in self.parameters.items()},
-            effects={
-                effect: {name: said(value) for name, value in values.items()}
-                for effect, values in self.effects.items()
-            },
-        )
-
-
-def _site_of(name: str, bench: bool) -> str:
-    effect = EFFECTS[name]
-    return "damper" if bench and "damper" in effect.sites else effect.site
-
-
-def new_model(
-    law: str = DEFAULT,
-    effects: tuple[str, ...] = (),
-    building: str = "",
-    drive: str = VOLTAGE.name,
-) -> StudyModel:
-    """Return a model with every parameter at its default.
-
-    Parameters
-    ----------
-    law, effects : names of the law and of effects that join it
-    building : file of the structure, relative to the study; "" on a bench
-    drive : the channel that commands the damper
-    """
-    model = StudyModel(law, defaults_of(law, "", drive), {}, building, drive=drive)
-    for effect in effects:
-        model = model.with_effect(effect)
-    return model
 
 
 def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) -> StudyModel:
@@ -269,20 +92,8 @@ def read_model(path: Path, study: Path | None = None, *, to_show: bool = False) 
     else:
         parameters = _values(toml, ("parameters",), given, (law, ""), drive)
     base = "" if only_shown else base_and_variant(law)[0].name
-    effects: dict[str, dict[str, Value]] = {}
-    for name, table in toml.table((), data, "effects").items():
-        own = beside / "effects" / f"{name}.py"
-        untrusted = waiting(own) if name not in EFFECTS else None
-        if untrusted and not to_show:
-            raise untrusted
-        if untrusted:
-            own_values = table.get("parameters") if isinstance(table, dict) else None
-            effects[name] = as_written(toml, ("effects", name, "parameters"), own_values)
-            only_shown.append(name)
-            continue
-        found = _effect(toml, name, table, (base, drive), own)
-        if found is not None:
-            effects[name] = found
+    effects, untrusted = _effects(toml, (base, drive), beside / "effects", to_show)
+    only_shown += untrusted
     _exclusions(toml, [name for name in effects if name not in only_shown])
     building = toml.text((), data, "building")
     if building and not (beside / building).is_file():
@@ -309,6 +120,36 @@ def _unusable_law(toml: Toml, law: str, folder: Path, to_show: bool) -> list[str
     toml.error(("law",), why or unknown("law", law, law_names()))
     toml.check()
     return []
+
+
+def _effects(
+    toml: Toml, joined: tuple[str, str], folder: Path, to_show: bool
+) -> tuple[dict[str, dict[str, Value]], list[str]]:
+    """Return the values of all effects, and the names of those whose code must not run yet.
+
+    Parameters
+    ----------
+    toml : the file
+    joined : the law that they join, and the model's drive
+    folder : where the user's own effects are
+    to_show : whether those that must not run are there as well, else TrustError is raised
+    """
+    effects: dict[str, dict[str, Value]] = {}
+    only_shown = []
+    for name, table in toml.table((), toml.data, "effects").items():
+        own = folder / f"{name}.py"
+        untrusted = waiting(own) if name not in EFFECTS else None
+        if untrusted and not to_show:
+            raise untrusted
+        if untrusted:
+            own_values = table.get("parameters") if isinstance(table, dict) else None
+            effects[name] = as_written(toml, ("effects", name, "parameters"), own_values)
+            only_shown.append(name)
+            continue
+        found = _effect(toml, name, table, joined, own)
+        if found is not None:
+            effects[name] = found
+    return effects, only_shown
 
 
 def _effect(
@@ -396,6 +237,8 @@ def _value(
         toml.error(keys, f"{name}: {low:g} to {high:g} leaves what is physical, {allowed}.")
     if not low <= value <= high:
         toml.error((*keys, "value"), f"{name} = {value:g} is outside {low:g} to {high:g} {unit}.")
+    if given["std"] is not None and given["std"] < 0.0:
+        toml.error((*keys, "std"), f"std = {given['std']:g}; 0 or a positive number is right.")
     free = table.get("free", default.free)
     if not isinstance(free, bool):
         toml.error((*keys, "free"), f"free = {written(free)}; true or false is right.")

@@ -50,12 +50,9 @@ def pieces_of(table: Table, split: str, channels: Mapping[str, ChannelSpec]) -> 
         raise RecordError(f"{table.source}: split = {split!r}; {RIGHT}")
     kind, _, title = split.partition(" ")
     if kind == "restart":
-        cuts = np.flatnonzero(np.diff(_values(table, "time", channels)) < 0.0) + 1
+        cuts = np.flatnonzero(np.diff(_filled(_values(table, "time", channels))) < 0.0) + 1
     elif kind == "column":
-        number = table.values[table.find(title.strip()).text]
-        known = np.isfinite(number)
-        filled = number[np.maximum.accumulate(np.where(known, np.arange(len(number)), 0))]
-        cuts = np.flatnonzero(np.diff(filled) != 0.0) + 1
+        cuts = np.flatnonzero(np.diff(_filled(_numbers(table, title.strip()))) != 0.0) + 1
     else:
         cuts = _rests(table, channels)
     parts = [part for part in np.split(np.arange(table.rows), cuts) if len(part) >= SHORTEST]
@@ -65,8 +62,27 @@ def pieces_of(table: Table, split: str, channels: Mapping[str, ChannelSpec]) -> 
             "column": f'"{title.strip()}" never changes',
             "rests": f"nothing rests for {RESTS:g} s between two motions",
         }[kind]
+        if len(cuts):
+            why = f"no two of its stretches have {SHORTEST} samples, the fewest of a run"
         raise RecordError(f"{table.source}: {why}: the file holds one run. Leave split out.")
     return [_rows(table, part, number) for number, part in enumerate(parts, 1)]
+
+
+def _numbers(table: Table, title: str) -> Array:
+    """Return a column's numbers; RecordError where it holds words."""
+    column = table.find(title).text
+    if column in table.not_numeric:
+        raise RecordError(
+            f'{table.source}: column "{column}": {table.not_numeric[column]}. A column that tells '
+            "runs apart holds numbers."
+        )
+    return table.values[column]
+
+
+def _filled(values: Array) -> Array:
+    """Return values (n,) with the last one that is known where one is missing."""
+    known = np.isfinite(values)
+    return values[np.maximum.accumulate(np.where(known, np.arange(len(values)), 0))]
 
 
 def _values(table: Table, channel: str, channels: Mapping[str, ChannelSpec]) -> Array:
@@ -75,18 +91,24 @@ def _values(table: Table, channel: str, channels: Mapping[str, ChannelSpec]) -> 
         raise RecordError(
             f"{table.source}: no column is the {channel}, which tells its runs apart."
         )
-    return table.values[table.find(spec.column).text]
+    return _numbers(table, spec.column)
 
 
 def _rests(table: Table, channels: Mapping[str, ChannelSpec]) -> NDArray[np.int64]:
     """Return the middles of rests between two motions."""
     motion = "velocity" if "velocity" in channels else "displacement"
-    y, time = _values(table, motion, channels), _values(table, "time", channels)
-    step = float(np.median(np.diff(time)))
+    y, spec = _values(table, motion, channels), channels.get("time")
+    step = 0.0 if spec is None or spec.step is None else spec.step
+    if not step:
+        step = float(np.median(np.diff(_filled(_values(table, "time", channels)))))
     every = np.arange(len(y))
     good = np.isfinite(y)
+    if not good.any():
+        raise RecordError(f"{table.source}: the {motion}, which tells its runs apart, is missing.")
     y = np.interp(every, every[good], y[good])
     window = max(1, round(0.1 * RESTS / step)) if step > 0.0 else 1
+    if len(y) <= 4 * window:
+        return np.zeros(0, dtype=np.int64)  # too short for two runs and a rest
     smooth = np.convolve(y, np.ones(window) / window, mode="same")
     speed = np.abs(smooth) if motion == "velocity" else np.abs(np.gradient(smooth))
     speed[: 2 * window], speed[-2 * window :] = speed[2 * window], speed[-2 * window - 1]

@@ -82,9 +82,10 @@ def spikes_of(time: Array, channels: Mapping[str, Array], *, mask: bool) -> tupl
     found = []
     for channel, y in channels.items():
         for begin, end in find_spikes(y):
-            beside = np.concatenate([y[max(begin - LONGEST, 0) : begin], y[end : end + LONGEST]])
-            part = y[begin:end] - float(np.nanmedian(beside))
-            most = int(np.argmax(np.abs(part)))
+            before, after = (part[np.isfinite(part)] for part in (y[:begin], y[end:]))
+            beside = np.concatenate([before[-LONGEST:], after[:LONGEST]])
+            part = y[begin:end] - float(np.median(beside))
+            most = int(np.nanargmax(np.abs(part)))
             found.append(Spike(channel, float(time[begin + most]), float(part[most])))
             if mask:
                 y[begin:end] = np.nan

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -68,11 +68,33 @@ def table_from_frame(frame: pd.DataFrame, name: str = "frame") -> Table:
     """Return the table of a pandas frame: titles with units, or units in `attrs["units"]`.
 
     An index with a name is a column, too: the time of bristle's own results is one.
+
+    Raises
+    ------
+    RecordError
+        If two columns have one name.
     """
     if frame.index.name is not None:
         frame = frame.reset_index().rename(columns={frame.index.name: str(frame.index.name)})
-    data = {str(key): frame[key].to_numpy() for key in frame.columns}
+    names = [str(key) for key in frame.columns]
+    refuse_twice(names, name)
+    data = {key: frame.iloc[:, k].to_numpy() for k, key in enumerate(names)}
     return from_arrays(data, name, frame.attrs.get("units", {}))
+
+
+def refuse_twice(names: Sequence[str], source: str) -> None:
+    """Refuse columns that share a name: which one is meant, nobody could say.
+
+    Raises
+    ------
+    RecordError
+        If a name stands twice.
+    """
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise RecordError(
+            f'{source}: {names.count(twice)} columns are called "{twice}". Rename them.'
+        )
 
 
 def from_arrays(

@@ -100,7 +100,13 @@ def _likeliest(
 def level_draws(n: int, runs: list[dict[str, Any]], dt: float, draws: int, seed: int) -> Array:
     """Return draws (d, n, 3) of the smoother's error at the median jerk and noise of the runs.
 
-    The runs have the same instruments.
+    Parameters
+    ----------
+    n : how many samples a draw has
+    runs : the level's motion in each, see `corrected`; all have the same instruments
+    dt : step [s]
+    draws : how many draws, d
+    seed : of the draws
     """
     generator = np.random.default_rng(seed)
     jerk = float(np.median([run["jerk"] for run in runs]))
@@ -126,6 +132,14 @@ def corrected(
     A floor's motion is smoother than white jerk: the smoother lets noise pass where nothing moves,
     and takes some motion for noise. Most of the acceleration's error is known therefore from the
     motion found (three quarters of it on the buildings of the tests), and taken off.
+
+    Parameters
+    ----------
+    level : the smoothed motion of one level: `state` (n, 3), `r` (3,) and `have` (3,) of its
+        channels, `jerk` and `std`
+    dt : step [s]
+    draws : how many draws, 0 for none
+    seed : of the draws
     """
     state, r, have, jerk = level["state"], level["r"], level["have"], level["jerk"]
     if not draws:

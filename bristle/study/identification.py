@@ -16,6 +16,7 @@ from ..identify.residuals import robust_z
 from ..identify.rig import DAMPER, Rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
 from ..identify.table import LawError, error_table
+from ..physics.effect import EFFECTS
 from ..physics.forms import shown_law
 from ..physics.laws import base_and_variant, law_names
 from ..progress import tell
@@ -235,11 +236,16 @@ def _tabled(own: str) -> tuple[str, ...]:
 
 
 def _by_site(models: SiteModels) -> list[str]:
-    """Return the sentence that tells z by site, none where the one site goes without saying."""
+    """Return the sentence that tells z by site.
+
+    None where the one site goes without saying, or no run is held out.
+    """
     problems = {at.site.shown: at.site.holdout for at in models.values()}
     if "" in problems:
         return []
     z = {n: robust_z(p, models[n].model) for n, p in problems.items() if p is not None}
+    if not z:
+        return []
     text = ", ".join(f"{site} {plain(z[site])}" for site in sorted(z, key=lambda site: -z[site]))
     return [f"z on held-out runs by site: {text}; the z of the errors is that of the worst site."]
 
@@ -256,8 +262,6 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
         return model
     if law not in law_names():
         raise StudyError(f'law "{law}"; there are: {", ".join(law_names())}.')
-    from ..physics.effect import EFFECTS
-
     other = new_model(law, (), model.building, model.drive)
     base, _ = base_and_variant(law)
     unfit = [

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from ..data.channels import DRIVE, ChannelSpec, channel_unit
 from ..data.decimate import FAST, RATE
-from ..data.guess import Guess, guess_channels, left_out
+from ..data.guess import Guess, guess_channels, left_out, too_few_rows
 from ..data.measurement import measurements_of
 from ..data.model import new_model
 from ..data.model_text import model_text
@@ -215,7 +215,8 @@ def _refuse_incomplete(
     there = {guess.channel for guess in guesses} | set(channels)
     wrong = []
     if "time" not in there:
-        wrong.append("no column can be the time: --channel time=COLUMN@s, or --step 0.002")
+        why = too_few_rows(table) or "no column can be the time"
+        wrong.append(f"{why}: --channel time=COLUMN@s, or --step 0.002")
     if rig == "bench":
         if not there & {"displacement", "velocity"}:
             wrong.append(

@@ -6,13 +6,13 @@ import csv
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import isfinite
 from pathlib import Path
 
 from ..data.channels import DRIVE, PLAIN
 from ..data.labels import UNITS, Label, label_text
 from ..data.titles import title, unit_or_none
 from ..errors import StudyError, UnitError
-from ..findings import written
 from ..units import convert, same_dimension
 from .run_file import ROLES
 
@@ -177,12 +177,12 @@ def _number(text: str) -> float:
 
 def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
     """Return what a pattern such as "I{}A" or "oil=batch{}" finds in a name."""
-    option = "--level" if level else "--label"
+    asked = f'{"--level" if level else "--label"} "{pattern}"'
     named, _, rest = pattern.rpartition("=")
     right = "--level 'I{}A', or --level 'current=run{}_', is right"
     right = right if level else "--label 'oil=batch{}' is right"
     if rest.count("{}") != 1 or (not level and not named):
-        raise StudyError(f"{option} {written(pattern)}: {right}, where {{}} is the value.")
+        raise StudyError(f"{asked}: {right}, where {{}} is the value.")
     before, after = rest.split("{}")
     spelled = re.match(r"[A-Za-z%]*", after)
     unit = _SPELLED.get(spelled.group(), spelled.group()) if spelled else ""
@@ -191,7 +191,7 @@ def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
         named = named or (_quantity_or_none(known.name) if known else "")
         if named not in DRIVE:
             raise StudyError(
-                f"{option} {written(pattern)}: a unit must follow {{}}, A or V or %, or the "
+                f"{asked}: a unit must follow {{}}, A or V or %, or the "
                 f"channel stand before it: {right}."
             )
     target = PLAIN.get(named) or UNITS.get(named, "")
@@ -200,12 +200,15 @@ def _matched(file: Path, pattern: str, *, level: bool) -> Facts:
     match = re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}", file.stem + "_")
     match = match or re.search(rf"{re.escape(before)}({wanted}){re.escape(after)}$", file.stem)
     if match is None:
-        raise StudyError(f'{option} {written(pattern)}: it fits no part of "{file.name}".')
+        raise StudyError(f'{asked}: it fits no part of "{file.name}".')
     if not number:
         return Facts(labels={named: match.group(1)})
     value = _number(match.group(1))
-    if known is not None and target and same_dimension(known.name, target):
-        value = convert(value, known.name, target)
+    if known is not None and target:
+        try:
+            value = convert(value, known.name, target)
+        except UnitError as error:
+            raise StudyError(f"{asked}: {named}: {error}") from None
     return Facts(levels={named: value}) if level else Facts(labels={named: value})
 
 
@@ -235,12 +238,19 @@ def rows_of_table(path: Path, files: Sequence[Path]) -> list[Facts]:
         raise StudyError(
             f'--runs {path}: no column is called "file"; there are {", ".join(header)}.'
         )
+    named = [name.strip() for name in header if name.strip()]
+    twice = next((name for name in named if named.count(name) > 1), "")
+    if twice:
+        raise StudyError(f'--runs {path}: {named.count(twice)} columns are called "{twice}".')
     found: dict[str, Facts] = {}
     for number, row in enumerate(rows, 2):
         where = f"--runs {path}, row {number}"
         if len(row) != len(header):
             raise StudyError(f"{where}: {len(row)} fields under {len(header)} titles.")
-        found[Path(row[at[0]].strip()).name] = _facts(header, row, at[0], where)
+        file = Path(row[at[0]].strip()).name
+        if file in found:
+            raise StudyError(f"{where}: there is a row of {file} above; one is right.")
+        found[file] = _facts(header, row, at[0], where)
     return [_row_of(file, found, path) for file in files]
 
 
@@ -268,7 +278,7 @@ def _facts(header: Sequence[str], row: Sequence[str], file: int, where: str) -> 
         target = PLAIN.get(name, "") if name in DRIVE else UNITS.get(name, "")
         number = _number_or_none(value)
         if number is None and target:
-            raise StudyError(f'{where}: {name} is "{value}"; a number is right.')
+            raise StudyError(f'{where}: {name} is "{value}"; a finite number is right.')
         if number is None:
             found = found.and_(Facts(labels={name: value}))
             continue
@@ -283,7 +293,9 @@ def _facts(header: Sequence[str], row: Sequence[str], file: int, where: str) -> 
 
 
 def _number_or_none(text: str) -> float | None:
+    """Return a finite number, None where a text is none."""
     try:
-        return float(text.replace(",", "."))
+        number = float(text.replace(",", "."))
     except ValueError:
         return None
+    return number if isfinite(number) else None

@@ -141,10 +141,13 @@ def with_mask(text: str) -> str:
     if "mask" in document:
         document["mask"] = True
         return tomlkit.dumps(document)
+    # Above the first key or below the schema: further down a line may be part of a longer text.
     lines = text.split("\n")
-    first = next((k for k, line in enumerate(lines) if line.lstrip().startswith("[")), len(lines))
+    keys = (k for k, line in enumerate(lines) if line.strip() and line.lstrip()[0] != "#")
+    first = next(keys, len(lines))
+    first += "".join(lines[first : first + 1]).startswith("schema")
     line = "mask = true # isolated spikes count as not measured"
-    return "\n".join([*lines[:first], line, "", *lines[first:]])
+    return "\n".join([*lines[:first], line, *lines[first:]])
 
 
 def _as_toml(spec: ChannelSpec) -> dict[str, Any]:

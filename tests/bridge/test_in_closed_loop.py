@@ -19,6 +19,7 @@ from study.made import write_runs
 from bristle.bridge.closed_loop import closed_loop, closed_loop_in
 from bristle.bridge.closed_loop_input import house_of, trials_in
 from bristle.bridge.closed_loop_result import ClosedLoop, Predicted
+from bristle.bridge.closed_loop_runs import Trial
 from bristle.bridge.draws import Simulator, drawn_models
 from bristle.bridge.in_building import House, Shaking
 from bristle.cli import main
@@ -26,6 +27,7 @@ from bristle.data.model import StudyModel, new_model
 from bristle.errors import StudyError
 from bristle.physics.building import paper_building
 from bristle.physics.drive import drive_named
+from bristle.physics.effect import EFFECTS
 from bristle.physics.forms import joined_form
 from bristle.study import Study, create_study
 from bristle.study.openings import openings
@@ -199,6 +201,8 @@ def test_what_cannot_be_is_refused(
         (["--draws", "3"], "--draws needs --closed-loop"),
         (["--closed-loop", "--level", "3"], "--level needs --in"),
         (["--closed-loop", "--draws", "-1"], "0 or a positive whole number"),
+        (["--closed-loop", "--in", "house.toml", "--role", "test"], "does not go with --in"),
+        (["--closed-loop", "--in", "house.toml", "--level", "nan"], "a finite number is right"),
         (["--closed-loop", "--out", "a.png"], "there is no picture"),
         (["--closed-loop", "--in", str(house(made)), "--ground", "el_centro_1940_ns"],
          "in a building of its own"),
@@ -255,6 +259,16 @@ def test_a_record_alone_gives_a_prediction_with_its_band(
     assert "--in house.toml" in capsys.readouterr().err
 
 
+def test_a_command_in_another_unit_than_that_of_the_damper_is_refused(
+    made: Path, bench: Study
+) -> None:
+    time = 0.01 * np.arange(101)
+    shaking = Shaking("pulse", time, np.sin(time), 2.0 * time, drive=drive_named("current"))
+    trial = Trial(shaking, {}, np.ones(101, dtype=bool), (0.0, 0.0))
+    with pytest.raises(StudyError, match=r"command is a current, .* identified with a voltage"):
+        closed_loop_in(bench, house_of(house(made)), [trial], draws=0)
+
+
 # -- draws and scenarios
 
 
@@ -288,6 +302,18 @@ def test_law_form_effects_and_limits_are_in_the_scenario(tmp_path: Path) -> None
     (tmp_path / "still").mkdir()
     other = Simulator(model, paper, False, still, tmp_path / "still").scenario()
     assert other.component("damper").parameters["voltage"] == 3.0
+
+
+def test_a_mass_that_is_drawn_as_zero_is_attached_to_nothing(tmp_path: Path) -> None:
+    mass = f"fluid_inertia.{EFFECTS['fluid_inertia'].mass}"
+    model = new_model("bingham", ("fluid_inertia",)).with_values({mass: 0.4})
+    shaking = Shaking("pulse", 0.01 * np.arange(101), np.zeros(101))
+    simulator = Simulator(model, House(paper_building()), True, shaking, tmp_path)
+    scenario = simulator.scenario()
+    for drawn in (0.3, 0.0):
+        other = simulator._with_values(scenario, model.with_values({mass: drawn}))
+        assert other.component("structure").parameters["attached_mass"] == drawn
+        assert other.component("damper").parameters[mass] == 0.0
 
 
 def test_a_command_of_another_kind_is_played_as_it_is(tmp_path: Path) -> None:

@@ -76,8 +76,11 @@ def driven(slave: Any, start: Any, step: Any, output: Any, to: Any) -> np.ndarra
 
 
 def array(values: Any) -> np.ndarray:
-    """Return an array, never an empty one; flags and whole numbers stay such."""
-    return np.array(values) if len(values) else np.zeros(1, dtype=np.int64)
+    """Return an array, never an empty one; flags and whole numbers stay such.
+
+    What is empty counts as numbers, as it is where it is filled: one compilation serves both.
+    """
+    return np.array(values) if len(values) else np.zeros(1)
 
 
 @pytest.mark.parametrize(("name", "given"), CASES, ids=[f"{n}-{len(g)}" for n, g in CASES])

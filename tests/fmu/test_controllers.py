@@ -22,6 +22,7 @@ from bristle.errors import BuildError, DesignError
 from bristle.fmu import build, catalogue
 from bristle.fmu.controller import MEASURED
 from bristle.fmu.description import extract, read_description
+from bristle.fmu.plan import PACKAGE
 from bristle.fmu.slave import Slave
 from bristle.physics.building import paper_building
 from bristle.physics.laws import law_code
@@ -275,7 +276,7 @@ def test_inverse_law_gives_the_commanded_force_where_it_can() -> None:
 
 def test_lpv_looks_its_matrices_up_by_the_speed_and_feeds_back_what_is_applied() -> None:
     slave = started("Lpv", anti_windup=200.0)
-    c = read_controller(Path(build._PACKAGE) / "control" / "data" / "lpv.json")
+    c = read_controller(PACKAGE / "control" / "data" / "lpv.json")
     x, spare = [0.0] * c.n, [0.0] * c.n
     for k in range(200):
         y, _, v, _ = motion(k * H) if k else [0.0] * 4

@@ -14,6 +14,34 @@ from bristle.physics.damper import DamperModel
 from bristle.physics.inputs import Inputs
 from bristle.physics.laws import laws_of
 
+HOUSE = """
+schema = 1
+title = "A damper in the paper's building"
+
+[run]
+stop = {stop}
+step = {step}
+
+[components.ground]
+fmu = "SignalSource"
+parameters = {{ {ground} }}
+
+[components.structure]
+fmu = "Structure"
+parameters = {{ {structure} }}
+
+[components.damper]
+fmu = "{damper}"
+parameters = {{ {parameters} }}
+
+[connections]
+"structure.ground_acceleration" = "ground.value"
+"structure.damper_force" = "damper.force"
+"damper.displacement" = "structure.base_displacement"
+"damper.velocity" = "structure.base_velocity"
+"""
+"""A scenario, to be filled in with times in s, and with parameters as TOML has them."""
+
 LAWS = tuple(law.name for law in laws_of("damper"))
 NO_LAW = {law.name: dict.fromkeys(law.linear(), 0.0) for law in laws_of("damper")}
 """Parameters that leave nothing of a law: what remains is the effects."""

@@ -13,7 +13,7 @@ from zlib import crc32
 
 import numpy as np
 import pytest
-from rigs import LAWS, NO_LAW, Bench, force_at, loop_energy, sine
+from rigs import HOUSE, LAWS, NO_LAW, Bench, force_at, loop_energy, sine
 
 from bristle import units
 from bristle.component.structure import StructureModel
@@ -310,32 +310,7 @@ def test_switched_on_it_matters(effect: type[Effect], law: str) -> None:
 
 # -- in a scenario
 
-SCENARIO = """
-schema = 1
-title = "Every effect at once"
-
-[run]
-stop = 0.1
-step = 0.002
-
-[components.ground]
-fmu = "SignalSource"
-parameters = {{ kind = "half_sine", amplitude = 2.0, duration = 0.2 }}
-
-[components.structure]
-fmu = "Structure"
-parameters = {{ {structure} }}
-
-[components.damper]
-fmu = "{damper}"
-parameters = {{ voltage = 4.0, {effects} }}
-
-[connections]
-"structure.ground_acceleration" = "ground.value"
-"structure.damper_force" = "damper.force"
-"damper.displacement" = "structure.base_displacement"
-"damper.velocity" = "structure.base_velocity"
-"""
+PULSE = 'kind = "half_sine", amplitude = 2.0, duration = 0.2'
 
 
 def spelled(effects: list[type[Effect]]) -> str:
@@ -347,14 +322,15 @@ def spelled(effects: list[type[Effect]]) -> str:
 
 
 @pytest.mark.parametrize(("damper", "law"), [(component_of_law(law), law) for law in LAWS])
-def test_a_scenario_can_switch_every_effect_on(
-    damper: str, law: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path / "cache"))
+def test_a_scenario_can_switch_every_effect_on(damper: str, law: str, tmp_path: Path) -> None:
     joined = [effect for effect in effects_of("damper", law) if effect.name != "backlash"]
     file = tmp_path / "all.toml"
-    text = {"structure": spelled(list(effects_of("structure"))), "effects": spelled(joined)}
-    file.write_text(SCENARIO.format(damper=damper, **text), encoding="utf-8")
+    text = {
+        "stop": 0.1, "step": 0.002, "ground": PULSE, "damper": damper,
+        "structure": spelled(list(effects_of("structure"))),
+        "parameters": f"voltage = 4.0, {spelled(joined)}",
+    }  # fmt: skip
+    file.write_text(HOUSE.format(**text), encoding="utf-8")
     loaded = {component.name: component for component in load_scenario(file).components}
     for effect in joined:
         assert loaded["damper"].parameters[f"{effect.name}.on"] is True

@@ -221,7 +221,8 @@ def test_a_law_that_moves_by_its_rate_lags_as_it_says(slow_law: type[Law]) -> No
     assert force == pytest.approx(6.0 * tanh(5.0) * (1.0 - np.exp(-1.0)), rel=1e-4)
 
 
-def test_fits_find_its_parameters(law: type[Law]) -> None:
+def test_fits_find_its_parameters(law: type[Law], slow_law: type[Law]) -> None:
+    """Both laws are there, so that what was compiled for them serves here as well."""
     truth = {"f_c": 1.2, "f_v": 0.6, "c": 25.0, "k": 110.0, "v_s": 0.03}
     made = problem("hyperbolic", truth, [])
     starts = start_models(made, Model("hyperbolic"), 3)

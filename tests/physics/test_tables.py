@@ -187,7 +187,8 @@ def test_an_fmu_names_each_value(effect: type[Effect]) -> None:
     assert slave["force"] == pytest.approx(2.3, rel=1e-12)
 
 
-def test_a_fit_finds_a_curve(effect: type[Effect]) -> None:
+def test_a_fit_finds_a_curve(law: type[Law], effect: type[Effect]) -> None:
+    # The law is there, so that what is compiled serves below as well.
     # The size of all is held: with it free the curve has one degree of freedom too many; and so is
     # the value at zero, to which the others are measured.
     truth = {f"sloped.curve[{k}]": v for k, v in enumerate((-2.0, 0.0, 0.4, 3.0), 1)}
@@ -292,7 +293,7 @@ def test_python_and_numba_agree(law: Any, effect: Any, effects: list[str]) -> No
         assert plain == pytest.approx(compiled[k], rel=1e-12)
 
 
-def test_a_fit_finds_the_map(law: type[Law], tmp_path: Path) -> None:
+def test_a_fit_finds_the_map(law: type[Law], effect: type[Effect], tmp_path: Path) -> None:
     truth = {"map[1]": 1.0, "map[2]": 2.0, "map[3]": 1.5, "map[4]": 0.5, "c": 30.0, "v_s": 0.03}
     made = problem("mapped", [], {**truth, "c_1": 4.0, "c_2": 0.3})
     start = start_models(made, Model("mapped"), 1)[0]

@@ -20,7 +20,7 @@ from bristle.errors import StudyError
 from bristle.fmu.description import read_description
 from bristle.physics.drive import DRIVES, VOLTAGE, text_for, unit_for
 from bristle.study.create import create_study
-from bristle.study.run_facts import RunChoices
+from bristle.study.run_facts import RunChoices, rows_of_table
 from bristle.study.study import Study
 
 RATE = 200.0
@@ -171,6 +171,7 @@ def test_the_report_tells_what_is_known_of_runs_and_how_to_make_them_again(lab, 
         (RunChoices(levels=["U{}V"]), 'it fits no part of "'),
         (RunChoices(levels=["I{}"]), "a unit must follow"),
         (RunChoices(levels=["IA"]), "is the value"),
+        (RunChoices(levels=["voltage=I{}A"]), '--level "voltage=I{}A": voltage: '),
         (RunChoices(labels=["oil{}"]), "is right, where {} is the value"),
         (RunChoices(levels=["I{}A"], labels=["batch=Q{}"]), "it fits no part of"),
         (RunChoices(table=Path("nowhere.csv")), "cannot be read"),
@@ -180,6 +181,28 @@ def test_what_is_wrong_with_a_pattern_is_one_clear_word(lab, tmp_path, choices, 
     with pytest.raises(StudyError, match=re.escape(what)):
         create_study(tmp_path / "rig", files(lab)[:3], runs=choices)
     assert not (tmp_path / "rig").exists()
+
+
+@pytest.mark.parametrize(
+    ("rows", "what"),
+    [
+        ("# a comment", "a line of titles and a line per run are right"),
+        ("a.csv,1\nlab/a.csv,2", "row 3: there is a row of a.csv above; one is right"),
+        ("a.csv,nan", 'row 2: current is "nan"; a finite number is right'),
+    ],
+)
+def test_a_row_that_cannot_count_is_refused(tmp_path, rows, what) -> None:
+    table = tmp_path / "runs.csv"
+    table.write_text(f"file,current [A]\n{rows}\n")
+    with pytest.raises(StudyError, match=re.escape(what)):
+        rows_of_table(table, [Path("a.csv")])
+
+
+def test_a_table_of_runs_with_two_columns_of_one_name_is_refused(tmp_path) -> None:
+    table = tmp_path / "runs.csv"
+    table.write_text("file;current [A];current [A]\na.csv;1;2\n")
+    with pytest.raises(StudyError, match=r'2 columns are called "current \[A\]"'):
+        rows_of_table(table, [Path("a.csv")])
 
 
 def test_a_level_and_a_channel_exclude_each_other(tmp_path) -> None:

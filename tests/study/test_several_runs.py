@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from bristle.errors import RecordError, StudyError
 from bristle.study.create import create_study
 from bristle.study.data_check import check_data
 from bristle.study.run_facts import RunChoices
+from bristle.study.settings import with_mask
 from bristle.study.study import Study
 
 
@@ -172,6 +174,8 @@ def test_spikes_are_told_with_time_and_size_and_masked_on_request(tmp_path, caps
     text = (tmp_path / "rig" / "study.toml").read_text()
     assert "mask = true" in text
     assert text.index("mask = true") < text.index("[[runs]]")
+    for long in ('# ours\nschema = 1\nnotes = """\n[a list]\n"""\n', "", "[channels.time]\n"):
+        assert tomllib.loads(with_mask(long)) == {**tomllib.loads(long), "mask": True}
     after = Study(tmp_path / "rig").read()[0]
     assert np.flatnonzero(~after.measured).tolist() == [700, 2001, 2002]
     assert np.max(np.abs(after["force"] - bench_run(1)["F [N]"])) < 8.0

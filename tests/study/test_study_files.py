@@ -245,6 +245,7 @@ def test_comments_of_a_model_stay(tmp_path: Path) -> None:
         ),
         ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nvalue = "x"', "a finite number"),
         ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nfree = 1', "true or false"),
+        ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\nstd = -1.0', "line 4: std = -1; 0 or"),
         ('schema = 1\nlaw = "lugre"\n[parameters.sigma_a]\norigin = "x"', 'no origin "x"'),
         ('schema = 1\nlaw = "lugre"\n[parameters]\nsigma_a = 5.0', "value = ..."),
         ('schema = 1\nlaw = "lugre"\n[effects.gas_sprin]', 'effect "gas_sprin".*"gas_spring"'),

@@ -74,7 +74,7 @@ def _add_time(
     for key, array in scalars.items():
         value = float(array.ravel()[0])
         short = _short(key)
-        if value <= 0.0 or short not in (*_STEPS, *_RATES):
+        if not 0.0 < value < np.inf or short not in (*_STEPS, *_RATES):
             continue
         step = value if short in _STEPS else 1.0 / value
         data["time_s"] = np.arange(size) * step

@@ -45,8 +45,8 @@ def read(content: bytes, name: str) -> Table:
         If no rows of numbers are found, a row has another count of columns, or decimal commas
         cannot be told from those between columns: with the line.
     """
-    text, notes = _decode(content, name)
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    text, notes = decoded(content, name)
+    lines = lines_of(text)
     layout = _find_layout(lines, name)
     first = next(k for k, line in enumerate(lines) if _is_data(line, layout))
     columns = _header(lines[:first], layout, name, first, notes)
@@ -63,7 +63,14 @@ def read(content: bytes, name: str) -> Table:
     return Table(name, columns, values, body.lines, "line", not_numeric, (*notes, *body.notes))
 
 
-def _decode(content: bytes, name: str) -> tuple[str, list[str]]:
+def decoded(content: bytes, name: str) -> tuple[str, list[str]]:
+    """Return a file's text, and what is to be known of how it was read.
+
+    Raises
+    ------
+    RecordError
+        If it is no text.
+    """
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         try:
             return content.decode("utf-16"), []
@@ -80,9 +87,22 @@ def _decode(content: bytes, name: str) -> tuple[str, list[str]]:
         return content.decode("cp1252", "replace"), ["not UTF-8: read as Windows-1252 text"]
 
 
+def lines_of(text: str) -> list[str]:
+    """Return the lines of a text, however they end."""
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
 def _is_data(line: str, layout: Layout) -> bool:
-    stripped = line.strip()
-    return bool(stripped) and not is_comment(line) and layout.fits(layout.split(stripped))
+    return (
+        bool(line.strip())
+        and not is_comment(line)
+        and layout.fits(layout.split(_without_ends(line)))
+    )
+
+
+def _without_ends(line: str) -> str:
+    """Return a line without blanks around it; a tab there parts an empty field from the others."""
+    return line.strip(" \r\n")
 
 
 def _find_layout(lines: list[str], name: str) -> Layout:
@@ -90,7 +110,7 @@ def _find_layout(lines: list[str], name: str) -> Layout:
     full = [k for k, line in enumerate(lines) if line.strip() and not is_comment(line)]
     if not full:
         raise RecordError(f"{name}: there is no row of numbers. {_RIGHT}")
-    middle = [lines[k].strip() for k in islice(full, len(full) // 2, len(full) // 2 + 60)]
+    middle = [_without_ends(lines[k]) for k in islice(full, len(full) // 2, len(full) // 2 + 60)]
     if len(middle) > 3:
         middle.pop()  # the last line of a file may be cut
     best: tuple[float, Layout] | None = None
@@ -247,7 +267,7 @@ def _instants(
     out = list(columns)
     for index in list(body.not_numeric):
         try:
-            texts = [layout.split(lines[line - 1].strip())[index] for line in body.lines]
+            texts = [layout.split(_without_ends(lines[at - 1]))[index] for at in body.lines]
         except IndexError:
             continue
         seconds = seconds_of(texts)

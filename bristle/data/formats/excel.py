@@ -9,12 +9,14 @@ from __future__ import annotations
 import io
 import re
 import zipfile
+from dataclasses import replace
 from datetime import date, datetime, time
 from typing import Any
 from xml.etree import ElementTree
 
 from ...errors import RecordError
 from ..table import Table
+from ..titles import is_unit_row
 from . import delimited
 from ._extra import library
 
@@ -76,27 +78,23 @@ def read(content: bytes, name: str) -> Table:
         except RecordError as error:
             reasons.append(str(error))
             continue
-        return _with_notes(table, part, where, notes, [one.title for one, _ in texts], sheet.title)
+        lines = ["", *delimited.lines_of(text)]
+        _refuse_merged(part, table, lines[int(table.lines[0]) - 1], where)
+        return _with_notes(table, part, notes, [one.title for one, _ in texts], sheet.title)
     first = reasons[0] if len(reasons) == 1 else f"{name}: no sheet holds rows of numbers."
     raise RecordError(first)
 
 
-def _with_notes(
-    table: Table, part: bytes, where: str, notes: list[str], titles: list[str], own: str
-) -> Table:
-    """Return a sheet's table with what is to be known of it; refuse merged cells in it.
+def _with_notes(table: Table, part: bytes, notes: list[str], titles: list[str], own: str) -> Table:
+    """Return a sheet's table with what is to be known of it.
 
     Parameters
     ----------
     table : as read from the sheet's text
     part : the sheet's XML
-    where : the file and the sheet, for messages
     notes : of the workbook
     titles, own : of all sheets, and of this one
     """
-    from dataclasses import replace
-
-    _refuse_merged(part, table, where)
     formulas = len(_formulas(part))
     if formulas:
         notes = [*notes, f"{formulas} cells hold formulas: their stored values are taken"]
@@ -171,9 +169,17 @@ def _refuse_without_values(part: bytes, where: str) -> None:
             )
 
 
-def _refuse_merged(part: bytes, table: Table, where: str) -> None:
-    """Refuse merged cells in the table or in the row above it; elsewhere they do no harm."""
-    first = int(table.lines[0]) - 2  # titles, and a row of units below
+def _refuse_merged(part: bytes, table: Table, above: str, where: str) -> None:
+    """Refuse merged cells in the table, its titles or their units; elsewhere they do no harm.
+
+    Parameters
+    ----------
+    part : the sheet's XML
+    table : as read from the sheet's text
+    above : the row above the first one of numbers
+    where : the file and the sheet, for messages
+    """
+    first = int(table.lines[0]) - 1 - is_unit_row(above.split("\t"))
     for match in _MERGED.finditer(part):
         left, top, right, bottom = (one.decode() for one in match.groups())
         if int(bottom) >= first and (left != right or int(bottom) > int(top)):

@@ -27,8 +27,8 @@ def read(content: bytes, name: str) -> Table:
     """Return the table in an HDF5 file.
 
     Datasets of one dimension are columns, called `group.dataset`; a matrix gives `name_1`,
-    `name_2`; a compound dataset gives its fields. An attribute `unit` or `units` is the unit. The
-    rest is as in a MAT file of version 7.
+    `name_2`; a compound dataset gives its fields, called `dataset.field` where two share a name.
+    An attribute `unit` or `units` is the unit. The rest is as in a MAT file of version 7.
 
     Raises
     ------
@@ -41,7 +41,8 @@ def read(content: bytes, name: str) -> Table:
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
             for key, dataset in _datasets(file, h5py):
-                for column, array in _arrays(key, dataset):
+                for called, array in _arrays(key, dataset):
+                    column = f"{key}.{called}" if called in units else called
                     found.append((column, array))
                     units[column] = _unit(dataset)
     # A damaged file surfaces as any of these from the library's own parsing.
@@ -74,8 +75,9 @@ def _arrays(key: str, dataset: Any) -> Iterator[tuple[str, AnyArray]]:
 def _unit(dataset: Any) -> str | None:
     for key in _UNITS:
         stated = dataset.attrs.get(key)
-        if stated is not None:
-            text = stated.decode() if isinstance(stated, bytes) else str(stated)
+        if stated is not None and np.size(stated) == 1:
+            first = np.ravel(stated)[0]  # some programs write an array of one text
+            text = first.decode(errors="replace") if isinstance(first, bytes) else str(first)
             unit = unit_or_none(text)
             return None if unit is None else unit.name
     return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ...errors import RecordError
-from ..table import Table, from_arrays
+from ..table import Table, from_arrays, refuse_twice
 from ..titles import unit_or_none
 
 
@@ -18,15 +18,16 @@ def read(content: bytes, name: str) -> Table:
     Raises
     ------
     RecordError
-        If the file is damaged or holds no samples.
+        If the file is damaged, two columns have one name, or it holds no samples.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
-        read = pq.read_table(pa.BufferReader(content))
+        read = pq.ParquetFile(pa.BufferReader(content)).read()
     except (pa.ArrowException, OSError, ValueError) as error:
         raise RecordError(f"{name}: no Parquet file, or damaged ({error}).") from None
+    refuse_twice(read.column_names, name)
     units = {}
     for one in read.schema:
         stated = (one.metadata or {}).get(b"unit", b"").decode()

@@ -19,6 +19,9 @@ from .candidates import Search, candidate_of
 from .fitting import fit_signs, fit_units
 from .levels import structure_guesses
 
+FEWEST = 10
+"""Rows of numbers below which no column is taken for the time."""
+
 
 @dataclass(frozen=True)
 class Guess:
@@ -81,13 +84,21 @@ def specs(table: Table, guesses: list[Guess]) -> dict[str, ChannelSpec]:
     return {guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses}
 
 
+def too_few_rows(table: Table) -> str:
+    """Return that no column is taken for the time in so few rows, "" where there are enough."""
+    if table.rows >= FEWEST:
+        return ""
+    rows = "one row" if table.rows == 1 else f"{table.rows} rows"
+    return f"{rows} of numbers: no column can be recognised as the time in fewer than {FEWEST}"
+
+
 def _find_time(table: Table) -> tuple[Guess | None, float]:
     """Return the guess of the time and the usual spacing [s], 0 where there is no time."""
     best: tuple[int, Guess, float] | None = None
     for column in table.columns:
         values = table.values[column.text]
         good = values[np.isfinite(values)]
-        if len(good) < max(10.0, 0.5 * table.rows):
+        if len(good) < max(FEWEST, 0.5 * table.rows):
             continue
         spacing = np.diff(good)
         rising = float(np.mean(spacing > 0.0)) > 0.98

@@ -1,0 +1,188 @@
+"""A model: the damper's law, its parameters and the effects that were added, as values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from math import isfinite
+
+from ..physics.drive import DRIVES, VOLTAGE, unit_for
+from ..physics.effect import EFFECTS, plain_name
+from ..physics.laws import DEFAULT, base_and_variant
+from ..physics.parameter import Parameter
+from ..units import convert
+from .correlation import Array, Correlation, correlation_of_covariance, covariance_of
+from .declared import declared_of, defaults_of
+from .model_value import Value
+
+
+@dataclass(frozen=True)
+class StudyModel:
+    """The content of a model.toml; all parameters of the law and its effects are there.
+
+    `parameters` of the law by name; `effects` name to parameters; `building` the file of the
+    structure, relative to the study, "" on a bench; `only_shown` the effects, and the law, whose
+    code must not run yet: the model can be shown, not used; `correlation` of the identified
+    parameters' errors, None where none was stored; `drive` is the channel that commands the damper,
+    on whose unit those of parameters depend.
+    """
+
+    law: str
+    parameters: dict[str, Value]
+    effects: dict[str, dict[str, Value]] = field(default_factory=dict)
+    building: str = ""
+    only_shown: tuple[str, ...] = ()
+    correlation: Correlation | None = None
+    drive: str = VOLTAGE.name
+
+    @property
+    def base_law(self) -> str:
+        """The law without its variant: "bingham" of "bingham_standard"."""
+        return base_and_variant(self.law)[0].name
+
+    def flat(self) -> dict[str, Value]:
+        """Return all parameters by the names of FMUs: "f_c", "gas_spring.k"."""
+        out = dict(self.parameters)
+        for effect, values in self.effects.items():
+            out.update({f"{effect}.{name}": value for name, value in values.items()})
+        return out
+
+    def values(self) -> dict[str, float]:
+        """Return all values in SI by the names of FMUs."""
+        return {
+            name: convert(value.value, value.unit, self.declared(name).unit)
+            for name, value in self.flat().items()
+        }
+
+    def free(self) -> list[str]:
+        """Return the names of the parameters that a fit may move."""
+        return [name for name, value in self.flat().items() if value.free]
+
+    def declared(self, name: str) -> Parameter:
+        """Return the declaration of a parameter: default, SI unit, bounds, text.
+
+        Of an effect or law that is only shown the file tells what there is.
+        """
+        effect, _, own = name.rpartition(".")
+        if (effect or self.law) in self.only_shown:
+            value = self.effects[effect][own] if effect else self.parameters[own]
+            return Parameter(value.value, value.unit, (value.low, value.high), "")
+        return declared_of(self.law, effect, self.drive)[own]
+
+    def with_values(
+        self,
+        values: Mapping[str, float],
+        std: Mapping[str, float] | None = None,
+        origin: str = "identified",
+    ) -> StudyModel:
+        """Return the model with values in SI, and their standard deviations, put in its units."""
+        std = std or {}
+        flat = self.flat()
+        for name, value in values.items():
+            unit = self.declared(name).unit
+            own = flat[name].unit
+            spread = convert(std[name], unit, own) if name in std else None
+            flat[name] = replace(
+                flat[name], value=convert(value, unit, own), std=spread, origin=origin
+            )
+        # Errors of other values say nothing of these.
+        kept = (
+            self.correlation.of([n for n in flat if n not in values]) if self.correlation else None
+        )
+        return replace(
+            self,
+            parameters={name: flat[name] for name in self.parameters},
+            effects={
+                effect: {own: flat[f"{effect}.{own}"] for own in named}
+                for effect, named in self.effects.items()
+            },
+            correlation=kept,
+        )
+
+    def with_covariance(self, names: Sequence[str], covariance: Array) -> StudyModel:
+        """Return the model with how the errors of these parameters go together.
+
+        Parameters
+        ----------
+        names : parameters, whose standard deviations the model has
+        covariance : (p, p) of their errors, in SI
+        """
+        return replace(self, correlation=correlation_of_covariance(names, covariance))
+
+    def uncertain(self) -> list[str]:
+        """Return the names of the parameters that have a standard deviation."""
+        return [n for n, v in self.flat().items() if v.std is not None and isfinite(v.std)]
+
+    def covariance(self) -> tuple[tuple[str, ...], Array]:
+        """Return the identified parameters and the covariance (p, p) of their errors in SI.
+
+        Without a stored correlation errors count as independent.
+        """
+        names, flat = self.uncertain(), self.flat()
+        own = [(flat[name].std or 0.0, flat[name].unit, self.declared(name).unit) for name in names]
+        return tuple(names), covariance_of(names, [convert(*one) for one in own], self.correlation)
+
+    def at(self, site: str, bench: bool) -> StudyModel:
+        """Return the model with the effects of one site alone, by their plain names.
+
+        Parameters
+        ----------
+        site : one of `physics.effect.SITES`
+        bench : whether the model is of a damper on a bench, whose effects are all the damper's
+        """
+        own = [name for name in self.effects if _site_of(name, bench) == site]
+        return replace(self, effects={plain_name(name): self.effects[name] for name in own})
+
+    def with_effect(self, effect: str) -> StudyModel:
+        """Return the model with one more effect, its parameters at their defaults."""
+        added = defaults_of("", effect, self.drive)
+        return replace(self, effects={**self.effects, effect: added})
+
+    def with_drive(self, drive: str) -> StudyModel:
+        """Return the model for another command: the same numbers, per ampere in place of per volt.
+
+        Parameters
+        ----------
+        drive : one of `data.channels.DRIVE`
+        """
+        if drive == self.drive:
+            return self
+        old = DRIVES[self.drive].unit
+
+        def said(value: Value) -> Value:
+            return replace(value, unit=unit_for(value.unit, DRIVES[drive], old))
+
+        return replace(
+            self,
+            drive=drive,
+            parameters={name: said(value) for name, value in self.parameters.items()},
+            effects={
+                effect: {name: said(value) for name, value in values.items()}
+                for effect, values in self.effects.items()
+            },
+        )
+
+
+def _site_of(name: str, bench: bool) -> str:
+    effect = EFFECTS[name]
+    return "damper" if bench and "damper" in effect.sites else effect.site
+
+
+def new_model(
+    law: str = DEFAULT,
+    effects: tuple[str, ...] = (),
+    building: str = "",
+    drive: str = VOLTAGE.name,
+) -> StudyModel:
+    """Return a model with every parameter at its default.
+
+    Parameters
+    ----------
+    law, effects : names of the law and of effects that join it
+    building : file of the structure, relative to the study; "" on a bench
+    drive : the channel that commands the damper
+    """
+    model = StudyModel(law, defaults_of(law, "", drive), {}, building, drive=drive)
+    for effect in effects:
+        model = model.with_effect(effect)
+    return model

@@ -1,0 +1,25 @@
+"""Compiles what many test files need, in a process of its own beside the first of them.
+
+Else each worker of a run on a fresh machine compiles the coupled engine by itself, for a minute.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import bristle
+from bristle.identify.bench import Bench
+
+
+def compile_ahead() -> None:
+    """Call each compiled function once, as tests do: its machine code is then on disk."""
+    # First without clocks, then with them: a process that has them never goes back.
+    for scenario in ("half_sine_pulse", "el_centro_0p6g_clipped"):
+        bristle.run(scenario, {"run.stop": 0.01}, engine="compiled")
+    still = np.zeros(8)
+    for effects in ([], ["coil_lag"]):
+        Bench("lugre", effects).force(still, still, still, still, 0.002, {})
+
+
+if __name__ == "__main__":
+    compile_ahead()
