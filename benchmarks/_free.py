@@ -10,15 +10,26 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
+from bristle.data.checks.levels import tells_a_bend
 from bristle.data.measurement import Measurement
 from bristle.diagnose.corrected import corrected
 from bristle.diagnose.damper import look_at_damper
 from bristle.diagnose.decision import missing
 from bristle.diagnose.faults import SensorFault
-from bristle.diagnose.law_free import diagnose_laws
+from bristle.diagnose.finding import Finding
+from bristle.diagnose.law_choice import Pair, choose, search
+from bristle.diagnose.law_trials import LawTrial, try_laws
 from bristle.diagnose.learned.curve import Curve, effect_text
 from bristle.diagnose.learned.fit import learn
-from bristle.diagnose.opening import Insufficient, Opening, opening
+from bristle.diagnose.opening import (
+    Insufficient,
+    Opening,
+    Progress,
+    bench_data,
+    opened_with,
+    opening,
+    silent,
+)
 from bristle.identify.model import Model, Problem
 from bristle.identify.prepare import prepare
 from bristle.identify.residuals import has_offset, zero_of
@@ -26,6 +37,7 @@ from bristle.identify.search_context import refine
 from bristle.physics.laws import DEFAULT
 from bristle.physics.user import defined
 from bristle.study.inputs import runs_of
+from bristle.study.runs import Runs
 
 from ._floor import share_of
 
@@ -57,28 +69,66 @@ NAME = "learned_"
 """Begin of the names of curves."""
 
 
-def steps(train: Sequence[Measurement]) -> tuple[Found, Found, Found]:
+def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, Found, Found]:
     """Return what training runs lead to: the bare law of least error, law with effects, all.
 
     Parameters
     ----------
     train : the training runs; a part of them judges the steps
+    say : called with a few words at each stage
+
+    Raises
+    ------
+    ValueError
+        If the training runs carry no verdict.
     """
     split = runs_of(list(train), [])
-    verdict = diagnose_laws(split.train, split.holdout, Model(DEFAULT))
-    after = verdict.after
-    if after is None:
-        raise ValueError(f"the training runs carry no verdict: {verdict.words}")
-    assert verdict.laws is not None
-    bare = min((row.trial for row in verdict.laws.rows), key=lambda trial: trial.rms)
-    law = Found(bare.model, (), bare.z, verdict.sensors, False)
-    model = after.model
+    data = bench_data(split.train, split.holdout, Model(DEFAULT), say)
+    if isinstance(data, Insufficient):
+        raise ValueError(" ".join(data.reasons))
+    say("trying every law")
+    bends = tells_a_bend(split.train)
+    rows = try_laws(data.problem, data.held_out, Model(DEFAULT), bends=bends)
+
+    def look(row: LawTrial) -> Pair:
+        say(f"effects that {row.law} lacks (z {row.trial.z:.2f})")
+        return Pair(row, *look_at_damper(opened_with(row.trial, data)))
+
+    chosen = choose(search(rows, look))
+    assert chosen.opened is not None
+    bare = min((row.trial for row in rows), key=lambda trial: trial.rms)
+    law = Found(bare.model, (), bare.z, data.faults, False)
+    opened = _with_effects(split, chosen.finding, chosen.opened, say)
+    return law, _found(opened, ()), _with_curves(opened, say)
+
+
+def _with_effects(split: Runs, finding: Finding, opened: Opening, say: Progress) -> Opening:
+    """Add effects as long as one is named, or lowers the error beyond chance; see `study auto`."""
+    while len(opened.before.model.effects) < MOST:
+        gaining = [one for one in finding.trials if missing(opened.before, one)]
+        if finding.kind == "effect" and finding.model is not None:
+            model = finding.model
+        elif finding.kind == "unknown" and gaining:
+            model = gaining[0].model
+        else:
+            break
+        say(f"{model.law} + {' + '.join(model.effects)}")
+        again = opening(split.train, split.holdout, model, identified=True)
+        if isinstance(again, Insufficient):
+            break
+        opened = again
+        if len(model.effects) < MOST:
+            finding, opened = look_at_damper(opened)
+    return opened
+
+
+def _with_curves(opened: Opening, say: Progress) -> Found:
+    """Learn curves as long as one lowers the error beyond chance and the model is not full."""
+    curves: tuple[Curve, ...] = ()
     with ExitStack() as stack:
-        opened, model = _effects(split.train, split.holdout, model)
-        free = _found(opened, ())
-        curves: tuple[Curve, ...] = ()
         while len(opened.before.model.effects) < MOST:
             name = f"{NAME}{len(curves) + 1}"
+            say(f"{name} (z {opened.before.z:.2f})")
             learned = learn(opened, name)
             if learned.refused or learned.curve is None or learned.after is None:
                 break
@@ -88,27 +138,7 @@ def steps(train: Sequence[Measurement]) -> tuple[Found, Found, Found]:
                 opened, before=learned.after, problem=opened.problem.of(opened.problem.runs),
                 held_out=opened.held_out.of(opened.held_out.runs), part=None,
             )  # fmt: skip
-        return law, free, _found(opened, curves)
-
-
-def _effects(
-    train: Sequence[Measurement], judging: Sequence[Measurement], model: Model
-) -> tuple[Opening, Model]:
-    """Add effects as long as one is named, or lowers the error beyond chance; see `study auto`."""
-    while True:
-        opened = opening(train, judging, model, identified=True)
-        if isinstance(opened, Insufficient):
-            raise ValueError(" ".join(opened.reasons))
-        if len(model.effects) >= MOST:
-            return opened, model
-        finding, looked = look_at_damper(opened)
-        if finding.kind == "effect" and finding.model is not None:
-            model = finding.model
-            continue
-        gaining = [one for one in finding.trials if missing(looked.before, one)]
-        if finding.kind != "unknown" or not gaining:
-            return looked, looked.before.model
-        model = gaining[0].model
+    return _found(opened, curves)
 
 
 def _found(opened: Opening, curves: tuple[Curve, ...]) -> Found:

@@ -104,6 +104,28 @@ def test_answers_of_another_version_are_none():
     }
 
 
+def test_steps_see_training_runs_alone(monkeypatch):
+    model = _free.Found(Model("dahl"), (), 1.0, (), False)
+    calls = []
+
+    def steps(train):
+        calls.append(("steps", train))
+        return model, model, model
+
+    def opened_once(found, train, held):
+        calls.append(("opened", held))
+        return 0.1
+
+    monkeypatch.setattr(_reach, "steps", steps)
+    monkeypatch.setattr(_reach, "opened_once", opened_once)
+    monkeypatch.setattr(_reach, "corrected_runs", lambda found, train, held: (train, held))
+    monkeypatch.setattr(_reach, "least_squares", lambda model, train, held: 0.2)
+    made = _reach.found(_reach.STEPS, ["a", "b"], ["c"])
+    assert calls == [("steps", ["a", "b"]), ("opened", ["c"]), ("opened", ["c"])]
+    assert made["law"] == {"share": 0.2, "with": "dahl"}
+    assert made["learned"] == {"share": 0.1, "with": "dahl", "z": 1.0}
+
+
 def test_words_of_a_model():
     assert _free.Found(Model("lugre", ("gas_spring",)), (), 1.0, (), False).words == (
         "lugre + gas_spring"
