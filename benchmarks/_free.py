@@ -22,6 +22,7 @@ from bristle.diagnose.law_trials import LawTrial, try_laws
 from bristle.diagnose.learned.curve import Curve, effect_text
 from bristle.diagnose.learned.fit import learn
 from bristle.diagnose.opening import (
+    BenchData,
     Insufficient,
     Opening,
     Progress,
@@ -69,8 +70,21 @@ NAME = "learned_"
 """Begin of the names of curves."""
 
 
-def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, Found, Found]:
-    """Return what training runs lead to: the bare law of least error, law with effects, all.
+def bare_law(train: Sequence[Measurement]) -> Found:
+    """Return the law of least plain error on the part of training runs that judges.
+
+    Raises
+    ------
+    ValueError
+        If the training runs carry no verdict.
+    """
+    _, data, rows = _laws(train, silent)
+    best = min((row.trial for row in rows), key=lambda trial: trial.rms)
+    return Found(best.model, (), best.z, data.faults, False)
+
+
+def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, Found]:
+    """Return the models that training runs lead to: law with effects, and with curves besides.
 
     Parameters
     ----------
@@ -82,13 +96,7 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
     ValueError
         If the training runs carry no verdict.
     """
-    split = runs_of(list(train), [])
-    data = bench_data(split.train, split.holdout, Model(DEFAULT), say)
-    if isinstance(data, Insufficient):
-        raise ValueError(" ".join(data.reasons))
-    say("trying every law")
-    bends = tells_a_bend(split.train)
-    rows = try_laws(data.problem, data.held_out, Model(DEFAULT), bends=bends)
+    split, data, rows = _laws(train, say)
 
     def look(row: LawTrial) -> Pair:
         say(f"effects that {row.law} lacks (z {row.trial.z:.2f})")
@@ -96,10 +104,21 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
 
     chosen = choose(search(rows, look))
     assert chosen.opened is not None
-    bare = min((row.trial for row in rows), key=lambda trial: trial.rms)
-    law = Found(bare.model, (), bare.z, data.faults, False)
     opened = _with_effects(split, chosen.finding, chosen.opened, say)
-    return law, _found(opened, ()), _with_curves(opened, say)
+    return _found(opened, ()), _with_curves(opened, say)
+
+
+def _laws(
+    train: Sequence[Measurement], say: Progress
+) -> tuple[Runs, BenchData, tuple[LawTrial, ...]]:
+    """Return training runs split in two, prepared, and the trials of all laws on them."""
+    split = runs_of(list(train), [])
+    data = bench_data(split.train, split.holdout, Model(DEFAULT), say)
+    if isinstance(data, Insufficient):
+        raise ValueError(" ".join(data.reasons))
+    say("trying every law")
+    bends = tells_a_bend(split.train)
+    return split, data, try_laws(data.problem, data.held_out, Model(DEFAULT), bends=bends)
 
 
 def _with_effects(split: Runs, finding: Finding, opened: Opening, say: Progress) -> Opening:

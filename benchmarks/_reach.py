@@ -16,7 +16,7 @@ from bristle.identify.prepare import prepare
 from . import _measured
 from ._answers import Answer, Answers
 from ._floor import LEARNERS, WITHOUT, have_learner, least_squares, without_physics
-from ._free import corrected_runs, opened_once, steps
+from ._free import bare_law, corrected_runs, opened_once, steps
 from ._measured import Row
 from ._rows import Row as Figure
 
@@ -30,8 +30,10 @@ SETS = {
 Error = tuple[float, str]
 """An error, and what it belongs to."""
 
-STEPS = "steps"
-"""The job of law, effects and curves; the other ones are named as the learners are."""
+NOT_RUN: Error = (float("nan"), "not run yet")
+
+STEPS, LAW = "steps", "law"
+"""The jobs of law, effects and curves, and of a bare law; others are named as the learners are."""
 
 VERSION = 1
 """Raised where `_floor` or `_free` finds other numbers: answers of before are then none."""
@@ -90,6 +92,7 @@ def jobs(folders: Sequence[str]) -> Iterator[tuple[str, str, int]]:
     """Yield the jobs of sets; the learners where they are installed."""
     for folder in folders:
         yield folder, STEPS, VERSION
+        yield folder, LAW, VERSION
         for learner in LEARNERS if have_learner() else ():
             yield folder, learner.name, VERSION
 
@@ -110,22 +113,24 @@ def _by_folder(made: dict[str, Answer], folders: Sequence[str]) -> Found:
 
 def found(job: str, train: list[Measurement], held: list[Measurement]) -> Answer:
     """Return the answer to a job: held-out runs are opened by its last call alone."""
-    if job != STEPS:
-        learner = next(one for one in LEARNERS if one.name == job)
-        runs = [[prepare(run) for run in part] for part in (train, held)]
-        reached = without_physics(learner, runs[0], runs[1])
-        return {"share": reached.share, "with": reached.chosen, "folds": reached.folds}
-    law, free, learned = steps(train)
-    out: Answer = {
-        name: {"share": opened_once(one, train, held), "with": one.words, "z": one.z}
-        for name, one in (("free", free), ("learned", learned))
-    }
-    share = least_squares(law.model, *corrected_runs(law, train, held))
-    return out | {"law": {"share": share, "with": law.words}}
+    if job == LAW:
+        law = bare_law(train)
+        share = least_squares(law.model, *corrected_runs(law, train, held))
+        return {"share": share, "with": law.words}
+    if job == STEPS:
+        pairs = zip(("free", "learned"), steps(train), strict=True)
+        return {
+            name: {"share": opened_once(one, train, held), "with": one.words, "z": one.z}
+            for name, one in pairs
+        }
+    learner = next(one for one in LEARNERS if one.name == job)
+    runs = [[prepare(run) for run in part] for part in (train, held)]
+    reached = without_physics(learner, runs[0], runs[1])
+    return {"share": reached.share, "with": reached.chosen, "folds": reached.folds}
 
 
 def beside(found: Found, rows: Sequence[Row]) -> list[Beside]:
-    """Return the sets of which the steps of the package are known, with their floors.
+    """Return the sets of which a floor is known, with the models of the package.
 
     Parameters
     ----------
@@ -134,14 +139,20 @@ def beside(found: Found, rows: Sequence[Row]) -> list[Beside]:
     """
     out = []
     for folder, done in found.items():
-        if STEPS not in done:
-            continue
-        title, made = SETS[folder][0], done[STEPS]
+        title, made = SETS[folder][0], done.get(STEPS, {})
         given = [(row.after, f"{row.law} + {row.after_with}") for row in rows if row.data == title]
-        floors = [(made["law"]["share"], f"{made['law']['with']}, least squares")]
-        floors += [(one["share"], job) for job, one in done.items() if job != STEPS]
-        free, learned = ((made[k]["share"], made[k]["with"]) for k in ("free", "learned"))
-        best = min(given, default=(float("nan"), "not run"))
+        floors = [
+            (one["share"], f"{one['with']} by least squares" if job == LAW else job)
+            for job, one in done.items()
+            if job != STEPS
+        ]
+        if not floors:
+            continue
+        free, learned = (
+            (made[name]["share"], made[name]["with"]) if made else NOT_RUN
+            for name in ("free", "learned")
+        )
+        best = min(given, default=NOT_RUN)
         out.append(Beside(title, best, free, learned, tuple(floors)))
     return out
 
@@ -156,10 +167,9 @@ def markdown(found: Sequence[Beside]) -> list[str]:
     ]
     for one in found:
         error, which = one.floor
-        lines.append(
-            f"| {one.data} | {one.given[0]:.1%} | {one.free[0]:.1%} | {one.learned[0]:.1%} | "
-            f"{error:.1%} ({which}) | {one.ratio:.2f} |"
-        )
+        ours = " | ".join(_percent(part) for part in (one.given, one.free, one.learned))
+        ratio = f"{one.ratio:.2f}" if one.ratio == one.ratio else "-"
+        lines.append(f"| {one.data} | {ours} | {error:.1%} ({which}) | {ratio} |")
     lines.append("")
     for one in found:
         floors = "; ".join(f"{which} {error:.1%}" for error, which in one.floors)
@@ -172,6 +182,10 @@ def markdown(found: Sequence[Beside]) -> list[str]:
     return lines
 
 
+def _percent(error: Error) -> str:
+    return error[1] if error == NOT_RUN else f"{error[0]:.1%}"
+
+
 def figures(found: Sequence[Beside]) -> list[Figure]:
     """Return a row per set: the ratio to the floor."""
     return [
@@ -181,4 +195,5 @@ def figures(found: Sequence[Beside]) -> list[Figure]:
             f"<= {GOAL}", one.ratio / GOAL, f"floor: {one.floor[1]}",
         )
         for one in found
+        if one.ratio == one.ratio
     ]  # fmt: skip
