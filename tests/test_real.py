@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import real
+from benchmarks import _measured, real
 
 DATA = Path(__file__).resolve().parent.parent / "../shared/data"
 
@@ -22,15 +22,15 @@ def test_what_is_not_there_is_said(tmp_path, capsys):
     text = page.read_text(encoding="utf-8")
     assert text.startswith(f"# Before\n\n{real.MARK}\n")
     assert "old figures" not in text
-    assert {row["skipped"] for row in json.loads(kept.read_text())} >= {
+    assert {row["skipped"] for row in json.loads(kept.read_text())["rows"]} >= {
         "not run: there is no mr_damper_utfpr"
     }
 
 
 def test_fit_and_loop_area():
     t = np.linspace(0.0, 20.0 * np.pi, 4001)
-    assert real.fit(np.sin(t), np.sin(t)) == pytest.approx(1.0)
-    assert real.fit(np.sin(t), np.zeros_like(t)) == pytest.approx(0.0, abs=1e-6)
+    assert _measured.fit(np.sin(t), np.sin(t)) == pytest.approx(1.0)
+    assert _measured.fit(np.sin(t), np.zeros_like(t)) == pytest.approx(0.0, abs=1e-6)
 
     class Run:
         """A run that slides against a friction of 3 N."""
@@ -40,14 +40,14 @@ def test_fit_and_loop_area():
 
     # Whole periods: the area is 3 N times the path, an offset adds nothing.
     force = 3.0 * np.sign(np.cos(t)) + 100.0
-    assert real.dissipative(Run(), force) == pytest.approx(3.0, rel=1e-2)
+    assert _measured.dissipative(Run(), force) == pytest.approx(3.0, rel=1e-2)
 
 
 @pytest.mark.skipif(not (DATA / "mr_damper_mathworks").is_dir(), reason="the data are not there")
 def test_the_published_reference_comes_out():
-    run = real.read_measurement(DATA / "mr_damper_mathworks" / "mrdamper.csv")
-    assert real.fit_of(run, tanh=False) == pytest.approx(0.368, abs=5e-4)
-    assert real.fit_of(run, tanh=True) == pytest.approx(0.453, abs=0.01)
+    run = _measured.read_measurement(DATA / "mr_damper_mathworks" / "mrdamper.csv")
+    assert _measured.fit_of(run, tanh=False) == pytest.approx(0.368, abs=5e-4)
+    assert _measured.fit_of(run, tanh=True) == pytest.approx(0.453, abs=0.01)
 
 
 @pytest.mark.skipif(not (DATA / "shake_table_base_isolated").is_dir(), reason="no such data")
@@ -55,7 +55,9 @@ def test_the_building_is_the_same_in_two_earthquakes():
     folder = DATA / "shake_table_base_isolated"
     found = []
     for name in ("bi_bncs_cnp100.csv", "bi_bncs_lac100.csv"):
-        fit = real.identify_structure(real.shaken(folder, [name]), real.unknown_masses())
+        fit = _measured.identify_structure(
+            _measured.shaken(folder, [name]), _measured.unknown_masses()
+        )
         found.append((fit.frequencies[:2], fit.std_frequencies[:2]))
     (one, s_1), (other, s_2) = found
     assert np.all(np.abs(one - other) < 3.0 * np.hypot(s_1, s_2))

@@ -1,0 +1,198 @@
+"""Which model the package arrives at where nobody names law, effect or curve: on training runs.
+
+The same steps as `bristle study auto --law all --greedy --learn`. Every one is judged on a part of
+the training runs, split off as `bristle study new` splits, so that runs held out see the end alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+
+from bristle.data.checks.levels import tells_a_bend
+from bristle.data.measurement import Measurement
+from bristle.diagnose.corrected import corrected
+from bristle.diagnose.damper import look_at_damper
+from bristle.diagnose.decision import missing
+from bristle.diagnose.faults import SensorFault
+from bristle.diagnose.finding import Finding
+from bristle.diagnose.law_choice import Pair, choose, search
+from bristle.diagnose.law_trials import LawTrial, try_laws
+from bristle.diagnose.learned.curve import Curve, effect_text
+from bristle.diagnose.learned.fit import learn
+from bristle.diagnose.opening import (
+    BenchData,
+    Insufficient,
+    Opening,
+    Progress,
+    bench_data,
+    opened_with,
+    opening,
+    silent,
+)
+from bristle.identify.model import Model, Problem
+from bristle.identify.prepare import prepare
+from bristle.identify.residuals import has_offset, zero_of
+from bristle.identify.search_context import refine
+from bristle.physics.laws import DEFAULT
+from bristle.physics.user import defined
+from bristle.study.inputs import runs_of
+from bristle.study.runs import Runs
+
+from ._floor import share_of
+
+MOST = 4
+"""Effects and curves that are added at the most, as in `study auto`."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A model with its curves, and how the steps to it did on the part that judged them.
+
+    `z` error / noise there; `faults` of the channels, as the training runs show them.
+    """
+
+    model: Model
+    curves: tuple[Curve, ...]
+    z: float
+    faults: tuple[SensorFault, ...]
+    free_zero: bool
+
+    @property
+    def words(self) -> str:
+        """Law, effects and curves."""
+        effects = [one for one in self.model.effects if not one.startswith(NAME)]
+        return " + ".join([self.model.law, *effects, *(one.words() for one in self.curves)])
+
+
+NAME = "learned_"
+"""Begin of the names of curves."""
+
+
+def bare_law(train: Sequence[Measurement]) -> Found:
+    """Return the law of least plain error on the part of training runs that judges.
+
+    Raises
+    ------
+    ValueError
+        If the training runs carry no verdict.
+    """
+    _, data, rows = _laws(train, silent)
+    best = min((row.trial for row in rows), key=lambda trial: trial.rms)
+    return Found(best.model, (), best.z, data.faults, False)
+
+
+def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, Found]:
+    """Return the models that training runs lead to: law with effects, and with curves besides.
+
+    Parameters
+    ----------
+    train : the training runs; a part of them judges the steps
+    say : called with a few words at each stage
+
+    Raises
+    ------
+    ValueError
+        If the training runs carry no verdict.
+    """
+    split, data, rows = _laws(train, say)
+
+    def look(row: LawTrial) -> Pair:
+        say(f"effects that {row.law} lacks (z {row.trial.z:.2f})")
+        return Pair(row, *look_at_damper(opened_with(row.trial, data)))
+
+    chosen = choose(search(rows, look))
+    assert chosen.opened is not None
+    opened = _with_effects(split, chosen.finding, chosen.opened, say)
+    return _found(opened, ()), _with_curves(opened, say)
+
+
+def _laws(
+    train: Sequence[Measurement], say: Progress
+) -> tuple[Runs, BenchData, tuple[LawTrial, ...]]:
+    """Return training runs split in two, prepared, and the trials of all laws on them."""
+    split = runs_of(list(train), [])
+    data = bench_data(split.train, split.holdout, Model(DEFAULT), say)
+    if isinstance(data, Insufficient):
+        raise ValueError(" ".join(data.reasons))
+    say("trying every law")
+    bends = tells_a_bend(split.train)
+    return split, data, try_laws(data.problem, data.held_out, Model(DEFAULT), bends=bends)
+
+
+def _with_effects(split: Runs, finding: Finding, opened: Opening, say: Progress) -> Opening:
+    """Add effects as long as one is named, or lowers the error beyond chance; see `study auto`."""
+    while len(opened.before.model.effects) < MOST:
+        gaining = [one for one in finding.trials if missing(opened.before, one)]
+        if finding.kind == "effect" and finding.model is not None:
+            model = finding.model
+        elif finding.kind == "unknown" and gaining:
+            model = gaining[0].model
+        else:
+            break
+        say(f"{model.law} + {' + '.join(model.effects)}")
+        again = opening(split.train, split.holdout, model, identified=True)
+        if isinstance(again, Insufficient):
+            break
+        opened = again
+        if len(model.effects) < MOST:
+            finding, opened = look_at_damper(opened)
+    return opened
+
+
+def _with_curves(opened: Opening, say: Progress) -> Found:
+    """Learn curves as long as one lowers the error beyond chance and the model is not full."""
+    curves: tuple[Curve, ...] = ()
+    with ExitStack() as stack:
+        while len(opened.before.model.effects) < MOST:
+            name = f"{NAME}{len(curves) + 1}"
+            say(f"{name} (z {opened.before.z:.2f})")
+            learned = learn(opened, name)
+            if learned.refused or learned.curve is None or learned.after is None:
+                break
+            curves = (*curves, learned.curve)
+            stack.enter_context(defined({name: effect_text(name, learned.curve, "a benchmark")}))
+            opened = replace(
+                opened, before=learned.after, problem=opened.problem.of(opened.problem.runs),
+                held_out=opened.held_out.of(opened.held_out.runs), part=None,
+            )  # fmt: skip
+    return _found(opened, curves)
+
+
+def _found(opened: Opening, curves: tuple[Curve, ...]) -> Found:
+    before = opened.before
+    return Found(before.model, curves, before.z, opened.faults, opened.problem.free_zero)
+
+
+def opened_once(found: Found, train: Sequence[Measurement], held: Sequence[Measurement]) -> float:
+    """Return the error of a model on held-out runs, fitted to all training runs [1].
+
+    Parameters
+    ----------
+    found : the model, its values those of a part of the training runs
+    train, held : the runs that it is fitted to, and those that judge it
+    """
+    texts = {
+        f"{NAME}{k}": effect_text(f"{NAME}{k}", curve, "a benchmark")
+        for k, curve in enumerate(found.curves, 1)
+    }
+    with defined(texts):
+        problem, judging = corrected_runs(found, train, held)
+        model = refine(found.model, problem)
+        zero = zero_of(problem, model)[0] if found.free_zero and not has_offset(model) else 0.0
+        errors = [
+            (run.force - judging.predict(model, run) - zero)[run.skip :] for run in judging.runs
+        ]
+        return share_of(errors, judging.runs)
+
+
+def corrected_runs(
+    found: Found, train: Sequence[Measurement], held: Sequence[Measurement]
+) -> tuple[Problem, Problem]:
+    """Return training and held-out runs without the faults that the training runs show."""
+    problem, judging = (
+        Problem([prepare(run) for run in corrected(part, found.faults)]) for part in (train, held)
+    )
+    problem.free_zero = found.free_zero
+    return problem, judging
