@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date
@@ -165,7 +166,9 @@ def learn_effect(
         file.write_text(text, encoding="utf-8")
         remember_made(file, text)
     picture = study.write_report(f"{name}.png", curve_png(found, forms))
-    return LearnedEffect(found, forms, closed, file, picture)
+    learned = LearnedEffect(found, forms, closed, file, picture)
+    study.write_report(f"{name}.json", json.dumps(learned.as_dict(), indent=2, ensure_ascii=False))
+    return learned
 
 
 def _opened(study: Study) -> Opening:

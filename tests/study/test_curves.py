@@ -68,6 +68,9 @@ def test_a_learned_curve_is_an_effect_of_the_study(study, learned):
     assert "KNOTS" in found.file.read_text()
     assert found.picture is not None
     assert found.picture.read_bytes().startswith(b"\x89PNG")
+    # The report shows what was learned from here.
+    kept = json.loads((study.reports_folder / "learned_1.json").read_text())
+    assert kept == found.as_dict()
     first, second = found.sentences()
     assert "from 6.00 to 1.02" in first
     assert "a spring of 300 N/m" in second
