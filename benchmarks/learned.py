@@ -19,7 +19,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bristle.diagnose.learned.closed import GOOD, closed_forms
+from bristle.diagnose.learned.closed import closed_forms, name_of
 from bristle.diagnose.learned.fit import fit_closed, learn
 from bristle.diagnose.opening import Insufficient, opening
 from bristle.identify.model import Model
@@ -125,9 +125,9 @@ def _learned(case: cases.Recorded, law: str) -> Answer:
     if forms:
         best = forms[0]
         out |= {"name": best.name, "left": best.left}
-        closed = fit_closed(opened, found, best) if best.left <= GOOD else None
+        closed = fit_closed(opened, found, best) if name_of(forms) else None
         z = closed.trial.z if closed else z
         out["closed"] = closed is not None
         signal, names = RIGHT.get(case.task.form, ("", set()))
-        out["named"] = best.left <= GOOD and curve.along == signal and best.name in names
+        out["named"] = name_of(forms) is not None and curve.along == signal and best.name in names
     return before | out | {"z": z}

@@ -12,8 +12,8 @@ from typing import Any
 
 from ..diagnose.bench import BenchRuns
 from ..diagnose.equilibrium import BuildingRuns
-from ..diagnose.learned.closed import GOOD, ClosedForm, closed_forms, in_words
-from ..diagnose.learned.curve import effect_text
+from ..diagnose.learned.closed import ClosedForm, closed_forms, in_words, name_of
+from ..diagnose.learned.effect_file import effect_text
 from ..diagnose.learned.fit import Closed, LearnedCurve, fit_closed, learn
 from ..diagnose.opening import Insufficient, Opening
 from ..errors import StudyError
@@ -58,8 +58,8 @@ class LearnedEffect:
             f"from {found.before.z:.2f} to {found.after.z:.2f}; that is {fall:.0f} % of what "
             "exceeds the noise."
         ]
-        if self.forms and self.forms[0].left <= GOOD:
-            best = self.forms[0]
+        best = name_of(self.forms)
+        if best is not None:
             out.append(
                 f"The curve is nearly {in_words(best, curve)} "
                 f"({100.0 * best.left:.0f} % of its variation remains)."
@@ -97,7 +97,7 @@ class LearnedEffect:
             curve = found.curve
             out |= {
                 "z": found.after.z, "z_train": found.after.train, "part": curve.part,
-                "along": curve.along, "unit": curve.of.unit, "along_unit": curve.signal.unit,
+                "along": curve.along, "unit": curve.unit, "along_unit": curve.along_unit,
                 "knots": list(curve.knots), "values": list(curve.values), "std": list(found.std),
                 "memory": dict(curve.memory),
                 "forms": [
@@ -151,8 +151,9 @@ def learn_effect(
     if found.refused or found.curve is None:
         return LearnedEffect(found)
     forms, closed, curve = tuple(closed_forms(found.curve, found.std)), None, found.curve
-    if forms and forms[0].left <= GOOD and not table:
-        closed = fit_closed(opened, found, forms[0])
+    best = name_of(forms)
+    if best is not None and not table:
+        closed = fit_closed(opened, found, best)
     if not write:
         return LearnedEffect(found, forms, closed)
     origin = f"learned from the runs of {study.name}, {date.today().year}"

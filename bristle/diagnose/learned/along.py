@@ -79,6 +79,20 @@ class Along:
             for node in product(*(grids[n] for n in self.memory))
         ]
 
+    def limits(self, dt: float, stroke: float) -> dict[str, tuple[float, float]]:
+        """Return between which values a parameter of its memory is sought.
+
+        Parameters
+        ----------
+        dt : step of the runs [s]
+        stroke : their RMS displacement [m]
+        """
+        known = {
+            "tau": (max(TIMES[0], 2.0 * dt), 4.0 * TIMES[-1]),
+            "way": (0.3 * WAYS[0] * stroke, 3.0 * WAYS[-1] * stroke),
+        }
+        return {name: known[name] for name in self.memory}
+
 
 def faded(signal: Array, dt: float, tau: float, begin: float) -> Array:
     """Return a signal (n,) behind a first-order lag.

@@ -12,14 +12,13 @@ from numpy.typing import NDArray
 from ...quantity import plain, quantity
 from ...units import canonical
 from .curve import Curve, Formula
+from .rule import LEARN, LearnRule
+from .slip import SLIP
 
 Array = NDArray[np.float64]
 
 NODES = 80
 """Values of a parameter in which a form is not linear that are looked at."""
-
-GOOD = 0.12
-"""Share of a curve's variation that a form may leave to be its name."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +112,11 @@ FORMS = (
 )  # fmt: skip
 
 
+def name_of(forms: Sequence[ClosedForm], rule: LearnRule = LEARN) -> ClosedForm | None:
+    """Return the form that names a curve, the first of `forms`; None where it leaves too much."""
+    return forms[0] if forms and forms[0].left <= rule.follows else None
+
+
 def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     """Return the forms fitted to a curve, the best first; fewer numbers win where two are near.
 
@@ -121,6 +125,8 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     curve : as fitted
     std : (k,) of its values; a knot that was held at zero counts as the surest of the others
     """
+    if curve.part == SLIP:
+        return []  # each of its values is a force of its own
     s, y = np.array(curve.knots), np.array(curve.values)
     given = np.array(std)
     some = given[given > 0.0]
@@ -137,7 +143,7 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
 def formula_of(found: ClosedForm, curve: Curve) -> Formula:
     """Return a closed form as an effect computes it, without the constant that a law has."""
     s = curve.signal.source
-    unit, along = curve.of.unit, curve.signal.unit
+    unit, along = curve.unit, curve.along_unit
     per = {"line": 1, "parabola": 2, "quadratic drag": 2, "cubic": 3}.get(found.name, 0)
     slope = canonical(unit + f"/({along})" * per)
     if found.name == "line" and (curve.part, curve.along) in _PHYSICAL:
@@ -184,7 +190,7 @@ def _spread(y: Array, weight: Array) -> float:
 
 def in_words(found: ClosedForm, curve: Curve) -> str:
     """Return a form with its numbers, for a sentence: "a line, 320 N/m"."""
-    unit, along = curve.of.unit, curve.signal.unit
+    unit, along = curve.unit, curve.along_unit
     if found.name == "constant":
         return f"a constant, {quantity(found.values[0], unit)}"
     m, d, scaled = found.values[1], found.values[2], found.form.scales is not None
