@@ -13,18 +13,25 @@ from typing import Any
 from ..diagnose.bench import BenchRuns
 from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.learned.closed import ClosedForm, closed_forms, in_words, name_of
+from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.effect_file import effect_text
 from ..diagnose.learned.fit import Closed, LearnedCurve, fit_closed, learn
+from ..diagnose.learned.slip import SLIP
 from ..diagnose.opening import Insufficient, Opening
 from ..errors import StudyError
 from ..physics.effect import EFFECTS
 from ..progress import tell
-from ..quantity import plain
+from ..quantity import plain, quantity
 from ..trust import remember_made
 from .curve_picture import curve_png
 from .identification import as_model
 from .rig import building_of
 from .study import Study
+
+_ONLY_DAMPER = (
+    "Curves are learned in the damper alone. In a building's isolation layer and storeys, bristle "
+    "diagnose tries the effects of the library and your own."
+)
 
 
 @dataclass(frozen=True)
@@ -70,6 +77,10 @@ class LearnedEffect:
                     + ", ".join(self._values())
                     + "."
                 )
+        elif curve.part == SLIP:
+            pairs = zip(curve.knots, curve.values, strict=True)
+            elements = [f"{quantity(f, 'N')} at {quantity(x, 'm')}" for x, f in pairs if f > 0.0]
+            out.append(f"They give way with {', '.join(elements)} of travel.")
         elif self.forms:
             out.append(
                 f"No closed form follows it: the nearest, {in_words(self.forms[0], curve)}, leaves "
@@ -149,13 +160,20 @@ def learn_effect(
     opened = _opened(study)
     found = learn(opened, name, parts=parts, along=along)
     if found.refused or found.curve is None:
+        if study.settings.has_building:
+            found = replace(found, refused=f"{found.refused} {_ONLY_DAMPER}")
         return LearnedEffect(found)
-    forms, closed, curve = tuple(closed_forms(found.curve, found.std)), None, found.curve
+    forms, closed = tuple(closed_forms(found.curve, found.std)), None
     best = name_of(forms)
     if best is not None and not table:
         closed = fit_closed(opened, found, best)
-    if not write:
-        return LearnedEffect(found, forms, closed)
+    learned = LearnedEffect(found, forms, closed)
+    return _written(study, learned, found.curve) if write else learned
+
+
+def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffect:
+    """Write a learned effect's file, its picture, and what the report says of it."""
+    name, closed = learned.name, learned.closed
     origin = f"learned from the runs of {study.name}, {date.today().year}"
     if closed is not None:
         memory = tuple((n, closed.trial.model.value(f"{name}.{n}")) for n, _ in curve.memory)
@@ -166,10 +184,10 @@ def learn_effect(
         file.parent.mkdir(exist_ok=True)
         file.write_text(text, encoding="utf-8")
         remember_made(file, text)
-    picture = study.write_report(f"{name}.png", curve_png(found, forms))
-    learned = LearnedEffect(found, forms, closed, file, picture)
-    study.write_report(f"{name}.json", json.dumps(learned.as_dict(), indent=2, ensure_ascii=False))
-    return learned
+    picture = study.write_report(f"{name}.png", curve_png(learned.found, learned.forms))
+    told = json.dumps(learned.as_dict(), indent=2, ensure_ascii=False)
+    study.write_report(f"{name}.json", told)
+    return replace(learned, file=file, picture=picture)
 
 
 def _opened(study: Study) -> Opening:
@@ -186,7 +204,7 @@ def _opened(study: Study) -> Opening:
     if opened is None:
         raise StudyError(
             "the damper's force was not measured and cannot be reconstructed: nothing can be "
-            "learned of the damper."
+            f"learned of the damper. {_ONLY_DAMPER}"
         )
     if isinstance(opened, Insufficient):
         raise StudyError("the data carry no verdict: " + " ".join(opened.reasons))

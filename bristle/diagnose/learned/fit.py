@@ -90,18 +90,19 @@ def learn(
     fitted = _fitted(chosen, name, before.model, train, held_out)
     fitted = sorted(fitted, key=lambda one: learning.weighed(one.loss, one.curve.memory))
     best, curve = fitted[0], fitted[0].curve
-    refused, told = "", f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
-    if not missing(before, best.trial, rule):
-        refused = (
-            f"The best curve, {curve.words()}, does not lower the error on held-out runs beyond "
-            f"chance {told}."
-        )
-    elif rule.excess(best.trial.z) > (1.0 - rule.first) * rule.excess(before.z):
-        refused = (
-            f"The best curve, {curve.words()}, explains too little of the error on held-out runs "
-            f"{told}."
-        )
+    refused = _refusal(before, best, rule)
     return LearnedCurve(name, curve, best.std, before, best.trial, tuple(fitted[1:]), refused)
+
+
+def _refusal(before: Trial, best: Fitted, rule: DecisionRule) -> str:
+    """Return why the best curve is not kept; "" where it is."""
+    why = ""
+    if not missing(before, best.trial, rule):
+        why = "does not lower the error on held-out runs beyond chance"
+    elif rule.excess(best.trial.z) > (1.0 - rule.first) * rule.excess(before.z):
+        why = "explains too little of the error on held-out runs"
+    told = f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
+    return f"The best curve, {best.curve.words()}, {why} {told}." if why else ""
 
 
 @dataclass(frozen=True)
