@@ -121,6 +121,13 @@ def fit_closed(
     """Fit a closed form in the place of a learned curve; None where it is clearly worse.
 
     It has fewer numbers, and holds between and beyond the knots: as good is good enough.
+
+    Parameters
+    ----------
+    opened : runs and the fitted model, as a diagnosis begins with them
+    found : the curve, with the name of its effect
+    form : fitted to the curve
+    rule : the numbers that decide between curves
     """
     assert found.curve is not None
     assert found.after is not None

@@ -245,7 +245,7 @@ def _slipping(known: Normal) -> Promise | None:
     Those whose force comes out negative are left out one by one.
     """
     residual, p = known.residual, known.grams.shape[1]
-    travels = _stroke(residual) * np.array(SHARES)
+    travels = [_stroke(residual) * share for share in SHARES]
     shown = _values(residual, signal_of(travels), {}) * residual.parts["force"][:, None]
     left = list(range(len(travels)))
     while len(left) > 1:  # a table has two knots at least
@@ -254,7 +254,7 @@ def _slipping(known: Normal) -> Promise | None:
             return None
         loss, found, _ = smooth
         if found.min() >= 0.0:
-            given = tuple(map(float, travels[left])), tuple(map(float, found))
+            given = tuple(travels[k] for k in left), tuple(map(float, found))
             return Promise(Curve(SLIP, SLIP, (), *given, drive=residual.drive), loss)
         left.pop(int(np.argmin(found)))
     return None
