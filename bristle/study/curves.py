@@ -15,7 +15,7 @@ from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.learned.closed import ClosedForm, closed_forms, in_words, name_of
 from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.effect_file import effect_text
-from ..diagnose.learned.fit import Closed, LearnedCurve, fit_closed, learn
+from ..diagnose.learned.fit import Closed, LearnedCurve, close, learn
 from ..diagnose.learned.slip import SLIP
 from ..diagnose.opening import Insufficient, Opening
 from ..errors import StudyError
@@ -164,9 +164,10 @@ def learn_effect(
             found = replace(found, refused=f"{found.refused} {_ONLY_DAMPER}")
         return LearnedEffect(found)
     forms, closed = tuple(closed_forms(found.curve, found.std)), None
-    best = name_of(forms)
-    if best is not None and not table:
-        closed = fit_closed(opened, found, best)
+    if not table:
+        closed = close(opened, found, forms)
+    if closed is not None:  # the name that the effect's formula has
+        forms = (closed.form, *(one for one in forms if one is not closed.form))
     learned = LearnedEffect(found, forms, closed)
     return _written(study, learned, found.curve) if write else learned
 

@@ -62,7 +62,7 @@ def learned(monkeypatch):
             return replace(found_of(refused), name=name)
 
         monkeypatch.setattr(curves, "learn", learn)
-        monkeypatch.setattr(curves, "fit_closed", lambda *_: None)
+        monkeypatch.setattr(curves, "close", lambda *_: None)
 
     return given
 

@@ -21,6 +21,10 @@ NODES = 80
 """Values of a parameter in which a form is not linear that are looked at."""
 
 
+LEAST = 0.02
+"""Share of a curve's height within which its values are not told apart."""
+
+
 @dataclass(frozen=True)
 class Form:
     """A formula c + m h(s), with a scale d or without, or c + m h(s) + n k(s).
@@ -132,12 +136,14 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     some = given[given > 0.0]
     least = float(np.median(some)) if len(some) else 1.0
     # What the data tell least must not decide, and no knot alone.
-    weight = 1.0 / np.hypot(np.where(given > 0.0, given, least), 0.02 * float(np.ptp(y)) + 1e-300)
+    alike = LEAST * float(np.ptp(y)) + 1e-300
+    weight = 1.0 / np.hypot(np.where(given > 0.0, given, least), alike)
     size = _spread(y, weight)
     if not size > 0.0:
         return []
     found = [_fitted(form, s, y, weight, size) for form in FORMS if form.count() + 1 <= len(s)]
-    return sorted(found, key=lambda one: one.left * 1.25 ** one.form.count())
+    # Less than the weights' own share tells no forms apart.
+    return sorted(found, key=lambda one: (one.left + LEAST) * 1.25 ** one.form.count())
 
 
 def formula_of(found: ClosedForm, curve: Curve) -> Formula:
@@ -200,7 +206,10 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
             return (
                 f"proportional to {curve.signal.words}: {physical[0]} of {plain(m)} {physical[1]}"
             )
-        return f"a line, {plain(m)} {unit} per {along}"
+        each = "" if along == "1" else f" per {along}"
+        if unit == "1":
+            return f"a line of slope {plain(m)}{each}"
+        return f"a line, {plain(m)} {unit}{each}"
     scale = {
         "ripple": f", pitch {quantity(d, along)}",
         "power": f" with exponent {plain(d, 2)}",

@@ -18,7 +18,7 @@ MATH = tuple(
 )
 """Functions that a hook may import."""
 
-POSITIVE = ("tau", "way", "d")
+POSITIVE = ("tau", "way", "early", "d")
 """Parameters that are times, lengths and scales: they stay above zero."""
 
 Declared = tuple[str, float, str, str]

@@ -26,6 +26,9 @@ from .screen import Promise, distinct, promises
 TRIED = 4
 """Curves that are fitted with everything else, of those that promise most."""
 
+CLOSED = 2
+"""Closed forms that are fitted in the place of a curve, until one does as well."""
+
 SWEEPS = 12
 """Jacobians of such a fit, at the most."""
 
@@ -113,6 +116,22 @@ class Closed:
     formula: Formula
     trial: Trial
     std: dict[str, float]
+
+
+def close(
+    opened: Opening, found: LearnedCurve, forms: Sequence[ClosedForm], rule: LearnRule = LEARN
+) -> Closed | None:
+    """Fit the closed forms that may name a curve in its place; return the first that does as well.
+
+    Parameters
+    ----------
+    opened : runs and the fitted model, as a diagnosis begins with them
+    found : the curve, with the name of its effect
+    forms : fitted to the curve, the best first
+    rule : the numbers that decide between curves
+    """
+    able = [one for one in forms if one.left <= rule.follows][:CLOSED]
+    return next(filter(None, (fit_closed(opened, found, one, rule) for one in able)), None)
 
 
 def fit_closed(
