@@ -19,8 +19,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from bristle.diagnose.learned.closed import GOOD, closed_forms
-from bristle.diagnose.learned.fit import fit_closed, learn
+from bristle.diagnose.learned.closed import closed_forms, name_of
+from bristle.diagnose.learned.fit import close, learn
 from bristle.diagnose.opening import Insufficient, opening
 from bristle.identify.model import Model
 
@@ -35,16 +35,18 @@ ADEQUATE = 1.5
 """z up to which a learned curve holds what was missing."""
 
 RIGHT = {
-    "bow": ("displacement", {"parabola", "power"}),
-    "taper": ("displacement", {"line"}),
-    "detent": ("displacement", {"ripple"}),
-    "rings": ("displacement", {"ripple"}),
-    "thixotropic": ("rebuilding", {"line"}),
-    "ageing": ("rebuilding", {"logarithm", "line", "levelling off", "hyperbola"}),
-    "jamming": ("speed", {"threshold", "levelling off"}),
-    "power": ("speed", {"threshold"}),
-}
-"""Signal and closed forms that name a hidden form; a fixture's resonance is no curve."""
+    "bow": {"displacement": {"parabola", "power"}},
+    "taper": {"displacement": {"line"}},
+    "detent": {"displacement": {"ripple"}},
+    "rings": {"displacement": {"ripple"}},
+    "thixotropic": {"rebuilding": {"line"}},
+    "ageing": {
+        "age": {"line"}, "rebuilding": {"logarithm", "line", "levelling off", "hyperbola"},
+    },
+    "jamming": {"speed": {"threshold", "levelling off"}},
+    "power": {"speed": {"threshold"}},
+}  # fmt: skip
+"""Signals and closed forms that name a hidden form; a fixture's resonance is no curve."""
 
 
 def run() -> list[Row]:
@@ -123,11 +125,11 @@ def _learned(case: cases.Recorded, law: str) -> Answer:
     curve, z = found.curve, found.after.z
     out = {"learned": True, "part": curve.part, "along": curve.along, "z_table": z}
     if forms:
-        best = forms[0]
+        closed = close(opened, found, forms)
+        best = closed.form if closed else forms[0]
         out |= {"name": best.name, "left": best.left}
-        closed = fit_closed(opened, found, best) if best.left <= GOOD else None
         z = closed.trial.z if closed else z
         out["closed"] = closed is not None
-        signal, names = RIGHT.get(case.task.form, ("", set()))
-        out["named"] = best.left <= GOOD and curve.along == signal and best.name in names
+        right = RIGHT.get(case.task.form, {}).get(curve.along, set())
+        out["named"] = name_of(forms) is not None and best.name in right
     return before | out | {"z": z}

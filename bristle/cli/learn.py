@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--as", dest="parts", metavar="PART[,PART]", default="",
         help="on which part it may act: force, friction, yield, viscous, fluid, yield_field, "
-        "fluid_field, command; default all",
+        "fluid_field, command, slip; default all",
     )  # fmt: skip
     parser.add_argument("--name", default="", help="of the effect; default learned_1, learned_2")
     parser.add_argument(
@@ -49,10 +49,11 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
+    signals = {**{name: name for name in ALONG}, **_of_command(study.drive)}
     found = learn_effect(
         study,
         parts=_listed(arguments.parts, PARTS, "--as"),
-        along=_listed(arguments.along, ALONG, "--along"),
+        along=[signals[one] for one in _listed(arguments.along, signals, "--along")],
         name=arguments.name,
         table=arguments.table,
         write=not arguments.dry_run,
@@ -72,6 +73,14 @@ def main(arguments: argparse.Namespace) -> int:
     elif found.found.refused:
         print(f"\nNext:  {command('compare', arguments.folder)}")
     return 0
+
+
+def _of_command(drive: str) -> dict[str, str]:
+    """Return how the signals of a command may be called in a study: `current` for `voltage`."""
+    from ..physics.drive import VOLTAGE
+
+    old = (VOLTAGE.name, f"recent_{VOLTAGE.name}")
+    return {name.replace(VOLTAGE.name, drive): name for name in old if drive}
 
 
 def _listed(text: str, known: Collection[str], option: str) -> list[str]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..data.labels import Label
+from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
 from ..physics.laws import LAWS, Law
 from ..physics.parameter import CHOICES, Parameter
@@ -148,7 +149,9 @@ class Problem:
         """Return the typical size on this rig of a parameter of some unit, in SI."""
         if not self._sizes:
             self._sizes = sizes(self.runs)
-        return self._sizes.get(unit, 1.0)
+        as_voltage = (unit_for(unit, VOLTAGE, drive.unit) for drive in DRIVES.values())
+        known = next((one for one in as_voltage if one in self._sizes), "1")
+        return self._sizes[known]
 
     def scaled(self, law: str, name: str) -> float:
         """Return a parameter's default brought to the size of this rig, within its bounds."""

@@ -17,6 +17,7 @@ from ..quantity import quantity, short_z
 from ..study.run_file import TEST
 from ..study.staircase import HistoryStep, history_steps
 from .reproduce import commands
+from .study_curves import curves_section
 from .study_tables import data_table, data_words, parameter_table, run_errors
 from .study_verdict import untold_section, verdict_section
 
@@ -131,6 +132,7 @@ def render(content: Content) -> str:
         _tiles(content),
         _history(content),
         _before_after(content),
+        curves_section(study, content.model.effects),
         _where(content),
         _on_test_runs(content),
         _parameters(content),

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..diagnose.learned.closed import GOOD, ClosedForm, in_words
+from ..diagnose.learned.closed import ClosedForm, in_words, name_of
 from ..diagnose.learned.fit import LearnedCurve
 from ..draw.style import BLUE, GREY, PALE, VERMILION, Page, look, png, short_z
 from ..quantity import scale
@@ -43,14 +43,15 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
     curve = found.curve
     assert curve is not None
     s, y, half = np.array(curve.knots), np.array(curve.values), 1.96 * np.array(found.std)
-    across, along = scale(curve.signal.unit, float(np.max(np.abs(s))))
-    up, unit = scale(curve.of.unit, float(np.max(np.abs(y))))
+    across, along = scale(curve.along_unit, float(np.max(np.abs(s))))
+    up, unit = scale(curve.unit, float(np.max(np.abs(y))))
     axes.axhline(0.0, color=PALE, lw=1.0)
     axes.fill_between(across * s, up * (y - half), up * (y + half), color=BLUE, alpha=0.18, lw=0.0)
     axes.plot(across * s, up * y, color=BLUE, lw=2.2, marker="o", ms=4, label="learned")
     if forms:
         best = forms[0]
-        name = in_words(best, curve) if best.left <= GOOD else f"nearest form: {best.name}"
+        named = name_of(forms)
+        name = in_words(named, curve) if named else f"nearest form: {best.name}"
         axes.plot(
             across * s, up * np.array(best.curve), color=VERMILION, lw=1.4, ls="--", label=name
         )

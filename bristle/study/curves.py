@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date
@@ -11,19 +12,26 @@ from typing import Any
 
 from ..diagnose.bench import BenchRuns
 from ..diagnose.equilibrium import BuildingRuns
-from ..diagnose.learned.closed import GOOD, ClosedForm, closed_forms, in_words
-from ..diagnose.learned.curve import effect_text
-from ..diagnose.learned.fit import Closed, LearnedCurve, fit_closed, learn
+from ..diagnose.learned.closed import ClosedForm, closed_forms, in_words, name_of
+from ..diagnose.learned.curve import Curve
+from ..diagnose.learned.effect_file import effect_text
+from ..diagnose.learned.fit import Closed, LearnedCurve, close, learn
+from ..diagnose.learned.slip import SLIP
 from ..diagnose.opening import Insufficient, Opening
 from ..errors import StudyError
 from ..physics.effect import EFFECTS
 from ..progress import tell
-from ..quantity import plain
+from ..quantity import plain, quantity
 from ..trust import remember_made
 from .curve_picture import curve_png
 from .identification import as_model
 from .rig import building_of
 from .study import Study
+
+_ONLY_DAMPER = (
+    "Curves are learned in the damper alone. In a building's isolation layer and storeys, bristle "
+    "diagnose tries the effects of the library and your own."
+)
 
 
 @dataclass(frozen=True)
@@ -57,8 +65,8 @@ class LearnedEffect:
             f"from {found.before.z:.2f} to {found.after.z:.2f}; that is {fall:.0f} % of what "
             "exceeds the noise."
         ]
-        if self.forms and self.forms[0].left <= GOOD:
-            best = self.forms[0]
+        best = name_of(self.forms)
+        if best is not None:
             out.append(
                 f"The curve is nearly {in_words(best, curve)} "
                 f"({100.0 * best.left:.0f} % of its variation remains)."
@@ -69,6 +77,10 @@ class LearnedEffect:
                     + ", ".join(self._values())
                     + "."
                 )
+        elif curve.part == SLIP:
+            pairs = zip(curve.knots, curve.values, strict=True)
+            elements = [f"{quantity(f, 'N')} at {quantity(x, 'm')}" for x, f in pairs if f > 0.0]
+            out.append(f"They give way with {', '.join(elements)} of travel.")
         elif self.forms:
             out.append(
                 f"No closed form follows it: the nearest, {in_words(self.forms[0], curve)}, leaves "
@@ -96,7 +108,7 @@ class LearnedEffect:
             curve = found.curve
             out |= {
                 "z": found.after.z, "z_train": found.after.train, "part": curve.part,
-                "along": curve.along, "unit": curve.of.unit, "along_unit": curve.signal.unit,
+                "along": curve.along, "unit": curve.unit, "along_unit": curve.along_unit,
                 "knots": list(curve.knots), "values": list(curve.values), "std": list(found.std),
                 "memory": dict(curve.memory),
                 "forms": [
@@ -148,12 +160,21 @@ def learn_effect(
     opened = _opened(study)
     found = learn(opened, name, parts=parts, along=along)
     if found.refused or found.curve is None:
+        if study.settings.has_building:
+            found = replace(found, refused=f"{found.refused} {_ONLY_DAMPER}")
         return LearnedEffect(found)
-    forms, closed, curve = tuple(closed_forms(found.curve, found.std)), None, found.curve
-    if forms and forms[0].left <= GOOD and not table:
-        closed = fit_closed(opened, found, forms[0])
-    if not write:
-        return LearnedEffect(found, forms, closed)
+    forms, closed = tuple(closed_forms(found.curve, found.std)), None
+    if not table:
+        closed = close(opened, found, forms)
+    if closed is not None:  # the name that the effect's formula has
+        forms = (closed.form, *(one for one in forms if one is not closed.form))
+    learned = LearnedEffect(found, forms, closed)
+    return _written(study, learned, found.curve) if write else learned
+
+
+def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffect:
+    """Write a learned effect's file, its picture, and what the report says of it."""
+    name, closed = learned.name, learned.closed
     origin = f"learned from the runs of {study.name}, {date.today().year}"
     if closed is not None:
         memory = tuple((n, closed.trial.model.value(f"{name}.{n}")) for n, _ in curve.memory)
@@ -164,8 +185,10 @@ def learn_effect(
         file.parent.mkdir(exist_ok=True)
         file.write_text(text, encoding="utf-8")
         remember_made(file, text)
-    picture = study.write_report(f"{name}.png", curve_png(found, forms))
-    return LearnedEffect(found, forms, closed, file, picture)
+    picture = study.write_report(f"{name}.png", curve_png(learned.found, learned.forms))
+    told = json.dumps(learned.as_dict(), indent=2, ensure_ascii=False)
+    study.write_report(f"{name}.json", told)
+    return replace(learned, file=file, picture=picture)
 
 
 def _opened(study: Study) -> Opening:
@@ -182,7 +205,7 @@ def _opened(study: Study) -> Opening:
     if opened is None:
         raise StudyError(
             "the damper's force was not measured and cannot be reconstructed: nothing can be "
-            "learned of the damper."
+            f"learned of the damper. {_ONLY_DAMPER}"
         )
     if isinstance(opened, Insufficient):
         raise StudyError("the data carry no verdict: " + " ".join(opened.reasons))

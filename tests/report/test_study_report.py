@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
+import shutil
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
@@ -15,6 +17,7 @@ from made import write_runs
 
 from bristle.cli import main
 from bristle.data.model import StudyModel, Value
+from bristle.report.study_curves import curves_section
 from bristle.report.study_page import gather, render, study_report
 from bristle.report.study_tables import parameter_table, with_interval
 from bristle.study import Study, create_study
@@ -245,3 +248,25 @@ def test_a_value_is_at_the_edge_only_where_it_stands_at_a_bound(value, low, told
     known = Value(value, "N/m", low, 1e9, std=0.9)
     _, _, notes = parameter_table(StudyModel("lugre", parameters={"sigma_a": known}))
     assert any("at a bound" in note for note in notes) is told
+
+
+def test_what_was_learned_is_shown_with_its_picture_and_what_its_formula_leaves(folder, tmp_path):
+    study = Study(shutil.copytree(folder, tmp_path / "rig"))
+    told = {
+        "sentences": ["learned_1 is an added force along displacement.", "It is <nearly> a line."],
+        "forms": [{"name": "line", "formula": "c + m s", "values": [0.0, 3.0], "left": 0.042}],
+    }
+    study.write_report("learned_1.json", json.dumps(told))
+    study.write_report("learned_1.png", b"\x89PNG of a curve")
+    # Without the effect's file it is gone, and so is what was said of it.
+    assert curves_section(study, ()) == ""
+    (study.effects_folder / "learned_1.py").write_text("")
+    section = curves_section(study, ())
+    checked(section)
+    assert base64.b64encode(b"\x89PNG of a curve").decode() in section
+    said = text_of(section)
+    for text in ("It is &lt;nearly&gt; a line.", "g = c + m s", "4 %", "bristle add rig learned_1"):
+        assert text in said
+    assert "bristle add" not in curves_section(study, ("learned_1",))
+    study.write_report("learned_1.json", '{"sentences": ["half a file"]}')
+    assert "reports/learned_1.json cannot be read" in text_of(curves_section(study, ("learned_1",)))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from bristle.cli import main
+from bristle.cli.learn import _of_command
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.fit import LearnedCurve
@@ -55,8 +57,12 @@ def learned(monkeypatch):
 
     def given(refused: str = "") -> None:
         monkeypatch.setattr(curves, "_opened", lambda study: None)
-        monkeypatch.setattr(curves, "learn", lambda *_, **__: found_of(refused))
-        monkeypatch.setattr(curves, "fit_closed", lambda *_: None)
+
+        def learn(_opened, name, **_options):
+            return replace(found_of(refused), name=name)
+
+        monkeypatch.setattr(curves, "learn", learn)
+        monkeypatch.setattr(curves, "close", lambda *_: None)
 
     return given
 
@@ -68,6 +74,9 @@ def test_a_learned_curve_is_an_effect_of_the_study(study, learned):
     assert "KNOTS" in found.file.read_text()
     assert found.picture is not None
     assert found.picture.read_bytes().startswith(b"\x89PNG")
+    # The report shows what was learned from here.
+    kept = json.loads((study.reports_folder / "learned_1.json").read_text())
+    assert kept == found.as_dict()
     first, second = found.sentences()
     assert "from 6.00 to 1.02" in first
     assert "a spring of 300 N/m" in second
@@ -86,6 +95,33 @@ def test_what_is_refused_leaves_the_study_as_it_was(study, learned):
     assert found.file is None
     assert found.sentences() == ["Nothing was learned. The best curve does not lower the error."]
     assert sorted(path.name for path in study.folder.rglob("*")) == before
+
+
+def test_in_a_building_it_is_said_that_curves_are_the_damper_s(study, learned, monkeypatch):
+    learned("No curve lowers the error.")
+    monkeypatch.setattr(type(study.settings), "has_building", True)
+    told = learn_effect(study).sentences()[0]
+    assert told.startswith("Nothing was learned. No curve lowers the error.")
+    assert "in the damper alone" in told
+
+
+def test_a_building_whose_damper_s_force_is_not_known_is_refused(study, monkeypatch):
+    monkeypatch.setattr(curves, "building_of", lambda *_: object())
+    monkeypatch.setattr(curves.BuildingRuns, "__init__", lambda *_: None)
+    monkeypatch.setattr(curves.BuildingRuns, "open_damper", lambda _: None)
+    with pytest.raises(StudyError, match=r"not measured .* isolation layer and storeys"):
+        learn_effect(study)
+    assert not list(study.effects_folder.glob("*.py"))
+
+
+def test_elastic_slip_elements_are_told_one_by_one(study, learned, monkeypatch):
+    learned()
+    curve = Curve("slip", "slip", (), (0.0004, 0.002, 0.009), (0.4, 0.0, 0.8))
+    found = replace(found_of(), curve=curve, std=(0.01,) * 3)
+    monkeypatch.setattr(curves, "learn", lambda *_, **__: found)
+    first, second = learn_effect(study).sentences()
+    assert first.startswith("learned_1 is parallel elastic-slip elements. With it")
+    assert second == "They give way with 0.4 N at 0.4 mm, 0.8 N at 9 mm of travel."
 
 
 def test_a_dry_run_writes_no_effect(study, learned):
@@ -114,6 +150,11 @@ def test_a_signal_or_part_that_there_is_not_is_told(study, capsys, option, value
     told = capsys.readouterr().err
     assert value in told
     assert "Did you mean" in told
+
+
+def test_a_signal_goes_by_the_name_of_the_rig_s_command():
+    assert _of_command("current") == {"current": "voltage", "recent_current": "recent_voltage"}
+    assert _of_command("") == {}
 
 
 @pytest.mark.slow

@@ -20,6 +20,15 @@ TIMES = (0.02, 0.1, 0.5, 2.5)
 WAYS = (0.3, 1.5)
 """Travels that wear a structure down which rebuilds at rest, in RMS displacements."""
 
+EARLY = 0.02
+"""Age [s] over which the logarithm of a contact's age begins to grow, where the scan looks."""
+
+_AGED = """    rate = abs(q.v) / p.way
+    if rate * q.dt > 1e-9:
+        kept = exp(-rate * q.dt)
+        return ((1.0 - kept) / rate + z.age * kept,)
+    return (z.age + q.dt,)"""
+
 _FADING = "    return ({signal} + (z.recent - {signal}) * exp(-q.dt / p.tau),)"
 
 _REBUILT = """    rate = 1.0 / p.tau + abs(q.v) / p.way
@@ -37,6 +46,7 @@ _TRAVEL = """    if q.v * z.way < 0.0:
 MEMORIES = {
     "tau": ("s", "time over which it fades"),
     "way": ("m", "travel that wears it down"),
+    "early": ("s", "age up to which it hardly changes"),
 }
 """Unit and meaning of the parameters of a memory."""
 
@@ -73,11 +83,27 @@ class Along:
         grids = {
             "tau": [tau for tau in TIMES if 2.0 * dt <= tau <= length / 3.0],
             "way": [share * stroke for share in WAYS],
+            "early": [EARLY],
         }
         return [
             dict(zip(self.memory, node, strict=True))
             for node in product(*(grids[n] for n in self.memory))
         ]
+
+    def limits(self, dt: float, stroke: float) -> dict[str, tuple[float, float]]:
+        """Return between which values a parameter of its memory is sought.
+
+        Parameters
+        ----------
+        dt : step of the runs [s]
+        stroke : their RMS displacement [m]
+        """
+        known = {
+            "tau": (max(TIMES[0], 2.0 * dt), 4.0 * TIMES[-1]),
+            "way": (0.3 * WAYS[0] * stroke, 3.0 * WAYS[-1] * stroke),
+            "early": (0.05 * EARLY, 50.0 * EARLY),
+        }
+        return {name: known[name] for name in self.memory}
 
 
 def faded(signal: Array, dt: float, tau: float, begin: float) -> Array:
@@ -119,6 +145,23 @@ def rebuilt(run: Run, memory: dict[str, float]) -> Array:
     return out
 
 
+def aged(run: Run, memory: dict[str, float]) -> Array:
+    """Return the logarithm (n,) of the age of a contact that travel renews: ln(1 + q/early).
+
+    Its age q [s] grows by 1 - |v| q/way: the ageing law of Dieterich (1979), J. Geophys. Res. 84,
+    2161-2168, and Ruina (1983), J. Geophys. Res. 88, 10359-10370.
+    """
+    speed = np.append(0.0, 0.5 * (np.abs(run.v[1:]) + np.abs(run.v[:-1])))
+    worn = run.dt * speed / memory["way"]
+    kept = np.exp(-worn)
+    grown = run.dt * np.where(worn > 1e-9, (1.0 - kept) / np.maximum(worn, 1e-9), 1.0)
+    out, now = np.empty(len(speed)), 0.0
+    for k in range(len(speed)):
+        now = grown[k] + now * kept[k] if k else 0.0
+        out[k] = now
+    return np.asarray(np.log(1.0 + out / memory["early"]))
+
+
 def _fading(name: str, unit: str, words: str, signal: str, needs: str, start: str) -> Along:
     def history(run: Run, memory: dict[str, float]) -> Array:
         now = np.abs(run.v) if signal == "abs(q.v)" else getattr(run, needs)
@@ -150,6 +193,10 @@ ALONG = {
         Along(
             "rebuilding", "1", "a structure that rebuilds at rest", ("v", "dt"), "z.built", rebuilt,
             (("built", "1"),), (), _REBUILT, ("tau", "way"),
+        ),
+        Along(
+            "age", "1", "the logarithm of the contact's age, which travel renews", ("v", "dt"),
+            "log(1.0 + z.age / p.early)", aged, (("age", "s"),), (), _AGED, ("early", "way"),
         ),
         _fading("recent_displacement", "m", "recent displacement", "q.x", "x", "x"),
         _fading("recent_speed", "m/s", "recent speed", "abs(q.v)", "v", ""),

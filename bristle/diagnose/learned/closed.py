@@ -12,14 +12,17 @@ from numpy.typing import NDArray
 from ...quantity import plain, quantity
 from ...units import canonical
 from .curve import Curve, Formula
+from .rule import LEARN, LearnRule
+from .slip import SLIP
 
 Array = NDArray[np.float64]
 
 NODES = 80
 """Values of a parameter in which a form is not linear that are looked at."""
 
-GOOD = 0.12
-"""Share of a curve's variation that a form may leave to be its name."""
+
+LEAST = 0.02
+"""Share of a curve's height within which its values are not told apart."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +116,11 @@ FORMS = (
 )  # fmt: skip
 
 
+def name_of(forms: Sequence[ClosedForm], rule: LearnRule = LEARN) -> ClosedForm | None:
+    """Return the form that names a curve, the first of `forms`; None where it leaves too much."""
+    return forms[0] if forms and forms[0].left <= rule.follows else None
+
+
 def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     """Return the forms fitted to a curve, the best first; fewer numbers win where two are near.
 
@@ -121,23 +129,27 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     curve : as fitted
     std : (k,) of its values; a knot that was held at zero counts as the surest of the others
     """
+    if curve.part == SLIP:
+        return []  # each of its values is a force of its own
     s, y = np.array(curve.knots), np.array(curve.values)
     given = np.array(std)
     some = given[given > 0.0]
     least = float(np.median(some)) if len(some) else 1.0
     # What the data tell least must not decide, and no knot alone.
-    weight = 1.0 / np.hypot(np.where(given > 0.0, given, least), 0.02 * float(np.ptp(y)) + 1e-300)
+    alike = LEAST * float(np.ptp(y)) + 1e-300
+    weight = 1.0 / np.hypot(np.where(given > 0.0, given, least), alike)
     size = _spread(y, weight)
     if not size > 0.0:
         return []
     found = [_fitted(form, s, y, weight, size) for form in FORMS if form.count() + 1 <= len(s)]
-    return sorted(found, key=lambda one: one.left * 1.25 ** one.form.count())
+    # Less than the weights' own share tells no forms apart.
+    return sorted(found, key=lambda one: (one.left + LEAST) * 1.25 ** one.form.count())
 
 
 def formula_of(found: ClosedForm, curve: Curve) -> Formula:
     """Return a closed form as an effect computes it, without the constant that a law has."""
     s = curve.signal.source
-    unit, along = curve.of.unit, curve.signal.unit
+    unit, along = curve.unit, curve.along_unit
     per = {"line": 1, "parabola": 2, "quadratic drag": 2, "cubic": 3}.get(found.name, 0)
     slope = canonical(unit + f"/({along})" * per)
     if found.name == "line" and (curve.part, curve.along) in _PHYSICAL:
@@ -184,7 +196,7 @@ def _spread(y: Array, weight: Array) -> float:
 
 def in_words(found: ClosedForm, curve: Curve) -> str:
     """Return a form with its numbers, for a sentence: "a line, 320 N/m"."""
-    unit, along = curve.of.unit, curve.signal.unit
+    unit, along = curve.unit, curve.along_unit
     if found.name == "constant":
         return f"a constant, {quantity(found.values[0], unit)}"
     m, d, scaled = found.values[1], found.values[2], found.form.scales is not None
@@ -194,7 +206,10 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
             return (
                 f"proportional to {curve.signal.words}: {physical[0]} of {plain(m)} {physical[1]}"
             )
-        return f"a line, {plain(m)} {unit} per {along}"
+        each = "" if along == "1" else f" per {along}"
+        if unit == "1":
+            return f"a line of slope {plain(m)}{each}"
+        return f"a line, {plain(m)} {unit}{each}"
     scale = {
         "ripple": f", pitch {quantity(d, along)}",
         "power": f" with exponent {plain(d, 2)}",

@@ -1,30 +1,17 @@
-"""A curve that is learned: on which part of the model it acts, along which signal, at which knots.
-
-Its text is that of an effect's file, in the standard library alone: what is fitted, exported and
-read by the user is the same.
-"""
+"""A curve that is learned: on which part of the model it acts, along which signal, its values."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from ...physics.drive import VOLTAGE, drive_named, unit_for
 from ...quantity import quantity
-from .along import ALONG, MEMORIES, Along
+from .along import ALONG, Along
+from .slip import SLIP, force_source, signal_of
 
 BOUND = 30.0
 """Times the largest value of a learned curve: bounds of each of its values."""
-
-
-MATH = tuple(
-    one.__name__ for one in (math.copysign, math.cos, math.exp, math.log, math.sin, math.tanh)
-)
-"""Functions that a hook may import."""
-
-POSITIVE = ("tau", "way", "d")
-"""Parameters that are times, lengths and scales: they stay above zero."""
 
 
 class Part(NamedTuple):
@@ -66,22 +53,28 @@ PARTS = {
     "yield_field": Part(
         "yield_factor", "max(1.0 + {g} * q.V / TOP, 0.02)", "1",
         "a factor of the yield force under command",
-        "yield force x (1 + g V/V_top)", ("V",), -0.98,
+        "yield force x (1 + g u/u_top), u the command", ("V",), -0.98,
     ),
     "fluid_field": Part(
         "factor", "max(1.0 + {g} * q.V / TOP, 0.02)", "1",
         "a factor of the fluid's whole force under command",
-        "force of the fluid x (1 + g V/V_top)", ("V",), -0.98,
+        "force of the fluid x (1 + g u/u_top), u the command", ("V",), -0.98,
     ),
     "command": Part(
         "voltage", "max(q.V + {g}, 0.0)", "V", "a map of the command",
-        "the damper sees V + g", ("V",), level=True,
+        "the damper sees u + g, u the command", ("V",), level=True,
+    ),
+    SLIP: Part(
+        "force", "{g}", "N", "parallel elastic-slip elements", "F = F_model + sum of curve[k] s_k",
+        (), 0.0,
     ),
 }  # fmt: skip
 
 
 def may_change(part: str, along: str) -> bool:
     """Return whether a curve along a signal may change a part: a command's map depends on it."""
+    if SLIP in (part, along):
+        return part == along
     of_command = along in ("voltage", "recent_voltage")
     if part == "command":
         return of_command
@@ -94,7 +87,8 @@ class Curve:
 
     `memory` holds the parameters of the signal's memory [SI]; `held` the knots (from 0) whose value
     stays zero; `slow` is the speed [m/s] below which a friction changes its sign smoothly, `top`
-    the largest command of the runs [V].
+    the largest command of the runs; `drive` names what the command is, whose unit takes the place
+    of volts. Elastic-slip elements have their travels as knots, and their forces as values.
     """
 
     part: str
@@ -105,6 +99,7 @@ class Curve:
     held: tuple[int, ...] = ()
     slow: float = 1e-3
     top: float = 1.0
+    drive: str = VOLTAGE.name
 
     @property
     def of(self) -> Part:
@@ -114,10 +109,35 @@ class Curve:
     @property
     def signal(self) -> Along:
         """The signal that it depends on."""
-        return ALONG[self.along]
+        return ALONG[self.along] if self.along in ALONG else signal_of(self.knots)
+
+    @property
+    def unit(self) -> str:
+        """The unit of its values."""
+        return unit_for(self.of.unit, drive_named(self.drive))
+
+    @property
+    def along_unit(self) -> str:
+        """The unit of its knots."""
+        return unit_for(self.signal.unit, drive_named(self.drive))
+
+    @property
+    def source(self) -> str:
+        """Its value as a hook computes it from the table."""
+        if self.part == SLIP:
+            return force_source(len(self.knots))
+        return f"interpolate({self.signal.source}, KNOTS, p.curve)"
+
+    @property
+    def passive(self) -> bool:
+        """Whether it gives no energy over a cycle, whatever its values."""
+        conserves = self.part == "force" and self.along == "displacement"
+        return self.part == SLIP or conserves or self.of.hook not in ("force", "voltage")
 
     def words(self) -> str:
         """Return what it is, in a few words: "an added force along displacement"."""
+        if self.part == SLIP:
+            return self.of.words
         times = dict(self.memory)
         faded = f" (over {quantity(times['tau'], 's')})" if "tau" in times else ""
         return f"{self.of.words} along {self.signal.words}{faded}"
@@ -126,9 +146,7 @@ class Curve:
 def bounds_of(curve: Curve) -> tuple[float, float]:
     """Return the bounds of the values of a curve, in its unit."""
     size = BOUND * max(max(abs(value) for value in curve.values), 1e-9)
-    if curve.of.unit == "1":
-        return max(curve.of.low, -size), max(size, 5.0)
-    return -size, size
+    return max(curve.of.low, -size), max(size, 5.0) if curve.of.unit == "1" else size
 
 
 @dataclass(frozen=True)
@@ -141,127 +159,3 @@ class Formula:
     g: str
     text: str
     parameters: tuple[tuple[str, float, str], ...]
-
-
-def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = None) -> str:
-    """Return the text of the effect's file of a curve.
-
-    Parameters
-    ----------
-    name : of the effect, and of its file
-    curve : with the values to begin with
-    origin : what it was learned from and when, for the file's `source`
-    formula : what stands for the table, None for the table itself
-    """
-    along, part = curve.signal, curve.of
-    title = name.replace("_", " ").capitalize()
-    g = formula.g if formula else f"interpolate({along.source}, KNOTS, p.curve)"
-    body = [
-        "    @staticmethod",
-        f"    def {part.hook}(q, z, p):",
-        f"        return {part.expression.format(g=g)}",
-    ]
-    if along.advance:
-        body += ["", "    @staticmethod", "    def advance(q, z, p):"]
-        body += ["    " + line for line in along.advance.splitlines()]
-    functions = [name for name in MATH if f"{name}(" in "\n".join(body)]
-    parameters = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
-    if formula:
-        parameters += [
-            (n, value, unit, f"{n} in g = {formula.text}") for n, value, unit in formula.parameters
-        ]
-    kinds = [
-        *(["Parameter"] if parameters else []), *([] if formula else ["Table", "interpolate"]),
-    ]  # fmt: skip
-    lines = [
-        f'"""{title}: {part.words} along {along.words}, learned from measurements."""',
-        "",
-        *([f"from math import {', '.join(functions)}", ""] if functions else []),
-        f"from bristle.physics.effect import Effect, {', '.join(kinds)}",
-        *([] if formula else ["", *_row("KNOTS = ", curve.knots)]),
-        *([] if formula else [f'"""Where the curve is given: {along.words} [{along.unit}]."""']),
-        *_constant("SLOW", part, curve.slow, "Speed [m/s] over which friction turns round."),
-        *_constant("TOP", part, curve.top, "Largest command of the runs [V]."),
-        "",
-        "",
-        f"class {''.join(word.capitalize() for word in name.split('_'))}(Effect):",
-        f'    """{title}: {part.words} that depends on {along.words}.',
-        "",
-        f"        {part.formula},   g = {formula.text if formula else 'curve(s)'},   "
-        f"s = {along.words}",
-        "",
-        "    Learned from measurements, not derived. Leaves out what those runs did not do: doubt",
-        "    it where the motion goes further"
-        + ("." if formula else ", for beyond its ends the curve keeps its value."),
-        '    """',
-        "",
-        f'    name = "{name}"',
-        '    sites = ("damper",)',
-        *_fields(curve),
-        f'    source = "{origin}"',
-        f'    expect = "an error that depends on {along.words}"',
-        "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
-    ]  # fmt: skip
-    if curve.held and not formula:
-        held = tuple(f"curve[{k + 1}]" for k in curve.held)
-        lines.append(f"    assumed = {held!r}  # the law has a constant already".replace("'", '"'))
-    if parameters:
-        lines += ["    parameters = {", *_declared(parameters), "    }"]
-    if not formula:
-        low, high = bounds_of(curve)
-        lines += [
-            "    tables = {",
-            '        "curve": Table(',
-            "            KNOTS,",
-            *(f"            {line}" for line in _row("", curve.values, ",")),
-            f'            "{part.unit}",',
-            f"            ({low:.4g}, {high:.4g}),",
-            '            "value of the curve",',
-            "        )",
-            "    }",
-        ]
-    return "\n".join([*lines, "", *body]) + "\n"
-
-
-def _constant(name: str, part: Part, value: float, text: str) -> list[str]:
-    """Return the lines of a constant that a part's expression uses; none where it does not."""
-    used = name in part.expression
-    return ["", f"{name} = {value:.6g}", f'"""{text}"""'] if used else []
-
-
-def _fields(curve: Curve) -> list[str]:
-    """Return the lines of the class data that follow from part and signal."""
-    along, part = curve.signal, curve.of
-    needs = tuple(dict.fromkeys((*along.needs, *part.needs)))
-    given: dict[str, object] = {
-        "needs": needs,
-        "states": dict(along.states),
-        "starts": dict(along.starts),
-        "passive": part.hook not in ("force", "voltage") or _conserves(curve),
-        "zero_at_rest": part.expression != "{g}",
-    }
-    texts = [(key, f"{value!r}".replace("'", '"')) for key, value in given.items()]
-    return [f"    {key} = {text}" for key, text in texts if text not in ("{}", "()")]
-
-
-def _declared(parameters: Sequence[tuple[str, float, str, str]]) -> list[str]:
-    """Return the lines that declare parameters: name, value, unit, meaning."""
-    lines = []
-    for name, value, unit, text in parameters:
-        size = BOUND * max(abs(value), 1e-9)
-        low, high = (0.02 * value, 50.0 * value) if name in POSITIVE else (-size, size)
-        bounds = f"({low:.4g}, {high:.4g})"
-        lines.append(f'        "{name}": Parameter({value:.6g}, "{unit}", {bounds}, "{text}"),')
-    return lines
-
-
-def _conserves(curve: Curve) -> bool:
-    """Return whether an added force gives no energy over a cycle whatever its curve."""
-    return curve.part == "force" and curve.along == "displacement"
-
-
-def _row(begin: str, values: tuple[float, ...], end: str = "") -> list[str]:
-    """Return the lines of a tuple of numbers, some to a line."""
-    texts = [f"{float(f'{value:.6g}')!r}," for value in values]  # 0.0, for numba wants one type
-    rows = [" ".join(texts[k : k + 6]) for k in range(0, len(texts), 6)]
-    return [f"{begin}(", *(f"    {row}" for row in rows), f"){end}"]

@@ -16,14 +16,18 @@ from ..decision import missing
 from ..opening import Opening
 from ..rule import BENCH, DecisionRule
 from .closed import ClosedForm, formula_of
-from .curve import Curve, Formula, effect_text
-from .screen import Normal, Promise, distinct, promises, residual_of
+from .curve import Curve, Formula
+from .effect_file import effect_text
+from .normal import Normal
+from .residual import residual_of
+from .rule import LEARN, LearnRule
+from .screen import Promise, distinct, promises
 
 TRIED = 4
 """Curves that are fitted with everything else, of those that promise most."""
 
-AS_GOOD = 1.03
-"""Times the error of a curve on the training runs: what a closed form in its place may have."""
+CLOSED = 2
+"""Closed forms that are fitted in the place of a curve, until one does as well."""
 
 SWEEPS = 12
 """Jacobians of such a fit, at the most."""
@@ -67,6 +71,7 @@ def learn(
     parts: Sequence[str] = (),
     along: Sequence[str] = (),
     rule: DecisionRule = BENCH,
+    learning: LearnRule = LEARN,
 ) -> LearnedCurve:
     """Learn what the model of an opening misses at the damper.
 
@@ -75,36 +80,32 @@ def learn(
     opened : runs and the fitted model, as a diagnosis begins with them
     name : of the effect that the curve becomes
     parts, along : names of `PARTS` and `ALONG` that are tried; empty for all
-    rule : the numbers that decide
+    rule, learning : the numbers that decide whether a curve is kept, and which one is tried
     """
     before, train, held_out = opened.before, opened.searched, opened.held_out
     residual = residual_of(train, before.model)
     worth = (1.0 - rule.gain) ** 2 * Normal(residual).without_curve()
-    found = [
-        one
-        for one in promises(residual)
-        if one.loss <= worth
-        and (not parts or one.curve.part in parts)
-        and (not along or one.curve.along in along)
-    ]
-    chosen = distinct(found, TRIED)
+    found = [one for one in promises(residual, parts, along, learning) if one.loss <= worth]
+    chosen = distinct(found, TRIED, learning.near)
     if not chosen:
         why = "No curve lowers the error on stretches of the training runs that it has not seen."
         return LearnedCurve(name, None, (), before, None, (), why)
     fitted = _fitted(chosen, name, before.model, train, held_out)
+    fitted = sorted(fitted, key=lambda one: learning.weighed(one.loss, one.curve.memory))
     best, curve = fitted[0], fitted[0].curve
-    refused, told = "", f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
-    if not missing(before, best.trial, rule):
-        refused = (
-            f"The best curve, {curve.words()}, does not lower the error on held-out runs beyond "
-            f"chance {told}."
-        )
-    elif rule.excess(best.trial.z) > (1.0 - rule.first) * rule.excess(before.z):
-        refused = (
-            f"The best curve, {curve.words()}, explains too little of the error on held-out runs "
-            f"{told}."
-        )
+    refused = _refusal(before, best, rule)
     return LearnedCurve(name, curve, best.std, before, best.trial, tuple(fitted[1:]), refused)
+
+
+def _refusal(before: Trial, best: Fitted, rule: DecisionRule) -> str:
+    """Return why the best curve is not kept; "" where it is."""
+    why = ""
+    if not missing(before, best.trial, rule):
+        why = "does not lower the error on held-out runs beyond chance"
+    elif rule.excess(best.trial.z) > (1.0 - rule.first) * rule.excess(before.z):
+        why = "explains too little of the error on held-out runs"
+    told = f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
+    return f"The best curve, {best.curve.words()}, {why} {told}." if why else ""
 
 
 @dataclass(frozen=True)
@@ -117,10 +118,35 @@ class Closed:
     std: dict[str, float]
 
 
-def fit_closed(opened: Opening, found: LearnedCurve, form: ClosedForm) -> Closed | None:
+def close(
+    opened: Opening, found: LearnedCurve, forms: Sequence[ClosedForm], rule: LearnRule = LEARN
+) -> Closed | None:
+    """Fit the closed forms that may name a curve in its place; return the first that does as well.
+
+    Parameters
+    ----------
+    opened : runs and the fitted model, as a diagnosis begins with them
+    found : the curve, with the name of its effect
+    forms : fitted to the curve, the best first
+    rule : the numbers that decide between curves
+    """
+    able = [one for one in forms if one.left <= rule.follows][:CLOSED]
+    return next(filter(None, (fit_closed(opened, found, one, rule) for one in able)), None)
+
+
+def fit_closed(
+    opened: Opening, found: LearnedCurve, form: ClosedForm, rule: LearnRule = LEARN
+) -> Closed | None:
     """Fit a closed form in the place of a learned curve; None where it is clearly worse.
 
     It has fewer numbers, and holds between and beyond the knots: as good is good enough.
+
+    Parameters
+    ----------
+    opened : runs and the fitted model, as a diagnosis begins with them
+    found : the curve, with the name of its effect
+    form : fitted to the curve
+    rule : the numbers that decide between curves
     """
     assert found.curve is not None
     assert found.after is not None
@@ -136,7 +162,7 @@ def fit_closed(opened: Opening, found: LearnedCurve, form: ClosedForm) -> Closed
         held_out = opened.held_out.of(opened.held_out.runs)
         model = refine(replace(base, values=values), train, SWEEPS)
         trial = judge(model, train, held_out)
-        if trial.train > AS_GOOD * found.after.train or not missing(found.before, trial):
+        if trial.train > rule.as_good * found.after.train or not missing(found.before, trial):
             return None
         std = intervals_of(train, model).std
         given = tuple(
@@ -151,40 +177,40 @@ def fit_closed(opened: Opening, found: LearnedCurve, form: ClosedForm) -> Closed
 def _fitted(
     chosen: Sequence[Promise], name: str, base: Model, train: Problem, held_out: Problem
 ) -> list[Fitted]:
-    """Return the curves fitted with everything else, the best on the training runs first."""
-    names = [f"{name}_{k}" for k in range(len(chosen))]
+    """Return the curves fitted with everything else."""
     texts = {
-        own: effect_text(own, one.curve, "a trial") for own, one in zip(names, chosen, strict=True)
+        f"{name}_{k}": effect_text(f"{name}_{k}", one.curve, "a trial")
+        for k, one in enumerate(chosen)
     }
     count, out = Count("fitting a curve", len(chosen)), []
     with defined(texts):
         train, held_out = train.of(train.runs), held_out.of(held_out.runs)
-        for own, one in zip(names, chosen, strict=True):
-            curve = one.curve
-            values = {f"{own}.curve[{k}]": value for k, value in enumerate(curve.values, 1)}
-            values |= {f"{own}.{n}": value for n, value in curve.memory}
-            joined = replace(base, effects=(*base.effects, own))
-            ends = [
-                refine(replace(joined, values={**law, **values}), train, SWEEPS)
-                for law in _laws(base, train)
-            ]
-            model = min(ends, key=lambda end: _error(train, end))
-            trial = judge(model, train, held_out)
-            std = intervals_of(train, model).std
-            entries = [f"{own}.curve[{k + 1}]" for k in range(len(curve.knots))]
-            fitted = replace(
-                curve, values=tuple(model.value(entry) for entry in entries),
-                memory=tuple((n, model.value(f"{own}.{n}")) for n, _ in curve.memory),
-            )  # fmt: skip
-            bare = _renamed(trial, own, name)
-            out.append(
-                Fitted(
-                    fitted, tuple(std.get(entry, 0.0) for entry in entries), bare,
-                    _left_out(train, model),
-                )
-            )  # fmt: skip
-            count.done(curve.words())
-    return sorted(out, key=lambda one: one.loss)
+        for own, one in zip(texts, chosen, strict=True):
+            found = _inside(one.curve, own, base, train, held_out)
+            out.append(replace(found, trial=_renamed(found.trial, own, name)))
+            count.done(one.curve.words())
+    return out
+
+
+def _inside(curve: Curve, own: str, base: Model, train: Problem, held_out: Problem) -> Fitted:
+    """Return a curve fitted inside a model, as the effect `own`."""
+    entries = [f"{own}.curve[{k + 1}]" for k in range(len(curve.knots))]
+    values = dict(zip(entries, curve.values, strict=True))
+    values |= {f"{own}.{n}": value for n, value in curve.memory}
+    joined = replace(base, effects=(*base.effects, own))
+    ends = [
+        refine(replace(joined, values={**law, **values}), train, SWEEPS)
+        for law in _laws(base, train)
+    ]
+    model = min(ends, key=lambda end: _error(train, end))
+    std = intervals_of(train, model).std
+    fitted = replace(
+        curve, values=tuple(model.value(entry) for entry in entries),
+        memory=tuple((n, model.value(f"{own}.{n}")) for n, _ in curve.memory),
+    )  # fmt: skip
+    trial = judge(model, train, held_out)
+    deviations = tuple(std.get(entry, 0.0) for entry in entries)
+    return Fitted(fitted, deviations, trial, _left_out(train, model))
 
 
 def _laws(base: Model, train: Problem) -> list[dict[str, float]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bristle.diagnose.learned.closed import FORMS, GOOD, closed_forms, formula_of, in_words
+from bristle.diagnose.learned.closed import FORMS, closed_forms, formula_of, in_words, name_of
 from bristle.diagnose.learned.curve import Curve
 
 KNOTS = np.linspace(-0.015, 0.015, 13)  # m
@@ -37,9 +37,16 @@ def test_few_numbers_win_where_more_do_hardly_better():
     assert closed_forms(curve_of(values), [0.05] * len(KNOTS))[0].name == "line"
 
 
+def test_a_curve_without_a_unit_along_one_without_has_a_slope():
+    knots = np.linspace(0.6, 3.0, 9)
+    curve = curve_of(0.22 * (knots - 1.5), "age", "yield", knots)
+    best = closed_forms(curve, [0.01] * 9)[0]
+    assert in_words(best, curve) == "a line of slope 0.22"
+
+
 def test_chance_has_no_form():
     values = np.random.default_rng(1).normal(0.0, 1.0, len(KNOTS))
-    assert closed_forms(curve_of(values), [0.01] * len(KNOTS))[0].left > GOOD
+    assert name_of(closed_forms(curve_of(values), [0.01] * len(KNOTS))) is None
 
 
 def test_a_force_in_proportion_to_acceleration_is_a_mass():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import log
 
 import numpy as np
 import pytest
@@ -10,7 +11,9 @@ import pytest
 from bristle.check.conformance import examine
 from bristle.diagnose.learned.along import ALONG
 from bristle.diagnose.learned.closed import closed_forms, formula_of
-from bristle.diagnose.learned.curve import PARTS, Curve, effect_text, may_change
+from bristle.diagnose.learned.curve import PARTS, Curve, may_change
+from bristle.diagnose.learned.effect_file import effect_text
+from bristle.diagnose.learned.slip import SLIP, slips
 from bristle.errors import PhysicsError
 from bristle.identify.fit import Problem, Run
 from bristle.physics.effect import EFFECTS, Q
@@ -20,7 +23,7 @@ STEP = 0.002  # s
 T = STEP * np.arange(1500)
 NONE = np.zeros((0, len(T), 4))
 PAIRS = [(part, along) for part in PARTS for along in ALONG if may_change(part, along)]
-MEMORY = {"tau": 0.2, "way": 0.004}
+MEMORY = {"tau": 0.2, "way": 0.004, "early": 0.02}
 
 
 def run() -> Run:
@@ -38,6 +41,10 @@ def curve_of(part: str, along: str, size: float = 0.4) -> Curve:
     knots = np.linspace(values.min(), values.max(), 5)
     curve = tuple(size * np.array([0.0, 0.2, 0.5, 0.4, -0.3]))
     return Curve(part, along, tuple(memory.items()), tuple(knots), curve, (0,), 0.003, 8.0)
+
+
+def slip_of(size: float = 0.4) -> Curve:
+    return Curve(SLIP, SLIP, (), (0.0004, 0.002, 0.009), (size, 0.0, 2.0 * size))
 
 
 def signals(now: Run, k: int, dt: float) -> Q:
@@ -67,13 +74,14 @@ def test_the_memory_of_the_hook_is_that_of_the_scan(along):
         p, advance = effect.values_of({}), effect.hooks()["advance"]
         begin = {state: getattr(signals(now, 0, 0.0), of) for state, of in effect.starts.items()}
         z = effect.State(*(begin.get(state, 0.0) for state in effect.states))
-        out = [z[0]]
+        shown = eval(f"lambda z, p: {ALONG[along].source}", {"log": log})
+        out = [shown(z, p)]
         for k in range(1, len(T)):
             means = {n: 0.5 * (getattr(now, n)[k - 1] + getattr(now, n)[k]) for n in "xvaV"}
             middle = signals(now, k, STEP)._replace(**means)
             z = effect.State(*advance(middle, z, p))
             z = effect.State(*advance(signals(now, k, 0.0), z, p))
-            out.append(z[0])
+            out.append(shown(z, p))
     expected = ALONG[along].history(now, dict(curve.memory))
     assert np.max(np.abs(np.array(out) - expected)) < 0.02 * np.ptp(expected)
 
@@ -91,6 +99,46 @@ def test_a_learned_effect_conforms_as_any_other(closed):
     with defined({"learned_9": text}):
         failed = [check for check in examine(EFFECTS["learned_9"]) if not check.holds]
     assert failed == []
+
+
+@pytest.mark.slow
+def test_elastic_slip_elements_conform():
+    with defined({"learned_9": effect_text("learned_9", slip_of(), "made for a test, 2026")}):
+        assert [check for check in examine(EFFECTS["learned_9"]) if not check.holds] == []
+
+
+def test_elastic_slip_elements_are_those_of_the_scan():
+    curve, now = slip_of(), run()
+    text = effect_text("learned_9", curve, "made for a test, 2026")
+    with defined({"learned_9": text}):
+        effect = EFFECTS["learned_9"]
+        assert effect.passive
+        assert [one.bounds[0] for one in effect.parameters.values()] == [0.0, 0.0, 0.0]
+        p, hooks = effect.values_of({}), effect.hooks()
+        z, out = effect.State(0.0, 0.0, 0.0), [0.0]
+        for k in range(1, len(T)):
+            v = 0.5 * (now.v[k - 1] + now.v[k])
+            z = effect.State(*hooks["advance"](signals(now, k, STEP)._replace(v=v), z, p))
+            out.append(hooks["force"](signals(now, k, STEP), z, p))
+    expected = slips(now, np.array(curve.knots)) @ curve.values
+    assert np.max(np.abs(np.array(out) - expected)) < 0.01
+    assert np.max(np.abs(expected)) == pytest.approx(1.2)  # N, all of them slip
+
+
+def test_a_current_is_told_as_one():
+    for part, along in (("yield_field", "speed"), ("command", "voltage")):
+        curve = replace(curve_of(part, along), drive="current")
+        text = effect_text("learned_9", curve, "made for a test, 2026")
+        assert '"V"' not in text.replace('needs = ("V",)', "").replace('"v", "V")', "")
+        assert "[V]" not in text
+    assert "Largest command of the runs [A]" in effect_text(
+        "learned_9", replace(curve_of("yield_field", "speed"), drive="current"), "a test, 2026"
+    )
+    with defined({"learned_9": text}):
+        assert EFFECTS["learned_9"].parameters["curve[2]"].unit == "A"
+        problem = Problem([replace(run(), drive="current")])
+        assert problem.size("A") == problem.size("V") == 8.0
+        assert problem.size("N/A2") == problem.size("N/V2") != 1.0
 
 
 def test_a_factor_never_turns_the_force_round():

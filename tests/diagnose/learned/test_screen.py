@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from bristle.diagnose.learned.screen import (
-    Normal,
-    distinct,
-    hats_at,
-    knots_of,
-    promises,
-    residual_of,
-)
+from bristle.diagnose.learned.along import rebuilt
+from bristle.diagnose.learned.normal import Normal, hats_at
+from bristle.diagnose.learned.residual import residual_of
+from bristle.diagnose.learned.screen import distinct, knots_of, promises
+from bristle.diagnose.learned.slip import SLIP, slips
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, fit
 
@@ -45,6 +44,10 @@ def first_of(hidden):
     return promises(residual_of(problem, base))
 
 
+def run_of(x):
+    return Run("run", STEP, x, 0.0 * x, 0.0 * x, 0.0 * x, 0.0 * x, NOISE, NOWHERE)
+
+
 def bell(x):
     return 1.0 - 0.5 * np.exp(-((x / 0.004) ** 2))
 
@@ -69,6 +72,44 @@ def test_the_hidden_curve_comes_first(case):
     assert best.curve.part.endswith(part)
     assert best.curve.along == along
     assert best.loss < 2.0  # noise alone leaves 1; the law's parameters move to first order
+
+
+def test_elastic_slip_elements_are_found_with_no_negative_force():
+    travels = np.array([0.001, 0.006])  # m
+    problem = runs(lambda x, v, V, F: F + slips(run_of(x), travels) @ [0.8, 1.5])
+    base = fit(problem, Model("bingham", (), VALUES), with_std=False).model
+    residual = residual_of(problem, base)
+    best = promises(residual, along=(SLIP, "travel"))[0]
+    assert best.curve.part == SLIP
+    assert min(best.curve.values) >= 0.0
+    # The law had taken up a part of them: the joint fit gives it back.
+    assert best.loss < 0.1 * Normal(residual).without_curve()
+
+
+def test_a_memory_is_found_between_the_nodes_of_the_scan():
+    tau, way = 0.23, 0.004  # s, m
+
+    def hidden(x, v, V, F):
+        moved = replace(run_of(x), v=v)
+        return F * (1.0 + rebuilt(moved, {"tau": tau, "way": way}))
+
+    problem = runs(hidden)
+    base = fit(problem, Model("bingham", (), VALUES), with_std=False).model
+    best = promises(residual_of(problem, base), along=("rebuilding",))[0]
+    memory = dict(best.curve.memory)
+    assert memory["tau"] == pytest.approx(tau, rel=0.3)
+    assert memory["way"] == pytest.approx(way, rel=0.3)
+    assert best.loss < 2.0
+
+
+def test_the_elastic_part_of_a_law_is_no_yield_force():
+    problem = runs()
+    values = {**Model("tanh").values, "k": 400.0}
+    run = problem.runs[0]
+    columns = residual_of(problem, Model("tanh", (), values)).parts
+    without = residual_of(problem, Model("tanh", (), {**values, "k": 0.0})).parts
+    assert np.ptp(columns["fluid"] - without["fluid"]) > 0.5 * 400.0 * np.ptp(run.x) / NOISE
+    assert columns["yield"] == pytest.approx(without["yield"], abs=1e-6)
 
 
 def test_noise_alone_promises_nothing_worth_a_name():

@@ -1,0 +1,198 @@
+"""The file of a learned effect, in the standard library alone.
+
+What is fitted, exported and read by the user is the same text.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from ...physics.drive import drive_named, unit_for
+from .along import ALONG, MEMORIES
+from .curve import BOUND, Curve, Formula, bounds_of
+from .slip import SLIP
+
+MATH = tuple(
+    one.__name__ for one in (math.copysign, math.cos, math.exp, math.log, math.sin, math.tanh)
+)
+"""Functions that a hook may import."""
+
+POSITIVE = ("tau", "way", "early", "d")
+"""Parameters that are times, lengths and scales: they stay above zero."""
+
+Declared = tuple[str, float, str, str]
+"""A parameter's name, value, unit and meaning."""
+
+
+def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = None) -> str:
+    """Return the text of the effect's file of a curve.
+
+    Parameters
+    ----------
+    name : of the effect, and of its file
+    curve : with the values to begin with
+    origin : what it was learned from and when, for the file's `source`
+    formula : what stands for the table, None for the table itself
+    """
+    body = _hooks(curve, formula)
+    parameters: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
+    if formula:
+        parameters += [
+            (n, value, unit, f"{n} in g = {formula.text}") for n, value, unit in formula.parameters
+        ]
+    lines = [
+        *_imports(name, curve, body, bool(parameters), formula is None),
+        *_about(name, curve, formula),
+        "",
+        f'    name = "{name}"',
+        '    sites = ("damper",)',
+        *_fields(curve),
+        f'    source = "{origin}"',
+        f'    expect = "an error that depends on {_on(curve)}"',
+        "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
+    ]
+    if curve.held and not formula:
+        held = tuple(f"curve[{k + 1}]" for k in curve.held)
+        lines.append(f"    assumed = {held!r}  # the law has a constant already".replace("'", '"'))
+    if parameters:
+        lines += ["    parameters = {", *_declared(parameters), "    }"]
+    if not formula:
+        lines += _table(curve)
+    return "\n".join([*lines, "", *body]) + "\n"
+
+
+def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
+    """Return the lines of the hooks."""
+    part, along = curve.of, curve.signal
+    lines = [
+        "    @staticmethod",
+        f"    def {part.hook}(q, z, p):",
+        f"        return {part.expression.format(g=formula.g if formula else curve.source)}",
+    ]
+    if along.advance:
+        lines += ["", "    @staticmethod", "    def advance(q, z, p):"]
+        lines += ["    " + line for line in along.advance.splitlines()]
+    return lines
+
+
+def _imports(
+    name: str, curve: Curve, body: list[str], parameters: bool, table: bool
+) -> list[str]:  # fmt: skip
+    """Return the lines before the class: what the file is, its imports, its constants."""
+    functions = [one for one in MATH if f"{one}(" in "\n".join(body)]
+    reads = "interpolate(" in "\n".join(body)
+    kinds = [
+        *(["Parameter"] if parameters else []), *(["Table"] if table else []),
+        *(["interpolate"] if reads else []),
+    ]  # fmt: skip
+    lines = [
+        f'"""{_title(name)}: {_subject(curve, "along")}, learned from measurements."""',
+        "",
+        *([f"from math import {', '.join(functions)}", ""] if functions else []),
+        f"from bristle.physics.effect import Effect, {', '.join(kinds)}",
+    ]
+    if table:
+        lines += ["", *_row("KNOTS = ", curve.knots)]
+        unit = curve.along_unit
+        lines.append(f'"""Where the curve is given: {curve.signal.words} [{unit}]."""')
+    unit = drive_named(curve.drive).unit
+    return [
+        *lines,
+        *_constant("SLOW", curve, curve.slow, "Speed [m/s] over which friction turns round."),
+        *_constant("TOP", curve, curve.top, f"Largest command of the runs [{unit}]."),
+        "",
+        "",
+    ]
+
+
+def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
+    """Return the class's first lines and its docstring."""
+    g = f"g = {formula.text if formula else 'curve(s)'},   s = {curve.signal.words}"
+    end = "." if formula else ", for beyond its ends the curve keeps its value."
+    if curve.part == SLIP:
+        g = (
+            "-1 <= s_k <= 1\n\n    s_k is the state of a spring with a slider: x/KNOTS[k] since the"
+            " last reversal, until\n    it slips (Iwan 1966, J. Appl. Mech. 33(4))."
+        )
+        end = "."
+    return [
+        f"class {''.join(word.capitalize() for word in name.split('_'))}(Effect):",
+        f'    """{_title(name)}: {_subject(curve, "that depends on")}.',
+        "",
+        f"        {curve.of.formula},   {g}",
+        "",
+        "    Learned from measurements, not derived. Leaves out what those runs did not do: doubt",
+        f"    it where the motion goes further{end}",
+        '    """',
+    ]
+
+
+def _on(curve: Curve) -> str:
+    """Return on what the error depends that a curve explains."""
+    return ALONG["travel"].words if curve.part == SLIP else curve.signal.words
+
+
+def _title(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def _subject(curve: Curve, joined: str) -> str:
+    """Return what a curve is: its part, and its signal after a word or two."""
+    words = curve.of.words
+    return words if curve.part == SLIP else f"{words} {joined} {curve.signal.words}"
+
+
+def _table(curve: Curve) -> list[str]:
+    """Return the lines of the table's declaration."""
+    low, high = bounds_of(curve)
+    meaning = "force at which the element slips" if curve.part == SLIP else "value of the curve"
+    return [
+        "    tables = {",
+        '        "curve": Table(',
+        "            KNOTS,",
+        *(f"            {line}" for line in _row("", curve.values, ",")),
+        f'            "{curve.unit}",',
+        f"            ({low:.4g}, {high:.4g}),",
+        f'            "{meaning}",',
+        "        )",
+        "    }",
+    ]
+
+
+def _constant(name: str, curve: Curve, value: float, text: str) -> list[str]:
+    """Return the lines of a constant that a part's expression uses; none where it does not."""
+    used = name in curve.of.expression
+    return ["", f"{name} = {value:.6g}", f'"""{text}"""'] if used else []
+
+
+def _fields(curve: Curve) -> list[str]:
+    """Return the lines of the class data that follow from part and signal."""
+    along, part, drive = curve.signal, curve.of, drive_named(curve.drive)
+    given: dict[str, object] = {
+        "needs": tuple(dict.fromkeys((*along.needs, *part.needs))),
+        "states": {name: unit_for(unit, drive) for name, unit in along.states},
+        "starts": dict(along.starts),
+        "passive": curve.passive,
+        "zero_at_rest": curve.part == SLIP or part.expression != "{g}",
+    }
+    texts = [(key, f"{value!r}".replace("'", '"')) for key, value in given.items()]
+    return [f"    {key} = {text}" for key, text in texts if text not in ("{}", "()")]
+
+
+def _declared(parameters: Sequence[Declared]) -> list[str]:
+    """Return the lines that declare parameters: name, value, unit, meaning."""
+    lines = []
+    for name, value, unit, text in parameters:
+        size = BOUND * max(abs(value), 1e-9)
+        low, high = (0.02 * value, 50.0 * value) if name in POSITIVE else (-size, size)
+        bounds = f"({low:.4g}, {high:.4g})"
+        lines.append(f'        "{name}": Parameter({value:.6g}, "{unit}", {bounds}, "{text}"),')
+    return lines
+
+
+def _row(begin: str, values: tuple[float, ...], end: str = "") -> list[str]:
+    """Return the lines of a tuple of numbers, some to a line."""
+    texts = [f"{float(f'{value:.6g}')!r}," for value in values]  # 0.0, for numba wants one type
+    rows = [" ".join(texts[k : k + 6]) for k in range(0, len(texts), 6)]
+    return [f"{begin}(", *(f"    {row}" for row in rows), f"){end}"]

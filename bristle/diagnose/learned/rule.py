@@ -1,0 +1,55 @@
+"""The numbers that decide which curve is learned and how it is called, and what each one trades."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class LearnRule:
+    """What decides between curves; whether one is kept is decided by a `DecisionRule`.
+
+    A rule of your own is `dataclasses.replace(LEARN, follows=0.05)`.
+    """
+
+    near: float = 1.25
+    """Largest mean squared residual that a curve promises, over that of the best one, to be tried.
+
+    Trades: if higher, curves of no promise are fitted, which takes time; if lower, the curve that
+    is right is missed where the linear model of the scan is a poor one. Found: blind seeds.
+    """
+
+    memory: float = 1.02
+    """What each time or travel of a memory must lower the mean squared residual by, as a factor.
+
+    Trades: if higher, memories are missed; if lower, a short memory stands for a plain signal.
+    Found: blind seeds.
+    """
+
+    as_good: float = 1.03
+    """Largest error on training runs of a closed form over that of the curve which it replaces.
+
+    Trades: if higher, formulas stand where they only resemble the curve; if lower, tables stay
+    where a formula is right. Found: blind seeds.
+    """
+
+    follows: float = 0.12
+    """Largest share of a curve's variation that a closed form may leave to be the curve's name.
+
+    Trades: if higher, wrong names; if lower, curves without a name. Found: blind seeds.
+    """
+
+    def weighed(self, loss: float, memory: Sequence[object]) -> float:
+        """Return a mean squared residual, raised by what its memory must pay.
+
+        Parameters
+        ----------
+        loss : where the curve was not fitted
+        memory : the times and travels of its memory
+        """
+        return loss * self.memory ** len(memory)
+
+
+LEARN = LearnRule()
+"""A damper, on a bench or in a building."""
