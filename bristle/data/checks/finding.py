@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from ..corrections import Correction
+
 Level = Literal["error", "warning", "note"]
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
@@ -17,7 +19,8 @@ class Finding:
 
     `kind` names it for programs ("clipping"), `run` and `channel` are "" where it is about all;
     `text` says it with numbers, `do` what to do, "" where there is nothing; `value` is the number
-    by which findings of one kind are ordered, worst last.
+    by which findings of one kind are ordered, worst last. `correction` sets it right where that can
+    be done.
     """
 
     kind: str
@@ -27,10 +30,11 @@ class Finding:
     run: str = ""
     channel: str = ""
     value: float = 0.0
+    correction: Correction | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the finding as JSON has it."""
-        return asdict(self)
+        return {**asdict(self), "correction": self.correction and self.correction._asdict()}
 
 
 def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, list[str]]]:
