@@ -19,7 +19,7 @@ import numpy as np
 
 from ..quantity import plain, quantity
 from .channels import channel_unit
-from .spectral_lines import without_lines
+from .line_removal import without_lines
 from .table import Array
 
 FAULTS = {
@@ -39,6 +39,10 @@ class Correction(NamedTuple):
     channel: str
     fault: str
     value: float
+
+    def is_like(self, other: Correction) -> bool:
+        """Return whether another one sets the same right, by nearly the same value."""
+        return self[:2] == other[:2] and bool(np.isclose(self.value, other.value, rtol=5e-3))
 
     @property
     def text(self) -> str:

@@ -1,9 +1,9 @@
 """The force of a damper as a sum of shapes that all its runs share, with a gain and a zero of each.
 
 A force depends on the velocity, the command and the motion since it last turned. Shapes of these
-are what it is linear in: a yield force that turns with the velocity, bristles that deflect with the
-motion, each with the command's powers, a viscous force, a spring and a mass. No parameter is told by
-them; what they tell is whether runs are of one rig, recorded alike.
+are what it is linear in: a yield force that turns with the velocity, bristles that deflect with
+the motion, each with powers of the command, a viscous force, a spring and a mass. They tell no
+parameter; they tell whether runs are of one rig, and recorded alike.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ _SAMPLES = 1500  # of a run, at most
 _WIDTHS = (0.05, 0.3)  # of a yield force's turn, in standard deviations of the velocity
 _LENGTHS = np.array([0.03, 0.12, 0.5])  # over which a force builds up, in those of the displacement
 _PARTS = 6
+_MASS = 0.02  # s; so that an acceleration is about as large as the other shapes
 _TURNS = 25  # of gains and shapes
 
 
@@ -125,20 +126,17 @@ def _shapes(
     """Return the shapes (n, s) of each run that a damper's force is linear in, one size in all."""
     motions = [_displacement(run, v) for run, v in zip(runs, velocities, strict=True)]
     speed = float(np.std(np.concatenate(velocities)))
-    stroke = float(np.median([np.std(x) for x in motions]))
+    stroke = float(np.median([np.std(x) for x in motions])) or 1.0
     top = max((float(np.max(np.abs(run[run.drive]))) for run in runs if run.drive), default=0.0)
     out = []
     for run, v, x, k in zip(runs, velocities, motions, every, strict=True):
         rate, motion = v[::k] / speed, x[::k] / stroke
         u = run[run.drive][::k] / top if run.drive and top else np.zeros(len(rate))
         turning = [np.tanh(rate / width) for width in _WIDTHS]
-        columns = [
-            one * power
-            for one in (*turning, *_slips(motion).T)
-            for power in (1.0 + 0.0 * u, u, u * u)
-        ]
-        push = np.gradient(rate)
-        columns += [rate, rate * u, rate * np.abs(rate), motion, push / (np.std(push) or 1.0)]
+        powers = (np.ones(len(u)), u, u * u)
+        columns = [one * power for one in (*turning, *_slips(motion).T) for power in powers]
+        push = np.gradient(rate) / (k * run.step) * _MASS
+        columns += [rate, rate * u, rate * np.abs(rate), motion, push]
         out.append(np.column_stack(columns))
     used = np.any(np.concatenate(out) != 0.0, axis=0)
     return [one[:, used] for one in out]

@@ -13,23 +13,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .channels import DRIVE
+from .line_removal import BETA, amplitude_of
+from .mains import MAINS_OFF, mains_lines, mains_of
 from .noise import is_switched
 from .table import Array
-
-Complex = NDArray[np.complex128]
-
-MAINS = (50.0, 60.0)
-"""Frequencies of the mains [Hz]."""
 
 FEWEST = 500
 """Samples from which on a line can be told from what stands beside it."""
 
-_MAINS_OFF = 2e-3  # share by which the mains may be off; a grid keeps to a fifth of that
-_MAINS_ORDERS = 5  # harmonics of the mains that are looked for beyond half the sampling rate
-_BETA = 14.0  # of the Kaiser window: 100 dB, so that no motion leaks to where lines are looked for
 _HALF_WIDTH = 5  # bins of that window's main lobe to either side
 _SLOW = 25.0  # Hz; what is slower is taken off before the jumps of a force are cut down
 _CUT = 4.0  # standard deviations, told from the median, at which they are cut
@@ -117,52 +110,6 @@ def spectral_lines(channels: Mapping[str, Array], step: float) -> list[SpectralL
     return [line for line in out if not _is_driven(line, out, spectra, able, step)]
 
 
-def without_lines(y: Array, step: float, frequencies: Sequence[float]) -> Array:
-    """Return a channel without lines: the sinusoids that fit it best are taken off.
-
-    The sinusoid is fitted in pieces of ten seconds that overlap, so that it may drift. All else
-    that the channel holds stays, at other frequencies to 0.1 Hz.
-
-    Parameters
-    ----------
-    y : (n,) evenly spaced
-    step : s
-    frequencies : Hz
-    """
-    out = np.array(y, dtype=float)
-    time = step * np.arange(len(y))
-    for frequency in frequencies:
-        wave = np.exp(2j * np.pi * frequency * time)
-        out -= np.real(_drifting(out, wave, max(round(5.0 / step), 2)) * wave)
-    return out
-
-
-def _drifting(y: Array, wave: Complex, half: int) -> Complex:
-    """Return the complex amplitude (n,) of a wave (n,) in y, linear between pieces of 2 `half`."""
-    n = len(y)
-    centres = np.linspace(0.0, n - 1.0, max(n // half, 1) + 1)
-    found = []
-    for centre in centres:
-        part = slice(max(int(centre) - half, 0), int(centre) + half + 1)
-        if centre < half:
-            part = slice(0, min(2 * half, n))
-        elif centre > n - 1 - half:
-            part = slice(max(n - 2 * half, 0), n)
-        found.append(_amplitude(y[part], wave[part]))
-    at = np.arange(n)
-    real = np.interp(at, centres, np.real(found))
-    return np.asarray(real + 1j * np.interp(at, centres, np.imag(found)), dtype=complex)
-
-
-def _amplitude(y: Array, wave: Complex) -> complex:
-    """Return the complex amplitude of a wave (n,) in y (n,): y = Re(amplitude wave).
-
-    Under a Kaiser window, so that motions far below do not leak in.
-    """
-    window = np.kaiser(len(y), _BETA)
-    return complex(2.0 * np.sum(window * y * np.conj(wave)) / np.sum(window))
-
-
 def _is_able(name: str, y: Array) -> bool:
     return len(y) >= FEWEST and float(np.ptp(y)) > 0.0 and not is_switched(y)
 
@@ -211,7 +158,7 @@ def _commands(name: str, y: Array) -> bool:
 def _spectrum(y: Array, step: float) -> _Spectrum:
     from scipy.ndimage import median_filter
 
-    window = np.kaiser(len(y), _BETA)
+    window = np.kaiser(len(y), BETA)
     size = np.abs(np.fft.rfft((y - np.mean(y)) * window)) * 2.0 / float(np.sum(window))
     level = np.sqrt(median_filter(size**2, 2 * _SMOOTH + 1, mode="nearest") / np.log(2.0))
     least = 1e-12 * float(size.max())
@@ -268,53 +215,11 @@ def _stands_alone(k: int, spectrum: _Spectrum, step: float, periods: Sequence[fl
     beside = np.abs(frequency - own) <= reach
     beside &= np.abs(frequency - own) > _HALF_WIDTH * width
     beside[: _HALF_WIDTH + 1] = False
-    for other in _mains_lines(step):  # those of the mains may be as large
-        beside &= np.abs(frequency - other) > max(_HALF_WIDTH * width, _MAINS_OFF * other)
+    for other in mains_lines(step):  # those of the mains may be as large
+        beside &= np.abs(frequency - other) > max(_HALF_WIDTH * width, MAINS_OFF * other)
     known = mains_of(own, step, 2.0 * width)[0]
     least = _MAINS_ALONE if known else _ALONE
     return bool(spectrum.amplitude[k] > least * np.max(spectrum.amplitude[beside], initial=0.0))
-
-
-def _mains_lines(step: float) -> list[float]:
-    """Return where the harmonics of the mains show at a sampling step [s], in Hz."""
-    half = 0.5 / step
-    return [
-        _folded(order * mains, step)
-        for mains in MAINS
-        for order in range(1, max(int(half / mains), _MAINS_ORDERS) + 1)
-    ]
-
-
-def _folded(frequency: float, step: float) -> float:
-    """Return where a frequency [Hz] shows that is sampled every `step` [s]."""
-    rate = 1.0 / step
-    return abs(frequency - rate * round(frequency / rate))
-
-
-def mains_of(frequency: float, step: float, width: float) -> tuple[float, int, bool]:
-    """Return the mains frequency [Hz] that a line is of, the order, and whether it is folded.
-
-    Parameters
-    ----------
-    frequency : Hz, as recorded
-    step : sampling step [s]
-    width : Hz within which it is known
-
-    Returns
-    -------
-    (mains, order, folded)
-        (0, 0, False) where it is none of the mains.
-    """
-    half = 0.5 / step
-    for folded in (False, True):
-        for mains in MAINS:
-            for order in range(1, max(int(half / mains), _MAINS_ORDERS) + 1):
-                whole = order * mains
-                if (whole > half) is not folded or (folded and order > _MAINS_ORDERS):
-                    continue
-                if abs(_folded(whole, step) - frequency) <= max(_MAINS_OFF * whole, width):
-                    return mains, order, folded
-    return 0.0, 0, False
 
 
 def _refined(y: Array, frequency: float, step: float) -> float:
@@ -322,7 +227,7 @@ def _refined(y: Array, frequency: float, step: float) -> float:
     from scipy.optimize import minimize_scalar
 
     time, width = step * np.arange(len(y)), 1.0 / (step * len(y))
-    centred = (y - np.mean(y)) * np.kaiser(len(y), _BETA)
+    centred = (y - np.mean(y)) * np.kaiser(len(y), BETA)
 
     def missing(f: float) -> float:
         return -float(np.abs(np.sum(centred * np.exp(-2j * np.pi * f * time))))
@@ -339,7 +244,7 @@ def _is_steady(y: Array, frequency: float, step: float) -> bool:
     wave = np.exp(2j * np.pi * frequency * step * np.arange(len(y)))
     size = 2 * len(y) // (_BLOCKS + 1)
     begins = [k * size // 2 for k in range(_BLOCKS)]
-    parts = np.array([_amplitude(y[a : a + size], wave[a : a + size]) for a in begins])
+    parts = np.array([amplitude_of(y[a : a + size], wave[a : a + size]) for a in begins])
     phase, block = np.unwrap(np.angle(parts)), np.arange(_BLOCKS)
     if float(np.max(np.abs(np.diff(phase)))) > 1.0:
         return False
@@ -353,7 +258,7 @@ def _size_between_jumps(y: Array, frequency: float, step: float) -> float:
     """Return the amplitude of a line in a channel (n,), told where the channel does not jump."""
     fast, most = _fast(y, step)
     wave = np.exp(2j * np.pi * frequency * step * np.arange(len(y)))
-    weight = np.kaiser(len(y), _BETA) * (np.abs(fast) <= most)
+    weight = np.kaiser(len(y), BETA) * (np.abs(fast) <= most)
     found = 2.0 * abs(np.sum(weight * fast * np.conj(wave))) / float(np.sum(weight))
     return float(found) / _passed(frequency, step)
 
@@ -382,8 +287,8 @@ def _is_driven(
     for name in [line.channel, *others]:
         x, v = f"{_level(name)}displacement", f"{_level(name)}velocity"
         if x in (line.channel, *others) and v in (line.channel, *others):
-            rate = 2j * np.pi * line.frequency * _amplitude(channels[x], wave)
-            shown = _amplitude(channels[v], wave)
+            rate = 2j * np.pi * line.frequency * amplitude_of(channels[x], wave)
+            shown = amplitude_of(channels[v], wave)
             if abs(rate - shown) < 0.3 * abs(shown):
                 return True
     return False

@@ -10,7 +10,6 @@ shape otherwise. Displacement and velocity are held against each other in every 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import log
 
 import numpy as np
@@ -94,7 +93,7 @@ def _motion(runs: Sequence[Measurement]) -> Iterator[Finding]:
             yield _of_motion(run, ratio, runs)
         if abs(zero) > max(ZERO, SCATTER * _scatter(apart)):
             yield Finding(
-                "velocity zero",
+                "run zero",
                 "warning",
                 f"velocity shows {plain(float(zero) * rms)} m/s more than in the other runs: its "
                 "mean is not the way that the displacement went.",
@@ -102,7 +101,7 @@ def _motion(runs: Sequence[Measurement]) -> Iterator[Finding]:
                 run.name,
                 "velocity",
                 abs(float(zero)),
-                Correction("velocity", "bias", float(zero) * rms),
+                (Correction("velocity", "bias", float(zero) * rms),),
             )
 
 
@@ -125,7 +124,7 @@ def _turned(run: Measurement) -> Finding:
         run.name,
         turned,
         1.0,
-        Correction(turned, "sign", -1.0),
+        (Correction(turned, "sign", -1.0),),
     )
 
 
@@ -148,7 +147,7 @@ def _of_motion(run: Measurement, ratio: float, runs: Sequence[Measurement]) -> F
         "run gain", "warning",
         f"{text}; by its noise, {channel} shows {plain(value, 4)} times what it should.",
         "Give the run a correction, or leave it out.", channel=channel,
-        correction=Correction(channel, "gain", value), **where,
+        corrections=(Correction(channel, "gain", value),), **where,
     )  # fmt: skip
 
 
@@ -224,14 +223,16 @@ def _of_gain(run: Measurement, gain: float) -> Finding:
         return Finding(
             "run sign", "error", "force has the opposite sign of that in the other runs.",
             "Give the run a correction, or leave it out.", run.name, "force", 1.0,
-            Correction("force", "sign", -1.0),
+            (Correction("force", "sign", -1.0),),
         )  # fmt: skip
+    turned = (Correction("force", "sign", -1.0),) if gain < 0.0 else ()
+    corrections = (*turned, Correction("force", "gain", abs(gain)))
     return Finding(
         "run gain", "warning",
         f"force is {plain(gain, 3)} times what the other runs say at the same motion and command: "
         "another range of the load cell, another temperature, or another damper.",
         "Give the run a correction if the load cell's range was another, else leave it out.",
-        run.name, "force", abs(log(abs(gain))), Correction("force", "gain", gain),
+        run.name, "force", abs(log(abs(gain))), corrections,
     )  # fmt: skip
 
 
@@ -241,7 +242,7 @@ def _of_zero(run: Measurement, zero: float, share: float, rms: float) -> Finding
         f"force shows {quantity(zero, 'N', 3, rms)} more than in the other runs, whatever the "
         "motion and the command: the load cell was not set to zero, or a preload acted.",
         "Give the run a correction, or leave it out.", run.name, "force", share,
-        Correction("force", "bias", zero),
+        (Correction("force", "bias", zero),),
     )  # fmt: skip
 
 
