@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .channels import DRIVE
-from .line_removal import BETA, amplitude_of
+from .line_removal import BETA, amplitude_of, drifting_amplitude, without_slow
 from .mains import MAINS_OFF, mains_lines, mains_of
 from .noise import is_switched
 from .table import Array
@@ -24,8 +24,6 @@ FEWEST = 500
 """Samples from which on a line can be told from what stands beside it."""
 
 _HALF_WIDTH = 5  # bins of that window's main lobe to either side
-_SLOW = 25.0  # Hz; what is slower is taken off before the jumps of a force are cut down
-_CUT = 4.0  # standard deviations, told from the median, at which they are cut
 _SMOOTH = 60  # bins to either side whose median is the level about a line
 _POWER = 60.0  # a line's power over that level; chance reaches 60 in one of 1e26 bins
 _ALONE = 4.0  # times the largest amplitude beside a line
@@ -118,36 +116,13 @@ def _moves(name: str) -> bool:
     return name.endswith(_MOTION)
 
 
-def _fast(y: Array, step: float) -> tuple[Array, float]:
-    """Return a channel (n,) without what is slow, and the size at which its jumps are cut down."""
-    fast = np.asarray(y - _slow(y, step), dtype=float)
-    most = _CUT * 1.4826 * float(np.median(np.abs(fast)))
-    return fast, most or float(np.max(np.abs(fast)))
-
-
 def _cut_down(y: Array, step: float) -> Array:
     """Return a channel (n,) without what is slow, its jumps cut down to the size of the rest.
 
     A jump is everywhere in a spectrum, and a line in every sample.
     """
-    fast, most = _fast(y, step)
+    fast, most = without_slow(y, step)
     return np.clip(fast, -most, most)
-
-
-def _slow(y: Array, step: float) -> Array:
-    """Return the mean of a channel (n,) about each sample, weighted by a Hann window."""
-    half = max(round(1.0 / (_SLOW * step)), 1)
-    taps = np.hanning(2 * half + 1)[1:-1]
-    padded = np.pad(y, half - 1, mode="reflect", reflect_type="odd")
-    return np.asarray(np.convolve(padded, taps / taps.sum(), "valid"), dtype=float)
-
-
-def _passed(frequency: float, step: float) -> float:
-    """Return what `_cut_down` leaves of a line's amplitude."""
-    half = max(round(1.0 / (_SLOW * step)), 1)
-    taps = np.hanning(2 * half + 1)[1:-1]
-    turns = np.cos(2.0 * np.pi * frequency * step * np.arange(1 - half, half))
-    return 1.0 - float(taps @ turns) / float(taps.sum())
 
 
 def _commands(name: str, y: Array) -> bool:
@@ -198,7 +173,7 @@ def _lines(
         frequency = _refined(cut, float(spectrum.frequency[k]), step)
         if _is_steady(cut, frequency, step):
             mains, order, folded = mains_of(frequency, step, 2.0 / (step * len(y)))
-            amplitude = _size_between_jumps(y, frequency, step)
+            amplitude = float(np.mean(np.abs(drifting_amplitude(y, step, frequency))))
             found.append(SpectralLine(name, frequency, amplitude, mains, order, folded))
     return found
 
@@ -252,15 +227,6 @@ def _is_steady(y: Array, frequency: float, step: float) -> bool:
     turned = parts * np.exp(-1j * np.polyval(np.polyfit(block, phase, 2), block))
     mean = complex(np.mean(turned))
     return bool(np.sqrt(np.mean(np.abs(turned - mean) ** 2)) < _STEADY * abs(mean))
-
-
-def _size_between_jumps(y: Array, frequency: float, step: float) -> float:
-    """Return the amplitude of a line in a channel (n,), told where the channel does not jump."""
-    fast, most = _fast(y, step)
-    wave = np.exp(2j * np.pi * frequency * step * np.arange(len(y)))
-    weight = np.kaiser(len(y), BETA) * (np.abs(fast) <= most)
-    found = 2.0 * abs(np.sum(weight * fast * np.conj(wave))) / float(np.sum(weight))
-    return float(found) / _passed(frequency, step)
 
 
 def _is_driven(

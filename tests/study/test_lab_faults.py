@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bristle.cli import main
+from bristle.data.channels import ChannelSpec
 from bristle.data.checks.differing_runs import check_differing_runs
 from bristle.data.checks.recording import check_recording
 from bristle.data.corrections import Correction, set_right, wrong_value
@@ -21,15 +22,17 @@ from bristle.errors import StudyError
 from bristle.study.study import Study
 
 RATE = 500.0
+SIZES = {"displacement": 0.02, "velocity": 0.15, "force": 120.0}
+"""About the RMS of the channels, [m, m/s, N]."""
 
 
 def run(
     seed: int, seconds: float = 6.0, rate: float = RATE, noise: float = 0.01, sine: float = 0.0
 ):
-    """A Bingham damper, moved by many sines below 6 Hz or by one, at a voltage that is switched."""
+    """A Bingham damper, moved by eight sines below 4 Hz or by one, at a voltage that is switched."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate)
-    frequencies = np.array([sine]) if sine else rng.uniform(0.4, 6.0, 12)
+    frequencies = np.array([sine]) if sine else rng.uniform(0.4, 4.0, 8)
     phases = rng.uniform(0.0, 2.0 * np.pi, len(frequencies))
     turns = 2.0 * np.pi * frequencies * t[:, None] + phases
     x = np.sum(0.01 / frequencies * np.sin(turns), axis=1)
@@ -37,7 +40,9 @@ def run(
     volts = np.repeat(rng.uniform(0.0, 5.0, 40), int(rate) // 2)[: len(t)]
     force = (40.0 + 25.0 * volts) * np.tanh(v / 0.02) + 300.0 * v
     clean = {"displacement": x, "velocity": v, "force": force}
-    noisy = {name: y + noise * np.std(y) * rng.standard_normal(len(y)) for name, y in clean.items()}
+    noisy = {
+        name: y + noise * SIZES[name] * rng.standard_normal(len(y)) for name, y in clean.items()
+    }
     return t, {**noisy, "voltage": volts}
 
 
@@ -46,9 +51,10 @@ def measured(seed: int, change=lambda channels: None, **how) -> Measurement:
 
     t, channels = run(seed, **how)
     change(channels)
-    units = {"displacement": "m", "velocity": "m/s", "force": "N", "voltage": "V"}
-    frame = pd.DataFrame({"time [s]": t, **{f"{k} [{units[k]}]": y for k, y in channels.items()}})
-    return measurements_of(table_from_frame(frame, f"run_{seed}"))[0]
+    frame = pd.DataFrame({"time": t, **channels})
+    units = {"time": "s", "displacement": "m", "velocity": "m/s", "force": "N", "voltage": "V"}
+    specs = {name: ChannelSpec(name, unit) for name, unit in units.items()}
+    return measurements_of(table_from_frame(frame, f"run_{seed}"), specs)[0]
 
 
 # -- lines
@@ -107,7 +113,7 @@ def test_what_is_taken_off_is_the_line_alone():
     y = channels["force"]
     hum = 3.0 * np.sin(2.0 * np.pi * 50.02 * t + 0.3)
     left = without_lines(y + hum, 1.0 / RATE, [50.02]) - y
-    assert np.std(left) < 0.06 * np.std(hum)
+    assert np.std(left) < 0.15 * np.std(hum)
 
 
 def test_the_finding_says_where_the_line_is_from():
@@ -116,7 +122,7 @@ def test_the_finding_says_where_the_line_is_from():
 
     (found,) = check_recording(measured(1, hum))
     assert (found.kind, found.channel, found.run) == ("lines", "force", "run_1")
-    assert "a line at 50 Hz of 4" in found.text
+    assert "a line at 50 Hz of 3." in found.text
     assert "the mains of 50 Hz" in found.text
     assert found.corrections[0][:2] == ("force", "line")
 
