@@ -86,7 +86,7 @@ def _slow(y: Array, step: float) -> Array:
 
 
 def _passed(frequency: float, step: float) -> float:
-    """Return what `_cut_down` leaves of a line's amplitude."""
+    """Return what `without_slow` leaves of a line's amplitude."""
     half = max(round(1.0 / (_SLOW * step)), 2)
     taps = np.hanning(2 * half + 1)[1:-1]
     turns = np.cos(2.0 * np.pi * frequency * step * np.arange(1 - half, half))
