@@ -235,7 +235,7 @@ def test_values_that_correct_nothing_are_refused(fault, value):
 
 @pytest.fixture
 def folder(tmp_path):
-    for k in range(5):
+    for k in range(4):
         t, channels = run(k, seconds=4.0)
         if k == 1:
             channels["force"] = channels["force"] + 4.0 * np.sin(2.0 * np.pi * 50.0 * t)
