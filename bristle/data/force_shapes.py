@@ -100,8 +100,8 @@ def fitted_forces(parts: Sequence[ForcePart], sound: Sequence[int]) -> RunForces
         for part, g, p in zip(parts, gain, predicted, strict=True)
     ]
     errors = np.array([_errors(p, part.force) for p, part in zip(predicted, parts, strict=True)])
-    size = np.maximum(np.abs(gain), 1e-9)
-    return RunForces(gain, zero, np.array(misfit), errors[:, 0] / size, errors[:, 1])
+    relative = errors[:, 0] / np.maximum(np.abs(gain), 1e-9)
+    return RunForces(gain, zero, np.array(misfit), relative, errors[:, 1])
 
 
 def _errors(predicted: Array, force: Array) -> tuple[float, float]:
@@ -147,7 +147,8 @@ def _slips(motion: Array) -> Array:
     steps = np.diff(motion, prepend=motion[0])
     kept = np.exp(-np.abs(steps)[:, None] / _LENGTHS)
     pulled = np.sign(steps)[:, None] * (1.0 - kept)
-    out, now = np.empty_like(kept), np.zeros(len(_LENGTHS))
+    out: Array = np.empty(kept.shape)
+    now: Array = np.zeros(len(_LENGTHS))
     for k in range(len(out)):
         now = now * kept[k] + pulled[k]
         out[k] = now

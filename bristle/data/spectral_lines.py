@@ -134,10 +134,13 @@ def _spectrum(y: Array, step: float) -> _Spectrum:
     from scipy.ndimage import median_filter
 
     window = np.kaiser(len(y), BETA)
-    size = np.abs(np.fft.rfft((y - np.mean(y)) * window)) * 2.0 / float(np.sum(window))
+    scale = 2.0 / float(np.sum(window))
+    size = np.asarray(np.abs(np.fft.rfft((y - np.mean(y)) * window)) * scale, dtype=float)
     level = np.sqrt(median_filter(size**2, 2 * _SMOOTH + 1, mode="nearest") / np.log(2.0))
     least = 1e-12 * float(size.max())
-    return _Spectrum(np.fft.rfftfreq(len(y), step), size, np.maximum(level, least))
+    return _Spectrum(
+        np.fft.rfftfreq(len(y), step), size, np.asarray(np.maximum(level, least), dtype=float)
+    )
 
 
 def _band_top(y: Array, step: float) -> float:

@@ -135,19 +135,18 @@ def _of_motion(run: Measurement, ratio: float, runs: Sequence[Measurement]) -> F
         "runs"
     )
     channel = _channel_by_noise(run, ratio, runs)
-    where = {"run": run.name, "value": abs(log(ratio))}
     if not channel:
         return Finding(
             "run gain", "warning", f"{text}: one of the two has another gain in this run.",
-            "Look up the ranges of both instruments, or leave the run out.", channel="velocity",
-            **where,
+            "Look up the ranges of both instruments, or leave the run out.", run.name, "velocity",
+            abs(log(ratio)),
         )  # fmt: skip
     value = ratio if channel == "velocity" else 1.0 / ratio
     return Finding(
         "run gain", "warning",
         f"{text}; by its noise, {channel} shows {plain(value, 4)} times what it should.",
-        "Give the run a correction, or leave it out.", channel=channel,
-        corrections=(Correction(channel, "gain", value),), **where,
+        "Give the run a correction, or leave it out.", run.name, channel, abs(log(ratio)),
+        (Correction(channel, "gain", value),),
     )  # fmt: skip
 
 
@@ -180,7 +179,7 @@ def _channel_by_noise(run: Measurement, ratio: float, runs: Sequence[Measurement
 
 def _has_force(run: Measurement) -> bool:
     velocity = velocity_of_run(run) if run.has("force") else None
-    return velocity is not None and min(np.ptp(velocity), np.ptp(run["force"])) > 0.0
+    return velocity is not None and float(min(np.ptp(velocity), np.ptp(run["force"]))) > 0.0
 
 
 def _forces(runs: Sequence[Measurement]) -> Iterator[Finding]:
