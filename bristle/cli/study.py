@@ -13,6 +13,7 @@ from ._files import channels_of, files_of, test_files
 
 if TYPE_CHECKING:
     from ..study.create import Created
+    from ..study.data_check import DataCheck
 
 HELP = "studies of measurements: new, check, auto"
 
@@ -57,6 +58,10 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mask", action="store_true", help="from now on isolated spikes count as not measured"
     )
+    parser.add_argument(
+        "--correct", action="store_true",
+        help="set right what can be: lines, and gain, zero or sign of a run that differs",
+    )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     parser.set_defaults(act=_check)
 
@@ -216,6 +221,11 @@ def _check(arguments: argparse.Namespace) -> int:
     total = len(study.settings.runs)
     with Progress("checking the data", total, not arguments.json) as progress:
         found = check_data(study, progress.show)
+    if arguments.correct and found.corrections():
+        study = study.with_corrections(found.corrections())
+        if not arguments.json:
+            _print_corrections(found)
+        found = check_data(study)
     level = damper_level(list(found.runs)) if study.settings.has_building else ""
     picture = study.write_report("data_check.png", data_check_png(list(found.runs), level))
     if arguments.json:
@@ -229,6 +239,15 @@ def _check(arguments: argparse.Namespace) -> int:
         if not found.ok:
             print("Correct these errors before you fit a model.", file=sys.stderr)
     return 0
+
+
+def _print_corrections(found: DataCheck) -> None:
+    """Print what is set right from now on, run by run."""
+    print("From now on, by study.toml:")
+    for run, corrections in found.corrections().items():
+        for one in corrections:
+            print(f"  {run}: {one.text}.")
+    print()
 
 
 def _auto(arguments: argparse.Namespace) -> int:

@@ -17,12 +17,13 @@ from numpy.typing import NDArray
 from ..errors import RecordError, UnitError
 from ..units import conversion
 from .channels import DRIVE, ChannelSpec, channel_unit
+from .corrections import Correction, set_right
 from .decimate import decimated
 from .guess import guess_channels, specs, too_few_rows
 from .labels import Labels
 from .noise import Noise, estimate_noise
 from .read import read_table
-from .sampling import Sampling, evenly
+from .sampling import Even, Sampling, evenly
 from .spikes import Spike, spikes_of, spikes_text
 from .table import Array, Table, table_from_frame
 
@@ -36,7 +37,8 @@ class Known:
 
     `name` of the run, "" for that of its file; `levels` of a command that the file does not hold,
     by channel, in its unit; `labels` what else is known of the whole run; `rate` [Hz] to which
-    faster samples are decimated, 0 for none; `mask` whether isolated spikes count as not measured.
+    faster samples are decimated, 0 for none; `mask` whether isolated spikes count as not measured;
+    `corrections` what is set right in its channels.
     """
 
     name: str = ""
@@ -44,6 +46,7 @@ class Known:
     labels: Labels = field(default_factory=dict)
     rate: float = 0.0
     mask: bool = False
+    corrections: tuple[Correction, ...] = ()
 
 
 _ABSURD = 1e15  # in any SI unit; some recorders write 1e30 where a value is missing
@@ -228,6 +231,9 @@ def measurements_of(
     notes += _masked(spikes) if known.mask else []
     even = evenly(time, values, table.lines, table.source, table.place)
     notes += even.notes + _what_is_missing([*values, *known.levels])
+    if known.corrections:
+        even = _set_right(even, known.corrections)
+        notes.append(f"corrected: {'; '.join(one.text for one in known.corrections)}")
     fewer = decimated(even, known.rate)
     even, notes = fewer.even, [*notes, *fewer.notes]
     out = []
@@ -248,6 +254,16 @@ def measurements_of(
             )
         )  # fmt: skip
     return out
+
+
+def _set_right(even: Even, corrections: tuple[Correction, ...]) -> Even:
+    """Return pieces whose channels are set right."""
+    step = even.sampling.step
+    pieces = [
+        (time, set_right(channels, step, corrections), known)
+        for time, channels, known in even.pieces
+    ]
+    return replace(even, pieces=pieces)
 
 
 def _masked(spikes: tuple[Spike, ...]) -> list[str]:

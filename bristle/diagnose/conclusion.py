@@ -12,6 +12,7 @@ from .decision import Z
 from .faults import SensorFault, instruments_of
 from .finding import Finding
 from .load_cell import FORCE_GAIN
+from .low_pass import low_pass_text
 from .rule import BENCH
 from .verdict import Diagnosis
 
@@ -70,6 +71,7 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     unknown = next((part for part in parts if part.kind == "unknown"), None)
     reasons = [
         *_reasons(parts, kind),
+        *filter(None, map(low_pass_text, parts)),
         *about.notes,
         *(_without_load_cell(a) for a in alike.values()),
     ]

@@ -9,13 +9,17 @@ from typing import Any
 import numpy as np
 
 from ..data.checks.channels import check_channels
+from ..data.checks.differing_runs import check_differing_runs
 from ..data.checks.finding import Finding, grouped, sentence
 from ..data.checks.motion import check_force, check_motion, velocity_of_run
+from ..data.checks.recording import check_recording
 from ..data.checks.runs import Excitation, check_runs, excitation_of
+from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..data.relation import band
 from ..quantity import plain, scale
 from .openings import runs_for_test
+from .reading import read_runs
 from .run_file import TEST
 from .study import Study
 
@@ -34,6 +38,14 @@ class DataCheck:
     def ok(self) -> bool:
         """Whether nothing must be mended first."""
         return all(finding.level != "error" for finding in self.findings)
+
+    def corrections(self) -> dict[str, list[Correction]]:
+        """Return what can be set right, by the name of the run."""
+        out: dict[str, list[Correction]] = {}
+        for finding in self.findings:
+            if finding.corrections:
+                out.setdefault(finding.run, []).extend(finding.corrections)
+        return out
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it as JSON has it."""
@@ -123,6 +135,13 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
         findings += _check_run(run, level)
         if show:
             show(done)
+    recorded = every
+    if study.settings.rate:  # nulls and lines are where the file has its samples
+        recorded = read_runs(study.folder, replace(study.settings, rate=0.0))
+    for run in recorded:
+        findings += check_recording(run)
+    if not study.settings.has_building:
+        findings += check_differing_runs(runs.all)
     together, excitations = check_runs(runs.train, runs.holdout, level)
     findings += together
     excitations += [excitation_of(run, level) for run in every[len(runs.all) :]]

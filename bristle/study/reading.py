@@ -43,6 +43,12 @@ def read_runs(folder: Path, settings: Settings, role: str | None = None) -> list
     return found
 
 
+def name_of_run(run: RunFile) -> str:
+    """Return what a run's measurement is called."""
+    stem = stem_of(run.file)
+    return f"{stem} run {run.piece}" if run.piece else stem
+
+
 def _measured(
     folder: Path, settings: Settings, run: RunFile, tables: Sequence[Table]
 ) -> list[Measurement]:
@@ -52,6 +58,7 @@ def _measured(
             f"{folder / 'study.toml'}: {run.file} holds {len(tables)} runs, and "
             f"piece = {run.piece} is none of them."
         )
-    name = f"{stem_of(run.file)} run {run.piece}" if run.piece else ""
-    known = Known(name, run.levels, run.labels, settings.rate, settings.mask)
+    known = Known(
+        name_of_run(run), run.levels, run.labels, settings.rate, settings.mask, run.corrections
+    )
     return measurements_of(tables[max(run.piece, 1) - 1], settings.channels, known=known)

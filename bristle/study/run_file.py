@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..data.channels import DRIVE, PLAIN, ChannelSpec
+from ..data.channels import DRIVE, PLAIN, ChannelSpec, is_channel
+from ..data.corrections import FAULTS, Correction, wrong_value
 from ..data.files import Toml
 from ..data.labels import UNITS, Label
-from ..findings import written
+from ..findings import unknown, written
 from ..lines import KeyPath
 
 TEST = "test"
 """The role of runs that no choice sees: neither a fit nor a verdict reads them."""
 
 ROLES = ("train", "holdout", TEST)
-_RUN_KEYS = ("file", "piece", "role", *DRIVE, *UNITS, "labels")
+_RUN_KEYS = ("file", "piece", "role", *DRIVE, *UNITS, "labels", "correct")
+_CORRECTION_KEYS = Correction._fields
 
 
 @dataclass(frozen=True)
@@ -25,7 +27,8 @@ class RunFile:
     """One `[[runs]]`: the file, relative to the study, and its role, one of `ROLES`.
 
     `levels` of a command that the file does not hold, by channel, in its unit; `labels` what else
-    is known of the whole run; `piece` its number in a file of several runs, from 1, else 0.
+    is known of the whole run; `piece` its number in a file of several runs, from 1, else 0;
+    `corrections` what is set right in its channels as it is read.
     """
 
     file: str
@@ -33,6 +36,7 @@ class RunFile:
     levels: Mapping[str, float] = field(default_factory=dict)
     labels: Mapping[str, Label] = field(default_factory=dict)
     piece: int = 0
+    corrections: tuple[Correction, ...] = ()
 
     @property
     def name(self) -> str:
@@ -69,7 +73,7 @@ def read_runs(toml: Toml, folder: Path, split: bool) -> tuple[RunFile, ...]:
             toml.error((*keys, "file"), f"there is no file {folder / file}.")
         made = RunFile(
             file, role, _levels(toml, keys, table), _labels(toml, keys, table),
-            _piece(toml, keys, table, split),
+            _piece(toml, keys, table, split), _corrections(toml, keys, table),
         )  # fmt: skip
         if any(made.name == run.name for run in out):
             toml.error((*keys, "file"), f"{made.name} is listed twice: one of the two must go.")
@@ -112,6 +116,32 @@ def _piece(toml: Toml, keys: KeyPath, table: Mapping[str, Any], split: bool) -> 
     return piece if isinstance(piece, int) else 0
 
 
+def _corrections(toml: Toml, keys: KeyPath, table: Mapping[str, Any]) -> tuple[Correction, ...]:
+    """Return what a run's table sets right in its channels."""
+    listed = table.get("correct", [])
+    right = '[{ channel = "force", fault = "gain", value = 1.25 }]'
+    if not isinstance(listed, list) or not all(isinstance(one, dict) for one in listed):
+        toml.error((*keys, "correct"), f"correct = {written(listed)}; {right} is right.")
+        return ()
+    out = []
+    for index, one in enumerate(listed):
+        here = (*keys, "correct", index)
+        toml.known(here, one, _CORRECTION_KEYS)
+        channel, fault = toml.text(here, one, "channel"), toml.text(here, one, "fault")
+        value = toml.number(here, one, "value")
+        if not is_channel(channel):
+            toml.error(here, unknown("channel", channel, PLAIN))
+        elif fault not in FAULTS:
+            toml.error(here, unknown("fault", fault, FAULTS))
+        elif value is None:
+            toml.error(here, f"{fault} has no value: {FAULTS[fault]}.")
+        elif wrong := wrong_value(fault, value):
+            toml.error(here, f"{fault} = {written(value)}: {wrong}")
+        else:
+            out.append(Correction(channel, fault, value))
+    return tuple(out)
+
+
 def check_levels(
     toml: Toml, runs: tuple[RunFile, ...], channels: Mapping[str, ChannelSpec]
 ) -> None:
@@ -148,4 +178,18 @@ def run_as_toml(run: RunFile) -> Any:
         inline = tomlkit.inline_table()
         inline.update(other)
         table.add("labels", inline)
+    if run.corrections:
+        table.add("correct", corrections_as_toml(run.corrections))
     return table
+
+
+def corrections_as_toml(corrections: Sequence[Correction]) -> Any:
+    """Return corrections as a run's table holds them, one a line."""
+    import tomlkit
+
+    array = tomlkit.array()
+    for one in corrections:
+        inline = tomlkit.inline_table()
+        inline.update(one._asdict())
+        array.append(inline)
+    return array.multiline(True)

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from ..data.channels import DRIVE, PLAIN, ChannelSpec, channel_unit, is_channel
+from ..data.corrections import Correction
 from ..data.files import Toml, write_whole
 from ..data.pieces import wrong_split
 from ..errors import RecordError, UnitError
 from ..findings import unknown, written
 from ..units import same_dimension
-from .run_file import RunFile, check_levels, read_runs, run_as_toml
+from .run_file import RunFile, check_levels, corrections_as_toml, read_runs, run_as_toml
 
 RIGS = ("bench", "structure")
 CUT_OFF = 18.0
@@ -148,6 +149,24 @@ def with_mask(text: str) -> str:
     first += "".join(lines[first : first + 1]).startswith("schema")
     line = "mask = true # isolated spikes count as not measured"
     return "\n".join([*lines[:first], line, *lines[first:]])
+
+
+def with_corrections(text: str, found: Mapping[int, Sequence[Correction]]) -> str:
+    """Return the text of a study.toml with more corrections of runs, all else as it was.
+
+    Parameters
+    ----------
+    text : of the file
+    found : corrections by the place of the run in `[[runs]]`
+    """
+    import tomlkit
+
+    document = tomlkit.parse(text)
+    for place, corrections in found.items():
+        table = document["runs"][place]  # type: ignore[index]
+        known = [Correction(**one) for one in table.unwrap().get("correct", [])]  # type: ignore[union-attr]
+        table["correct"] = corrections_as_toml([*known, *corrections])  # type: ignore[index]
+    return tomlkit.dumps(document)
 
 
 def _as_toml(spec: ChannelSpec) -> dict[str, Any]:

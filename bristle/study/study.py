@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from filelock import FileLock, Timeout
 
 from .. import __version__
+from ..data.corrections import Correction
 from ..data.files import read_json, write_json, write_whole
 from ..data.measurement import Measurement
 from ..data.model import StudyModel, read_model
@@ -22,10 +23,10 @@ from ..physics.user import Loaded, waiting
 from ..trust import can_do_without, load
 from .history import History, Step
 from .new import make_folder
-from .reading import read_runs
+from .reading import name_of_run, read_runs
 from .run_file import ROLES, TEST
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
-from .settings import Settings, read_settings, with_mask
+from .settings import Settings, read_settings, with_corrections, with_mask
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -293,6 +294,31 @@ class Study:
         path = self.folder / "study.toml"
         with self.writing():
             write_whole(path, with_mask(path.read_text(encoding="utf-8-sig")))
+        return Study(self.folder)
+
+    def with_corrections(self, found: Mapping[str, Sequence[Correction]]) -> Study:
+        """Write corrections into study.toml, and return the study as it is then.
+
+        Parameters
+        ----------
+        found : corrections by the name of the run, or of a part of it
+
+        Raises
+        ------
+        StudyError
+            If no run has such a name.
+        """
+        path = self.folder / "study.toml"
+        names = [name_of_run(run) for run in self.settings.runs]
+        places: dict[int, list[Correction]] = {}
+        for name, corrections in found.items():
+            own = [one for one in names if name == one or name.startswith((f"{one} (", f"{one}, "))]
+            if not own:
+                raise StudyError(f'{path}: no run is called "{name}".')
+            known = places.setdefault(names.index(max(own, key=len)), [])
+            known += [one for one in corrections if not any(map(one.is_like, known))]
+        with self.writing():
+            write_whole(path, with_corrections(path.read_text(encoding="utf-8-sig"), places))
         return Study(self.folder)
 
     def verdict(self) -> dict[str, Any] | None:

@@ -7,7 +7,11 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from ..corrections import Correction
+
 Level = Literal["error", "warning", "note"]
+_OF_ONE_RUN = ("run gain", "run sign", "run zero")
+"""Kinds that say how one run differs from the others."""
 _ORDER = {"error": 0, "warning": 1, "note": 2}
 
 
@@ -17,7 +21,8 @@ class Finding:
 
     `kind` names it for programs ("clipping"), `run` and `channel` are "" where it is about all;
     `text` says it with numbers, `do` what to do, "" where there is nothing; `value` is the number
-    by which findings of one kind are ordered, worst last.
+    by which findings of one kind are ordered, worst last. `corrections` set it right where that can
+    be done.
     """
 
     kind: str
@@ -27,17 +32,19 @@ class Finding:
     run: str = ""
     channel: str = ""
     value: float = 0.0
+    corrections: tuple[Correction, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return the finding as JSON has it."""
-        return asdict(self)
+        return {**asdict(self), "corrections": [one._asdict() for one in self.corrections]}
 
 
 def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, list[str]]]:
     """Return the worst finding of each kind and channel, with the runs that share it."""
-    groups: dict[tuple[str, str, str], list[Finding]] = defaultdict(list)
+    groups: dict[tuple[str, ...], list[Finding]] = defaultdict(list)
     for finding in findings:
-        groups[finding.level, finding.kind, finding.channel].append(finding)
+        run = finding.run if finding.kind in _OF_ONE_RUN else ""
+        groups[finding.level, finding.kind, finding.channel, run].append(finding)
     out = [
         (max(group, key=lambda one: one.value), [one.run for one in group if one.run])
         for group in groups.values()

@@ -1,0 +1,161 @@
+"""What a laboratory does wrong: planted in measurements of the generator, named or not.
+
+    python -m benchmarks lab --each 20
+
+makes what is missing of `--each` cases per fault, with the generator of the blind benchmark, and
+prints how many are named with channel, run and value; without a number it prints what is there.
+Each case is checked as it is, too: what is said of those is a false alarm. No model is fitted.
+
+hum       a sinusoid at 50 or 60 Hz, off by up to 0.04 %, of 3 to 10 % of the channel's RMS
+line      the same at a frequency between 25 and 200 Hz that is none of the mains
+average   a mean of 3 to 30 samples, noise included
+gain      one run's channel, noise included, times 0.7, 0.85, 1.15 or 1.4
+sign      one run's channel turned
+zero      15 or 40 % of the channel's RMS added to one run's force or velocity
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import traceback
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from bristle.data.checks.differing_runs import check_differing_runs
+from bristle.data.checks.finding import Finding
+from bristle.data.checks.recording import check_recording
+from bristle.data.measurement import Measurement
+
+from ._answers import Answer, Answers
+from ._blind import cases, score
+from ._blind.plan import make_plan
+from ._blind.subject import measurements
+from ._rows import Row
+
+SEED = 23
+FAULTS = ("hum", "line", "average", "gain", "sign", "zero")
+CLEAN = "clean"
+GOAL = 0.9
+NEAR = {"line": 1e-3, "gain": 0.05, "sign": 0.0, "bias": 0.1}
+"""Share by which a told value may be off."""
+
+
+def run() -> list[Row]:
+    """Return the rows of what has been made so far."""
+    return rows(Answers("lab").kept())
+
+
+def main(given: list[str]) -> int:
+    """Make what is missing, print the rows."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks lab", description=__doc__)
+    parser.add_argument("--each", type=int, default=0, metavar="CASES")
+    each = parser.parse_args(given).each
+    done = Answers("lab").complete(_jobs(each), _answered)
+    for row in rows(done):
+        print(f"{row.name}: {row.measured} (goal {row.goal})")
+    return 0
+
+
+def rows(done: dict[str, Answer]) -> list[Row]:
+    """Return one row per fault that has answers, and one of the clean cases."""
+    out = []
+    for fault in (*FAULTS, CLEAN):
+        own = [answer for key, answer in done.items() if json.loads(key)[0] == fault]
+        if not own:
+            continue
+        right = score.Count(sum(one["right"] for one in own), len(own))
+        if fault == CLEAN:
+            alarms = right.of - right.good
+            name = "lab: false alarms"
+            out.append(Row(name, f"{alarms} of {right.of}", "0", float(alarms > 0) * 2.0))
+            continue
+        text = f"{right.good} of {right.of} named with channel, run and value"
+        out.append(Row(f"lab: {fault}", text, f">= {GOAL:.0%}", GOAL / max(right.share, 1e-3)))
+    return out
+
+
+def _jobs(each: int) -> Iterator[tuple[str, int]]:
+    yield from ((fault, k) for k in range(each) for fault in (CLEAN, *FAULTS))
+
+
+def _answered(fault: str, number: int) -> Answer:
+    """Return whether what is planted is named and nothing else; an error is wrong."""
+    try:
+        runs = _runs(number)
+        rng = np.random.default_rng([SEED, number, len(fault)])
+        if fault == CLEAN:
+            found = _found(runs)
+            return {"right": not found, "said": [one.text for one in found]}
+        changed, place, wanted = _planted(fault, runs, rng)
+        found = _found(changed)
+        named = [one for one in found if _names(one, changed[place].name, wanted)]
+        right = len(named) == 1 and len(found) == 1
+        said = [[one.run, one.channel, one.text] for one in found]
+        return {"right": right, "planted": [changed[place].name, *wanted], "said": said}
+    except Exception:  # whatever it is, it is the method's failure on this case
+        return {"right": False, "said": [], "error": traceback.format_exc()}
+
+
+def _runs(number: int) -> list[Measurement]:
+    """Return the runs of a case that hides nothing."""
+    case = cases.load(make_plan(SEED, 4 * (number + 1), "none")[number])
+    return measurements(case.runs, case.channels)
+
+
+def _found(runs: list[Measurement]) -> list[Finding]:
+    recorded = [finding for run in runs for finding in check_recording(run)]
+    return [*recorded, *check_differing_runs(runs)]
+
+
+def _names(found: Finding, run: str, wanted: tuple[str, str, float]) -> bool:
+    """Return whether a finding names the run, the channel and the value."""
+    channel, fault, value = wanted
+    if (found.run, found.channel) != (run, channel):
+        return False
+    if fault == "average":
+        return f"average of {value:.0f} samples" in found.text
+    told = [one for one in found.corrections if one.fault == fault]
+    return any(abs(one.value - value) <= NEAR[fault] * abs(value) for one in told)
+
+
+def _planted(
+    fault: str, runs: list[Measurement], rng: np.random.Generator
+) -> tuple[list[Measurement], int, tuple[str, str, float]]:
+    """Return the runs with one fault in one of them, its place, and what should be named."""
+    able = ("velocity", "force") if fault == "zero" else ("displacement", "velocity", "force")
+    place, channel = int(rng.integers(len(runs))), str(rng.choice(able))
+    one = runs[place]
+    y = one[channel]
+    rms = float(np.sqrt(np.mean(np.concatenate([each[channel] for each in runs]) ** 2)))
+    noise, wanted = one.noise[channel], (channel, fault, 0.0)
+    if fault in ("hum", "line"):
+        hum = rng.choice([50.0, 60.0]) * (1.0 + rng.uniform(-4e-4, 4e-4))
+        frequency = float(hum if fault == "hum" else _between(rng))
+        turns = 2.0 * np.pi * frequency * one.time + rng.uniform(0.0, 2.0 * np.pi)
+        y = y + rng.uniform(0.03, 0.1) * float(np.std(y)) * np.sin(turns)
+        wanted = (channel, "line", frequency)
+    elif fault == "average":
+        length = int(rng.integers(3, 31))
+        y = np.convolve(np.pad(y, (length - 1, 0), mode="edge"), np.ones(length) / length, "valid")
+        wanted = (channel, "average", float(length))
+    elif fault in ("gain", "sign"):
+        value = float(rng.choice([0.7, 0.85, 1.15, 1.4])) if fault == "gain" else -1.0
+        y, noise, wanted = value * y, abs(value) * noise, (channel, fault, value)
+    else:
+        value = float(rng.choice([-0.4, -0.15, 0.15, 0.4])) * rms
+        y, wanted = y + value, (channel, "bias", value)
+    changed = replace(
+        one, channels={**one.channels, channel: y}, noise={**one.noise, channel: noise}
+    )
+    return [*runs[:place], changed, *runs[place + 1 :]], place, wanted
+
+
+def _between(rng: np.random.Generator) -> float:
+    """Return a frequency [Hz] of no mains."""
+    while True:
+        found = float(rng.uniform(25.0, 200.0))
+        if all(abs(found - k * mains) > 1.0 for mains in (50.0, 60.0) for k in range(1, 5)):
+            return found

@@ -1,0 +1,80 @@
+"""Looks at how channels were recorded: lines that nothing drives, averages before storing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ...quantity import plain, quantity
+from ..channels import DRIVE
+from ..corrections import Correction
+from ..measurement import Measurement
+from ..moving_average import moving_average
+from ..spectral_lines import SpectralLine, spectral_lines
+from .finding import Finding
+
+
+def check_recording(run: Measurement) -> Iterator[Finding]:
+    """Yield what the spectra of a run's channels say of how they were recorded.
+
+    Parameters
+    ----------
+    run : with all samples of its file: fewer show neither nulls nor lines where they are
+    """
+    lines = spectral_lines(run.channels, run.step)
+    for channel in dict.fromkeys(line.channel for line in lines):
+        yield _of_lines(run, [line for line in lines if line.channel == channel])
+    if run.sampling.resampled:
+        return  # its samples are means of others
+    for channel, values in run.channels.items():
+        found = None if channel in DRIVE else moving_average(values, run.step)
+        if found is not None:
+            yield Finding(
+                "averaged",
+                "warning",
+                f"{channel} is a moving average of {found.length} samples "
+                f"({plain(1e3 * found.length * run.step)} ms): its spectrum has {found.nulls} "
+                "nulls at equal distances. Jumps are rounded that long, and a delay or lag of "
+                "that size may be the average's.",
+                "Store the channel as it was sampled, and measure again if you can.",
+                run.name,
+                channel,
+                found.length * run.step,
+            )
+
+
+def _of_lines(run: Measurement, lines: Sequence[SpectralLine]) -> Finding:
+    """Return the finding of all lines on one channel, the largest first."""
+    ordered = sorted(lines, key=lambda one: -one.amplitude)
+    channel, unit = ordered[0].channel, run.units[ordered[0].channel]
+    rms = float(np.std(run[channel])) or 1.0
+    told = [
+        f"{plain(one.frequency, 4)} Hz of {quantity(one.amplitude, unit, 2)} ({_origin(one, run)})"
+        for one in ordered
+    ]
+    what = "a line at" if len(told) == 1 else "lines at"
+    return Finding(
+        "lines",
+        "warning",
+        f"{channel} has {what} {', '.join(told)}; the largest is "
+        f"{plain(100.0 * ordered[0].amplitude / rms, 2)} % of its RMS, and no motion drives it.",
+        "`bristle study check FOLDER --correct` takes it off. Look for a loop of the ground, or a "
+        "shield that is open.",
+        run.name,
+        channel,
+        ordered[0].amplitude,
+        tuple(Correction(channel, "line", round(one.frequency, 4)) for one in ordered),
+    )
+
+
+def _origin(line: SpectralLine, run: Measurement) -> str:
+    """Return where a line is from, as far as its frequency tells."""
+    if not line.mains:
+        return "on this channel alone"
+    whole = f"the mains of {line.mains:g} Hz"
+    if line.order > 1:
+        whole = f"{plain(line.order * line.mains, 4)} Hz of {whole}"
+    if line.folded:
+        return f"{whole}, aliased at {plain(run.sampling.rate, 4)} samples per second"
+    return whole

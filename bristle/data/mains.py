@@ -1,0 +1,51 @@
+"""Where the mains and their harmonics show in a record, those beyond half its rate included."""
+
+from __future__ import annotations
+
+MAINS = (50.0, 60.0)
+"""Frequencies of the mains [Hz]."""
+
+MAINS_OFF = 2e-3  # share by which the mains may be off; a grid keeps to a fifth of that
+_MAINS_ORDERS = 5  # harmonics of the mains that are looked for beyond half the sampling rate
+
+
+def mains_lines(step: float) -> list[float]:
+    """Return where the harmonics of the mains show at a sampling step [s], in Hz."""
+    half = 0.5 / step
+    return [
+        _folded(order * mains, step)
+        for mains in MAINS
+        for order in range(1, max(int(half / mains), _MAINS_ORDERS) + 1)
+    ]
+
+
+def _folded(frequency: float, step: float) -> float:
+    """Return where a frequency [Hz] shows that is sampled every `step` [s]."""
+    rate = 1.0 / step
+    return abs(frequency - rate * round(frequency / rate))
+
+
+def mains_of(frequency: float, step: float, width: float) -> tuple[float, int, bool]:
+    """Return the mains frequency [Hz] that a line is of, the order, and whether it is folded.
+
+    Parameters
+    ----------
+    frequency : Hz, as recorded
+    step : sampling step [s]
+    width : Hz within which it is known
+
+    Returns
+    -------
+    (mains, order, folded)
+        (0, 0, False) where it is none of the mains.
+    """
+    half = 0.5 / step
+    for folded in (False, True):
+        for mains in MAINS:
+            for order in range(1, max(int(half / mains), _MAINS_ORDERS) + 1):
+                whole = order * mains
+                if (whole > half) is not folded or (folded and order > _MAINS_ORDERS):
+                    continue
+                if abs(_folded(whole, step) - frequency) <= max(MAINS_OFF * whole, width):
+                    return mains, order, folded
+    return 0.0, 0, False
