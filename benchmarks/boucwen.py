@@ -13,6 +13,8 @@ of it; m is known. The identified element is then put back under the mass, and y
 alone.
 """
 
+# Longer than 300 lines: the system, an own law and its simulation are one story.
+
 from __future__ import annotations
 
 import json
