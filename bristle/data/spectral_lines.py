@@ -139,7 +139,9 @@ def _spectrum(y: Array, step: float) -> _Spectrum:
     level = np.sqrt(median_filter(size**2, 2 * _SMOOTH + 1, mode="nearest") / np.log(2.0))
     least = 1e-12 * float(size.max())
     return _Spectrum(
-        np.fft.rfftfreq(len(y), step), size, np.asarray(np.maximum(level, least), dtype=float)
+        np.asarray(np.fft.rfftfreq(len(y), step), dtype=float),
+        size,
+        np.asarray(np.maximum(level, least), dtype=float),
     )
 
 

@@ -161,11 +161,11 @@ def with_corrections(text: str, found: Mapping[int, Sequence[Correction]]) -> st
     """
     import tomlkit
 
-    document = tomlkit.parse(text)
+    document: Any = tomlkit.parse(text)
     for place, corrections in found.items():
-        table = document["runs"][place]  # type: ignore[index]
-        known = [Correction(**one) for one in table.unwrap().get("correct", [])]  # type: ignore[union-attr]
-        table["correct"] = corrections_as_toml([*known, *corrections])  # type: ignore[index]
+        table = document["runs"][place]
+        known = [Correction(**one) for one in table.unwrap().get("correct", [])]
+        table["correct"] = corrections_as_toml([*known, *corrections])
     return tomlkit.dumps(document)
 
 

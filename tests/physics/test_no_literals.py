@@ -22,6 +22,7 @@ KINDS = {
 ELSEWHERE = {
     ("compare/coordinates.py", "temperature"): "a label of a run",
     ("data/labels.py", "temperature"): "a label of a run",
+    ("data/corrections.py", "delay"): "a fault of a channel that can be set right",
     ("data/checks/motion.py", "delay"): "a kind of finding: a channel that comes late",
     ("diagnose/corrected.py", "delay"): "a kind of sensor fault",
     ("diagnose/load_cell.py", "delay"): "a kind of sensor fault",

@@ -29,7 +29,7 @@ SIZES = {"displacement": 0.02, "velocity": 0.15, "force": 120.0}
 def run(
     seed: int, seconds: float = 6.0, rate: float = RATE, noise: float = 0.01, sine: float = 0.0
 ):
-    """A Bingham damper, moved by eight sines below 4 Hz or by one, at a voltage that is switched."""
+    """Return a Bingham damper's run: eight sines below 4 Hz or one, a voltage that is switched."""
     rng = np.random.default_rng(seed)
     t = np.arange(0.0, seconds, 1.0 / rate)
     frequencies = np.array([sine]) if sine else rng.uniform(0.4, 4.0, 8)

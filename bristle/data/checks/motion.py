@@ -109,7 +109,6 @@ def check_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
 def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -> Iterator[Finding]:
     if found is None:
         return  # one of the two stands still, which is said elsewhere
-    where = {"run": run.name, "channel": upper}
     if abs(found.correlation) < 0.9 and found.residual > 0.4:
         yield Finding(
             "derivative",
@@ -118,7 +117,8 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
             f"{found.correlation:.2f}.",
             "Check the columns: are two exchanged, or is one instrument not connected?",
             value=1.0 - abs(found.correlation),
-            **where,
+            run=run.name,
+            channel=upper,
         )
         return
     gain = (
@@ -136,7 +136,8 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
             f"{gain}{after}.",
             f"Check the {' and the '.join(doubts)} of both in study.toml.",
             value=abs(log10(size)),
-            **where,
+            run=run.name,
+            channel=upper,
         )
     else:
         certain = off > max(_GAIN, 4.0 * found.gain_std)
@@ -146,7 +147,8 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
             f"{gain}{after}.",
             "One of the two instruments is out of calibration." if certain else "",
             value=off,
-            **where,
+            run=run.name,
+            channel=upper,
         )
     if abs(found.delay) > max(_DELAY * run.step, 4.0 * found.delay_std):
         late = "later" if found.delay > 0.0 else "earlier"
@@ -158,5 +160,6 @@ def _related(run: Measurement, lower: str, upper: str, found: Relation | None) -
             f"than {lower}.",
             "Filters of two instruments differ: use the same on both, or one of the channels.",
             value=abs(found.delay),
-            **where,
+            run=run.name,
+            channel=upper,
         )
