@@ -19,7 +19,8 @@ from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.finding import Finding
 from bristle.diagnose.law_choice import Pair, choose, search
 from bristle.diagnose.law_trials import LawTrial, try_laws
-from bristle.diagnose.learned.curve import Curve, effect_text
+from bristle.diagnose.learned.curve import Curve
+from bristle.diagnose.learned.effect_file import effect_text
 from bristle.diagnose.learned.fit import learn
 from bristle.diagnose.opening import (
     BenchData,
