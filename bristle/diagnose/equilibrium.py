@@ -75,7 +75,7 @@ class BuildingRuns:
         self._straight = linear_storeys(self._present.effects)
         shaken = Shaken(self._train, self._holdout, self._present.law, self._straight)
         self._building = suited_masses(shaken, building)
-        self._masses = text_of_masses(building, self._building)
+        self._masses = text_of_masses(building, self._building, shaken.measured)
         self._problems = self._made(self._building)
         self._notes: list[str] = []
 

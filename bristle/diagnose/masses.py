@@ -3,7 +3,8 @@
 The shear of a storey is the inertia above it, and must go with one line through drift and drift
 rate at each storey; at the isolation layer it must go with the measured force besides. Masses that
 are off leave what no line takes up, and a load cell of another scale is, for equilibrium, nothing
-but masses that are all off alike. So masses are moved first, as far as a file may be wrong.
+but masses that are all off alike. So masses are moved first, as far as a file may be wrong. Without
+a measured force only their ratios can be told.
 """
 
 from __future__ import annotations
@@ -38,6 +39,11 @@ class Shaken:
     law: str
     straight: bool
 
+    @property
+    def measured(self) -> bool:
+        """Whether the damper's force was measured in every run."""
+        return all(run.force is not None for run in (*self.train, *self.holdout))
+
     def lines(self, building: Building) -> dict[str, Pair]:
         """Return the sites whose model is a line, with a building's masses."""
         found = problems_of(self.train, self.holdout, building, self.law, self.straight)
@@ -58,7 +64,7 @@ def suited_masses(shaken: Shaken, building: Building, rule: DecisionRule = SITE)
     if before <= rule.least_excess * len(lines):
         return building
     shift = _shift(shaken, building, lines, rule)
-    if float(np.max(np.abs(shift))) > rule.mass_doubt:
+    if float(np.max(np.abs(shift / (1.0 + shift)))) > rule.mass_doubt:
         return building
     moved = with_masses(building, shift)
     return moved if _excess(shaken.lines(moved), rule) <= rule.moved * before else building
@@ -71,13 +77,24 @@ def with_masses(building: Building, shift: Array) -> Building:
     return building._replace(M=tuple(map(tuple, M.tolist())))
 
 
-def text_of_masses(before: Building, after: Building) -> list[str]:
-    """Return the sentence about masses that were moved, in a list; none where none was."""
+def text_of_masses(before: Building, after: Building, measured: bool = True) -> list[str]:
+    """Return the sentence about masses that were moved, in a list; none where none was.
+
+    Parameters
+    ----------
+    before, after : the building as its file has it, and with masses that suit equilibrium
+    measured : whether the damper's force was measured
+    """
     if after is before:
         return []
     names = before.levels()
     share = [after.M[i][i] / before.M[i][i] - 1.0 for i in range(before.size)]
     told = ", ".join(f"{name} {one:+.1%}" for name, one in zip(names, share, strict=True))
+    if not measured:
+        return [
+            f"Equilibrium requires other masses than those in the building's file: {told}, with "
+            "their sum kept, which no run without a measured force shows. Weigh the building."
+        ]
     return [
         f"Equilibrium requires other masses than those in the building's file: {told}. A load "
         "cell whose gain is wrong by that much would look the same. Weigh the building, or check "
@@ -100,6 +117,7 @@ def _shift(
     """Return by which share (n,) each mass is to move: least squares, with what the file knows."""
     n = building.size
     unit = rule.mass_doubt / DEVIATIONS
+    able = _determined(n, n - len(lines), shaken.measured)
     others = [shaken.lines(with_masses(building, unit * np.eye(n)[j])) for j in range(n)]
     normal, gradient = np.eye(n), np.zeros(n)
     for site, (train, _) in lines.items():
@@ -120,7 +138,20 @@ def _shift(
         slopes = np.stack([left(_target(other[site][0]) - here) for other in others], axis=1)
         normal += slopes.T @ slopes
         gradient += slopes.T @ left(here)
-    return np.asarray(-unit * np.linalg.solve(normal, gradient))
+    return np.asarray(-unit * able @ np.linalg.solve(able.T @ normal @ able, able.T @ gradient))
+
+
+def _determined(n: int, lowest: int, measured: bool) -> Array:
+    """Return a basis (n, k) of the changes of n masses that equilibrium may tell.
+
+    Without a measured force the masses above the lowest line and all stiffnesses may be larger
+    alike: what lines leave would only shrink with them.
+    """
+    if measured:
+        return np.eye(n)
+    moved = np.zeros((n, n - lowest))
+    moved[lowest:] = np.eye(n - lowest) - 1.0 / (n - lowest)
+    return np.asarray(np.linalg.svd(moved)[0][:, : n - lowest - 1])
 
 
 def _target(problem: StructureProblem) -> Array:

@@ -15,14 +15,15 @@ from bristle.identify.response import responses
 DOUBTS = ([0.02, -0.03, 0.025], [-0.04, 0.01, 0.03], [0.0, 0.05, -0.02])
 
 
-def shaken(gain=1.0, hidden=None):
+def shaken(gain=1.0, hidden=None, without=()):
     """Return a building of two floors on isolation, and its responses."""
     b = building(2, True, 6)
     runs = []
     for i in range(3):
         clean = shake(b, 30 + i, friction, hidden)
         clean["force"] = clean["force"] * gain
-        runs.append(measured(clean, i))
+        clean["voltage"] = np.where(clean["time"] < np.mean(clean["time"]), 4.0, 0.0)
+        runs.append(measured(clean, i, without=without))
     found = responses(runs, b)
     return b, Shaken(found[:2], found[2:], "bingham", True)
 
@@ -46,6 +47,20 @@ def test_masses_that_are_off_are_found_and_no_fault_is_told(clean, doubt):
     (text,) = text_of_masses(told, found)
     assert "floor1" in text
     assert "cell whose gain is wrong" in text
+
+
+@pytest.mark.parametrize("doubt", [*DOUBTS, [0.0, -0.06, 0.06]])
+def test_without_a_measured_force_the_ratio_of_the_floors_is_found(doubt):
+    b, runs = shaken(without=("force",))
+    told = with_masses(b, np.array(doubt))
+    found = suited_masses(runs, told)
+    _, one, other = np.diag(b.M)
+    ratio = float(np.diag(found.M)[2] / np.diag(found.M)[1])
+    assert ratio == pytest.approx(other / one, rel=6e-3)
+    assert np.diag(found.M)[0] == np.diag(told.M)[0]
+    (text,) = text_of_masses(told, found, runs.measured)
+    assert "load cell" not in text
+    assert {look_at(site, *pair).kind for site, pair in runs.lines(found).items()} == {"none"}
 
 
 def test_right_masses_stay(clean):
