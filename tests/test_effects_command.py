@@ -9,6 +9,7 @@ import pytest
 from bristle.cli import main
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
+from bristle.quantity import typed
 
 
 def answer(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
@@ -37,7 +38,7 @@ def test_one_effect_is_told_in_full(name: str, capsys: pytest.CaptureFixture[str
     assert effect.source in said
     assert effect.expect in said
     for parameter, about in effect.parameters.items():
-        assert f"{name}.{parameter} = {about.value:g}" in said
+        assert f"{name}.{parameter} = {typed(about.value)}" in said
         assert about.text in said
 
 

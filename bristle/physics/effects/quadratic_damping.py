@@ -11,9 +11,10 @@ class QuadraticDamping(Effect):
         F = c_2 V_r^2 (|v|/V_r)^shape sgn(v),   V_r = 0.1 m/s
 
     With the exponent 1 it is the dashpot of a second load path, c_2 V_r [N s/m]; only a law without
-    a constant viscous part, such as the modified Bingham law, can tell that from its own. Leaves
-    out the laminar range below and cavitation above: doubt it when the force jumps or breaks off at
-    the highest speeds.
+    a constant viscous part, such as the modified Bingham law, can tell that from its own.
+
+    Leaves out the laminar range below and cavitation above: doubt it when the force jumps or
+    breaks off at the highest speeds.
     """
 
     name = "quadratic_damping"
