@@ -59,8 +59,18 @@ def compared(first: Trial, second: Trial, rule: DecisionRule = BENCH) -> Differe
     return paired(first.losses, second.losses, rule.chance)
 
 
+def serves_rest(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
+    """Return whether a model's z is that of the many samples near rest, at the cost of all others.
+
+    Only where the best model leaves more than noise: its plain error then says which one is wrong.
+    """
+    return best.z > rule.clean and other.rms > rule.most_rms * best.rms
+
+
 def clearly_worse(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
     """Return whether a model errs more than another by enough, and beyond chance."""
+    if serves_rest(other, best, rule):
+        return True
     if other.z <= best.z * (1.0 + rule.law_gain):
         return False
     apart = compared(other, best, rule)
@@ -69,6 +79,8 @@ def clearly_worse(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool
 
 def as_good(other: Trial, best: Trial, rule: DecisionRule = BENCH) -> bool:
     """Return whether the data cannot distinguish a model from the best one."""
+    if serves_rest(other, best, rule):
+        return False
     if other.z <= best.z * (1.0 + rule.close):
         return True
     apart = compared(other, best, rule)

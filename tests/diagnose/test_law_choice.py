@@ -203,3 +203,14 @@ def test_the_verdict_tells_law_table_and_what_does_as_well():
 def test_a_verdict_on_a_law_given_says_nothing_of_laws():
     assert law_sentences({"kind": "none", "effects": []}) == []
     assert headline({"kind": "effect", "effects": ["drift"]}) == "The model misses drift."
+
+
+def test_an_effect_that_explains_most_near_rest_is_not_preferred_to_a_law_with_half_the_error():
+    mimic = pair("bingham", 13.0, "effect", ("gas_spring",), 5.21)
+    law = pair("modified_bouc_wen", 5.2, "unknown")
+    assert not clearly_worse(mimic.after, law.after)  # by z the runs do not tell
+    assert choose([mimic, law]) is mimic
+    coarse = replace(mimic.after, rms=2.6 * law.after.rms)
+    coarse_pair = replace(mimic, finding=replace(mimic.finding, after=coarse))
+    assert clearly_worse(coarse, law.after)
+    assert choose([coarse_pair, law]) is law

@@ -92,17 +92,21 @@ def learn(
         return LearnedCurve(name, None, (), before, None, (), why)
     fitted = _fitted(chosen, name, before.model, train, held_out)
     fitted = sorted(fitted, key=lambda one: learning.weighed(one.loss, one.curve.memory))
-    best, curve = fitted[0], fitted[0].curve
-    refused = _refusal(before, best, rule)
-    return LearnedCurve(name, curve, best.std, before, best.trial, tuple(fitted[1:]), refused)
+    refusals = [_refusal(before, one, rule, learning) for one in fitted]
+    place = refusals.index("") if "" in refusals else 0
+    kept = fitted[place]
+    others = tuple(one for one in fitted if one is not kept)
+    return LearnedCurve(
+        name, kept.curve, kept.std, before, kept.trial, others, refusals[place]
+    )
 
 
-def _refusal(before: Trial, best: Fitted, rule: DecisionRule) -> str:
-    """Return why the best curve is not kept; "" where it is."""
+def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRule) -> str:
+    """Return why a curve is not kept; "" where it is."""
     why = ""
     if not missing(before, best.trial, rule):
         why = "does not lower the error on held-out runs beyond chance"
-    elif rule.excess(best.trial.z) > (1.0 - rule.first) * rule.excess(before.z):
+    elif rule.excess(best.trial.z) > (1.0 - learning.worth) * rule.excess(before.z):
         why = "explains too little of the error on held-out runs"
     told = f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
     return f"The best curve, {best.curve.words()}, {why} {told}." if why else ""

@@ -27,6 +27,13 @@ class LearnRule:
     Found: blind seeds.
     """
 
+    worth: float = 0.1
+    """Smallest share of the excess z^2 - 1 that a curve must explain to be kept.
+
+    Trades: if higher, a rig with several unknowns keeps its error although each curve lowers it; if
+    lower, curves that say little. Found: stated; that a gain is no chance is tested besides.
+    """
+
     as_good: float = 1.03
     """Largest error on training runs of a closed form over that of the curve which it replaces.
 
