@@ -16,13 +16,19 @@ import argparse
 import json
 import traceback
 from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
 
 import numpy as np
 
+from bristle.diagnose.candidates import Trial
 from bristle.diagnose.learned.closed import closed_forms, name_of
-from bristle.diagnose.learned.fit import close, learn
-from bristle.diagnose.opening import Insufficient, opening
+from bristle.diagnose.learned.curve import Curve
+from bristle.diagnose.learned.effect_file import effect_text
+from bristle.diagnose.learned.fit import LearnedCurve, close, learn
+from bristle.diagnose.opening import Insufficient, Opening, opening
 from bristle.identify.model import Model
+from bristle.physics.user import defined
 
 from ._answers import Answer, Answers
 from ._blind import cases
@@ -33,6 +39,9 @@ from ._rows import Row
 SEED = 12
 ADEQUATE = 1.5
 """z up to which a learned curve holds what was missing."""
+
+MOST = 3
+"""Curves that are learned one after the other, until they hold what was missing."""
 
 RIGHT = {
     "bow": {"displacement": {"parabola", "power"}},
@@ -117,19 +126,39 @@ def _learned(case: cases.Recorded, law: str) -> Answer:
     opened = opening(train, held_out, Model(law))
     if isinstance(opened, Insufficient):
         return {"learned": False, "why": list(opened.reasons)}
-    before = {"z_before": opened.before.z}
-    found = learn(opened, "learned_1")
-    if found.refused or found.curve is None or found.after is None:
-        return before | {"learned": False, "z": opened.before.z, "why": found.refused}
-    forms = closed_forms(found.curve, found.std)
-    curve, z = found.curve, found.after.z
-    out = {"learned": True, "part": curve.part, "along": curve.along, "z_table": z}
+    before, told = opened.before.z, list[Answer]()
+    with ExitStack() as stack:
+        while len(told) < MOST and (not told or opened.before.z > ADEQUATE):
+            name = f"learned_{len(told) + 1}"
+            found = learn(opened, name)
+            if found.refused or found.curve is None or found.after is None:
+                told = told or [{"why": found.refused}]
+                break
+            one, text, trial = _closed(opened, found, found.curve, case.task.form)
+            told.append(one)
+            stack.enter_context(defined({name: text}))
+            opened = replace(
+                opened, before=trial, problem=opened.problem.of(opened.problem.runs),
+                held_out=opened.held_out.of(opened.held_out.runs), part=None,
+            )  # fmt: skip
+    more = [one for one in told[1:] if "part" in one]
+    out = {"z_before": before, "learned": "part" in told[0], **told[0], "z": opened.before.z}
+    return {**out, "more": more} if more else out
+
+
+def _closed(
+    opened: Opening, found: LearnedCurve, curve: Curve, form: str
+) -> tuple[Answer, str, Trial]:
+    """Return what is told of a curve, its effect's text, and the trial of the model with it."""
+    assert found.after is not None
+    out: Answer = {"part": curve.part, "along": curve.along, "z_table": found.after.z}
+    forms, trial, formula = closed_forms(curve, found.std), found.after, None
     if forms:
         closed = close(opened, found, forms)
         best = closed.form if closed else forms[0]
-        out |= {"name": best.name, "left": best.left}
-        z = closed.trial.z if closed else z
-        out["closed"] = closed is not None
-        right = RIGHT.get(case.task.form, {}).get(curve.along, set())
-        out["named"] = name_of(forms) is not None and best.name in right
-    return before | out | {"z": z}
+        if closed:
+            trial, formula = closed.trial, closed.formula
+        right = RIGHT.get(form, {}).get(curve.along, set())
+        named = name_of(forms) is not None and best.name in right
+        out |= {"name": best.name, "left": best.left, "closed": bool(closed), "named": named}
+    return out, effect_text(found.name, curve, "a benchmark", formula), trial

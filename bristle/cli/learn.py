@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--as", dest="parts", metavar="PART[,PART]", default="",
         help="on which part it may act: force, friction, yield, viscous, fluid, yield_field, "
-        "fluid_field, command, slip; default all",
+        "fluid_field, command, slip, resonance; default all",
     )  # fmt: skip
     parser.add_argument("--name", default="", help="of the effect; default learned_1, learned_2")
     parser.add_argument(

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..diagnose.learned.closed import ClosedForm, in_words, name_of
+from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.fit import LearnedCurve
+from ..diagnose.learned.ring import RING, response
 from ..draw.style import BLUE, GREY, PALE, VERMILION, Page, look, png, short_z
 from ..quantity import scale
 
@@ -30,13 +32,35 @@ def draw_curve(found: LearnedCurve, forms: Sequence[ClosedForm]) -> Page:
         heading = f"{found.name}: {curve.words()}"
         said = (
             f"z on held-out runs {short_z(found.before.z)} before, {short_z(found.after.z)} with "
-            "it. The band is the 95 % interval of each value."
+            "it."
         )
+        if curve.part != RING:
+            said += " The band is the 95 % interval of each value."
         page = Page(8.0, 3.6, heading, said)
         grid = page.grid(1, 1, top=0.3, bottom=0.55, left=0.75, right=0.4)
         axes = page.figure.add_subplot(grid[0, 0])
-        _draw(axes, found, forms)
+        if curve.part == RING:
+            _draw_mode(axes, curve)
+        else:
+            _draw(axes, found, forms)
     return page
+
+
+def _draw_mode(axes: Axes, curve: Curve) -> None:
+    """Draw by what factor a load cell shows the force at each frequency."""
+    mode = dict(curve.memory)
+    at = np.geomspace(0.2 * mode["frequency"], 5.0 * mode["frequency"], 800)
+    shown = response(curve.values[0], mode["frequency"], mode["damping"], at)
+    axes.axhline(1.0, color=PALE, lw=1.0)
+    axes.semilogx(at, shown, color=BLUE, lw=2.2)
+    axes.set_ylim(0.0, None)
+    decades = 10.0 ** np.arange(np.floor(np.log10(at[0])), np.ceil(np.log10(at[-1])) + 1)
+    ticks = np.outer(decades, [1.0, 2.0, 5.0]).ravel()
+    axes.set_xticks([one for one in ticks if at[0] <= one <= at[-1]])
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_formatter("")
+    axes.set_xlabel("frequency [Hz]")
+    axes.set_title("amplitude of the force shown / of the damper's force")
 
 
 def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:

@@ -16,6 +16,7 @@ from ..diagnose.learned.closed import ClosedForm, closed_forms, in_words, name_o
 from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.effect_file import effect_text
 from ..diagnose.learned.fit import Closed, LearnedCurve, close, learn
+from ..diagnose.learned.ring import RING
 from ..diagnose.learned.slip import SLIP
 from ..diagnose.opening import Insufficient, Opening
 from ..errors import StudyError
@@ -81,6 +82,14 @@ class LearnedEffect:
             pairs = zip(curve.knots, curve.values, strict=True)
             elements = [f"{quantity(f, 'N')} at {quantity(x, 'm')}" for x, f in pairs if f > 0.0]
             out.append(f"They give way with {', '.join(elements)} of travel.")
+        elif curve.part == RING:
+            mode = dict(curve.memory)
+            out.append(
+                f"{100.0 * curve.values[0]:.3g} % of the force passes through a mode at "
+                f"{plain(mode['frequency'], 4)} Hz with a damping ratio of "
+                f"{plain(mode['damping'], 2)}: the frame, the fixture or the load cell itself. "
+                "Stiffen it, or measure the force closer to the damper."
+            )
         elif self.forms:
             out.append(
                 f"No closed form follows it: the nearest, {in_words(self.forms[0], curve)}, leaves "

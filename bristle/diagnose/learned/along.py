@@ -47,6 +47,8 @@ MEMORIES = {
     "tau": ("s", "time over which it fades"),
     "way": ("m", "travel that wears it down"),
     "early": ("s", "age up to which it hardly changes"),
+    "frequency": ("Hz", "natural frequency of the mode"),
+    "damping": ("1", "damping ratio of the mode"),
 }
 """Unit and meaning of the parameters of a memory."""
 

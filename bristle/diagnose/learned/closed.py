@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from ...quantity import plain, quantity
 from ...units import canonical
-from .curve import Curve, Formula
+from .curve import ALONE, Curve, Formula
 from .rule import LEARN, LearnRule
-from .slip import SLIP
 
 Array = NDArray[np.float64]
 
@@ -129,8 +128,8 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     curve : as fitted
     std : (k,) of its values; a knot that was held at zero counts as the surest of the others
     """
-    if curve.part == SLIP:
-        return []  # each of its values is a force of its own
+    if curve.part in ALONE:
+        return []  # its values are no curve
     s, y = np.array(curve.knots), np.array(curve.values)
     given = np.array(std)
     some = given[given > 0.0]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from ...physics.drive import VOLTAGE, drive_named, unit_for
 from ...quantity import quantity
 from .along import ALONG, Along
+from .ring import RING, SIGNAL
 from .slip import SLIP, force_source, signal_of
 
 BOUND = 30.0
@@ -68,12 +69,20 @@ PARTS = {
         "force", "{g}", "N", "parallel elastic-slip elements", "F = F_model + sum of curve[k] s_k",
         (), 0.0,
     ),
+    RING: Part(
+        "channel", "q.value + p.share * (z.ring - q.value)", "1",
+        "a resonance of what holds the load cell",
+        "F_shown = F + share (r - F)", (), 0.0,
+    ),
 }  # fmt: skip
+
+ALONE = (SLIP, RING)
+"""Parts that are no curve along a signal: what they depend on has their own name."""
 
 
 def may_change(part: str, along: str) -> bool:
     """Return whether a curve along a signal may change a part: a command's map depends on it."""
-    if SLIP in (part, along):
+    if part in ALONE or along in ALONE:
         return part == along
     of_command = along in ("voltage", "recent_voltage")
     if part == "command":
@@ -88,7 +97,8 @@ class Curve:
     `memory` holds the parameters of the signal's memory [SI]; `held` the knots (from 0) whose value
     stays zero; `slow` is the speed [m/s] below which a friction changes its sign smoothly, `top`
     the largest command of the runs; `drive` names what the command is, whose unit takes the place
-    of volts. Elastic-slip elements have their travels as knots, and their forces as values.
+    of volts. Elastic-slip elements have their travels as knots, and their forces as values; a
+    resonance has one value, its share, and frequency and damping ratio as memory.
     """
 
     part: str
@@ -109,7 +119,16 @@ class Curve:
     @property
     def signal(self) -> Along:
         """The signal that it depends on."""
+        if self.part == RING:
+            return SIGNAL
         return ALONG[self.along] if self.along in ALONG else signal_of(self.knots)
+
+    @property
+    def entries(self) -> tuple[str, ...]:
+        """The names of the parameters that its values are."""
+        if self.part == RING:
+            return ("share",)
+        return tuple(f"curve[{k + 1}]" for k in range(len(self.knots)))
 
     @property
     def unit(self) -> str:
@@ -132,12 +151,15 @@ class Curve:
     def passive(self) -> bool:
         """Whether it gives no energy over a cycle, whatever its values."""
         conserves = self.part == "force" and self.along == "displacement"
-        return self.part == SLIP or conserves or self.of.hook not in ("force", "voltage")
+        active = ("force", "voltage", "channel")
+        return self.part == SLIP or conserves or self.of.hook not in active
 
     def words(self) -> str:
         """Return what it is, in a few words: "an added force along displacement"."""
         if self.part == SLIP:
             return self.of.words
+        if self.part == RING:
+            return f"{self.of.words}, near {quantity(dict(self.memory)['frequency'], 'Hz')}"
         times = dict(self.memory)
         faded = f" (over {quantity(times['tau'], 's')})" if "tau" in times else ""
         return f"{self.of.words} along {self.signal.words}{faded}"

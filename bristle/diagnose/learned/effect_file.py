@@ -10,7 +10,8 @@ from collections.abc import Sequence
 
 from ...physics.drive import drive_named, unit_for
 from .along import ALONG, MEMORIES
-from .curve import BOUND, Curve, Formula, bounds_of
+from .curve import ALONE, BOUND, Curve, Formula, bounds_of
+from .ring import RING
 from .slip import SLIP
 
 MATH = tuple(
@@ -18,7 +19,7 @@ MATH = tuple(
 )
 """Functions that a hook may import."""
 
-POSITIVE = ("tau", "way", "early", "d")
+POSITIVE = ("tau", "way", "early", "d", "frequency", "damping")
 """Parameters that are times, lengths and scales: they stay above zero."""
 
 Declared = tuple[str, float, str, str]
@@ -37,16 +38,19 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     """
     body = _hooks(curve, formula)
     parameters: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
+    table = formula is None and curve.part != RING
+    if curve.part == RING:
+        parameters.append(("share", curve.values[0], "1", "share of the force that rings"))
     if formula:
         parameters += [
             (n, value, unit, f"{n} in g = {formula.text}") for n, value, unit in formula.parameters
         ]
     lines = [
-        *_imports(name, curve, body, bool(parameters), formula is None),
+        *_imports(name, curve, body, bool(parameters), table),
         *_about(name, curve, formula),
         "",
         f'    name = "{name}"',
-        '    sites = ("damper",)',
+        *_where(curve),
         *_fields(curve),
         f'    source = "{origin}"',
         f'    expect = "an error that depends on {_on(curve)}"',
@@ -57,7 +61,7 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
         lines.append(f"    assumed = {held!r}  # the law has a constant already".replace("'", '"'))
     if parameters:
         lines += ["    parameters = {", *_declared(parameters), "    }"]
-    if not formula:
+    if table:
         lines += _table(curve)
     return "\n".join([*lines, "", *body]) + "\n"
 
@@ -116,6 +120,12 @@ def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
             " last reversal, until\n    it slips (Iwan 1966, J. Appl. Mech. 33(4))."
         )
         end = "."
+    if curve.part == RING:
+        g = (
+            "r'' + 2 damping w r' + w^2 r = w^2 F,   w = 2 pi frequency\n\n    F is the damper's "
+            "force, r its part that a mode of the frame or the fixture lets ring."
+        )
+        end = "."
     return [
         f"class {''.join(word.capitalize() for word in name.split('_'))}(Effect):",
         f'    """{_title(name)}: {_subject(curve, "that depends on")}.',
@@ -130,7 +140,16 @@ def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
 
 def _on(curve: Curve) -> str:
     """Return on what the error depends that a curve explains."""
+    if curve.part == RING:
+        return "the frequency of the force"
     return ALONG["travel"].words if curve.part == SLIP else curve.signal.words
+
+
+def _where(curve: Curve) -> list[str]:
+    """Return the lines that say where the effect acts."""
+    if curve.part == RING:
+        return ['    sites = ("sensor",)', '    shows = "force"']
+    return ['    sites = ("damper",)']
 
 
 def _title(name: str) -> str:
@@ -140,7 +159,7 @@ def _title(name: str) -> str:
 def _subject(curve: Curve, joined: str) -> str:
     """Return what a curve is: its part, and its signal after a word or two."""
     words = curve.of.words
-    return words if curve.part == SLIP else f"{words} {joined} {curve.signal.words}"
+    return words if curve.part in ALONE else f"{words} {joined} {curve.signal.words}"
 
 
 def _table(curve: Curve) -> list[str]:
@@ -174,7 +193,7 @@ def _fields(curve: Curve) -> list[str]:
         "states": {name: unit_for(unit, drive) for name, unit in along.states},
         "starts": dict(along.starts),
         "passive": curve.passive,
-        "zero_at_rest": curve.part == SLIP or part.expression != "{g}",
+        "zero_at_rest": curve.part in ALONE or part.expression != "{g}",
     }
     texts = [(key, f"{value!r}".replace("'", '"')) for key, value in given.items()]
     return [f"    {key} = {text}" for key, text in texts if text not in ("{}", "()")]
@@ -186,6 +205,7 @@ def _declared(parameters: Sequence[Declared]) -> list[str]:
     for name, value, unit, text in parameters:
         size = BOUND * max(abs(value), 1e-9)
         low, high = (0.02 * value, 50.0 * value) if name in POSITIVE else (-size, size)
+        low, high = (0.0, 1.2) if name == "share" else (low, high)
         bounds = f"({low:.4g}, {high:.4g})"
         lines.append(f'        "{name}": Parameter({value:.6g}, "{unit}", {bounds}, "{text}"),')
     return lines

@@ -96,9 +96,7 @@ def learn(
     place = refusals.index("") if "" in refusals else 0
     kept = fitted[place]
     others = tuple(one for one in fitted if one is not kept)
-    return LearnedCurve(
-        name, kept.curve, kept.std, before, kept.trial, others, refusals[place]
-    )
+    return LearnedCurve(name, kept.curve, kept.std, before, kept.trial, others, refusals[place])
 
 
 def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRule) -> str:
@@ -198,7 +196,7 @@ def _fitted(
 
 def _inside(curve: Curve, own: str, base: Model, train: Problem, held_out: Problem) -> Fitted:
     """Return a curve fitted inside a model, as the effect `own`."""
-    entries = [f"{own}.curve[{k + 1}]" for k in range(len(curve.knots))]
+    entries = [f"{own}.{entry}" for entry in curve.entries]
     values = dict(zip(entries, curve.values, strict=True))
     values |= {f"{own}.{n}": value for n, value in curve.memory}
     joined = replace(base, effects=(*base.effects, own))

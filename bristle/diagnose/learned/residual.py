@@ -26,7 +26,8 @@ class Residual:
     `r` (n,) normalised; `weight` (n,) robust; `fold` (n,) which stretch a sample belongs to;
     `known` (n, p) the sensitivities to the parameters; `parts` columns (n,) that a curve of each
     part is multiplied with, over the noise; `runs` of the samples, `keeps` which of each; `slow`
-    [m/s], `top` and `drive` as of a `Curve`.
+    [m/s], `top` and `drive` as of a `Curve`; `shown` the predicted force [N] of each run whose
+    force a load cell showed, `sigma` (n,) [N] the noise that samples are divided by.
     """
 
     r: Array
@@ -39,6 +40,8 @@ class Residual:
     slow: float
     top: float
     drive: str
+    shown: list[Array]
+    sigma: Array
 
 
 def residual_of(problem: Problem, base: Model) -> Residual:
@@ -60,6 +63,8 @@ def residual_of(problem: Problem, base: Model) -> Residual:
         slow,
         problem.size("V"),
         problem.runs[0].drive,
+        [problem.predict(base, run) for run in problem.runs if not isinstance(run, StructureRun)],
+        sigma,
     )
 
 
