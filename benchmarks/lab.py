@@ -4,7 +4,8 @@
 
 makes what is missing of `--each` cases per fault, with the generator of the blind benchmark, and
 prints how many are named with channel, run and value; without a number it prints what is there.
-Each case is checked as it is, too: what is said of those is a false alarm. No model is fitted.
+Each case is checked as it is, too: what is said of those is a false alarm. Only the last
+two faults need a model, which is fitted.
 
 hum       a sinusoid at 50 or 60 Hz, off by up to 0.04 %, of 3 to 10 % of the channel's RMS
 line      the same at a frequency between 25 and 200 Hz that is none of the mains
@@ -12,6 +13,8 @@ average   a mean of 3 to 30 samples, noise included
 gain      one run's channel, noise included, times 0.7, 0.85, 1.15 or 1.4
 sign      one run's channel turned
 zero      15 or 40 % of the channel's RMS added to one run's force or velocity
+clock     the clock of the force's logger 100 to 1000 ppm fast or slow
+apart     one run's force 4 to 20 ms late or early: two loggers that did not start together
 """
 
 from __future__ import annotations
@@ -28,18 +31,24 @@ from bristle.data.checks.differing_runs import check_differing_runs
 from bristle.data.checks.finding import Finding
 from bristle.data.checks.recording import check_recording
 from bristle.data.measurement import Measurement
+from bristle.diagnose.faults import SensorFault
+from bristle.diagnose.opening import opening
+from bristle.identify.model import Model
 
 from ._answers import Answer, Answers
 from ._blind import cases, score
-from ._blind.plan import make_plan
+from ._blind.plan import Task, make_plan
 from ._blind.subject import measurements
 from ._rows import Row
 
 SEED = 23
-FAULTS = ("hum", "line", "average", "gain", "sign", "zero")
+FAULTS = ("hum", "line", "average", "gain", "sign", "zero", "clock", "apart")
+BY_MODEL = ("clock", "apart")
+"""Faults that show only beside a model, which is fitted."""
+
 CLEAN = "clean"
 GOAL = 0.9
-NEAR = {"line": 1e-3, "gain": 0.05, "sign": 0.0, "bias": 0.1}
+NEAR = {"line": 1e-3, "gain": 0.05, "sign": 0.0, "bias": 0.1, "clock": 0.2, "delay": 0.2}
 """Share by which a told value may be off."""
 
 
@@ -88,7 +97,11 @@ def _answered(fault: str, number: int) -> Answer:
         rng = np.random.default_rng([SEED, number, len(fault)])
         if fault == CLEAN:
             found = _found(runs)
-            return {"right": not found, "said": [one.text for one in found]}
+            told = _told_by_model(runs, number)
+            words = [*(one.text for one in found), *(one.words for one in told)]
+            return {"right": not words, "said": words}
+        if fault in BY_MODEL:
+            return _clocks(fault, number, runs, rng)
         changed, place, wanted = _planted(fault, runs, rng)
         found = _found(changed)
         named = [one for one in found if _names(one, changed[place].name, wanted)]
@@ -99,9 +112,56 @@ def _answered(fault: str, number: int) -> Answer:
         return {"right": False, "said": [], "error": traceback.format_exc()}
 
 
+def _clocks(fault: str, number: int, runs: list[Measurement], rng: np.random.Generator) -> Answer:
+    """Return whether a model tells the clock of the force's logger, or that it started apart."""
+    size = float(rng.choice([-1.0, 1.0]))
+    if fault == "clock":
+        place, size = None, size * 10.0 ** float(rng.uniform(-4.0, -3.0))
+    else:
+        place, size = int(rng.integers(len(runs))), size * float(rng.uniform(0.004, 0.02))
+    changed = [
+        _late(run, size, fault, rng) if place in (None, k) else run for k, run in enumerate(runs)
+    ]
+    told = _told_by_model(changed, number)
+    kind, name = ("clock", "") if place is None else ("delay", runs[place].name)
+    near = [abs(one.value - size) <= NEAR[kind] * abs(size) for one in told]
+    right = len(told) == 1 and (told[0].fault, told[0].run) == (kind, name) and near[0]
+    said = [[one.run, one.channel, one.words] for one in told]
+    return {"right": right, "planted": [name, "force", kind, size], "said": said}
+
+
+def _late(run: Measurement, size: float, fault: str, rng: np.random.Generator) -> Measurement:
+    """Return a run whose force is late by `size` [s], or increasingly, by `size` s each second.
+
+    The motion is moved, which is smooth: between two samples it is taken as linear, and the noise
+    that this takes off is added. The force's jumps stay what they were.
+    """
+    at = np.arange(len(run.time), dtype=float)
+    when = at * (1.0 + size) if fault == "clock" else at + size / run.step
+    share = np.mod(when, 1.0)
+    lost = np.sqrt(1.0 - share**2 - (1.0 - share) ** 2)
+    moved = {"voltage": run["voltage"][np.clip(np.round(when), 0, at[-1]).astype(int)]}
+    for name in ("displacement", "velocity"):
+        noise = run.noise[name] * lost * rng.standard_normal(len(at))
+        moved[name] = np.interp(when, at, run[name]) + noise
+    return replace(run, channels={**run.channels, **moved})
+
+
+def _told_by_model(runs: list[Measurement], number: int) -> list[SensorFault]:
+    """Return the faults that a diagnosis of the runs begins with."""
+    law = _task(number).law
+    train, held = ([run for run in runs if run.name.startswith(r)] for r in ("train", "holdout"))
+    opened = opening(train, held, Model(law))
+    return list(opened.faults)
+
+
+def _task(number: int) -> Task:
+    return make_plan(SEED, 4 * (number + 1), "none")[number]
+
+
 def _runs(number: int) -> list[Measurement]:
     """Return the runs of a case that hides nothing."""
-    case = cases.load(make_plan(SEED, 4 * (number + 1), "none")[number])
+    case = cases.load(_task(number))
     return measurements(case.runs, case.channels)
 
 

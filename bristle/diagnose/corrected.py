@@ -8,13 +8,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.corrections import Correction, set_right
 from ..data.measurement import Measurement
 from .clipping import beyond_range
 from .faults import SensorFault
 
 Array = NDArray[np.float64]
 
-ORDER = {"bias": 1, "sign": 2, "gain": 3, "delay": 4}
+ORDER = {"bias": 1, "sign": 2, "gain": 3, "clock": 4, "delay": 5}
 """In which order faults are taken back: an offset is on what the instrument shows."""
 
 
@@ -30,7 +31,7 @@ def corrected(runs: Sequence[Measurement], faults: Sequence[SensorFault]) -> lis
 def _corrected(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
     channels, lost, noise = dict(run.channels), dict(run.lost), dict(run.noise)
     for fault in sorted(faults, key=lambda one: ORDER.get(one.fault, 0)):
-        if fault.channel not in channels:
+        if fault.channel not in channels or fault.run not in ("", run.name):
             continue
         values = channels[fault.channel]
         if fault.fault == "sign":
@@ -42,6 +43,9 @@ def _corrected(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
             channels[fault.channel] = values - fault.value
         elif fault.fault == "delay":
             channels[fault.channel] = earlier(values, fault.value / run.step)
+        elif fault.fault == "clock":
+            known = [Correction(fault.channel, "clock", fault.value)]
+            channels |= set_right({fault.channel: values}, run.step, known)
         elif fault.fault in ("lag", "high-pass", "derived"):
             del channels[fault.channel]  # displacement says the same, without it
         elif fault.fault == "clipping":

@@ -16,7 +16,8 @@ class SensorFault:
     what an instrument does: "lag" [s, of first order], "high-pass" [1/s, its corner]; "derived" [s,
     how late] is a velocity that was computed from the displacement, "unrelated" (0) one of another
     motion. `std` is the uncertainty of `value`; `words` a sentence; `either` the channel that may
-    have it instead, as far as the data tell.
+    have it instead, as far as the data tell; `run` the run whose channel it is, "" for all.
+    "clock" [s/s] is what the channel's clock gains on that of the motion.
     """
 
     channel: str
@@ -25,6 +26,7 @@ class SensorFault:
     std: float
     words: str
     either: str = ""
+    run: str = ""
 
     def as_dict(self) -> dict[str, object]:
         """Return what verdict.json holds of it."""
@@ -32,7 +34,8 @@ class SensorFault:
             "channel": self.channel, "fault": self.fault, "value": self.value, "std": self.std,
             "words": self.words,
         }  # fmt: skip
-        return {**entry, "either": self.either} if self.either else entry
+        more = {"either": self.either, "run": self.run}
+        return {**entry, **{key: text for key, text in more.items() if text}}
 
 
 def instruments_of(sensors: Sequence[SensorFault]) -> tuple[str, ...]:

@@ -19,6 +19,7 @@ from ..identify.structure import StructureProblem
 from ..physics.effect import effects_of
 from ..quantity import plain
 from .candidates import SECONDS, Trial, judge, try_all, try_members
+from .clocks import clock_faults
 from .corrected import corrected
 from .faults import SensorFault, words_of
 from .model_based_faults import model_based_fault
@@ -185,6 +186,11 @@ def opened_with(before: Trial, data: BenchData) -> Opening:
         if shown.fault.fault == "bias":  # found without the effects that are tried next
             problem, held_out = problem.with_free_zero(), held_out.with_free_zero()
             before = judge(before.model, problem, held_out)
+    elif not isinstance(problem, StructureProblem):
+        apart = clock_faults(before, problem, held_out)
+        if apart is not None:
+            faults += apart.faults
+            problem, held_out, before = apart.train, apart.held_out, apart.trial
     return Opening(before, problem, held_out, tuple(faults), data.noise, data.shown)
 
 

@@ -76,7 +76,13 @@ def ringing(force: Array, dt: float, frequency: float, damping: float) -> Array:
 
 
 def response(share: float, frequency: float, damping: float, at: Array) -> Array:
-    """Return shown over true force (n,), the amplitude, at frequencies (n,) [Hz]."""
+    """Return shown over true force (n,), the amplitude.
+
+    Parameters
+    ----------
+    share, frequency, damping : of the mode: 1, Hz, 1
+    at : frequencies (n,) [Hz]
+    """
     s = 1j * at / frequency
     mode = 1.0 / (1.0 + 2.0 * damping * s + s * s)
-    return np.abs(1.0 + share * (mode - 1.0))
+    return np.asarray(np.abs(1.0 + share * (mode - 1.0)))

@@ -1,0 +1,105 @@
+"""Loggers whose clocks differ: what is planted is told and set right, and nothing where none is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from shaken import measured
+
+from bristle.diagnose.candidates import judge
+from bristle.diagnose.clocks import clock_faults, clocks_of
+from bristle.diagnose.corrected import corrected
+from bristle.diagnose.faults import SensorFault
+from bristle.identify.bench import Bench
+from bristle.identify.fit import Model, Problem, Run, fit
+
+STEP = 0.002  # s
+T = STEP * np.arange(5000)
+VALUES = {"sigma_a": 700.0, "sigma_0": 450.0, "sigma_1": 5.0, "sigma_2": 100.0, "sigma_b": 18.0}
+NOISE = 0.05  # N
+RATE = 4e-4  # s/s: 4 ms in 10 s
+
+
+def runs(rate=0.0, late=(0.0,) * 4, effect=lambda v, F: F):
+    """Return four runs whose force was recorded at other times than the motion."""
+    out = []
+    for seed, begin in enumerate(late):
+        random = np.random.default_rng(seed)
+        w = 2.0 * np.pi * random.uniform(0.4, 4.0, 8)
+        shift, size = random.uniform(0.0, 6.0, 8)[:, None], 0.05 / w
+
+        def motion(t, w=w, shift=shift, size=size):
+            angle = w[:, None] * t + shift
+            return size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
+
+        V = np.full(len(T), 2.0 * seed)
+        # A force that is read at t on its own clock is that of the moment (t - late)/(1 + rate).
+        x, v, a = motion((T - begin) / (1.0 + rate))
+        force = effect(v, Bench("lugre", []).force(x, v, a, V, STEP, VALUES))
+        force = force + NOISE * random.standard_normal(len(T))
+        x, v, a = motion(T)
+        none = np.zeros((0, len(T), 4))
+        out.append(Run(f"run{seed}", STEP, x, v, a, V, force, NOISE, none))
+    return Problem(out[:3]), Problem(out[3:])
+
+
+def opened(train, held_out):
+    model = fit(train, Model("lugre", (), VALUES), with_std=False).model
+    return judge(model, train, held_out), train, held_out
+
+
+def test_a_clock_that_gains_is_told_with_its_rate_and_set_right():
+    before, *pair = opened(*runs(RATE))
+    found = clock_faults(before, *pair)
+    (fault,) = found.faults
+    assert (fault.channel, fault.fault, fault.run) == ("force", "clock", "")
+    assert fault.value == pytest.approx(RATE, rel=0.03)
+    assert abs(fault.value - RATE) < 4.0 * fault.std
+    assert before.z > 1.3
+    assert found.trial.z == pytest.approx(1.0, abs=0.05)
+    assert "400 ppm" in fault.words
+    assert "fast" in fault.words
+
+
+@pytest.mark.parametrize("late", [0.008, -0.012])
+def test_a_run_that_began_apart_is_told_with_its_name(late):
+    before, *pair = opened(*runs(late=(0.0, late, 0.0, 0.0)))
+    found = clock_faults(before, *pair)
+    (fault,) = found.faults
+    assert (fault.fault, fault.run) == ("delay", "run1")
+    assert fault.value == pytest.approx(late, rel=0.05)
+    assert ("later" if late > 0.0 else "earlier") in fault.words
+    assert found.trial.train == pytest.approx(1.0, abs=0.05)
+
+
+def test_no_fault_where_noise_is_all_or_something_else_is_missing():
+    assert clock_faults(*opened(*runs())) is None
+    spring = runs(effect=lambda v, F: F + 40.0 * v * np.abs(v) / 0.05)
+    before, *pair = opened(*spring)
+    assert before.z > 1.5
+    assert clock_faults(before, *pair) is None
+
+
+def test_too_short_a_run_says_nothing_of_clocks():
+    train, _ = runs()
+    short = [
+        replace(run, **{n: getattr(run, n)[:400] for n in ("x", "v", "a", "V", "force")})
+        for run in train.runs
+    ]
+    assert clocks_of(Model("lugre", (), VALUES), Problem(short)) is None
+
+
+def test_a_fault_of_one_run_corrects_that_run_alone():
+    ramp = 10.0 * T
+    channels = {"time": T, "displacement": np.sin(T), "force": ramp}
+    pair = [measured(channels, 0, noise=0.0, name=name) for name in ("one", "two")]
+    late = SensorFault("force", "delay", 0.1, 0.0, "", run="two")
+    one, two = corrected(pair, [late])
+    assert one["force"] == pytest.approx(ramp)
+    assert two["force"][:4000] == pytest.approx(ramp[:4000] + 1.0)
+    (fast,) = corrected(pair[:1], [SensorFault("force", "clock", 1e-3, 0.0, "")])
+    assert fast["force"][:4000] == pytest.approx(1.001 * ramp[:4000])
+    assert late.as_dict()["run"] == "two"
+    assert "run" not in SensorFault("force", "clock", 1e-3, 0.0, "").as_dict()
