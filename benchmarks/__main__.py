@@ -2,8 +2,8 @@
 
 A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them. `blind`
 named first has options of its own (`python -m benchmarks blind --help`): it takes hours, and the
-table here shows what its last run found. So have `instruments`, `lab`, `learned` and `calibrate`,
-whose own table shows what each value of the decision rule trades.
+table here shows what its last run found. So have `instruments`, `lab`, `law_free`,
+`learned` and `calibrate`, whose own table shows what each value of the decision rule trades.
 """
 
 from __future__ import annotations
@@ -46,6 +46,10 @@ def main() -> int:
         from .lab import main as lab
 
         return lab(sys.argv[2:])
+    if sys.argv[1:2] == ["law_free"] and len(sys.argv) > 2:
+        from .law_free import main as law_free
+
+        return law_free(sys.argv[2:])
     if sys.argv[1:2] == ["learned"] and len(sys.argv) > 2:
         from .learned import main as learned
 

@@ -17,7 +17,8 @@ from bristle.diagnose.damper import look_at_damper
 from bristle.diagnose.decision import missing
 from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.finding import Finding
-from bristle.diagnose.law_choice import Pair, choose, search
+from bristle.diagnose.law_choice import choose, search
+from bristle.diagnose.law_free import Looks
 from bristle.diagnose.law_trials import LawTrial, try_laws
 from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.effect_file import effect_text
@@ -28,7 +29,6 @@ from bristle.diagnose.opening import (
     Opening,
     Progress,
     bench_data,
-    opened_with,
     opening,
     silent,
 )
@@ -99,11 +99,7 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
     """
     split, data, rows = _laws(train, say)
 
-    def look(row: LawTrial) -> Pair:
-        say(f"effects that {row.law} lacks (z {row.trial.z:.2f})")
-        return Pair(row, *look_at_damper(opened_with(row.trial, data)))
-
-    chosen = choose(search(rows, look))
+    chosen = choose(search(rows, Looks(data, say)))
     assert chosen.opened is not None
     opened = _with_effects(split, chosen.finding, chosen.opened, say)
     return _found(opened, ()), _with_curves(opened, say)

@@ -19,8 +19,17 @@ from .sites import better, equals
 from .zero import free_zero, renewed_zero, zero_fault
 
 
-def look_at_damper(opened: Opening, say: Progress = silent) -> tuple[Finding, Opening]:
+def look_at_damper(
+    opened: Opening, say: Progress = silent, made: Trials | None = None, *, pairs: bool = True
+) -> tuple[Finding, Opening]:
     """Return what a damper's law lacks, by `opened.rule`.
+
+    Parameters
+    ----------
+    opened : what the look begins with
+    say : is told what is being done
+    made : the trials of single effects, where they were made before
+    pairs : whether two effects are tried where no single one suffices
 
     Returns
     -------
@@ -29,12 +38,12 @@ def look_at_damper(opened: Opening, say: Progress = silent) -> tuple[Finding, Op
     before, rule = opened.before, opened.rule
     if not opened.scope.rank_all and max(before.z, before.train) <= rule.quiet:
         return of_decision(as_noise(before, ()), before), opened
-    made, decision = _decided(opened, say)
+    made, decision = _decided(opened, say, made, pairs)
     sensors = renewed_zero(opened, decision)
     freed = free_zero(opened, decision)
     if freed is not None:
         say("the zero of the force is fitted along with every effect")
-        again, other = _decided(freed, say)
+        again, other = _decided(freed, say, None, pairs)
         zero = zero_fault(freed.problem, other)
         if zero is not None:
             opened, made, decision, sensors = freed, again, other, (zero,)
@@ -48,13 +57,20 @@ def look_at_damper(opened: Opening, say: Progress = silent) -> tuple[Finding, Op
     return replace(found, patterns=patterns), opened
 
 
-def _decided(opened: Opening, say: Progress) -> tuple[Trials, Decision]:
+def _decided(
+    opened: Opening, say: Progress, made: Trials | None, pairs: bool
+) -> tuple[Trials, Decision]:
     """Return the trials of effects at a damper, and the decision that they lead to."""
-    made, rule = Trials(opened, say), opened.rule
+    made, rule = made or Trials(opened, say), opened.rule
     organised = rule.organised < 1.0 and bool(made.patterns)
     if organised:
         organised = is_organised(made.patterns[0].share, made.patterns[0].p, rule)
-    return made, decide(opened.before, made.single, made.grow, organised, made.reduce, rule)
+    grow, reduce = (made.grow, made.reduce) if pairs else (_no_pairs, None)
+    return made, decide(opened.before, made.single, grow, organised, reduce, rule)
+
+
+def _no_pairs(_first: Trial) -> list[Trial]:
+    return []
 
 
 def is_organised(share: float, p: float, rule: DecisionRule = BENCH) -> bool:

@@ -133,33 +133,43 @@ def simplest(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> LawTrial:
 
 
 def search(
-    rows: Sequence[LawTrial], look: Callable[[LawTrial], Pair], rule: DecisionRule = BENCH
+    rows: Sequence[LawTrial], look: Callable[[LawTrial, bool], Pair], rule: DecisionRule = BENCH
 ) -> list[Pair]:
     """Return the pairs that decide; `look` searches the effects that a law lacks.
 
     Where noise is all that the best law leaves, the simplest that it does not surpass comes first:
     if that lacks nothing and contains no effect, no other is searched. Then come the simpler ones
     first: a law is left out where the runs are explained already by no more parameters than it
-    would have with the smallest effect that can join it.
+    would have with the smallest effect that can join it. Two effects of a law are tried only where
+    no law with a single one explains the runs so well that none could be clearly better.
 
     Parameters
     ----------
     rows : the laws tried
-    look : called with a row; returns what its law lacks
+    look : called with a row, and whether to try two effects; returns what its law lacks
     rule : the numbers that decide
     """
-    first, found = simplest(rows, rule), []
+    first, begun = simplest(rows, rule), list[Pair]()
     if first.trial.z <= rule.complete:
-        found.append(look(first))
-        if found[0].finding.kind == "none" and not first.contains:
-            return found
-    searched = {pair.row.law for pair in found}
+        begun.append(look(first, True))
+        if begun[0].finding.kind == "none" and not first.contains:
+            return begun
+    searched = {pair.row.law for pair in begun}
     others = [row for row in survivors(rows, rule) if row.law not in searched]
-    for row in sorted(others, key=lambda row: (row.fitted, row.trial.z)):
-        known = [pair.fitted for pair in found if pair.explains and pair.after.z <= rule.complete]
-        if not known or min(known) > _least_with_effect(row):
-            found.append(look(row))
+    for pairs in (False, True):
+        found = list(begun)
+        for row in sorted(others, key=lambda row: (row.fitted, row.trial.z)):
+            if _worth_a_look(row, found, rule):
+                found.append(look(row, pairs))
+        if any(pair.explains and pair.after.z <= 1.0 + rule.law_gain for pair in found):
+            break
     return found
+
+
+def _worth_a_look(row: LawTrial, found: Sequence[Pair], rule: DecisionRule) -> bool:
+    """Return whether a law, with an effect, could be simpler than what explains the runs."""
+    known = [pair.fitted for pair in found if pair.explains and pair.after.z <= rule.complete]
+    return not known or min(known) > _least_with_effect(row)
 
 
 def _least_with_effect(row: LawTrial) -> int:

@@ -17,7 +17,15 @@ from .inconsistent_runs import contradicted
 from .law_choice import Pair, choose, equivalents, search
 from .law_trials import LawTrial, not_finite, try_laws
 from .law_verdict import LawVerdict
-from .opening import BenchData, Insufficient, Progress, bench_data, opened_with, silent
+from .opening import (
+    BenchData,
+    Insufficient,
+    Progress,
+    Trials,
+    bench_data,
+    opened_with,
+    silent,
+)
 from .rule import BENCH, DecisionRule
 from .verdict import Diagnosis
 
@@ -51,7 +59,7 @@ def diagnose_laws(
         return Diagnosis("insufficient", (), data.reasons, sensors=data.faults, noise=data.noise)
     say("trying every law")
     rows = try_laws(data.problem, data.held_out, present, bends=tells_a_bend(train))
-    pairs = search(rows, lambda row: _look(row, data, say), rule)
+    pairs = search(rows, Looks(data, say), rule)
     chosen = choose(pairs, rule)
     assert chosen.opened is not None
     say(f"intervals of {chosen.row.law}")
@@ -65,9 +73,27 @@ def diagnose_laws(
     return replace(conclude({DAMPER: finding}, about), laws=laws)
 
 
-def _look(row: LawTrial, data: BenchData, say: Progress) -> Pair:
-    """Return what a law lacks."""
-    say(f"effects that {row.law} lacks")
-    opened = opened_with(row.trial, data)
-    finding, opened = look_at_damper(opened, say)
-    return Pair(row, finding, opened)
+class Looks:
+    """What laws lack, on one bench's runs: a second look at a law takes up where the first ended.
+
+    Parameters
+    ----------
+    data : the runs
+    say : called with a few words at each stage
+    """
+
+    def __init__(self, data: BenchData, say: Progress = silent) -> None:
+        self.data, self.say = data, say
+        self.made: dict[str, Trials] = {}
+
+    def __call__(self, row: LawTrial, pairs: bool) -> Pair:
+        """Return what a law lacks: single effects alone, or pairs as well where none suffices."""
+        made = self.made.get(row.law)
+        if made is None:
+            self.say(f"effects that {row.law} lacks (error / noise {row.trial.z:.2f})")
+            made = Trials(opened_with(row.trial, self.data), self.say)
+            self.made[row.law] = made
+        elif pairs:
+            self.say(f"two effects that {row.law} lacks")
+        finding, opened = look_at_damper(made.opened, self.say, made, pairs=pairs)
+        return Pair(row, finding, opened)

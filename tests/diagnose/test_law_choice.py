@@ -58,8 +58,9 @@ def looker(*pairs):
     known = {one.row.law: one for one in pairs}
     asked = []
 
-    def look(one):
-        asked.append(one.law)
+    def look(one, pairs):
+        if one.law not in asked:
+            asked.append(one.law)
         return known[one.law]
 
     return look, asked
@@ -214,3 +215,20 @@ def test_an_effect_that_explains_most_near_rest_is_not_preferred_to_a_law_with_h
     coarse_pair = replace(mimic, finding=replace(mimic.finding, after=coarse))
     assert clearly_worse(coarse, law.after)
     assert choose([coarse_pair, law]) is law
+
+
+def test_two_effects_are_tried_only_where_no_single_one_explains_the_runs():
+    rows = [row("bouc_wen", 3.0), row("lugre", 5.0), row("bingham", 6.0)]
+    twice = []
+
+    def look(one, pairs):
+        twice.extend([one.law] * pairs)
+        effect = "effect" if one.law == "lugre" else "unknown"
+        return pair(one.law, one.trial.z, effect, ("gas_spring",), z_of_lugre[one.law])
+
+    z_of_lugre = {"lugre": 1.0, "bingham": 2.0, "bouc_wen": 3.0}
+    assert choose(search(rows, look)).row.law == "lugre"
+    assert twice == []
+    z_of_lugre["lugre"] = 1.06  # a pair could be clearly better
+    search(rows, look)
+    assert twice == ["bingham", "lugre", "bouc_wen"]
