@@ -1,0 +1,137 @@
+"""Which law and which effects a bench has, where nobody names the law.
+
+    python -m benchmarks law_free --none 20 --effect 20
+
+makes what is missing of these figures, with the generator of the blind benchmark, and prints them;
+without a number it prints what is there.
+
+none       cases of a Bingham or LuGre damper that hide nothing
+effect     the same with one effect of the library at 15 or 40 %
+
+A case is right where the verdict names the law and the effects that made the runs. It is equal
+where it names another pair of no more parameters and tells that the true one does as well.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import traceback
+from collections.abc import Iterator
+from time import perf_counter
+
+from bristle.diagnose.faults import instruments_of
+from bristle.diagnose.law_choice import Pair
+from bristle.diagnose.law_free import diagnose_laws
+from bristle.identify.model import Model
+from bristle.physics.forms import split_form
+
+from ._answers import Answer, Answers
+from ._blind import cases, score
+from ._blind.plan import Task, make_plan
+from ._blind.subject import measurements
+from ._rows import Row
+
+SEED = 41
+GOALS = {"none": 0.95, "effect": 0.9}
+
+
+def run() -> list[Row]:
+    """Return the rows of what has been made so far."""
+    return rows(Answers("law_free").kept())
+
+
+def main(given: list[str]) -> int:
+    """Make what is missing of the figures, print them."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks law_free", description=__doc__)
+    for name in GOALS:
+        parser.add_argument(f"--{name}", type=int, default=0, metavar="CASES")
+    chosen = parser.parse_args(given)
+    done = Answers("law_free").complete(_jobs(chosen), answered)
+    for row in rows(done):
+        print(f"{row.name}: {row.measured} (goal {row.goal})")
+    return 0
+
+
+def _jobs(chosen: argparse.Namespace) -> Iterator[tuple[str, int]]:
+    for name in GOALS:
+        yield from ((name, k) for k in range(getattr(chosen, name)))
+
+
+def rows(done: dict[str, Answer]) -> list[Row]:
+    """Return the rows of what has answers."""
+    out = []
+    for kind, goal in GOALS.items():
+        own = [answer for key, answer in done.items() if json.loads(key)[0] == kind]
+        if not own:
+            continue
+        right = score.Count(sum(bool(one.get("right")) for one in own), len(own))
+        equal = sum(bool(one.get("equal")) for one in own)
+        share = (right.good + equal) / right.of
+        text = f"{right.good} of {right.of} right, {equal} equal"
+        ratio = goal / max(share, 1e-3)
+        out.append(Row(f"law free: {kind}", text, f">= {goal:.0%}", ratio))
+        false = sum(bool(one.get("alarm")) for one in own)
+        if kind == "none":
+            text = f"{false} of {right.of}"
+            out.append(Row("law free: effects where none is hidden", text, "0", 2.0 * false))
+    return out
+
+
+def answered(kind: str, number: int) -> Answer:
+    """Return what the verdict names of a case; an error is wrong."""
+    task = _task(kind, number)
+    effects = () if kind == "none" else (task.effect,)
+    about = {"law": task.law, "effects": effects, "form": task.form, "strength": task.strength}
+    try:
+        return about | _named(task, effects)
+    except Exception:  # whatever it is, it is the method's failure on this case
+        return about | {"right": False, "error": traceback.format_exc()}
+
+
+def _task(kind: str, number: int) -> Task:
+    able = [
+        task
+        for task in make_plan(SEED, 6 * (number + 1) + 12, kind)
+        if task.noise == 0.01 and (kind == "none" or task.strength > 0.05)
+    ]
+    return able[number]
+
+
+def _named(task: Task, effects: tuple[str, ...]) -> Answer:
+    case = cases.load(task)
+    train, held_out = (
+        measurements(case.part(role), case.channels) for role in ("train", "holdout")
+    )
+    begin = perf_counter()
+    found = diagnose_laws(train, held_out, Model("bingham"))
+    took = perf_counter() - begin
+    laws = found.laws
+    if laws is None:
+        return {"right": False, "kind": found.kind, "seconds": took}
+    # A sensor's effect is told as a fault of its channel: its lag may be short enough for a delay.
+    told = list(instruments_of(found.sensors))
+    if any((one.channel, one.fault) == ("velocity", "delay") for one in found.sensors):
+        told.append("velocity_sensor")
+    said = laws.name, tuple(dict.fromkeys((*found.effects, *told)))
+    others = [(law, other) for law, other, _ in laws.equivalents]
+    right = _is(said, task.law, effects)
+    equal = not right and any(_is(one, task.law, effects) for one in others)
+    chosen = next(pair for pair in laws.pairs if pair.row is laws.row)
+    return {
+        "right": right, "equal": equal and _simple(chosen, laws.pairs, task.law, effects),
+        "alarm": found.kind in ("effect", "ambiguous") and not effects and not equal,
+        "kind": found.kind, "said": [said[0], list(said[1])], "others": others, "seconds": took,
+    }  # fmt: skip
+
+
+def _is(pair: tuple[str, tuple[str, ...]], law: str, effects: tuple[str, ...]) -> bool:
+    """Return whether a pair is that of a law, in its own form, and effects."""
+    plain, _, _ = split_form(pair[0])
+    return plain == law and set(pair[1]) == set(effects)
+
+
+def _simple(chosen: Pair, pairs: tuple[Pair, ...], law: str, effects: tuple[str, ...]) -> bool:
+    """Return whether a pair has no more parameters than the true one, where that was searched."""
+    true = [one for one in pairs if _is((one.row.law, one.finding.effects), law, effects)]
+    return all(chosen.fitted <= one.fitted for one in true)
