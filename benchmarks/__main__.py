@@ -3,7 +3,8 @@
 A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them. `blind`
 named first has options of its own (`python -m benchmarks blind --help`): it takes hours, and the
 table here shows what its last run found. So have `instruments`, `lab`, `law_free`,
-`learned` and `calibrate`, whose own table shows what each value of the decision rule trades.
+`learned`, `prediction` and `calibrate`, whose own table shows what each value of the decision rule
+trades.
 """
 
 from __future__ import annotations
@@ -54,6 +55,10 @@ def main() -> int:
         from .learned import main as learned
 
         return learned(sys.argv[2:])
+    if sys.argv[1:2] == ["prediction"] and len(sys.argv) > 2:
+        from .prediction import main as prediction
+
+        return prediction(sys.argv[2:])
     names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")

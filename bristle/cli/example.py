@@ -45,7 +45,9 @@ def _add_choices(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--outside", action="store_true", help="hide something that no effect of the library is"
     )
-    parser.add_argument("--law", default="", help="law of the damper: bingham or lugre")
+    parser.add_argument(
+        "--law", default="", help="law of the damper: bingham or lugre; in a building lugre"
+    )
     parser.add_argument(
         "--noise", type=float, default=0.01, metavar="SHARE",
         help="noise on every channel as a share of its RMS; 0.01 by default",

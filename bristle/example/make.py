@@ -108,7 +108,13 @@ def make_building(folder: Path | str, choice: Choice, *, load_cell: bool = True)
         If the folder exists, or the choice cannot be.
     """
     _check(Path(folder), choice)
-    law = choice.law or "lugre"
+    if choice.law not in ("", "lugre"):
+        raise StudyError(
+            f"--law {choice.law}: in a building the damper comes to rest and holds, for which an "
+            "example's Bingham force needs a travel: that would be the effect presliding. "
+            "lugre is right."
+        )
+    law = "lugre"
     draw, drawn, noise = _streams(choice.seed)
     values = _values(law, draw)
     frame = tower.frame(_spread(MASSES, draw), _spread(STIFFNESSES, draw))

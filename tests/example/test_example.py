@@ -15,7 +15,7 @@ from bristle.errors import StudyError
 from bristle.example import bench, excitation, make, tower
 from bristle.example.damper import Damper, in_library_names
 from bristle.example.hidden import HIDDEN, UNITS, Scales, able, choose
-from bristle.example.make import CENTRE, Choice, make_bench
+from bristle.example.make import CENTRE, Choice, make_bench, make_building
 from bristle.example.sealed import FILE, seal, unseal
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
@@ -172,6 +172,12 @@ def test_a_seed_draws_one_that_the_rig_can_have() -> None:
     assert drawn == set(able("bench", "lugre"))
     outside = choose("building", "lugre", (), True, np.random.default_rng(0))[0]
     assert outside.outside
+
+
+def test_a_building_is_refused_a_damper_that_would_need_an_effect_to_hold(tmp_path: Path) -> None:
+    with pytest.raises(StudyError, match="presliding"):
+        make_building(tmp_path / "tower", Choice(law="bingham", nothing=True))
+    assert not (tmp_path / "tower").exists()
 
 
 @pytest.mark.parametrize(
