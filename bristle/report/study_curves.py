@@ -42,9 +42,13 @@ def curves_section(study: Study, present: Collection[str]) -> str:
             caption = (
                 "The curve with the 95 % interval of each of its values, and the closed form that "
                 "follows it best."
+                if rows
+                else "What was learned is no curve with a closed form."
             )
             parts.append(html.figure(picture.read_bytes(), texts[0], caption))
-        parts.append(html.table(["form", "formula", "remains of the curve"], rows, numbers=(2,)))
+        if rows:  # a resonance and elastic-slip elements are no curve
+            heads = ["form", "formula", "remains of the curve"]
+            parts.append(html.table(heads, rows, numbers=(2,)))
         if name not in present:
             add = command("add", study.name, name)
             parts.append(html.paragraphs(f"The present model is without it:  {add}", kind="soft"))
