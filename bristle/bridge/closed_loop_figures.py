@@ -27,12 +27,17 @@ FEWEST = 5
 
 @dataclass(frozen=True)
 class Figures:
-    """Peak and RMS by response, of the model as it is and of draws (draws,) of its errors."""
+    """Peak and RMS by response, of the model as it is and of draws (draws,) of its errors.
+
+    `missed` is the share of the force that the model misses beyond noise: it is taken to miss as
+    much of a response.
+    """
 
     best: dict[Key, float]
     drawn: dict[Key, Array]
     stroke: float
     failed: int
+    missed: float = 0.0
 
     def band(self, key: Key) -> tuple[float, float] | None:
         """Return the 95 % band of what would be measured, None with too few draws."""
@@ -43,6 +48,7 @@ class Figures:
         wide = float(student.ppf(0.975, count - 1) * np.std(values, ddof=1))
         wide *= float(np.sqrt(1.0 + 1.0 / count))
         centre = float(np.mean(values))
+        wide = float(np.hypot(wide, 1.96 * self.missed * centre))
         return max(0.0, centre - wide), centre + wide
 
     def rows(self, trial: Trial, then: Figures | None) -> list[Predicted]:
@@ -61,7 +67,12 @@ class Figures:
 
 
 def figures_of(
-    model: StudyModel, place: tuple[House, bool], trial: Trial, draws: int, number: int
+    model: StudyModel,
+    place: tuple[House, bool],
+    trial: Trial,
+    draws: int,
+    number: int,
+    missed: float = 0.0,
 ) -> Figures:
     """Simulate a run with a model, and with draws of the errors of model and channels.
 
@@ -72,6 +83,7 @@ def figures_of(
     trial : the run
     draws : how many draws make a band; 0 for none
     number : of the run, which tells its draws from those of others
+    missed : share of the force that the model misses beyond noise
 
     Raises
     ------
@@ -102,7 +114,7 @@ def figures_of(
     level = house.building.levels()[0]
     stroke = float(np.max(np.abs(columns[f"structure.{level}_displacement"])))
     drawn = {key: np.array(values) for key, values in collected.items()}
-    return Figures(best, drawn, stroke, failed)
+    return Figures(best, drawn, stroke, failed, missed)
 
 
 def _names(columns: Columns, trial: Trial) -> dict[str, str]:

@@ -17,6 +17,7 @@ from study.house_made import study_of
 from study.made import write_runs
 
 from bristle.bridge.closed_loop import closed_loop, closed_loop_in
+from bristle.bridge.closed_loop_figures import Figures
 from bristle.bridge.closed_loop_input import house_of, trials_in
 from bristle.bridge.closed_loop_result import ClosedLoop, Predicted
 from bristle.bridge.closed_loop_runs import Trial
@@ -99,17 +100,28 @@ def test_the_model_before_the_last_step_stands_beside_it(found: ClosedLoop) -> N
 def test_the_band_is_that_of_the_drag(made: Path, found: ClosedLoop) -> None:
     study = Study(made)
     wide = study.model()
-    study.add_step("less sure", "to see", damper(wide, DRAG, spread=0.2), after={"z_holdout": 3.5})
+    errors = {"z_holdout": 3.5, "share_holdout": 0.01}
+    study.add_step("less sure", "to see", damper(wide, DRAG, spread=0.2), after=errors)
     try:
         other = closed_loop(study, draws=12)
     finally:
         study.undo()
     assert not found.notes
-    assert "the model is 3.50 times the noise; the band does not hold" in other.notes[0]
+    assert "the model is 3.50 times the noise; the band holds" in other.notes[0]
     one, two = (row(each, "base_displacement").band for each in (found, other))
     assert one is not None
     assert two is not None
     assert 2.0 < (two[1] - two[0]) / (one[1] - one[0]) < 7.0
+
+
+def test_what_a_model_misses_of_the_force_widens_the_band() -> None:
+    key = ("base_displacement", "rms")
+    drawn = {key: np.array([0.99, 1.01, 1.0, 0.98, 1.02])}
+    plain, wide = (Figures({key: 1.0}, drawn, 0.0, 0, missed).band(key) for missed in (0.0, 0.2))
+    assert plain is not None
+    assert wide is not None
+    half, more = 0.5 * (plain[1] - plain[0]), 0.5 * (wide[1] - wide[0])
+    assert more == pytest.approx(np.hypot(half, 1.96 * 0.2))
 
 
 def test_no_draws_no_band(made: Path) -> None:
