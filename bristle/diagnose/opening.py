@@ -11,7 +11,7 @@ import numpy as np
 from ..compare.patterns import ResidualPattern
 from ..data.derived import derived_velocity
 from ..data.measurement import Measurement
-from ..identify.fit import Model, Problem, identify
+from ..identify.fit import Model, Problem, Run, identify
 from ..identify.prepare import SHORTEST
 from ..identify.rig import DAMPER, Seeds, bench_rig
 from ..identify.search_context import refine
@@ -34,6 +34,12 @@ DRAWS = Seeds(train=0, holdout=1000, apart=1)
 CONTENDERS, NEAR = 3, 1.03
 """How many trials at most are fitted to all that was recorded, and up to which z as a multiple of
 the best one's: rivals are told apart on equal terms."""
+
+MANY = 200_000
+"""Samples of the training runs from which on effects are searched on some of the runs."""
+
+ENOUGH = 150_000
+"""Samples, about, of those runs: a search takes as long as they are."""
 
 Progress = Callable[[str], None]
 
@@ -191,7 +197,28 @@ def opened_with(before: Trial, data: BenchData) -> Opening:
         if apart is not None:
             faults += apart.faults
             problem, held_out, before = apart.train, apart.held_out, apart.trial
-    return Opening(before, problem, held_out, tuple(faults), data.noise, data.shown)
+    part = part_of(problem)
+    return Opening(before, problem, held_out, tuple(faults), data.noise, data.shown, part)
+
+
+def part_of(problem: Problem) -> Problem | None:
+    """Return the training runs that effects are searched on, None for all of them.
+
+    Of many samples a part says nearly as much of which effect it is; whole runs, so that what
+    builds up in them is there, spread evenly over levels of the command and speeds. The best
+    effects are fitted to all runs.
+    """
+    total = sum(len(run.force) for run in problem.runs)
+    every = -(-total // ENOUGH)
+    if total <= MANY or len(problem.runs) < 2 * every:
+        return None
+
+    def place(run: Run) -> tuple[float, float]:
+        level = float(np.mean(np.abs(run.V))) / problem.size("V")
+        return round(level, 1), float(np.std(run.v))
+
+    ordered = sorted(problem.runs, key=place)
+    return problem.of(ordered[every // 2 :: every])
 
 
 def _identified(present: Model, problem: Problem) -> Model:

@@ -1,0 +1,41 @@
+"""On which of many training runs effects are searched."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bristle.diagnose.opening import ENOUGH, MANY, part_of
+from bristle.identify.fit import Problem, Run
+
+
+def runs(count, samples):
+    """Return runs at five levels of the command, from slow to fast."""
+    out = []
+    for k in range(count):
+        v = (1.0 + k) * np.sin(0.01 * np.arange(samples))
+        V, none = np.full(samples, float(k % 5)), np.zeros((0, samples, 4))
+        out.append(Run(f"run{k}", 0.002, v, v, v, V, v, 0.1, none))
+    return Problem(out)
+
+
+def test_few_samples_are_all_searched():
+    assert part_of(runs(10, MANY // 10)) is None
+    assert part_of(runs(2, MANY)) is None  # what is left would be less than a run
+
+
+def test_of_many_samples_whole_runs_of_every_level_are_searched():
+    problem = runs(30, 20_000)
+    part = part_of(problem)
+    names = [run.name for run in part.runs]
+    assert set(names) < {run.name for run in problem.runs}
+    assert 0.5 * ENOUGH < sum(len(run.force) for run in part.runs) <= 1.2 * ENOUGH
+    assert {float(run.V[0]) for run in part.runs} == {0.0, 1.0, 2.0, 3.0, 4.0}
+    slow, fast = (choose(float(np.std(run.v)) for run in part.runs) for choose in (min, max))
+    assert fast > 3.0 * slow
+
+
+def test_runs_without_a_command_have_a_part_too():
+    problem = runs(30, 20_000)
+    for run in problem.runs:
+        run.V[:] = 0.0
+    assert len(part_of(problem).runs) >= 5
