@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.model import Model, Problem, Run
+from ..identify.residuals import residuals
+from ..identify.search import z_scale
 from ..identify.search_context import refine
 from ..quantity import plain
 from .candidates import Trial, judge
@@ -31,6 +33,9 @@ WINDOWS = 12
 TURNS = 15
 """How often at the most the lateness is estimated anew with runs set right and the law refitted:
 it is linear only where small, and a law bends to be late with the runs."""
+
+LARGE, HOPE = 2.0, 0.1
+"""z on the training runs from which on the first correction must take a share of the excess."""
 
 SETTLED = 0.03
 """Share of a sampling step by which no run may move any more."""
@@ -89,13 +94,15 @@ def clock_faults(
     if clocks is None or not _differ(clocks, runs, rule):
         return None
     count = len(train.runs)
-    for _ in range(TURNS):
+    for turn in range(TURNS):
         moved = [_set_right(run, clocks, k) for k, run in enumerate(runs)]
         model = refine(model, train.of(moved[:count]), 4)
         left = clocks_of(model, train.of(moved))
         if left is None:
             return None
         clocks = clocks.plus(left)
+        if turn == 0 and _lowered(moved[:count], model, train, before) < HOPE:
+            return None
         if _largest(left, runs) < SETTLED:
             break
     moved = [_set_right(run, clocks, k) for k, run in enumerate(runs)]
@@ -105,6 +112,19 @@ def clock_faults(
     if not faults or not _explain(trial, before, rule):
         return None
     return ClockFaults(faults, *right, trial)
+
+
+def _lowered(moved: list[Run], model: Model, train: Problem, before: Trial) -> float:
+    """Return which share of the excess on the training runs a first correction takes.
+
+    1 where that is small: one run apart hardly shows in it.
+    """
+    if before.train < LARGE:
+        return 1.0
+    problem = train.of(moved)
+    z = z_scale(residuals(problem, model, problem.expectation(model)))
+    was = before.train**2 - 1.0
+    return (was - max(z**2 - 1.0, 0.0)) / max(was, 1e-9)
 
 
 def _largest(clocks: Clocks, runs: list[Run]) -> float:

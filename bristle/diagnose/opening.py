@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -35,11 +35,11 @@ CONTENDERS, NEAR = 3, 1.03
 """How many trials at most are fitted to all that was recorded, and up to which z as a multiple of
 the best one's: rivals are told apart on equal terms."""
 
-MANY = 200_000
-"""Samples of the training runs from which on effects are searched on some of the runs."""
+MANY = 150_000
+"""Samples of the training runs from which on effects are searched on a part of them."""
 
-ENOUGH = 150_000
-"""Samples, about, of those runs: a search takes as long as they are."""
+ENOUGH, FEWEST = 75_000, 8
+"""Samples, about, of that part, for a search takes as long as they are; and its runs."""
 
 Progress = Callable[[str], None]
 
@@ -197,28 +197,37 @@ def opened_with(before: Trial, data: BenchData) -> Opening:
         if apart is not None:
             faults += apart.faults
             problem, held_out, before = apart.train, apart.held_out, apart.trial
-    part = part_of(problem)
+    part = None if isinstance(problem, StructureProblem) else part_of(problem)
     return Opening(before, problem, held_out, tuple(faults), data.noise, data.shown, part)
 
 
 def part_of(problem: Problem) -> Problem | None:
-    """Return the training runs that effects are searched on, None for all of them.
+    """Return the part of the training runs that effects are searched on, None for all.
 
-    Of many samples a part says nearly as much of which effect it is; whole runs, so that what
-    builds up in them is there, spread evenly over levels of the command and speeds. The best
-    effects are fitted to all runs.
+    Of many samples a part says nearly as much of which effect it is. It has the begins of runs, so
+    that what builds up in them is there, spread evenly over levels of the command and speeds. The
+    best effects are fitted to all runs.
     """
-    total = sum(len(run.force) for run in problem.runs)
-    every = -(-total // ENOUGH)
-    if total <= MANY or len(problem.runs) < 2 * every:
+    runs = problem.runs
+    if sum(len(run.force) for run in runs) <= MANY:
         return None
 
     def place(run: Run) -> tuple[float, float]:
         level = float(np.mean(np.abs(run.V))) / problem.size("V")
         return round(level, 1), float(np.std(run.v))
 
-    ordered = sorted(problem.runs, key=place)
-    return problem.of(ordered[every // 2 :: every])
+    ordered = sorted(runs, key=place)
+    chosen = np.linspace(0, len(runs) - 1, min(FEWEST, len(runs))).round().astype(int)
+    return problem.of([_begin(ordered[k], ENOUGH // len(chosen)) for k in chosen])
+
+
+def _begin(run: Run, samples: int) -> Run:
+    """Return the first samples of a run."""
+    if len(run.force) <= samples:
+        return run
+    part = {name: getattr(run, name)[:samples] for name in ("x", "v", "a", "V", "force")}
+    measured = None if run.measured is None else run.measured[:samples]
+    return replace(run, **part, draws=run.draws[:, :samples], measured=measured)
 
 
 def _identified(present: Model, problem: Problem) -> Model:

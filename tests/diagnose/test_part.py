@@ -1,10 +1,10 @@
-"""On which of many training runs effects are searched."""
+"""On which part of many samples effects are searched."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from bristle.diagnose.opening import ENOUGH, MANY, part_of
+from bristle.diagnose.opening import ENOUGH, FEWEST, MANY, part_of
 from bristle.identify.fit import Problem, Run
 
 
@@ -20,22 +20,26 @@ def runs(count, samples):
 
 def test_few_samples_are_all_searched():
     assert part_of(runs(10, MANY // 10)) is None
-    assert part_of(runs(2, MANY)) is None  # what is left would be less than a run
 
 
-def test_of_many_samples_whole_runs_of_every_level_are_searched():
+def test_of_many_samples_the_begins_of_runs_of_every_level_are_searched():
     problem = runs(30, 20_000)
     part = part_of(problem)
-    names = [run.name for run in part.runs]
-    assert set(names) < {run.name for run in problem.runs}
-    assert 0.5 * ENOUGH < sum(len(run.force) for run in part.runs) <= 1.2 * ENOUGH
+    assert len(part.runs) == FEWEST
+    assert len({run.name for run in part.runs}) == FEWEST
+    assert 0.9 * ENOUGH < sum(len(run.force) for run in part.runs) <= ENOUGH
     assert {float(run.V[0]) for run in part.runs} == {0.0, 1.0, 2.0, 3.0, 4.0}
     slow, fast = (choose(float(np.std(run.v)) for run in part.runs) for choose in (min, max))
     assert fast > 3.0 * slow
+    first = part.runs[0]
+    whole = next(run for run in problem.runs if run.name == first.name)
+    assert np.array_equal(first.force, whole.force[: len(first.force)])
+    assert first.draws.shape[1] == len(first.force)
 
 
-def test_runs_without_a_command_have_a_part_too():
+def test_runs_without_a_command_and_one_long_run_have_a_part_too():
     problem = runs(30, 20_000)
     for run in problem.runs:
         run.V[:] = 0.0
-    assert len(part_of(problem).runs) >= 5
+    assert len(part_of(problem).runs) == FEWEST
+    assert len(part_of(runs(1, 2 * MANY)).runs[0].force) == ENOUGH
