@@ -19,6 +19,9 @@ from dataclasses import asdict
 from . import __path__ as folder
 from ._rows import Row
 
+COUNTED = ("instruments", "lab", "law_free", "learned", "prediction")
+"""Benchmarks whose own options say how many cases are made."""
+
 
 def main() -> int:
     """Print the table; return 0 whatever is reached, for times depend on the machine."""
@@ -39,26 +42,9 @@ def main() -> int:
 
         show(laws(sys.argv[2:]))
         return 0
-    if sys.argv[1:2] == ["instruments"] and len(sys.argv) > 2:
-        from .instruments import main as instruments
-
-        return instruments(sys.argv[2:])
-    if sys.argv[1:2] == ["lab"] and len(sys.argv) > 2:
-        from .lab import main as lab
-
-        return lab(sys.argv[2:])
-    if sys.argv[1:2] == ["law_free"] and len(sys.argv) > 2:
-        from .law_free import main as law_free
-
-        return law_free(sys.argv[2:])
-    if sys.argv[1:2] == ["learned"] and len(sys.argv) > 2:
-        from .learned import main as learned
-
-        return learned(sys.argv[2:])
-    if sys.argv[1:2] == ["prediction"] and len(sys.argv) > 2:
-        from .prediction import main as prediction
-
-        return prediction(sys.argv[2:])
+    if sys.argv[1:2] and sys.argv[1] in COUNTED and len(sys.argv) > 2:
+        asked: int = importlib.import_module(f"benchmarks.{sys.argv[1]}").main(sys.argv[2:])
+        return asked
     names = [m.name for m in pkgutil.iter_modules(folder) if not m.name.startswith("_")]
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(names)}")

@@ -2,17 +2,48 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 from bristle.resources import cache_folder
 
 from ._blind import work
+from ._rows import Row
 
 Answer = dict[str, Any]
+
+
+def ask(
+    name: str,
+    text: str | None,
+    kinds: Sequence[str],
+    answer: Callable[..., Answer],
+    rows: Callable[[dict[str, Answer]], list[Row]],
+    given: Sequence[str],
+) -> int:
+    """Make what is missing of a benchmark's figures, print them; return 0.
+
+    Parameters
+    ----------
+    name, text : of the benchmark, and what it says of itself
+    kinds : of cases; `--KIND CASES` says how many there should be
+    answer : called with kind and number of a case; returns what is found
+    rows : returns the figures of all answers
+    given : options as typed
+    """
+    parser = argparse.ArgumentParser(prog=f"python -m benchmarks {name}", description=text)
+    for kind in kinds:
+        parser.add_argument(f"--{kind}", type=int, default=0, metavar="CASES")
+    chosen = parser.parse_args(given)
+    jobs = ((kind, k) for kind in kinds for k in range(getattr(chosen, kind)))
+    for row in rows(Answers(name).complete(jobs, answer)):
+        goal = f" (goal {row.goal})" if row.goal else ""
+        print(f"{row.name}: {row.measured}{goal}")
+    return 0
 
 
 class Answers:

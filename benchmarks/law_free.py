@@ -14,10 +14,8 @@ where it names another pair of no more parameters and tells that the true one do
 
 from __future__ import annotations
 
-import argparse
 import json
 import traceback
-from collections.abc import Iterator
 from time import perf_counter
 
 from bristle.diagnose.faults import instruments_of
@@ -26,7 +24,7 @@ from bristle.diagnose.law_free import diagnose_laws
 from bristle.identify.model import Model
 from bristle.physics.forms import split_form
 
-from ._answers import Answer, Answers
+from ._answers import Answer, Answers, ask
 from ._blind import cases, score
 from ._blind.plan import Task, make_plan
 from ._blind.subject import measurements
@@ -43,19 +41,7 @@ def run() -> list[Row]:
 
 def main(given: list[str]) -> int:
     """Make what is missing of the figures, print them."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks law_free", description=__doc__)
-    for name in GOALS:
-        parser.add_argument(f"--{name}", type=int, default=0, metavar="CASES")
-    chosen = parser.parse_args(given)
-    done = Answers("law_free").complete(_jobs(chosen), answered)
-    for row in rows(done):
-        print(f"{row.name}: {row.measured} (goal {row.goal})")
-    return 0
-
-
-def _jobs(chosen: argparse.Namespace) -> Iterator[tuple[str, int]]:
-    for name in GOALS:
-        yield from ((name, k) for k in range(getattr(chosen, name)))
+    return ask("law_free", __doc__, tuple(GOALS), answered, rows, given)
 
 
 def rows(done: dict[str, Answer]) -> list[Row]:

@@ -12,10 +12,8 @@ none       bench cases that hide nothing: nothing must be learned
 
 from __future__ import annotations
 
-import argparse
 import json
 import traceback
-from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 
@@ -30,7 +28,7 @@ from bristle.diagnose.opening import Insufficient, Opening, opening
 from bristle.identify.model import Model
 from bristle.physics.user import defined
 
-from ._answers import Answer, Answers
+from ._answers import Answer, Answers, ask
 from ._blind import cases
 from ._blind.plan import make_plan
 from ._blind.subject import measurements
@@ -65,19 +63,7 @@ def run() -> list[Row]:
 
 def main(given: list[str]) -> int:
     """Make what is missing of the figures, print them."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks learned", description=__doc__)
-    for name in ("outside", "none"):
-        parser.add_argument(f"--{name}", type=int, default=0, metavar="CASES")
-    chosen = parser.parse_args(given)
-    done = Answers("learned").complete(_jobs(chosen), _answered)
-    for row in rows(done):
-        print(f"{row.name}: {row.measured} (goal {row.goal})")
-    return 0
-
-
-def _jobs(chosen: argparse.Namespace) -> Iterator[tuple[str, int]]:
-    yield from (("outside", k) for k in range(chosen.outside))
-    yield from (("none", k) for k in range(chosen.none))
+    return ask("learned", __doc__, ("outside", "none"), _answered, rows, given)
 
 
 def rows(done: dict[str, Answer]) -> list[Row]:

@@ -10,7 +10,6 @@ added: what is judged is the band, not the verdict. Without a number it prints w
 
 from __future__ import annotations
 
-import argparse
 import tempfile
 import traceback
 from pathlib import Path
@@ -23,7 +22,7 @@ from bristle.example.make import Choice, make_building
 from bristle.study.identification import identify_study
 from bristle.study.learning import add_effects
 
-from ._answers import Answer, Answers
+from ._answers import Answer, Answers, ask
 from ._rows import Row
 
 FIRST = 700
@@ -37,13 +36,7 @@ def run() -> list[Row]:
 
 def main(given: list[str]) -> int:
     """Make what is missing of the figures, print them."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks prediction", description=__doc__)
-    parser.add_argument("--cases", type=int, default=0, metavar="CASES")
-    count = parser.parse_args(given).cases
-    done = Answers("prediction").complete([(k,) for k in range(count)], answered)
-    for row in rows(done):
-        print(f"{row.name}: {row.measured} (goal {row.goal})")
-    return 0
+    return ask("prediction", __doc__, ("cases",), answered, rows, given)
 
 
 def rows(done: dict[str, Answer]) -> list[Row]:
@@ -67,7 +60,7 @@ def rows(done: dict[str, Answer]) -> list[Row]:
     return out
 
 
-def answered(number: int) -> Answer:
+def answered(_kind: str, number: int) -> Answer:
     """Return whether each peak and RMS lies in its band; an error is an answer too."""
     effects = able("building", "lugre")
     effect = effects[number % len(effects)]
