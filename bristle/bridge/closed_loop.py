@@ -8,11 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import sqrt
 
 import numpy as np
 
-from ..compare.errors import CLOSE
 from ..data.measurement import Measurement
 from ..data.model import StudyModel, read_model
 from ..draw.style import percent
@@ -175,39 +173,27 @@ def _predicted(
 ) -> ClosedLoop:
     """Return the prediction of the present model and of that before the last step."""
     before, step = _before(study)
-    missed = _missed(study)
+    judged = history_steps(study.steps())
     rows: list[Predicted] = []
     strokes, failed = [], 0
     for number, trial in enumerate(trials):
         tell(f"simulating {trial.shaking.name}")
-        now = figures_of(model, place, trial, draws, number, missed[-1])
+        now = figures_of(model, place, trial, draws, number, judged[-1].missed)
         then = None
         if before is not None:
             drawn = draws if _has_covariance(before) else 0
-            then = figures_of(before, place, trial, drawn, number, missed[-2])
+            then = figures_of(before, place, trial, drawn, number, judged[-2].missed)
         rows += now.rows(trial, then)
         strokes.append(now.stroke)
         failed += now.failed
     notes = [f"{failed} of the draws could not be simulated"] if failed else []
-    if draws and missed[-1]:
-        z = history_steps(study.steps())[-1].z
+    last = judged[-1]
+    if draws and last.missed and last.z is not None:
         notes.append(
-            f"on held-out runs the error of the model is {short_z(z or 0.0)} times the noise; the "
-            f"band holds {percent(missed[-1])} more of each figure for what the model misses"
+            f"on held-out runs the error of the model is {short_z(last.z)} times the noise; what "
+            f"it misses, {percent(last.missed)} of the force, widens the band"
         )
     return ClosedLoop(tuple(rows), draws, step, tuple(notes), tuple(strokes))
-
-
-def _missed(study: Study) -> list[float]:
-    """Return for each step of a study the share of the force that its model misses beyond noise."""
-    steps = study.steps()
-    out = []
-    for k, one in enumerate(history_steps(steps)):
-        errors = steps[k].after or (steps[k + 1].before if k + 1 < len(steps) else {})
-        share = errors.get("share_holdout")
-        beyond = sqrt(1.0 - 1.0 / one.z**2) if one.z is not None and one.z > CLOSE else 0.0
-        out.append(beyond * float(share) if isinstance(share, int | float) else 0.0)
-    return out
 
 
 def _before(study: Study) -> tuple[StudyModel | None, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import log10
+from math import log10, sqrt
 from typing import TYPE_CHECKING, Any
 
 from ..quantity import plain, quantity, short_z
@@ -22,13 +22,24 @@ CLOSE = 1.1
 
 @dataclass(frozen=True)
 class HistoryStep:
-    """One step of the staircase: what was done, and z and error [N] of the model after it."""
+    """One step of the staircase: what was done, and z and error [N] of the model after it.
+
+    `share` is the error on held-out runs over the force's RMS [1].
+    """
 
     number: int
     what: str
     z: float | None
     z_train: float | None
     rms: float | None
+    share: float | None = None
+
+    @property
+    def missed(self) -> float:
+        """The share of the force that the model misses beyond noise; 0 where noise is all."""
+        if self.z is None or self.share is None or self.z <= CLOSE:
+            return 0.0
+        return self.share * sqrt(1.0 - 1.0 / self.z**2)
 
 
 @dataclass(frozen=True)
@@ -118,7 +129,8 @@ def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
         errors: dict[str, Any] = {**step.after}
         if not errors and k + 1 < len(steps):
             errors = {**steps[k + 1].before}
-        numbers = [_number(errors.get(key)) for key in ("z_holdout", "z_train", "rms_holdout")]
+        keys = ("z_holdout", "z_train", "rms_holdout", "share_holdout")
+        numbers = [_number(errors.get(key)) for key in keys]
         out.append(HistoryStep(step.number, step.what, *numbers))
     return out
 

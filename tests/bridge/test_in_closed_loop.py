@@ -107,7 +107,7 @@ def test_the_band_is_that_of_the_drag(made: Path, found: ClosedLoop) -> None:
     finally:
         study.undo()
     assert not found.notes
-    assert "the model is 3.50 times the noise; the band holds" in other.notes[0]
+    assert "3.50 times the noise; what it misses, 1.0 % of the force, widens" in other.notes[0]
     one, two = (row(each, "base_displacement").band for each in (found, other))
     assert one is not None
     assert two is not None
