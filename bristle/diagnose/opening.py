@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -192,13 +192,13 @@ def opened_with(before: Trial, data: BenchData) -> Opening:
         if shown.fault.fault == "bias":  # found without the effects that are tried next
             problem, held_out = problem.with_free_zero(), held_out.with_free_zero()
             before = judge(before.model, problem, held_out)
-    elif not isinstance(problem, StructureProblem):
+    else:
         apart = clock_faults(before, problem, held_out)
         if apart is not None:
             faults += apart.faults
             problem, held_out, before = apart.train, apart.held_out, apart.trial
-    part = None if isinstance(problem, StructureProblem) else part_of(problem)
-    return Opening(before, problem, held_out, tuple(faults), data.noise, data.shown, part)
+    shown_by = (tuple(faults), data.noise, data.shown)
+    return Opening(before, problem, held_out, *shown_by, part_of(problem))
 
 
 def part_of(problem: Problem) -> Problem | None:
@@ -218,16 +218,7 @@ def part_of(problem: Problem) -> Problem | None:
 
     ordered = sorted(runs, key=place)
     chosen = np.linspace(0, len(runs) - 1, min(FEWEST, len(runs))).round().astype(int)
-    return problem.of([_begin(ordered[k], ENOUGH // len(chosen)) for k in chosen])
-
-
-def _begin(run: Run, samples: int) -> Run:
-    """Return the first samples of a run."""
-    if len(run.force) <= samples:
-        return run
-    part = {name: getattr(run, name)[:samples] for name in ("x", "v", "a", "V", "force")}
-    measured = None if run.measured is None else run.measured[:samples]
-    return replace(run, **part, draws=run.draws[:, :samples], measured=measured)
+    return problem.of([ordered[k].of(slice(ENOUGH // len(chosen))) for k in chosen])
 
 
 def _identified(present: Model, problem: Problem) -> Model:

@@ -107,16 +107,8 @@ def _first_samples(run: Run, samples: int) -> StructureRun:
     """Return the first samples of a run, from rest: what a law remembers begins there."""
     assert isinstance(run, StructureRun)
     keep = run.keep[run.keep < samples]
-    first, own = slice(samples), slice(len(keep))
-    old = _whole(run)
-    whole = replace(
-        old, x=old.x[first], v=old.v[first], a=old.a[first], V=old.V[first],
-        force=old.force[first], draws=old.draws[:, first],
-    )  # fmt: skip
-    return replace(
-        run, x=run.x[own], v=run.v[own], a=run.a[own], V=run.V[own], force=run.force[own],
-        draws=run.draws[:, own], whole=whole, keep=keep,
-    )  # fmt: skip
+    whole = _whole(run).of(slice(samples))
+    return replace(run.of(slice(len(keep))), whole=whole, keep=keep)
 
 
 def decide_site(before: Trial, trials: Sequence[Trial], rule: DecisionRule = SITE) -> Decision:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,6 +56,14 @@ class Run:
     measured: NDArray[np.bool_] | None = None
     drive: str = "voltage"
     labels: Mapping[str, Label] = field(default_factory=dict)
+
+    def of(self, part: slice) -> Self:
+        """Return the run with these of its samples; `dt` and `skip` stay what they were."""
+        return replace(
+            self, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
+            force=self.force[part], draws=self.draws[:, part],
+            measured=None if self.measured is None else self.measured[part],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -172,14 +172,7 @@ def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Probl
     runs, thinned = [], []
     for run, (bias, sigma, draws) in zip(problem.runs, expected, strict=True):
         every = slice(None, None, THIN)
-        runs.append(
-            replace(
-                run, dt=run.dt * THIN, x=run.x[every], v=run.v[every], a=run.a[every],
-                V=run.V[every], force=run.force[every], draws=run.draws[:, every],
-                skip=-(-run.skip // THIN),
-                measured=None if run.measured is None else run.measured[every],
-            )
-        )  # fmt: skip
+        runs.append(replace(run.of(every), dt=run.dt * THIN, skip=-(-run.skip // THIN)))
         thinned.append((bias[every], sigma[every], draws[:, every]))
     return problem.of(runs), thinned
 
