@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ...quantity import plain, quantity
 from ...units import canonical
-from .curve import ALONE, Curve, Formula
+from .curve import Curve, Formula
 from .rule import LEARN, LearnRule
 
 Array = NDArray[np.float64]
@@ -128,7 +128,7 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     curve : as fitted
     std : (k,) of its values; a knot that was held at zero counts as the surest of the others
     """
-    if curve.part in ALONE:
+    if curve.of.alone:
         return []  # its values are no curve
     s, y = np.array(curve.knots), np.array(curve.values)
     given = np.array(std)

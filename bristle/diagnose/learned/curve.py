@@ -19,8 +19,10 @@ class Part(NamedTuple):
     """A part of the model that a curve may change.
 
     `hook` of an effect and the expression that it returns, `{g}` being the curve's value; `unit` of
-    the curve; `words` for sentences; `needs` more signals; `low` the least value of the curve;
-    `level` whether a constant is the law's own already, so that one knot stays at zero.
+    the curve; `words` for sentences; `needs` more signals; `low`, `high` the bounds of its values;
+    `level` whether a constant is the law's own already, so that one knot stays at zero. `site` is
+    where the effect acts. What is no curve along a signal is `alone`: `law` is the rest of its
+    equation, `cause` on what the error depends that it explains, `parameter` its only value.
     """
 
     hook: str
@@ -31,6 +33,12 @@ class Part(NamedTuple):
     needs: tuple[str, ...] = ()
     low: float = float("-inf")
     level: bool = False
+    high: float = float("inf")
+    site: str = "damper"
+    alone: bool = False
+    law: str = ""
+    cause: str = ""
+    parameter: str = ""
 
 
 PARTS = {
@@ -67,22 +75,24 @@ PARTS = {
     ),
     SLIP: Part(
         "force", "{g}", "N", "parallel elastic-slip elements", "F = F_model + sum of curve[k] s_k",
-        (), 0.0,
+        low=0.0, alone=True, cause=ALONG["travel"].words,
+        law="-1 <= s_k <= 1\n\n    s_k is the state of a spring with a slider: x/KNOTS[k] since the"
+        " last reversal, until\n    it slips (Iwan 1966, J. Appl. Mech. 33(4)).",
     ),
     RING: Part(
         "channel", "q.value + p.share * (z.ring - q.value)", "1",
-        "a resonance of what holds the load cell",
-        "F_shown = F + share (r - F)", (), 0.0,
+        "a resonance of what holds the load cell", "F_shown = F + share (r - F)",
+        low=0.0, high=1.2, site="sensor", alone=True, cause="the frequency of the force",
+        law="r'' + 2 damping w r' + w^2 r = w^2 F,   w = 2 pi frequency\n\n    F is the damper's "
+        "force, r its part that a mode of the frame or the fixture lets ring.",
+        parameter="share",
     ),
 }  # fmt: skip
-
-ALONE = (SLIP, RING)
-"""Parts that are no curve along a signal: what they depend on has their own name."""
 
 
 def may_change(part: str, along: str) -> bool:
     """Return whether a curve along a signal may change a part: a command's map depends on it."""
-    if part in ALONE or along in ALONE:
+    if PARTS[part].alone or along in PARTS:
         return part == along
     of_command = along in ("voltage", "recent_voltage")
     if part == "command":
@@ -126,8 +136,8 @@ class Curve:
     @property
     def entries(self) -> tuple[str, ...]:
         """The names of the parameters that its values are."""
-        if self.part == RING:
-            return ("share",)
+        if self.of.parameter:
+            return (self.of.parameter,)
         return tuple(f"curve[{k + 1}]" for k in range(len(self.knots)))
 
     @property

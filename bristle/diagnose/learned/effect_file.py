@@ -9,9 +9,8 @@ import math
 from collections.abc import Sequence
 
 from ...physics.drive import drive_named, unit_for
-from .along import ALONG, MEMORIES
-from .curve import ALONE, BOUND, Curve, Formula, bounds_of
-from .ring import RING
+from .along import MEMORIES
+from .curve import BOUND, Curve, Formula, bounds_of
 from .slip import SLIP
 
 MATH = tuple(
@@ -38,9 +37,7 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     """
     body = _hooks(curve, formula)
     parameters: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
-    table = formula is None and curve.part != RING
-    if curve.part == RING:
-        parameters.append(("share", curve.values[0], "1", "share of the force that rings"))
+    table = formula is None and not curve.of.parameter
     if formula:
         parameters += [
             (n, value, unit, f"{n} in g = {formula.text}") for n, value, unit in formula.parameters
@@ -50,17 +47,17 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
         *_about(name, curve, formula),
         "",
         f'    name = "{name}"',
-        *_where(curve),
+        f'    sites = ("{curve.of.site}",)',
         *_fields(curve),
         f'    source = "{origin}"',
-        f'    expect = "an error that depends on {_on(curve)}"',
+        f'    expect = "an error that depends on {curve.of.cause or curve.signal.words}"',
         "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
     ]
     if curve.held and not formula:
         held = tuple(f"curve[{k + 1}]" for k in curve.held)
         lines.append(f"    assumed = {held!r}  # the law has a constant already".replace("'", '"'))
     if parameters:
-        lines += ["    parameters = {", *_declared(parameters), "    }"]
+        lines += ["    parameters = {", *_declared(parameters), *_only_value(curve), "    }"]
     if table:
         lines += _table(curve)
     return "\n".join([*lines, "", *body]) + "\n"
@@ -114,18 +111,8 @@ def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
     """Return the class's first lines and its docstring."""
     g = f"g = {formula.text if formula else 'curve(s)'},   s = {curve.signal.words}"
     end = "." if formula else ", for beyond its ends the curve keeps its value."
-    if curve.part == SLIP:
-        g = (
-            "-1 <= s_k <= 1\n\n    s_k is the state of a spring with a slider: x/KNOTS[k] since the"
-            " last reversal, until\n    it slips (Iwan 1966, J. Appl. Mech. 33(4))."
-        )
-        end = "."
-    if curve.part == RING:
-        g = (
-            "r'' + 2 damping w r' + w^2 r = w^2 F,   w = 2 pi frequency\n\n    F is the damper's "
-            "force, r its part that a mode of the frame or the fixture lets ring."
-        )
-        end = "."
+    if curve.of.law:
+        g, end = curve.of.law, "."
     return [
         f"class {''.join(word.capitalize() for word in name.split('_'))}(Effect):",
         f'    """{_title(name)}: {_subject(curve, "that depends on")}.',
@@ -138,20 +125,6 @@ def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
     ]
 
 
-def _on(curve: Curve) -> str:
-    """Return on what the error depends that a curve explains."""
-    if curve.part == RING:
-        return "the frequency of the force"
-    return ALONG["travel"].words if curve.part == SLIP else curve.signal.words
-
-
-def _where(curve: Curve) -> list[str]:
-    """Return the lines that say where the effect acts."""
-    if curve.part == RING:
-        return ['    sites = ("sensor",)', '    shows = "force"']
-    return ['    sites = ("damper",)']
-
-
 def _title(name: str) -> str:
     return name.replace("_", " ").capitalize()
 
@@ -159,7 +132,7 @@ def _title(name: str) -> str:
 def _subject(curve: Curve, joined: str) -> str:
     """Return what a curve is: its part, and its signal after a word or two."""
     words = curve.of.words
-    return words if curve.part in ALONE else f"{words} {joined} {curve.signal.words}"
+    return words if curve.of.alone else f"{words} {joined} {curve.signal.words}"
 
 
 def _table(curve: Curve) -> list[str]:
@@ -193,7 +166,7 @@ def _fields(curve: Curve) -> list[str]:
         "states": {name: unit_for(unit, drive) for name, unit in along.states},
         "starts": dict(along.starts),
         "passive": curve.passive,
-        "zero_at_rest": curve.part in ALONE or part.expression != "{g}",
+        "zero_at_rest": part.alone or part.expression != "{g}",
     }
     texts = [(key, f"{value!r}".replace("'", '"')) for key, value in given.items()]
     return [f"    {key} = {text}" for key, text in texts if text not in ("{}", "()")]
@@ -205,10 +178,21 @@ def _declared(parameters: Sequence[Declared]) -> list[str]:
     for name, value, unit, text in parameters:
         size = BOUND * max(abs(value), 1e-9)
         low, high = (0.02 * value, 50.0 * value) if name in POSITIVE else (-size, size)
-        low, high = (0.0, 1.2) if name == "share" else (low, high)
         bounds = f"({low:.4g}, {high:.4g})"
         lines.append(f'        "{name}": Parameter({value:.6g}, "{unit}", {bounds}, "{text}"),')
     return lines
+
+
+def _only_value(curve: Curve) -> list[str]:
+    """Return the line that declares the value of what is no curve but has one; else none."""
+    part, (value, *_) = curve.of, curve.values
+    if not part.parameter:
+        return []
+    text = f"{part.parameter} of the force that it has"
+    bounds = f"({part.low:.4g}, {part.high:.4g})"
+    return [
+        f'        "{part.parameter}": Parameter({value:.6g}, "{part.unit}", {bounds}, "{text}"),'
+    ]
 
 
 def _row(begin: str, values: tuple[float, ...], end: str = "") -> list[str]:

@@ -19,9 +19,10 @@ from .closed import ClosedForm, formula_of
 from .curve import Curve, Formula
 from .effect_file import effect_text
 from .normal import Normal
+from .promise import Promise, distinct
 from .residual import residual_of
 from .rule import LEARN, LearnRule
-from .screen import Promise, distinct, promises
+from .screen import promises
 
 TRIED = 4
 """Curves that are fitted with everything else, of those that promise most."""

@@ -21,12 +21,6 @@ Array = NDArray[np.float64]
 RING = "resonance"
 """Name of the part of the model that this mode is, and of what its share depends on."""
 
-DAMPINGS = (0.01, 0.03, 0.1)
-"""Damping ratios at which the scan looks."""
-
-STEPS = (1.06, 1.02, 1.005)
-"""Factors by which the frequency is changed afterwards, one after the other."""
-
 ADVANCE = """    w = 6.283185307179586 * p.frequency
     half = 0.5 * q.dt
     loss, stiff = 2.0 * p.damping * w * half, (w * half) ** 2
@@ -34,7 +28,7 @@ ADVANCE = """    w = 6.283185307179586 * p.frequency
     rate = (z.rate * (1.0 - loss - stiff) + push) / (1.0 + loss + stiff)
     return z.ring + half * (z.rate + rate), rate, q.value"""
 
-SIGNAL = Along(
+SIGNAL = Along(  # it follows the force, which is no signal of the motion: `modes` scans it
     RING, "1", "a mode of what holds the load cell", ("value", "dt"), "",
     lambda run, _: np.zeros(len(run.force)),
     (("ring", "N"), ("rate", "N/s"), ("last", "N")), (("ring", "value"), ("last", "value")),

@@ -7,7 +7,6 @@ stretches of the training runs that it was not fitted to.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -15,10 +14,11 @@ from numpy.typing import NDArray
 
 from .along import ALONG, Along
 from .curve import PARTS, Curve, may_change
+from .modes import best_mode
 from .normal import Hats, Normal, hats_at
+from .promise import Promise, distinct
 from .residual import Residual
-from .ring import DAMPINGS, RING, frequencies, ringing
-from .ring import STEPS as RING_STEPS
+from .ring import RING
 from .rule import LEARN, LearnRule
 from .slip import SHARES, SLIP, signal_of
 
@@ -41,14 +41,6 @@ TUNED = 4
 
 STEPS = (2.0, 1.4, 1.2)
 """Factors by which such a time or travel is changed, one after the other."""
-
-
-@dataclass(frozen=True)
-class Promise:
-    """A curve with what it promises: `loss` the mean squared residual where it was not fitted."""
-
-    curve: Curve
-    loss: float
 
 
 def promises(
@@ -76,7 +68,7 @@ def promises(
     if SLIP in (parts or (SLIP,)) and SLIP in (along or (SLIP,)):
         found.append(_slipping(known))
     if RING in (parts or (RING,)) and RING in (along or (RING,)):
-        found.append(_ringing(known))
+        found.append(best_mode(known))
     without = known.without_curve()
     kept = sorted((p for p in found if p is not None and p.loss < without), key=lambda p: p.loss)
     remembering = [
@@ -266,60 +258,3 @@ def _slipping(known: Normal) -> Promise | None:
             return Promise(Curve(SLIP, SLIP, (), *given, drive=residual.drive), loss)
         left.pop(int(np.argmin(found)))
     return None
-
-
-def _ringing(known: Normal) -> Promise | None:
-    """Return the mode of what holds the load cell that promises most; None where none does."""
-    residual = known.residual
-    if not residual.shown:
-        return None
-    dt = residual.runs[0].dt
-    length = min(len(run.x) for run in residual.runs) * dt
-    nodes = product(map(float, frequencies(dt, length)), DAMPINGS)
-    found = [one for one in (_rings_at(known, *node) for node in nodes) if one is not None]
-    if not found:
-        return None
-    best = min(found, key=lambda one: one.loss)
-    for step in RING_STEPS:
-        for factor, damping in product((1.0 / step, 1.0, step), (0.6, 1.0, 1.6)):
-            at = dict(best.curve.memory)
-            tried = _rings_at(known, at["frequency"] * factor, at["damping"] * damping)
-            if tried is not None and tried.loss < best.loss:
-                best = tried
-    return best
-
-
-def _rings_at(known: Normal, frequency: float, damping: float) -> Promise | None:
-    """Return a mode with the share that fits best; None where that is none."""
-    residual = known.residual
-    column = np.concatenate(
-        [
-            ringing(force, run.dt, frequency, damping)[keep]
-            for force, run, keep in zip(residual.shown, residual.runs, residual.keeps, strict=True)
-        ]
-    )
-    normal = known.with_columns((column / residual.sigma)[:, None])
-    none = np.zeros_like(normal.grams[0])
-    gram, side = normal.grams.sum(axis=0) + normal.ridge(), normal.sides.sum(axis=0)
-    share = float(np.linalg.solve(gram, side)[-1])
-    if not 0.0 < share < 1.0:
-        return None
-    memory = (("frequency", frequency), ("damping", damping))
-    curve = Curve(RING, RING, memory, (0.0,), (share,), drive=residual.drive)
-    return Promise(curve, normal.left_out(none))
-
-
-def distinct(found: Sequence[Promise], count: int, near: float = LEARN.near) -> list[Promise]:
-    """Return the best promises of different parts and signals, those near the best one alone.
-
-    Parameters
-    ----------
-    found : the best first
-    count : how many at most
-    near : times the loss of the best one
-    """
-    first: dict[tuple[str, str], Promise] = {}
-    for one in found:
-        if one.loss <= near * found[0].loss:
-            first.setdefault((one.curve.part, one.curve.along), one)
-    return list(first.values())[:count]

@@ -9,8 +9,9 @@ import pytest
 
 from bristle.diagnose.learned.along import rebuilt
 from bristle.diagnose.learned.normal import Normal, hats_at
+from bristle.diagnose.learned.promise import distinct
 from bristle.diagnose.learned.residual import residual_of
-from bristle.diagnose.learned.screen import distinct, knots_of, promises
+from bristle.diagnose.learned.screen import knots_of, promises
 from bristle.diagnose.learned.slip import SLIP, slips
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, fit
