@@ -34,9 +34,6 @@ TURNS = 15
 """How often at the most the lateness is estimated anew with runs set right and the law refitted:
 it is linear only where small, and a law bends to be late with the runs."""
 
-LARGE, HOPE = 2.0, 0.1
-"""z on the training runs from which on the first correction must take a share of the excess."""
-
 SETTLED = 0.03
 """Share of a sampling step by which no run may move any more."""
 
@@ -101,7 +98,7 @@ def clock_faults(
         if left is None:
             return None
         clocks = clocks.plus(left)
-        if turn == 0 and _lowered(moved[:count], model, train, before) < HOPE:
+        if turn == 0 and _hopeless(moved[:count], model, train, before, rule):
             return None
         if _largest(left, runs) < SETTLED:
             break
@@ -114,17 +111,19 @@ def clock_faults(
     return ClockFaults(faults, *right, trial)
 
 
-def _lowered(moved: list[Run], model: Model, train: Problem, before: Trial) -> float:
-    """Return which share of the excess on the training runs a first correction takes.
+def _hopeless(
+    moved: list[Run], model: Model, train: Problem, before: Trial, rule: DecisionRule
+) -> bool:
+    """Return whether a first correction takes too little of a large excess to go on.
 
-    1 where that is small: one run apart hardly shows in it.
+    A small excess says nothing: one run apart hardly shows in it.
     """
-    if before.train < LARGE:
-        return 1.0
+    if before.train < rule.clocks_large:
+        return False
     problem = train.of(moved)
     z = z_scale(residuals(problem, model, problem.expectation(model)))
-    was = before.train**2 - 1.0
-    return (was - max(z**2 - 1.0, 0.0)) / max(was, 1e-9)
+    excess = before.train**2 - 1.0
+    return excess - max(z**2 - 1.0, 0.0) < rule.clocks_promise * excess
 
 
 def _largest(clocks: Clocks, runs: list[Run]) -> float:

@@ -321,6 +321,20 @@ class DecisionRule:
     Trades: if higher, faults are missed; if lower, more computing time. Found: blind seeds.
     """
 
+    clocks_large: float = 2.0
+    """z on the training runs from which on `clocks_promise` is asked of the clocks.
+
+    A small excess says nothing, because one run apart hardly shows in it. Trades: if lower, clocks
+    that differ are missed; if higher, more computing time. Found: the lab faults of the benchmarks.
+    """
+
+    clocks_promise: float = 0.1
+    """Share of the excess that the first correction of the clocks must take to go on.
+
+    Trades: if higher, clocks that differ are missed; if lower, more computing time. Found: the lab
+    faults of the benchmarks.
+    """
+
     plain: float = 1.3
     """z above which a drive recorded late needs no comparison with effects.
 
