@@ -44,20 +44,18 @@ def in_library_names(law: str, values: Values) -> dict[str, float]:
 class Damper:
     """A damper with what is hidden in it; states are a plain list in the order of `states`.
 
-    `values` of the law, `hidden` of the effects, both in SI. `free` for a damper whose motion is
-    not prescribed: a yield force that jumps then builds up over micrometres.
+    `values` of the law, `hidden` of the effects, both in SI.
     """
 
     law: str
     values: Values
     hidden: Values = field(default_factory=dict)
-    free: bool = False
     states: list[str] = field(init=False)
 
     def __post_init__(self) -> None:
         h = self.hidden
         groups = {
-            "share": self.law != "bingham" or self.free or "mount_k" in h,
+            "share": self.law != "bingham" or "mount_k" in h,
             "field": "coil_tau" in h,
             "heat": "heat_capacity" in h,
             "piston": "mount_k" in h,

@@ -123,8 +123,8 @@ def make_building(folder: Path | str, choice: Choice, *, load_cell: bool = True)
     hidden, secret = _secret("building", law, choice, scales, drawn)
     layer = {name: value for name, value in secret.items() if name in LAYER}
     inner = {name: value for name, value in secret.items() if name not in LAYER}
-    rig = tower.Tower(frame, Damper(law, values, inner, free=True), layer, scales)
-    plain = tower.Tower(frame, Damper(law, values, free=True), {}, scales)
+    rig = tower.Tower(frame, Damper(law, values, inner), layer, scales)
+    plain = tower.Tower(frame, Damper(law, values), {}, scales)
     plan = tower.plan(plain, draw)
     runs = {name: rig.perform(ground, volts) for name, ground, volts in plan}
     if not load_cell:

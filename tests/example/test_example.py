@@ -106,7 +106,7 @@ def test_a_gas_spring_adds_its_own_force_and_nothing_else() -> None:
 
 def a_tower(**hidden: float) -> tower.Tower:
     frame = tower.frame(np.array(make.MASSES), np.array(make.STIFFNESSES))
-    return tower.Tower(frame, Damper("lugre", CENTRE["lugre"], free=True), hidden, SCALES)
+    return tower.Tower(frame, Damper("lugre", CENTRE["lugre"]), hidden, SCALES)
 
 
 def shaken(rig: tower.Tower) -> bench.Signals:
