@@ -1,8 +1,9 @@
 """Learn what no known effect explains: a curve inside the model, as an effect of the study.
 
 A spline along displacement, speed, acceleration, the command or a memory of these acts as an added
-force, a factor of a part of the law, or a map of the command. It is kept where it lowers the error
-on held-out runs beyond chance.
+force, a factor of a part of the law, or a map of the command. In the isolation layer or a storey of
+a building it acts as an added force, friction or damping, or a factor of the stiffness. It is kept
+where it lowers the error on held-out runs beyond chance.
 """
 
 from __future__ import annotations
@@ -28,7 +29,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--as", dest="parts", metavar="PART[,PART]", default="",
         help="on which part it may act: force, friction, yield, viscous, fluid, yield_field, "
-        "fluid_field, command, slip, resonance; default all",
+        "fluid_field, command, slip, resonance; in a layer or storey force, friction, spring, "
+        "damping, slip; default all",
+    )  # fmt: skip
+    parser.add_argument(
+        "--at", metavar="SITE", default="",
+        help="where in a building: damper, layer, storey1, storey2 ...; default where the verdict "
+        "is unknown, or else where the model errs most",
     )  # fmt: skip
     parser.add_argument("--name", default="", help="of the effect; default learned_1, learned_2")
     parser.add_argument(
@@ -44,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Learn, write the effect's file, print what was found."""
     from ..diagnose.learned.along import ALONG
-    from ..diagnose.learned.curve import PARTS
+    from ..diagnose.learned.curve import PARTS, PARTS_OF_LINE
     from ..study.curves import learn_effect
     from ..study.study import Study
 
@@ -52,8 +59,9 @@ def main(arguments: argparse.Namespace) -> int:
     signals = {**{name: name for name in ALONG}, **_of_command(study.drive)}
     found = learn_effect(
         study,
-        parts=_listed(arguments.parts, PARTS, "--as"),
+        parts=_listed(arguments.parts, {**PARTS, **PARTS_OF_LINE}, "--as"),
         along=[signals[one] for one in _listed(arguments.along, signals, "--along")],
+        at=arguments.at.strip().replace(" ", ""),
         name=arguments.name,
         table=arguments.table,
         write=not arguments.dry_run,

@@ -15,13 +15,14 @@ NAMES = {
     "time": "time",
     "direction": "the direction of motion",
 }
-_OF_STOREY = {"displacement": "drift", "velocity": "drift rate", "speed": "drift speed"}
+OF_STOREY = {"displacement": "drift", "velocity": "drift rate", "speed": "drift speed"}
+"""What the motion at a storey is called."""
 
 
 def name_of(coordinate: str, site: str = "") -> str:
     """Return a coordinate as it is named in a sentence, at a site of a building if one is given."""
     if site.startswith("storey"):
-        coordinate = _OF_STOREY.get(coordinate, coordinate)
+        coordinate = OF_STOREY.get(coordinate, coordinate)
     return NAMES.get(coordinate, coordinate.replace("_", " "))
 
 

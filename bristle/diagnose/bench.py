@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from ..data.channels import DRIVE
 from ..data.measurement import Measurement
 from ..identify.model import Model
+from ..identify.rig import DAMPER
 from ..identify.structure import StructureProblem
 from .conclusion import About
 from .finding import Finding
@@ -45,6 +46,14 @@ class BenchRuns:
 
     def correct(self, _findings: dict[str, Finding]) -> None:
         """Do nothing: on a bench no equilibrium tells of the load cell."""
+
+    def sites(self) -> tuple[str, ...]:
+        """Return the names of the sites that the runs show."""
+        return (DAMPER,)
+
+    def open_site(self, site: str) -> Opening | Insufficient | None:
+        """Return a site's model fitted and judged; None for another site than the damper."""
+        return self.open_damper() if site == DAMPER else None
 
     def open_damper(self) -> Opening | Insufficient:
         """Return the damper's model fitted and judged, or why the data carry no verdict."""

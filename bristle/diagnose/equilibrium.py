@@ -31,7 +31,7 @@ from .masses import Shaken, suited_masses, text_of_masses
 from .opening import IN_BUILDING, Opening, Progress, median_noise
 from .rule import BENCH, INSIDE, SITE, DecisionRule
 from .sensors import SensorFault, sensor_faults
-from .sites import shortened
+from .sites import present_at, shortened
 from .verdict import late_values
 
 Pair = tuple[StructureProblem, StructureProblem]
@@ -129,6 +129,22 @@ class BuildingRuns:
         problem = problems_of(self._train, [], self._building, present.law, straight)
         damper = fit_damper(problem[DAMPER][0], at_site(present, DAMPER, problem))
         return within_prior(damper.model, self._train, self._building, present.law, straight)
+
+    def sites(self) -> tuple[str, ...]:
+        """Return the names of the sites that the runs show."""
+        return tuple(self._problems)
+
+    def open_site(self, site: str) -> Opening | None:
+        """Return a site's model fitted and judged, None where the runs do not show that site."""
+        if site == DAMPER:
+            return self.open_damper()
+        if site not in self._problems:
+            return None
+        train, held_out = self._problems[site]
+        before = present_at(site, train, held_out, self.part(site))
+        return Opening(
+            before, train, held_out, self._sensors, self._noise, rule=SITE, scope=IN_BUILDING
+        )
 
     def open_damper(self) -> Opening | None:
         """Return the damper's law fitted and judged, None where no damper was measured."""

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..identify.assigned import acts_at
 from ..identify.fit import fit
 from ..identify.line import fit_line
 from ..identify.model import Model, Run
@@ -47,6 +48,24 @@ def look_at(
     present : the effects that the model has at this site already, with their values; None if none
     rule : the numbers that decide
     """
+    before = present_at(site, train, held_out, present)
+    names = joinable_at(site, before.model)
+    if before.z <= rule.quiet and before.train <= rule.clean:
+        names = []  # a line leaves nothing that a further effect could explain
+    trials = [try_effect(name, before.model, train, held_out) for name in names]
+    trials.sort(key=lambda trial: trial.z)
+    return of_decision(decide_site(before, trials, rule), before, tuple(trials), site)
+
+
+def present_at(
+    site: str, train: StructureProblem, held_out: StructureProblem, present: Model | None = None
+) -> Trial:
+    """Return how the present model of a layer or storey does, fitted: a line with its effects.
+
+    Parameters
+    ----------
+    site, train, held_out, present : as in `look_at`
+    """
     linear = law_of_part(site)
     base = fit_line(train, linear.name)
     if present is not None and present.effects:
@@ -54,21 +73,14 @@ def look_at(
         limits = {**base.model.limits, **present.limits}
         start = replace(present, law=linear.name, values=values, limits=limits)
         base = fit(train, start, with_std=False)
-    before = judge(base.model, train, held_out)
-    names = joinable_at(site, base.model)
-    if before.z <= rule.quiet and before.train <= rule.clean:
-        names = []  # a line leaves nothing that a further effect could explain
-    trials = [try_effect(name, base.model, train, held_out) for name in names]
-    trials.sort(key=lambda trial: trial.z)
-    return of_decision(decide_site(before, trials, rule), before, tuple(trials), site)
+    return judge(base.model, train, held_out)
 
 
 def joinable_at(site: str, base: Model) -> list[str]:
     """Return the effects of the structure that can join a layer's or storey's model."""
-    hook = "force" if site == "layer" else "spring"
     taken = set(base.effects).union(*(EFFECTS[name].excludes for name in base.effects))
-    able = [e.key("structure") for e in effects_of("structure") if hook in e.hooks()]
-    return [name for name in able if name not in taken]
+    able = [effect.key("structure") for effect in effects_of("structure")]
+    return [name for name in able if name not in taken and acts_at(name, base, site, (site,))]
 
 
 def try_effect(

@@ -22,7 +22,7 @@ def at_site(model: Model, site: str, sites: Container[str]) -> Model:
     site : "damper", "layer", "storey1", ...
     sites : all sites that the runs show; without "layer" its effects are part of the damper's force
     """
-    effects = tuple(name for name in model.effects if _acts(name, model, site, sites))
+    effects = tuple(name for name in model.effects if acts_at(name, model, site, sites))
     law = model.law
     if site != "damper":
         law = law_of_part(site).name
@@ -37,7 +37,14 @@ def _belongs(name: str, effects: tuple[str, ...], site: str) -> bool:
     return effect in effects if dot else site == "damper"
 
 
-def _acts(name: str, model: Model, site: str, sites: Container[str]) -> bool:
+def acts_at(name: str, model: Model, site: str, sites: Container[str]) -> bool:
+    """Return whether an effect acts at a site; the number of its storey is the model's, if any.
+
+    Parameters
+    ----------
+    name : of the effect, by a model's names
+    model, site, sites : as in `at_site`
+    """
     effect = EFFECTS[name]
     if effect.site != "structure":
         return site == "damper"

@@ -6,16 +6,20 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date
+from itertools import product
 from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
+from ..compare.names import site_name
 from ..diagnose.bench import BenchRuns
 from ..diagnose.equilibrium import BuildingRuns
+from ..diagnose.learned.along import ALONG
 from ..diagnose.learned.closed import ClosedForm, closed_forms, in_words, name_of
-from ..diagnose.learned.curve import Curve
+from ..diagnose.learned.curve import Curve, may_change, parts_at
 from ..diagnose.learned.effect_file import effect_text
 from ..diagnose.learned.fit import Closed, LearnedCurve, close, learn
+from ..diagnose.learned.place import Place
 from ..diagnose.learned.ring import RING
 from ..diagnose.learned.slip import SLIP
 from ..diagnose.opening import Insufficient, Opening
@@ -29,10 +33,7 @@ from .identification import as_model
 from .rig import building_of
 from .study import Study
 
-_ONLY_DAMPER = (
-    "Curves are learned in the damper alone. In a building's isolation layer and storeys, bristle "
-    "diagnose tries the effects of the library and your own."
-)
+Runs = BenchRuns | BuildingRuns
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,8 @@ class LearnedEffect:
     """A learned curve as an effect of a study: `file` its effect's, None where none is kept.
 
     `forms` the closed forms fitted to it, the best first; `closed` the one that the effect has in
-    the place of the table, None for the table; `picture` where it is drawn.
+    the place of the table, None for the table; `picture` where it is drawn; `site` where on the rig
+    it was learned, "" on a bench, which has one.
     """
 
     found: LearnedCurve
@@ -48,6 +50,7 @@ class LearnedEffect:
     closed: Closed | None = None
     file: Path | None = None
     picture: Path | None = None
+    site: str = ""
 
     @property
     def name(self) -> str:
@@ -58,11 +61,11 @@ class LearnedEffect:
         """Return what was learned, as an engineer would say it."""
         found = self.found
         if found.refused or found.curve is None or found.after is None:
-            return [f"Nothing was learned. {found.refused}"]
+            return [f"Nothing was learned{self._where()}. {found.refused}"]
         curve = found.curve
         fall = 100.0 * (1.0 - _excess(found.after.z) / max(_excess(found.before.z), 1e-12))
         out = [
-            f"{self.name} is {curve.words()}. With it the error / noise (z) on held-out runs falls "
+            f"{self.name} is {curve.words()}{self._where()}. With it the error / noise (z) on held-out runs falls "
             f"from {found.before.z:.2f} to {found.after.z:.2f}; that is {fall:.0f} % of what "
             "exceeds the noise."
         ]
@@ -95,7 +98,19 @@ class LearnedEffect:
                 f"No closed form follows it: the nearest, {in_words(self.forms[0], curve)}, leaves "
                 f"{100.0 * self.forms[0].left:.0f} % of its variation."
             )
-        return out
+        return [*out, *self._line()]
+
+    def _where(self) -> str:
+        """Return at which site it was learned, for a sentence; "" on a bench."""
+        return f" at {site_name(self.site)}" if self.site else ""
+
+    def _line(self) -> list[str]:
+        """Return the sentence about the line of a layer or a storey beside the curve."""
+        curve, trial = self.found.curve, self.closed.trial if self.closed else self.found.after
+        if curve is None or trial is None or not curve.place.is_line:
+            return []
+        stiffness = trial.model.value(trial.model.law_class.stiffness)
+        return [f"Beside it, the linear stiffness there is {plain(stiffness, 4)} N/m."]
 
     def _values(self) -> list[str]:
         assert self.closed is not None
@@ -116,7 +131,8 @@ class LearnedEffect:
         if found.curve is not None and found.after is not None:
             curve = found.curve
             out |= {
-                "z": found.after.z, "z_train": found.after.train, "part": curve.part,
+                "z": found.after.z, "z_train": found.after.train, "site": curve.at,
+                "part": curve.part,
                 "along": curve.along, "unit": curve.unit, "along_unit": curve.along_unit,
                 "knots": list(curve.knots), "values": list(curve.values), "std": list(found.std),
                 "memory": dict(curve.memory),
@@ -139,17 +155,20 @@ def learn_effect(
     *,
     parts: Sequence[str] = (),
     along: Sequence[str] = (),
+    at: str = "",
     name: str = "",
     table: bool = False,
     write: bool = True,
 ) -> LearnedEffect:
-    """Learn what a study's model misses at the damper, as an effect of the study.
+    """Learn what a study's model misses at one of its sites, as an effect of the study.
 
     Parameters
     ----------
     study : the folder, opened
     parts, along : on which parts of the model a curve may act and along which signals, by name;
         empty for all
+    at : the site, "damper", "layer", "storey1" ...; else that where the verdict is unknown, or
+        where the model errs most
     name : of the effect; else learned_1, learned_2 ...
     table : whether the effect keeps the curve's table where a formula does as well
     write : whether to write the effect's file and the picture
@@ -157,7 +176,8 @@ def learn_effect(
     Raises
     ------
     StudyError
-        If the data carry no verdict, the damper's force is unknown, or the name is taken.
+        If the data carry no verdict, the runs do not show the site, no curve can have such a part
+        or signal there, or the name is taken.
     """
     for why in study.usable_effects():
         tell(f"left out: {why}")
@@ -166,19 +186,44 @@ def learn_effect(
         raise StudyError(f'the name "{name}" is no word of letters, digits and _, as worn_bore is.')
     if name in EFFECTS or (study.effects_folder / f"{name}.py").exists():
         raise StudyError(f'an effect is named "{name}" already. Another name is right.')
-    opened = _opened(study)
+    site, opened = _opened(study, at)
+    refuse_elsewhere(parts, along, Place(site))
     found = learn(opened, name, parts=parts, along=along)
+    told = site if study.settings.has_building else ""
     if found.refused or found.curve is None:
-        if study.settings.has_building:
-            found = replace(found, refused=f"{found.refused} {_ONLY_DAMPER}")
-        return LearnedEffect(found)
+        return LearnedEffect(found, site=told)
     forms, closed = tuple(closed_forms(found.curve, found.std)), None
     if not table:
         closed = close(opened, found, forms)
     if closed is not None:  # the name that the effect's formula has
         forms = (closed.form, *(one for one in forms if one is not closed.form))
-    learned = LearnedEffect(found, forms, closed)
+    learned = LearnedEffect(found, forms, closed, site=told)
     return _written(study, learned, found.curve) if write else learned
+
+
+def refuse_elsewhere(parts: Sequence[str], along: Sequence[str], place: Place) -> None:
+    """Refuse parts and signals that curves do not have at a place.
+
+    Raises
+    ------
+    StudyError
+        Naming what there is.
+    """
+    there = parts_at(place)
+    signals = [one.name for one in ALONG.values() if place.offers(one.needs)]
+    for asked, known, option in ((parts, list(there), "--as"), (along, signals, "--along")):
+        wrong = [one for one in asked if one not in known and one not in there]
+        if wrong:
+            raise StudyError(
+                f"{option}: {site_name(place.name)} has no {', '.join(wrong)}; there are "
+                f"{', '.join(known)}."
+            )
+    pairs = product(parts or there, along or [*signals, *there])
+    if not any(may_change(*pair, place) for pair in pairs):
+        raise StudyError(
+            f"--as {','.join(parts)} --along {','.join(along)}: at {site_name(place.name)} another "
+            "part says the same along these signals. Leave one of the two options out."
+        )
 
 
 def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffect:
@@ -200,25 +245,42 @@ def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffec
     return replace(learned, file=file, picture=picture)
 
 
-def _opened(study: Study) -> Opening:
+def _opened(study: Study, at: str) -> tuple[str, Opening]:
+    """Return the site to learn at, and what is known there."""
+    rig = _rig(study)
+    there = rig.sites()
+    if at and at not in there:
+        raise StudyError(
+            f"--at: these runs do not show the site {at}; they show {', '.join(there)}."
+        )
+    openings = [(site, rig.open_site(site)) for site in ([at] if at else _wanted(study, there))]
+    able = [(site, one) for site, one in openings if isinstance(one, Opening)]
+    if not able:
+        why = [" ".join(one.reasons) for _, one in openings if isinstance(one, Insufficient)]
+        raise StudyError("the data carry no verdict: " + " ".join(why))
+    return max(able, key=lambda pair: pair[1].before.z)
+
+
+def _rig(study: Study) -> Runs:
     model, runs = study.model(), study.runs()
     known = any(value.origin == "identified" for value in model.flat().values())
-    building = building_of(study, model)
-    at = as_model(model)
-    rig: BenchRuns | BuildingRuns
+    building, present = building_of(study, model), as_model(model)
     if building is None:
-        rig = BenchRuns(runs.train, runs.holdout, at, known, tell)
-    else:
-        rig = BuildingRuns(runs.train, runs.holdout, at, building, tell)
-    opened = rig.open_damper()
-    if opened is None:
-        raise StudyError(
-            "the damper's force was not measured and cannot be reconstructed: nothing can be "
-            f"learned of the damper. {_ONLY_DAMPER}"
-        )
-    if isinstance(opened, Insufficient):
-        raise StudyError("the data carry no verdict: " + " ".join(opened.reasons))
-    return opened
+        return BenchRuns(runs.train, runs.holdout, present, known, tell)
+    return BuildingRuns(runs.train, runs.holdout, present, building, tell)
+
+
+def _wanted(study: Study, there: Sequence[str]) -> list[str]:
+    """Return the sites where the verdict on the present model is unknown; all where it is nowhere.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    there : the sites that its runs show
+    """
+    findings = (study.verdict() or {}).get("findings") or []
+    unknown = [one["site"] for one in findings if one["kind"] == "unknown"]
+    return [site for site in there if site in unknown] or list(there)
 
 
 def _free_name(study: Study) -> str:

@@ -42,6 +42,10 @@ class Form:
         """Return how many numbers it has, the constant included."""
         return 1 + len(self.columns) + (self.scales is not None)
 
+    def at_rest(self) -> tuple[float, ...]:
+        """Return h, and k, where the signal is zero: they are the same at every scale."""
+        return tuple(map(float, self.at(np.zeros(1), 1.0)[0, 1:]))
+
     def at(self, s: Array, d: float) -> Array:
         """Return the columns (n, 1 + k) of a signal (n,), that of the constant first."""
         given = [
@@ -90,10 +94,16 @@ def _gaps(span: float, _step: float) -> Array:
     return np.linspace(0.02, 0.9, NODES) * span
 
 
+LINE = ("{s}",)
+"""The columns of a line."""
+
+_POWERS = {"line": 1, "parabola": 2, "quadratic drag": 2, "cubic": 3, "dead band": 1}
+"""By which power of the signal's unit the slope of a form is divided."""
+
 _TURN = "6.283185307179586 * {s} / {d}"
 FORMS = (
     Form("constant", "c", ()),
-    Form("line", "c + m s", ("{s}",)),
+    Form("line", "c + m s", LINE),
     Form("parabola", "c + m s^2", ("{s} ** 2",)),
     Form("quadratic drag", "c + m s |s|", ("{s} * abs({s})",)),
     Form("cubic", "c + m s^3", ("{s} ** 3",)),
@@ -137,10 +147,12 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     # What the data tell least must not decide, and no knot alone.
     alike = LEAST * float(np.ptp(y)) + 1e-300
     weight = 1.0 / np.hypot(np.where(given > 0.0, given, least), alike)
-    size = _spread(y, weight)
+    size = _spread(curve, y, weight)
     if not size > 0.0:
         return []
-    found = [_fitted(form, s, y, weight, size) for form in FORMS if form.count() + 1 <= len(s)]
+    forms = [one for one in FORMS if not (curve.of_line and one.columns in ((), LINE))]
+    able = [one for one in forms if one.count() + curve.of_line + 1 <= len(s)]
+    found = [_fitted(form, curve, y, weight, size) for form in able]
     # Less than the weights' own share tells no forms apart.
     return sorted(found, key=lambda one: (one.left + LEAST) * 1.25 ** one.form.count())
 
@@ -149,13 +161,15 @@ def formula_of(found: ClosedForm, curve: Curve) -> Formula:
     """Return a closed form as an effect computes it, without the constant that a law has."""
     s = curve.signal.source
     unit, along = curve.unit, curve.along_unit
-    per = {"line": 1, "parabola": 2, "quadratic drag": 2, "cubic": 3}.get(found.name, 0)
+    per = _POWERS.get(found.name, 0)
     slope = canonical(unit + f"/({along})" * per)
     if found.name == "line" and (curve.part, curve.along) in _PHYSICAL:
         slope = _PHYSICAL[curve.part, curve.along][1]
     found_at = dict(zip("cm", found.values[:2], strict=False))
     names = [f"p.{n}" for n, _ in zip("mn", found.form.columns, strict=False)]
     terms = [one.format(s=s, d="p.d") for one in found.form.columns]
+    rest = found.form.at_rest() if curve.rests else (0.0,) * len(terms)
+    terms = [f"({t} - {r!r})" if r else t for t, r in zip(terms, rest, strict=True)]
     g = " + ".join(f"{n} * {term}" for n, term in zip(names, terms, strict=True)) or "0.0"
     given = [("m", found_at["m"], slope)] if terms else []
     if found.form.scales is not None:
@@ -165,32 +179,39 @@ def formula_of(found: ClosedForm, curve: Curve) -> Formula:
     text = found.form.text
     if curve.of.level:  # the law's own strength is the constant
         text = text.removeprefix("c + ")
+        text += "".join(f" - {n}" for n, r in zip("mn", rest, strict=False) if r)
     else:
         given, g = [("c", found.values[0], unit), *given], f"p.c + {g}"
     return Formula(g, text, tuple(given))
 
 
-def _fitted(form: Form, s: Array, y: Array, weight: Array, size: float) -> ClosedForm:
+def _fitted(form: Form, curve: Curve, y: Array, weight: Array, size: float) -> ClosedForm:
     """Return a form at its best scale, its constants by weighted least squares."""
     best: ClosedForm | None = None
+    s, beside = np.array(curve.knots), int(curve.of_line)
     span, step = float(np.max(np.abs(s))), float(np.min(np.diff(s)))
     for d in form.scales(span, step) if form.scales else [1.0]:
-        A = form.at(s, float(d))
+        A = np.hstack([form.at(s, float(d)), s[:, None][:, :beside]])
         found = np.linalg.lstsq(A * weight[:, None], y * weight, rcond=1e-12)[0]
         at = A @ found
         left = float(np.sqrt(np.sum((weight * (y - at)) ** 2) / np.sum(weight**2))) / size
         if best is None or left < best.left:
-            own = tuple(map(float, found))
+            own = tuple(map(float, found[: len(found) - beside]))
             values = (*own[:2], *(() if len(own) < 2 else (float(d),)), *own[2:])
             best = ClosedForm(form, values, left, tuple(map(float, at)))
     assert best is not None
     return best
 
 
-def _spread(y: Array, weight: Array) -> float:
-    """Return the weighted RMS of values (k,) about their mean."""
-    mean = float(np.sum(weight**2 * y) / np.sum(weight**2))
-    return float(np.sqrt(np.sum((weight * (y - mean)) ** 2) / np.sum(weight**2)))
+def _spread(curve: Curve, y: Array, weight: Array) -> float:
+    """Return the weighted RMS of values (k,) about what the model has already.
+
+    That is their mean, or where its line is the model's own a line.
+    """
+    own = [np.ones_like(y), *([np.array(curve.knots)] if curve.of_line else [])]
+    A = np.stack(own, axis=1)
+    known = A @ np.linalg.lstsq(A * weight[:, None], y * weight, rcond=1e-12)[0]
+    return float(np.sqrt(np.sum((weight * (y - known)) ** 2) / np.sum(weight**2)))
 
 
 def in_words(found: ClosedForm, curve: Curve) -> str:
@@ -199,24 +220,25 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
     if found.name == "constant":
         return f"a constant, {quantity(found.values[0], unit)}"
     m, d, scaled = found.values[1], found.values[2], found.form.scales is not None
+    each = "" if along == "1" else f" per {along}"
     if found.name == "line":
         physical = _PHYSICAL.get((curve.part, curve.along))
         if physical:
             return (
                 f"proportional to {curve.signal.words}: {physical[0]} of {plain(m)} {physical[1]}"
             )
-        each = "" if along == "1" else f" per {along}"
         if unit == "1":
             return f"a line of slope {plain(m)}{each}"
         return f"a line, {plain(m)} {unit}{each}"
     scale = {
         "ripple": f", pitch {quantity(d, along)}",
         "power": f" with exponent {plain(d, 2)}",
-        "dead band": f" of {quantity(d, along)}",
+        "dead band": f" of {quantity(d, along)}, then {plain(m)} {unit}{each}",
     }.get(found.name, f" over {quantity(d, along)}" if scaled else "")
     height = np.hypot(m, found.values[3]) if len(found.values) > 3 else abs(m)
     article = "an" if found.name[0] in "aeiou" else "a"
-    tall = f", height {quantity(float(height), unit)}" if scale and found.name != "power" else ""
+    tall = f", height {quantity(float(height), unit)}"
+    tall = tall if scale and found.name not in ("power", "dead band") else ""
     return f"{article} {found.name}{scale}{tall}"
 
 

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import NamedTuple
 
+from ...identify.rig import DAMPER
 from ...physics.drive import VOLTAGE, drive_named, unit_for
 from ...quantity import quantity
 from .along import ALONG, Along
+from .place import Place
 from .ring import RING, SIGNAL
 from .slip import SLIP, force_source, signal_of
+
+_SLOPES = ("displacement", "velocity")
+"""Signals in proportion to which the line of a layer or a storey has a force."""
 
 BOUND = 30.0
 """Times the largest value of a learned curve: bounds of each of its values."""
@@ -23,6 +29,7 @@ class Part(NamedTuple):
     `level` whether a constant is the law's own already, so that one knot stays at zero. `site` is
     where the effect acts. What is no curve along a signal is `alone`: `law` is the rest of its
     equation, `cause` on what the error depends that it explains, `parameter` its only value.
+    `along` names the signals that it may depend on, where not all say something of their own.
     """
 
     hook: str
@@ -39,6 +46,7 @@ class Part(NamedTuple):
     law: str = ""
     cause: str = ""
     parameter: str = ""
+    along: tuple[str, ...] = ()
 
 
 PARTS = {
@@ -88,12 +96,55 @@ PARTS = {
         parameter="share",
     ),
 }  # fmt: skip
+"""The parts of a damper's model."""
+
+_PAST = ("travel", "rebuilding", "age", "recent_displacement", "recent_speed")
+
+PARTS_OF_LINE = {
+    "force": PARTS["force"]._replace(
+        level=True, along=("displacement", "velocity", "recent_displacement"),
+    ),
+    "friction": PARTS["friction"]._replace(
+        level=False, along=("displacement", "speed", *_PAST),
+    ),
+    "spring": Part(
+        "force", "max({g}, -0.98) * q.stiffness * q.x", "1", "a factor of the stiffness",
+        "stiffness x (1 + g)", ("x", "stiffness"), -0.98, True, along=("speed", *_PAST),
+    ),
+    "damping": Part(
+        "force", "{g} * q.v", "N.s/m", "an added damping", "F = F_model + g v", ("v",),
+        level=True, along=("displacement", *_PAST),
+    ),
+    SLIP: PARTS[SLIP],
+}  # fmt: skip
+"""The parts of the model of an isolation layer or a storey, a line: k x + c v with a constant."""
 
 
-def may_change(part: str, along: str) -> bool:
-    """Return whether a curve along a signal may change a part: a command's map depends on it."""
-    if PARTS[part].alone or along in PARTS:
+@cache
+def parts_at(place: Place) -> dict[str, Part]:
+    """Return the parts of the model at a place by name, as an effect acts on them there."""
+    if not place.is_line:
+        return PARTS
+    return {
+        name: part._replace(
+            site=place.site, hook=place.hook(part.hook), needs=place.needs(part.needs),
+            expression=place.source(part.expression),
+        )
+        for name, part in PARTS_OF_LINE.items()
+    }  # fmt: skip
+
+
+def may_change(part: str, along: str, place: Place = Place()) -> bool:
+    """Return whether a curve along a signal may change a part there.
+
+    A command's map depends on the command. What one part along a signal says already, such as a
+    stiffness along displacement and a force along it, no other one says again.
+    """
+    at = parts_at(place)[part]
+    if at.alone or along in PARTS:
         return part == along
+    if at.along and along not in at.along:
+        return False
     of_command = along in ("voltage", "recent_voltage")
     if part == "command":
         return of_command
@@ -108,7 +159,8 @@ class Curve:
     stays zero; `slow` is the speed [m/s] below which a friction changes its sign smoothly, `top`
     the largest command of the runs; `drive` names what the command is, whose unit takes the place
     of volts. Elastic-slip elements have their travels as knots, and their forces as values; a
-    resonance has one value, its share, and frequency and damping ratio as memory.
+    resonance has one value, its share, and frequency and damping ratio as memory. `at` is the site
+    of the rig where it acts.
     """
 
     part: str
@@ -120,18 +172,35 @@ class Curve:
     slow: float = 1e-3
     top: float = 1.0
     drive: str = VOLTAGE.name
+    at: str = DAMPER
+
+    @property
+    def place(self) -> Place:
+        """The site of the rig where it acts."""
+        return Place(self.at)
 
     @property
     def of(self) -> Part:
         """The part of the model that it changes."""
-        return PARTS[self.part]
+        return parts_at(self.place)[self.part]
+
+    @property
+    def of_line(self) -> bool:
+        """Whether its slope is the model's own already: its line, through rest."""
+        return self.place.is_line and self.part == "force" and self.along in _SLOPES
+
+    @property
+    def rests(self) -> bool:
+        """Whether it is zero where its signal is: a building at rest is to stay there."""
+        return self.place.is_line and self.part == "force"
 
     @property
     def signal(self) -> Along:
         """The signal that it depends on."""
         if self.part == RING:
             return SIGNAL
-        return ALONG[self.along] if self.along in ALONG else signal_of(self.knots)
+        along = ALONG[self.along] if self.along in ALONG else signal_of(self.knots)
+        return signal_at(along, self.place)
 
     @property
     def entries(self) -> tuple[str, ...]:
@@ -161,7 +230,7 @@ class Curve:
     def passive(self) -> bool:
         """Whether it gives no energy over a cycle, whatever its values."""
         conserves = self.part == "force" and self.along == "displacement"
-        active = ("force", "voltage", "channel")
+        active = ("force", "spring", "voltage", "channel")
         return self.part == SLIP or conserves or self.of.hook not in active
 
     def words(self) -> str:
@@ -173,6 +242,19 @@ class Curve:
         times = dict(self.memory)
         faded = f" (over {quantity(times['tau'], 's')})" if "tau" in times else ""
         return f"{self.of.words} along {self.signal.words}{faded}"
+
+
+def signal_at(along: Along, place: Place) -> Along:
+    """Return a signal as it is called at a place: the displacement of a storey is its drift.
+
+    The states of a building begin at zero, whatever its motion.
+    """
+    if not place.is_line:
+        return along
+    return replace(
+        along, words=place.words(along.words), needs=place.needs(along.needs),
+        source=place.source(along.source), advance=place.source(along.advance), starts=(),
+    )  # fmt: skip
 
 
 def bounds_of(curve: Curve) -> tuple[float, float]:

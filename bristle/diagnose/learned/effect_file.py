@@ -37,13 +37,14 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     """
     body = _hooks(curve, formula)
     parameters: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
+    only = [*_only_value(curve), *_only_storey(curve)]
     table = formula is None and not curve.of.parameter
     if formula:
         parameters += [
             (n, value, unit, f"{n} in g = {formula.text}") for n, value, unit in formula.parameters
         ]
     lines = [
-        *_imports(name, curve, body, bool(parameters), table),
+        *_imports(name, curve, body, bool(parameters or only), table),
         *_about(name, curve, formula),
         "",
         f'    name = "{name}"',
@@ -55,9 +56,11 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     ]
     if curve.held and not formula:
         held = tuple(f"curve[{k + 1}]" for k in curve.held)
-        lines.append(f"    assumed = {held!r}  # the law has a constant already".replace("'", '"'))
-    if parameters:
-        lines += ["    parameters = {", *_declared(parameters), *_only_value(curve), "    }"]
+        known = "stiffness or damping" if curve.of_line else "a constant"
+        whose = "line" if curve.place.is_line else "law"
+        lines.append(f"    assumed = {held!r}  # the {whose} has {known} already".replace("'", '"'))
+    if parameters or only:
+        lines += ["    parameters = {", *_declared(parameters), *only, "    }"]
     if table:
         lines += _table(curve)
     return "\n".join([*lines, "", *body]) + "\n"
@@ -66,9 +69,11 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
 def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
     """Return the lines of the hooks."""
     part, along = curve.of, curve.signal
+    elsewhere = ["        if p.which != 0.0 and p.which != q.storey:", "            return 0.0"]
     lines = [
         "    @staticmethod",
         f"    def {part.hook}(q, z, p):",
+        *(elsewhere if curve.place.storey else []),
         f"        return {part.expression.format(g=formula.g if formula else curve.source)}",
     ]
     if along.advance:
@@ -162,11 +167,11 @@ def _fields(curve: Curve) -> list[str]:
     """Return the lines of the class data that follow from part and signal."""
     along, part, drive = curve.signal, curve.of, drive_named(curve.drive)
     given: dict[str, object] = {
-        "needs": tuple(dict.fromkeys((*along.needs, *part.needs))),
+        "needs": tuple(dict.fromkeys((*along.needs, *part.needs, *_numbered(curve)))),
         "states": {name: unit_for(unit, drive) for name, unit in along.states},
         "starts": dict(along.starts),
         "passive": curve.passive,
-        "zero_at_rest": part.alone or part.expression != "{g}",
+        "zero_at_rest": curve.rests or part.alone or part.expression != "{g}",
     }
     texts = [(key, f"{value!r}".replace("'", '"')) for key, value in given.items()]
     return [f"    {key} = {text}" for key, text in texts if text not in ("{}", "()")]
@@ -193,6 +198,19 @@ def _only_value(curve: Curve) -> list[str]:
     return [
         f'        "{part.parameter}": Parameter({value:.6g}, "{part.unit}", {bounds}, "{text}"),'
     ]
+
+
+def _numbered(curve: Curve) -> tuple[str, ...]:
+    """Return the signal that tells one storey from another, for a curve of a storey."""
+    return ("storey",) if curve.place.storey else ()
+
+
+def _only_storey(curve: Curve) -> list[str]:
+    """Return the line that declares in which storey a curve acts; none at other places."""
+    if not curve.place.storey:
+        return []
+    text = "number of the storey; 0: every storey"
+    return [f'        "which": Parameter({curve.place.storey}.0, "1", (0.0, 20.0), "{text}"),']
 
 
 def _row(begin: str, values: tuple[float, ...], end: str = "") -> list[str]:

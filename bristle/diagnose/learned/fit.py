@@ -14,7 +14,7 @@ from ...progress import Count
 from ..candidates import Trial, judge
 from ..decision import missing
 from ..opening import Opening
-from ..rule import BENCH, DecisionRule
+from ..rule import DecisionRule
 from .closed import ClosedForm, formula_of
 from .curve import Curve, Formula
 from .effect_file import effect_text
@@ -71,18 +71,20 @@ def learn(
     *,
     parts: Sequence[str] = (),
     along: Sequence[str] = (),
-    rule: DecisionRule = BENCH,
+    rule: DecisionRule | None = None,
     learning: LearnRule = LEARN,
 ) -> LearnedCurve:
-    """Learn what the model of an opening misses at the damper.
+    """Learn what the model of an opening misses at its site.
 
     Parameters
     ----------
     opened : runs and the fitted model, as a diagnosis begins with them
     name : of the effect that the curve becomes
     parts, along : names of `PARTS` and `ALONG` that are tried; empty for all
-    rule, learning : the numbers that decide whether a curve is kept, and which one is tried
+    rule : the numbers that decide whether a curve is kept; None takes the opening's
+    learning : those that decide which one is tried
     """
+    rule = rule or opened.rule
     before, train, held_out = opened.before, opened.searched, opened.held_out
     residual = residual_of(train, before.model)
     worth = (1.0 - rule.gain) ** 2 * Normal(residual).without_curve()
@@ -165,7 +167,9 @@ def fit_closed(
         held_out = opened.held_out.of(opened.held_out.runs)
         model = refine(replace(base, values=values), train, SWEEPS)
         trial = judge(model, train, held_out)
-        if trial.train > rule.as_good * found.after.train or not missing(found.before, trial):
+        if trial.train > rule.as_good * found.after.train or not missing(
+            found.before, trial, opened.rule
+        ):
             return None
         std = intervals_of(train, model).std
         given = tuple(

@@ -8,10 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...identify.fit import Model, Problem, Run
+from ...identify.rig import DAMPER
 from ...identify.search import HUBER
 from ...identify.search_context import Search
-from ...identify.structure import StructureRun
+from ...identify.structure import StructureProblem, StructureRun
 from ...physics.inputs import Inputs
+from .place import Place
 
 Array = NDArray[np.float64]
 
@@ -26,8 +28,8 @@ class Residual:
     `r` (n,) normalised; `weight` (n,) robust; `fold` (n,) which stretch a sample belongs to;
     `known` (n, p) the sensitivities to the parameters; `parts` columns (n,) that a curve of each
     part is multiplied with, over the noise; `runs` of the samples, `keeps` which of each; `slow`
-    [m/s], `top` and `drive` as of a `Curve`; `shown` the predicted force [N] of each run whose
-    force a load cell showed, `sigma` (n,) [N] the noise that samples are divided by.
+    [m/s], `top`, `drive` and `at` as of a `Curve`; `shown` the predicted force [N] of each run
+    whose force a load cell showed, `sigma` (n,) [N] the noise that samples are divided by.
     """
 
     r: Array
@@ -42,6 +44,12 @@ class Residual:
     drive: str
     shown: list[Array]
     sigma: Array
+    at: str = DAMPER
+
+    @property
+    def place(self) -> Place:
+        """The site of the rig whose model this is the residual of."""
+        return Place(self.at)
 
 
 def residual_of(problem: Problem, base: Model) -> Residual:
@@ -52,7 +60,9 @@ def residual_of(problem: Problem, base: Model) -> Residual:
     scale = max(1.0, float(np.median(np.abs(r))) / 0.6745)
     sigma = _joined([noise for _, noise, _ in expected], problem.runs)
     slow = 0.03 * float(np.sqrt(np.mean(np.concatenate([run.v for run in problem.runs]) ** 2)))
-    parts = [_columns(problem, base, run, slow) for run in problem.runs]
+    at = _site_of(problem, base)
+    columns = _columns_of_line if Place(at).is_line else _columns
+    parts = [columns(problem, base, run, slow) for run in problem.runs]
     return Residual(
         r,
         np.minimum(1.0, HUBER * scale / np.maximum(np.abs(r), 1e-12)),
@@ -65,7 +75,17 @@ def residual_of(problem: Problem, base: Model) -> Residual:
         problem.runs[0].drive,
         [problem.predict(base, run) for run in problem.runs if not isinstance(run, StructureRun)],
         sigma,
+        at,
     )
+
+
+def _site_of(problem: Problem, base: Model) -> str:
+    """Return the site of a rig whose runs and model these are."""
+    of_line = isinstance(problem, StructureProblem) and base.law_class.site == "structure"
+    if not of_line:
+        return DAMPER
+    assert isinstance(problem, StructureProblem)
+    return f"storey{problem.storey}" if problem.storey else "layer"
 
 
 def _joined(values: list[Array], runs: list[Run]) -> Array:
@@ -112,6 +132,15 @@ def _columns(problem: Problem, base: Model, run: Run, slow: float) -> dict[str, 
     if law.has("command") and top > 1e-6:
         out["command"] = _by_command(problem, base, run, whole, 1e-3 * top)
     return out
+
+
+def _columns_of_line(_problem: Problem, base: Model, run: Run, slow: float) -> dict[str, Array]:
+    """Return what a unit of each part's curve adds to the force of a layer or a storey [N]."""
+    law = base.law_class
+    return {
+        "force": np.ones(len(run.force)), "friction": np.tanh(run.v / slow),
+        "spring": base.value(law.stiffness) * run.x, "damping": run.v,
+    }  # fmt: skip
 
 
 def _part(base: Model, run: Run, name: str) -> Array:

@@ -7,13 +7,14 @@ stretches of the training runs that it was not fitted to.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .along import ALONG, Along
-from .curve import PARTS, Curve, may_change
+from .curve import Curve, may_change
 from .modes import best_mode
 from .normal import Hats, Normal, hats_at
 from .promise import Promise, distinct
@@ -35,6 +36,9 @@ SMOOTH = tuple(10.0**k for k in range(-6, 5))
 
 FEWEST = 4
 """Knots of a curve at the least."""
+
+NEAR_REST = 0.5
+"""Displacement, or velocity, over its RMS up to which a line's slope counts as that near rest."""
 
 TUNED = 4
 """Curves along a memory, the best ones, whose times and travels are sought between the grid's."""
@@ -60,10 +64,10 @@ def promises(
     known = Normal(residual)
     found = []
     for signal, memory, values in signals(residual, along):
-        spline = _spline(signal, values)
+        spline = _spline(signal, values, residual.place.is_line)
         for part in residual.parts:
             asked = not parts or part in parts
-            if spline is not None and asked and may_change(part, signal.name):
+            if spline is not None and asked and may_change(part, signal.name, residual.place):
                 found.append(_promise(known, part, (signal, memory), spline, values))
     if SLIP in (parts or (SLIP,)) and SLIP in (along or (SLIP,)):
         found.append(_slipping(known))
@@ -100,17 +104,22 @@ def _tuned(known: Normal, one: Promise) -> Promise:
 def _at_memory(known: Normal, curve: Curve, memory: dict[str, float]) -> Promise | None:
     """Return the best curve of the same part and signal with other parameters of its memory."""
     values = _values(known.residual, curve.signal, memory)
-    spline = _spline(curve.signal, values)
+    spline = _spline(curve.signal, values, curve.place.is_line)
     if spline is None:
         return None
     return _promise(known, curve.part, (curve.signal, memory), spline, values)
 
 
-def _spline(along: Along, values: Array) -> tuple[Array, Hats] | None:
-    """Return the knots for a signal (n,) and their hat functions; None where it hardly varies."""
+def _spline(along: Along, values: Array, rest: bool) -> tuple[Array, Hats] | None:
+    """Return the knots for a signal (n,) and their hat functions; None where it hardly varies.
+
+    With `rest` a knot stands at zero, where a signal of both signs has it.
+    """
     if not float(np.ptp(values)) > 1e-9 * max(1e-300, float(np.max(np.abs(values)))):
         return None
     knots = knots_of(values, RIPPLED if along.name == "displacement" else FINE)
+    if rest and len(knots) > 2 and knots[1] < 0.0 < knots[-2]:
+        knots[np.argmin(np.abs(knots))] = 0.0
     return (knots, hats_at(values, knots)) if len(knots) >= FEWEST else None
 
 
@@ -126,7 +135,8 @@ def signals(
     """
     step = residual.runs[0].dt
     length = min(len(run.x) for run in residual.runs) * step
-    for along in (one for one in ALONG.values() if not names or one.name in names):
+    offered = (one for one in ALONG.values() if residual.place.offers(one.needs))
+    for along in (one for one in offered if not names or one.name in names):
         for memory in along.memories(step, length, _stroke(residual)):
             yield along, memory, _values(residual, along, memory)
 
@@ -166,9 +176,10 @@ def _promise(
 ) -> Promise | None:  # fmt: skip
     """Return the best curve of a part along a signal, None where it has too little to go by."""
     (along, memory), (knots, hats) = signal, spline
-    held = _held(part, knots, values)
-    free = [k for k in range(len(knots)) if k not in held]
     residual = known.residual
+    kind = Curve(part, along.name, tuple(memory.items()), (), (), at=residual.at)
+    held = _held(kind, knots, values)
+    free = [k for k in range(len(knots)) if k not in held]
     normal = known.with_curve(residual.parts[part], hats, free)
     bend = np.diff(np.eye(len(knots)), 2, axis=0)[:, free]
     smooth = _smoothest(normal, known.grams.shape[1], bend.T @ bend)
@@ -180,12 +191,12 @@ def _promise(
     most = RIPPLED if len(knots) > FINE else FINE
     count = int(np.clip(round(freedom) + 2, FEWEST, most))
     if len(knots) > count:
-        knots, fine, held = _fewer(part, knots, fine, count, values)
-    low = PARTS[part].low
-    curve = Curve(
-        part, along.name, tuple(memory.items()), tuple(map(float, knots)),
-        tuple(float(max(value, 0.9 * low)) for value in fine), held, residual.slow, residual.top,
-        residual.drive,
+        knots, fine, held = _fewer(kind, knots, fine, count, values)
+    low = kind.of.low
+    curve = replace(
+        kind, knots=tuple(map(float, knots)),
+        values=tuple(float(max(value, 0.9 * low)) for value in fine), held=held,
+        slow=residual.slow, top=residual.top, drive=residual.drive,
     )  # fmt: skip
     return Promise(curve, loss)
 
@@ -218,25 +229,43 @@ def _smoothest(normal: Normal, p: int, shape: Array) -> tuple[float, Array, floa
 
 
 def _fewer(
-    part: str, knots: Array, fine: Array, count: int, values: Array
+    kind: Curve, knots: Array, fine: Array, count: int, values: Array
 ) -> tuple[Array, Array, tuple[int, ...]]:
     """Return a curve at fewer of its knots: these, its values there, and which stay at zero."""
     at = knots[np.unique(np.round(np.linspace(0, len(knots) - 1, count)).astype(int))]
-    held = _held(part, at, values)
+    if kind.place.is_line and 0.0 in knots[1:-1] and 0.0 not in at:
+        at[1 + np.argmin(np.abs(at[1:-1]))] = 0.0
+    held = _held(kind, at, values)
     fine = np.interp(at, knots, fine)
+    if len(held) == 1:
+        fine -= fine[held[0]]
+    elif kind.of_line:
+        first, second = held
+        slope = (fine[second] - fine[first]) / (at[second] - at[first])
+        fine -= fine[first] + slope * (at - at[first])
     for k in held:
-        fine -= fine[k] if len(held) == 1 else 0.0
         fine[k] = 0.0
     return at, fine, held
 
 
-def _held(part: str, knots: Array, values: Array) -> tuple[int, ...]:
-    """Return which knots (from 0) stay at zero: what the law's own strength is already."""
-    if not PARTS[part].level:
+def _held(kind: Curve, knots: Array, values: Array) -> tuple[int, ...]:
+    """Return which knots (from 0) stay at zero: what the model has already.
+
+    A law has its own strength; the line of a layer or a storey a constant, and a slope: so the
+    curve is what is added to the stiffness near rest.
+    """
+    if not kind.of.level:
         return ()
-    if part == "command":
+    if kind.part == "command":
         return (0, len(knots) - 1)
-    return (int(np.argmin(np.abs(knots - np.median(values)))),)
+    if not kind.rests:
+        return (int(np.argmin(np.abs(knots - np.median(values)))),)
+    rest = int(np.argmin(np.abs(knots)))
+    if not kind.of_line:
+        return (rest,)
+    aside = np.abs(knots - NEAR_REST * float(np.std(values)))
+    aside[rest] = np.inf
+    return (rest, int(np.argmin(aside)))
 
 
 def _slipping(known: Normal) -> Promise | None:
@@ -255,6 +284,7 @@ def _slipping(known: Normal) -> Promise | None:
         loss, found, _ = smooth
         if found.min() >= 0.0:
             given = tuple(travels[k] for k in left), tuple(map(float, found))
-            return Promise(Curve(SLIP, SLIP, (), *given, drive=residual.drive), loss)
+            made = Curve(SLIP, SLIP, (), *given, drive=residual.drive, at=residual.at)
+            return Promise(made, loss)
         left.pop(int(np.argmin(found)))
     return None
