@@ -39,7 +39,7 @@ def probe(effect: type[Effect]) -> None:
     for name, parameter in effect.parameters.items():
         corners += [{**defaults, name: bound} for bound in parameter.bounds]
     for values in corners:
-        for q in _signals():
+        for q in _signals(effect):
             z = _state(effect, q, values)
             for hook in effect.hooks():
                 _call(effect, hook, q, z, values)
@@ -80,8 +80,10 @@ def _start(effect: type[Effect], values: dict[str, float]) -> None:
             raise FlawError(f"{name} returns {found!r}; finite numbers are right.", line)
 
 
-def _signals() -> list[Q]:
-    """Return signals at rest and in motion."""
+def _signals(effect: type[Effect]) -> list[Q]:
+    """Return signals at rest and in motion; of a storey those of the one where the effect acts."""
+    which = effect.parameters.get("which")
+    storey = which.value if which is not None and which.value else 1.0
     zero = Q(*(0.0 for _ in Q._fields))
     found = [zero._replace(dt=0.002)]
     for v, x, V in product((-0.15, -1e-4, 0.03), (-0.008, 0.004), (0.0, 5.0)):
@@ -89,7 +91,7 @@ def _signals() -> list[Q]:
             zero._replace(
                 x=x, v=v, a=20.0 * v, V=V, dt=0.002, drift=0.5 * x, drift_rate=0.5 * v, energy=0.3,
                 force=5.0 * copysign(1.0, v), rod_x=x, rod_v=v, halt=3.0, stiffness=1000.0,
-                storey=1.0, value=2.0 * v,
+                storey=storey, value=2.0 * v,
             )
         )  # fmt: skip
     return found
@@ -128,7 +130,7 @@ def _smooth_in_signals(effect: type[Effect], values: dict[str, float]) -> None:
         if signal not in RANGES:
             continue
         low = 0.0 if signal == "V" else -RANGES[signal]
-        for q, hook in product(_signals()[1:7], hooks):
+        for q, hook in product(_signals(effect)[1:7], hooks):
             given = partial(_at_signal, effect, hook, q, _state(effect, q, values), values, signal)
             refuse_jump(getattr(effect, hook), given, (low, RANGES[signal]), f"q.{signal}")
 
@@ -149,7 +151,7 @@ def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> Non
             reach = 3.0 * abs(parameter.value) or 1.0
             low, high = max(low, parameter.value - reach), min(high, parameter.value + reach)
         moved = False
-        for q, hook in product(_signals(), effect.hooks()):
+        for q, hook in product(_signals(effect), effect.hooks()):
             z = _state(effect, q, values)
             given = partial(_at_parameter, effect, hook, q, z, values, (name, low, high))
             if name in CHOICES:
@@ -173,7 +175,7 @@ def _moved_far_out(
 
     What begins beyond a knot, such as a stop behind a gap, does nothing before it.
     """
-    for factor, signal, hook in product(FURTHER, _signals()[1:], effect.hooks()):
+    for factor, signal, hook in product(FURTHER, _signals(effect)[1:], effect.hooks()):
         q = Q(*(factor * one for one in signal))._replace(dt=signal.dt, storey=signal.storey)
         try:
             z = _state(effect, q, values)

@@ -87,7 +87,7 @@ def _pitches(span: float, step: float) -> Array:
 
 
 def _powers(_span: float, _step: float) -> Array:
-    return np.linspace(0.25, 4.0, 61)
+    return np.linspace(0.25, 6.0, 93)
 
 
 def _gaps(span: float, _step: float) -> Array:

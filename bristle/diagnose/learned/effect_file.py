@@ -74,12 +74,20 @@ def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
         "    @staticmethod",
         f"    def {part.hook}(q, z, p):",
         *(elsewhere if curve.place.storey else []),
-        f"        return {part.expression.format(g=formula.g if formula else curve.source)}",
+        f"        return {part.expression.format(g=_value(curve, formula))}",
     ]
     if along.advance:
         lines += ["", "    @staticmethod", "    def advance(q, z, p):"]
         lines += ["    " + line for line in along.advance.splitlines()]
     return lines
+
+
+def _value(curve: Curve, formula: Formula | None) -> str:
+    """Return a curve's value as source, in brackets where it is a sum that is multiplied."""
+    if formula is None:
+        return curve.source
+    multiplied = "{g} *" in curve.of.expression or "* {g}" in curve.of.expression
+    return f"({formula.g})" if multiplied and " + " in formula.g else formula.g
 
 
 def _imports(
