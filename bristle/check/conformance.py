@@ -11,7 +11,7 @@ from math import cos, inf, isfinite, pi, sin
 import numpy as np
 
 from ..component.structure import StructureModel
-from ..physics.building import paper_building
+from ..physics.building import Building, paper_building
 from ..physics.damper import DamperModel
 from ..physics.effect import Effect, laws_joined
 from .channel import shown
@@ -140,8 +140,26 @@ def _energy(effect: type[Effect]) -> Check:
     return Check(asked, True)
 
 
+_FORCES = {"N": 10.0, "N/m": 1e3, "N/m2": 1e5, "N/m3": 1e7, "N.s/m": 50.0}
+"""Forces [SI, by unit] of effects that are no more than such a model of a building is made for."""
+
+
+def _building_of(effect: type[Effect]) -> Building:
+    """Return a building to simulate an effect in, as heavy as the forces of its own rig ask for."""
+    building = paper_building()
+    if not effect.of_this_rig():
+        return building
+    sizes = [
+        abs(p.value) / _FORCES[p.unit] for p in effect.parameters.values() if p.unit in _FORCES
+    ]
+    times = max([1.0, *sizes])
+    M, C, K = (tuple(tuple(times * one for one in row) for row in part) for part in building[1:4])
+    stiffnesses = tuple(times * one for one in building.stiffnesses)
+    return building._replace(M=M, C=C, K=K, stiffnesses=stiffnesses)
+
+
 def _building_rests(effect: type[Effect]) -> Check:
-    model = StructureModel(paper_building(), {}, [effect.name])
+    model = StructureModel(_building_of(effect), {}, [effect.name])
     for _ in range(20):
         model.step(0.002, 0.0, 0.0, 0.0)
     still = not any(model.x)
@@ -151,7 +169,7 @@ def _building_rests(effect: type[Effect]) -> Check:
 def _building_bounds(effect: type[Effect]) -> Check:
     asked = "it can be simulated at every bound"
     for values in _corners(effect):
-        model = StructureModel(paper_building(), values, [effect.name])
+        model = StructureModel(_building_of(effect), values, [effect.name])
         for k in range(200):
             model.step(0.002, 4.0 * sin(0.02 * k), 4.0 * sin(0.02 * k + 0.02), 0.0)
         if not all(isfinite(x) and abs(x) < 10.0 for x in model.x):

@@ -65,9 +65,9 @@ class LearnedEffect:
         curve = found.curve
         fall = 100.0 * (1.0 - _excess(found.after.z) / max(_excess(found.before.z), 1e-12))
         out = [
-            f"{self.name} is {curve.words()}{self._where()}. With it the error / noise (z) on held-out runs falls "
-            f"from {found.before.z:.2f} to {found.after.z:.2f}; that is {fall:.0f} % of what "
-            "exceeds the noise."
+            f"{self.name} is {curve.words()}{self._where()}. With it the error / noise (z) on "
+            f"held-out runs falls from {found.before.z:.2f} to {found.after.z:.2f}; that is "
+            f"{fall:.0f} % of what exceeds the noise."
         ]
         best = name_of(self.forms)
         if best is not None:

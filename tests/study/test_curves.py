@@ -14,14 +14,17 @@ from bristle.cli.learn import _of_command
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.fit import LearnedCurve
+from bristle.diagnose.opening import Opening
+from bristle.diagnose.verdict_file import SCHEMA
 from bristle.errors import StudyError
-from bristle.identify.fit import Model
+from bristle.identify.fit import Model, Problem
 from bristle.study import curves
 from bristle.study.curves import learn_effect
 from bristle.study.identification import identify_study
 from bristle.study.learning import add_effects
 from bristle.study.study import Study
 
+OPENED = curves._opened
 KNOTS = np.linspace(-0.015, 0.015, 13)  # m
 NONE = np.zeros(0)
 
@@ -56,7 +59,7 @@ def learned(monkeypatch):
     """Let nothing be fitted: what was learned is given."""
 
     def given(refused: str = "") -> None:
-        monkeypatch.setattr(curves, "_opened", lambda study: None)
+        monkeypatch.setattr(curves, "_opened", lambda study, at: ("damper", None))
 
         def learn(_opened, name, **_options):
             return replace(found_of(refused), name=name)
@@ -97,21 +100,70 @@ def test_what_is_refused_leaves_the_study_as_it_was(study, learned):
     assert sorted(path.name for path in study.folder.rglob("*")) == before
 
 
-def test_in_a_building_it_is_said_that_curves_are_the_damper_s(study, learned, monkeypatch):
+class House:
+    """The sites of a building as `learn_effect` asks for them, with the z of each."""
+
+    def __init__(self, **z: float) -> None:
+        self.z = z
+
+    def sites(self):
+        return tuple(self.z)
+
+    def open_site(self, site):
+        problem = Problem([])
+        return Opening(trial(self.z[site]), problem, problem)
+
+
+@pytest.fixture
+def house(study, learned, monkeypatch):
+    """Let the study be that of a building in which nothing is learned."""
     learned("No curve lowers the error.")
     monkeypatch.setattr(type(study.settings), "has_building", True)
-    told = learn_effect(study).sentences()[0]
-    assert told.startswith("Nothing was learned. No curve lowers the error.")
-    assert "in the damper alone" in told
+    monkeypatch.setattr(curves, "_opened", OPENED)
+    monkeypatch.setattr(curves, "_rig", lambda _: House(damper=3.0, layer=1.2, storey1=2.0))
+    return study
 
 
-def test_a_building_whose_damper_s_force_is_not_known_is_refused(study, monkeypatch):
-    monkeypatch.setattr(curves, "building_of", lambda *_: object())
-    monkeypatch.setattr(curves.BuildingRuns, "__init__", lambda *_: None)
-    monkeypatch.setattr(curves.BuildingRuns, "open_damper", lambda _: None)
-    with pytest.raises(StudyError, match=r"not measured .* isolation layer and storeys"):
-        learn_effect(study)
-    assert not list(study.effects_folder.glob("*.py"))
+def test_in_a_building_a_curve_is_learned_where_the_model_errs_most(house):
+    assert learn_effect(house).sentences()[0] == (
+        "Nothing was learned at the damper. No curve lowers the error."
+    )
+
+
+def test_where_the_verdict_is_unknown_comes_first(house):
+    found = [{"site": "damper", "kind": "effect"}, {"site": "layer", "kind": "unknown"}]
+    house.write_verdict({"schema": SCHEMA, "kind": "unknown", "findings": found})
+    assert "at the isolation layer." in learn_effect(house).sentences()[0]
+    assert "at storey 1." in learn_effect(house, at="storey1").sentences()[0]
+
+
+def test_a_site_that_the_runs_do_not_show_is_refused(house):
+    with pytest.raises(StudyError, match=r"the site storey7; they show damper, layer, storey1"):
+        learn_effect(house, at="storey7")
+
+
+@pytest.mark.parametrize(
+    ("asked", "told"),
+    [
+        ({"parts": ["yield"]}, "the isolation layer has no yield; there are force, friction"),
+        ({"along": ["voltage"]}, "the isolation layer has no voltage; there are displacement"),
+        ({"parts": ["spring"], "along": ["displacement"]}, "another part says the same"),
+    ],
+)
+def test_what_a_layer_does_not_have_is_refused(house, asked, told):
+    with pytest.raises(StudyError, match=told):
+        learn_effect(house, at="layer", **asked)
+
+
+def test_the_stiffness_beside_a_curve_is_told(study, learned, monkeypatch):
+    learned()
+    line = replace(trial(1.01), model=Model("linear_layer", (), {"k": 1012.3}))
+    curve = Curve("slip", "slip", (), (0.0004, 0.009), (0.4, 0.8), at="layer")
+    found = replace(found_of(), curve=curve, std=(0.01,) * 2, after=line)
+    monkeypatch.setattr(curves, "learn", lambda *_, **__: found)
+    assert learn_effect(study).sentences()[-1] == (
+        "Beside it, the linear stiffness there is 1012 N/m."
+    )
 
 
 def test_elastic_slip_elements_are_told_one_by_one(study, learned, monkeypatch):

@@ -42,6 +42,11 @@ class Form:
         """Return how many numbers it has, the constant included."""
         return 1 + len(self.columns) + (self.scales is not None)
 
+    @property
+    def grows(self) -> bool:
+        """Whether it grows with the signal without end."""
+        return bool(np.any(np.abs(self.at(np.array([1e9]), 1.0)[0, 1:]) > 100.0))
+
     def at_rest(self) -> tuple[float, ...]:
         """Return h, and k, where the signal is zero: they are the same at every scale."""
         return tuple(map(float, self.at(np.zeros(1), 1.0)[0, 1:]))
@@ -150,7 +155,7 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     size = _spread(curve, y, weight)
     if not size > 0.0:
         return []
-    forms = [one for one in FORMS if not (curve.of_line and one.columns in ((), LINE))]
+    forms = [one for one in FORMS if not (curve.of_line and one.columns == LINE)]
     able = [one for one in forms if one.count() + curve.of_line + 1 <= len(s)]
     found = [_fitted(form, curve, y, weight, size) for form in able]
     # Less than the weights' own share tells no forms apart.
@@ -158,8 +163,15 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
 
 
 def formula_of(found: ClosedForm, curve: Curve) -> Formula:
-    """Return a closed form as an effect computes it, without the constant that a law has."""
+    """Return a closed form as an effect computes it, without the constant that a law has.
+
+    What would take ever more from a building's own stiffness or friction ends with the data.
+    """
     s = curve.signal.source
+    grows = curve.place.is_line and found.form.grows
+    ends = grows and found.values[1] < 0.0
+    if ends:
+        s = f"min(max({s}, {curve.knots[0]:.6g}), {curve.knots[-1]:.6g})"
     unit, along = curve.unit, curve.along_unit
     per = _POWERS.get(found.name, 0)
     slope = canonical(unit + f"/({along})" * per)
@@ -182,7 +194,7 @@ def formula_of(found: ClosedForm, curve: Curve) -> Formula:
         text += "".join(f" - {n}" for n, r in zip("mn", rest, strict=False) if r)
     else:
         given, g = [("c", found.values[0], unit), *given], f"p.c + {g}"
-    return Formula(g, text, tuple(given))
+    return Formula(g, text, tuple(given), ends, ("m",) if grows and not ends else ())
 
 
 def _fitted(form: Form, curve: Curve, y: Array, weight: Array, size: float) -> ClosedForm:

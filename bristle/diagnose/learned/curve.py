@@ -10,12 +10,12 @@ from ...identify.rig import DAMPER
 from ...physics.drive import VOLTAGE, drive_named, unit_for
 from ...quantity import quantity
 from .along import ALONG, Along
-from .place import Place
+from .place import AT_DAMPER, Place
 from .ring import RING, SIGNAL
 from .slip import SLIP, force_source, signal_of
 
-_SLOPES = ("displacement", "velocity")
-"""Signals in proportion to which the line of a layer or a storey has a force."""
+_SLOPES = (("force", "displacement"), ("force", "velocity"), ("friction", "speed"))
+"""Parts and signals along which a straight curve is the line of a layer or a storey itself."""
 
 BOUND = 30.0
 """Times the largest value of a learned curve: bounds of each of its values."""
@@ -134,7 +134,7 @@ def parts_at(place: Place) -> dict[str, Part]:
     }  # fmt: skip
 
 
-def may_change(part: str, along: str, place: Place = Place()) -> bool:
+def may_change(part: str, along: str, place: Place = AT_DAMPER) -> bool:
     """Return whether a curve along a signal may change a part there.
 
     A command's map depends on the command. What one part along a signal says already, such as a
@@ -187,7 +187,7 @@ class Curve:
     @property
     def of_line(self) -> bool:
         """Whether its slope is the model's own already: its line, through rest."""
-        return self.place.is_line and self.part == "force" and self.along in _SLOPES
+        return self.place.is_line and (self.part, self.along) in _SLOPES
 
     @property
     def rests(self) -> bool:
@@ -267,9 +267,12 @@ def bounds_of(curve: Curve) -> tuple[float, float]:
 class Formula:
     """A closed form in the place of a curve's table: `g` its expression of `p`, as source.
 
-    `text` for readers; `parameters` by name: value and unit.
+    `text` for readers; `parameters` by name: value and unit; `ends` whether it keeps its value
+    beyond the ends of the data, as a table does; `positive` names parameters that stay above zero.
     """
 
     g: str
     text: str
     parameters: tuple[tuple[str, float, str], ...]
+    ends: bool = False
+    positive: tuple[str, ...] = ()

@@ -38,6 +38,7 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     body = _hooks(curve, formula)
     parameters: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
     only = [*_only_value(curve), *_only_storey(curve)]
+    kept = formula.positive if formula else ()
     table = formula is None and not curve.of.parameter
     if formula:
         parameters += [
@@ -60,7 +61,12 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
         whose = "line" if curve.place.is_line else "law"
         lines.append(f"    assumed = {held!r}  # the {whose} has {known} already".replace("'", '"'))
     if parameters or only:
-        lines += ["    parameters = {", *_declared(parameters), *only, "    }"]
+        lines += [
+            "    parameters = {",
+            *_declared(parameters, kept),
+            *only,
+            "    }",
+        ]
     if table:
         lines += _table(curve)
     return "\n".join([*lines, "", *body]) + "\n"
@@ -123,7 +129,8 @@ def _imports(
 def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
     """Return the class's first lines and its docstring."""
     g = f"g = {formula.text if formula else 'curve(s)'},   s = {curve.signal.words}"
-    end = "." if formula else ", for beyond its ends the curve keeps its value."
+    ends = formula is None or formula.ends
+    end = ", for beyond its ends the curve keeps its value." if ends else "."
     if curve.of.law:
         g, end = curve.of.law, "."
     return [
@@ -185,12 +192,16 @@ def _fields(curve: Curve) -> list[str]:
     return [f"    {key} = {text}" for key, text in texts if text not in ("{}", "()")]
 
 
-def _declared(parameters: Sequence[Declared]) -> list[str]:
-    """Return the lines that declare parameters: name, value, unit, meaning."""
+def _declared(parameters: Sequence[Declared], kept: Sequence[str] = ()) -> list[str]:
+    """Return the lines that declare parameters: name, value, unit, meaning.
+
+    Those in `kept` stay above zero: below it, a building would be pushed over.
+    """
     lines = []
     for name, value, unit, text in parameters:
         size = BOUND * max(abs(value), 1e-9)
         low, high = (0.02 * value, 50.0 * value) if name in POSITIVE else (-size, size)
+        low = 0.0 if name in kept else low
         bounds = f"({low:.4g}, {high:.4g})"
         lines.append(f'        "{name}": Parameter({value:.6g}, "{unit}", {bounds}, "{text}"),')
     return lines

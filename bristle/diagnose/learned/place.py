@@ -74,3 +74,7 @@ class Place:
         if not self._of_storey:
             return text
         return " ".join(OF_STOREY.get(word, word) for word in text.split(" "))
+
+
+AT_DAMPER = Place()
+"""The damper, on a bench or in a building."""

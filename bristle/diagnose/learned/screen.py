@@ -238,7 +238,7 @@ def _fewer(
     held = _held(kind, at, values)
     fine = np.interp(at, knots, fine)
     if len(held) == 1:
-        fine -= fine[held[0]]
+        fine -= fine[held[0]] * (1.0 if kind.of.level else at / at[held[0]])
     elif kind.of_line:
         first, second = held
         slope = (fine[second] - fine[first]) / (at[second] - at[first])
@@ -254,7 +254,7 @@ def _held(kind: Curve, knots: Array, values: Array) -> tuple[int, ...]:
     A law has its own strength; the line of a layer or a storey a constant, and a slope: so the
     curve is what is added to the stiffness near rest.
     """
-    if not kind.of.level:
+    if not (kind.of.level or kind.of_line):
         return ()
     if kind.part == "command":
         return (0, len(knots) - 1)
