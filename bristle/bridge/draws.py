@@ -57,7 +57,7 @@ class Simulator:
         quiet = replace(self.shaking, force=None, drive=VOLTAGE)
         file, _ = write_scenario(
             self.folder, (title, "# The model's damper in the building."), self.house, quiet,
-            own.structure, self._damper, own.damper,
+            own, self._damper,
         )  # fmt: skip
         return load_scenario(file)
 

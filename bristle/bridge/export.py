@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
+from shutil import copyfile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -252,6 +253,7 @@ def _structure(
     def damper(parameters: Parameters) -> str:
         return part_text("damper", {"fmu": fmu.name}, parameters)
 
-    return write_scenario(
-        folder, head, house, shaking_of(measurement), own.structure, damper, own.damper
-    )
+    copied = [Path(copyfile(one, folder / one.name)) for one in own.effects]
+    own = own._replace(effects=tuple(Path(one.name) for one in copied))
+    scenario, files = write_scenario(folder, head, house, shaking_of(measurement), own, damper)
+    return scenario, [*files, *copied]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from ..physics.building import Building
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
+from ..physics.user import own_effects
 from .scenario_files import part_text, scenario_text, signal_file
 
 Array = NDArray[np.float64]
@@ -89,11 +90,16 @@ def shaking_of(measurement: Measurement) -> Shaking:
 
 
 class Loads(NamedTuple):
-    """Parameters of the structure and of the damper that follow from their joint, and notes."""
+    """What a model makes of a building beside its damper.
+
+    Parameters of the `structure` and of the `damper` that follow from their joint; `notes`; and the
+    files of the structure's `effects` that are the user's own.
+    """
 
     structure: Parameters
     damper: Parameters
     notes: tuple[str, ...]
+    effects: tuple[Path, ...] = ()
 
 
 def loads(model: StudyModel, building: Building, bench: bool = False) -> Loads:
@@ -122,7 +128,9 @@ def loads(model: StudyModel, building: Building, bench: bool = False) -> Loads:
             )
     if LAWS[model.base_law].has("sign"):
         damper["moving_mass"] = mass
-    return Loads(structure, damper, tuple(notes))
+    files = own_effects()
+    effects = tuple(files[name] for name in layer.effects if EFFECTS[name].own)
+    return Loads(structure, damper, tuple(notes), effects)
 
 
 def masses(damper: StudyModel) -> list[str]:
@@ -131,8 +139,8 @@ def masses(damper: StudyModel) -> list[str]:
 
 
 def write_scenario(
-    folder: Path, head: tuple[str, str], house: House, shaking: Shaking, structure: Parameters,
-    damper: Callable[[Parameters], str], moving: Parameters,
+    folder: Path, head: tuple[str, str], house: House, shaking: Shaking, own: Loads,
+    damper: Callable[[Parameters], str],
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of a building with its damper under a ground motion, and its files.
 
@@ -141,17 +149,20 @@ def write_scenario(
     folder : where they go
     head : title of the scenario, and the comment above
     house, shaking : the building, and what drives it
-    structure, moving : parameters of the structure and the damper, see `loads`
+    own : what the model makes of the building
     damper : parameters to the text of the component that is called damper
 
     Returns
     -------
     scenario, files : the path of structure.toml, and of the files that it reads
     """
-    files, extra = [], {}
+    files: list[Path] = []
+    source: dict[str, Any] = {"fmu": "Structure"}
     if house.file is not None:
         files.append(Path(shutil.copyfile(house.file, folder / "building.toml")))
-        extra = {"building": files[0].name}
+        source["building"] = files[0].name
+    if own.effects:
+        source["effects"] = list(own.effects)
     files += write_signals(folder, shaking)
     level = house.building.levels()[0]
     wires = {
@@ -160,15 +171,15 @@ def write_scenario(
         "damper.displacement": f"structure.{level}_displacement",
         "damper.velocity": f"structure.{level}_velocity",
     }
-    if "moving_mass" in moving:
+    if "moving_mass" in own.damper:
         wires["damper.holding_force"] = "structure.holding_force"
     parts = [
         part_text("ground", {"fmu": "GroundMotion"}, {"record": GROUND}),
-        part_text("structure", {"fmu": "Structure", **extra}, structure),
+        part_text("structure", source, own.structure),
     ]
-    own = dict(moving)
+    moving = dict(own.damper)
     if shaking.command is None:
-        own[shaking.drive.name] = shaking.level
+        moving[shaking.drive.name] = shaking.level
     else:
         parts.append(_signal("drive", COMMAND))
         wires[f"damper.{shaking.drive.name}"] = "drive.value"
@@ -177,7 +188,7 @@ def write_scenario(
             signal_file(shaking.time, shaking.force, "force", "N", folder / "measured.csv")
         )
         parts.append(_signal("measured", "measured.csv"))
-    parts.append(damper(own))
+    parts.append(damper(moving))
     step = float(f"{shaking.spacing / shaking.fine:.12g}")
     stop = float(f"{(len(shaking.time) - 1) * shaking.fine * step:.12g}")
     scenario = folder / "structure.toml"
