@@ -29,6 +29,7 @@ from bristle.diagnose.opening import (
     Opening,
     Progress,
     bench_data,
+    opened_with,
     opening,
     silent,
 )
@@ -99,7 +100,7 @@ def steps(train: Sequence[Measurement], say: Progress = silent) -> tuple[Found, 
     """
     split, data, rows = _laws(train, say)
 
-    chosen = choose(search(rows, Looks(data, say)))
+    chosen = choose(search(rows, Looks(lambda trial: opened_with(trial, data), say)))
     assert chosen.opened is not None
     opened = _with_effects(split, chosen.finding, chosen.opened, say)
     return _found(opened, ()), _with_curves(opened, say)

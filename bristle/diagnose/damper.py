@@ -36,7 +36,7 @@ def look_at_damper(
     finding; and what the look began with: with the zero of the force free where that is off
     """
     before, rule = opened.before, opened.rule
-    if not opened.scope.rank_all and max(before.z, before.train) <= rule.quiet:
+    if noise_is_all(opened):
         return of_decision(as_noise(before, ()), before), opened
     made, decision = _decided(opened, say, made, pairs)
     sensors = renewed_zero(opened, decision)
@@ -55,6 +55,12 @@ def look_at_damper(
     found = replace(found, sensors=sensors, together=best_pair)
     patterns = tuple(made.patterns) if rule.organised < 1.0 else ()
     return replace(found, patterns=patterns), opened
+
+
+def noise_is_all(opened: Opening) -> bool:
+    """Return whether a model leaves nothing that an effect could lower, and none is ranked then."""
+    before = opened.before
+    return not opened.scope.rank_all and max(before.z, before.train) <= opened.rule.quiet
 
 
 def _decided(

@@ -88,10 +88,7 @@ def diagnose_rig(
         runs = BenchRuns(train, holdout, present, identified, say)
     else:
         runs = BuildingRuns(train, holdout, present, building, say)
-    findings: dict[str, Finding] = {}
-    for name, pair in runs.lines().items():
-        say(f"{name}: effects of the structure")
-        findings[name] = _line(name, pair, runs.part(name))
+    findings = look_at_lines(runs, say)
     runs.correct(findings)
     opened = runs.open_damper()
     if isinstance(opened, Insufficient):
@@ -106,6 +103,15 @@ def diagnose_rig(
         settled = excused if excused is not found else contradicted(found, opened)
         findings[DAMPER] = detailed(settled, opened)
     return conclude(findings, runs.about())
+
+
+def look_at_lines(runs: BenchRuns | BuildingRuns, say: Progress = silent) -> dict[str, Finding]:
+    """Return what the isolation layer and the storeys show, by site; nothing on a bench."""
+    findings: dict[str, Finding] = {}
+    for name, pair in runs.lines().items():
+        say(f"{name}: effects of the structure")
+        findings[name] = _line(name, pair, runs.part(name))
+    return findings
 
 
 def _line(name: str, pair: tuple[StructureProblem, StructureProblem], present: Model) -> Finding:

@@ -18,10 +18,10 @@ from ..identify.response import responses
 from ..identify.rig import DAMPER
 from ..identify.search_context import refine
 from ..identify.site_fit import fit_damper
-from ..identify.structure import StructureProblem, problems_of
+from ..identify.structure import ANY_LAW, StructureProblem, problems_of
 from ..physics.building import Building
 from .building_prior import moved_numbers, within_prior
-from .candidates import SHOWN, judge
+from .candidates import SHOWN, Trial, judge
 from .conclusion import About
 from .corrected import corrected
 from .damper import excused_by_sensor, left_by_filter
@@ -53,6 +53,7 @@ class BuildingRuns:
     train, holdout : measurements to fit to, and those that decide
     present : the model as it is, with the effects of all sites
     building : its masses are taken as known
+    free : whether the damper's law is sought: then those samples count that every law tells
     """
 
     def __init__(
@@ -62,8 +63,9 @@ class BuildingRuns:
         present: Model,
         building: Building,
         say: Progress,
+        free: bool = False,
     ) -> None:
-        self._building, self._say = building, say
+        self._building, self._say, self._free = building, say, free
         say("looking for sensor faults")
         self._sensors = tuple(sensor_faults([_as_bench(m, building) for m in (*train, *holdout)]))
         right = [_corrected(list(runs), self._sensors, building) for runs in (train, holdout)]
@@ -80,7 +82,7 @@ class BuildingRuns:
         self._notes: list[str] = []
 
     def _made(self, building: Building) -> dict[str, Pair]:
-        law = self._present.law
+        law = ANY_LAW if self._free else self._present.law
         return problems_of(self._train, self._holdout, building, law, self._straight)
 
     def lines(self) -> dict[str, Pair]:
@@ -146,6 +148,19 @@ class BuildingRuns:
             before, train, held_out, self._sensors, self._noise, rule=SITE, scope=IN_BUILDING
         )
 
+    @property
+    def damper(self) -> Pair | None:
+        """The damper's runs for training and held out, None where no damper was measured."""
+        return self._problems.get(DAMPER)
+
+    def suppose(self, damper: Model) -> None:
+        """Take a damper's law, fitted, in the place of the model's, whose other effects stay."""
+        own = self.part(DAMPER).effects
+        elsewhere = tuple(name for name in self._present.effects if name not in own)
+        values = {n: v for n, v in self._present.values.items() if n.partition(".")[0] in elsewhere}
+        effects = (*damper.effects, *elsewhere)
+        self._present = replace(damper, effects=effects, values={**values, **damper.values})
+
     def open_damper(self) -> Opening | None:
         """Return the damper's law fitted and judged, None where no damper was measured."""
         if DAMPER not in self._problems:
@@ -153,10 +168,20 @@ class BuildingRuns:
         self._say("damper: its law, then effects")
         train, held_out = self._problems[DAMPER]
         model = refine(fit_damper(train, self.part(DAMPER)).model, train)
+        return self.opened_with(judge(model, train, held_out))
+
+    def opened_with(self, before: Trial) -> Opening:
+        """Return what a look at the damper begins with.
+
+        Parameters
+        ----------
+        before : the trial of a model that was fitted to its runs
+        """
+        train, held_out = self._problems[DAMPER]
         # A force that no load cell shows cannot be late.
         shown = () if train.reconstructed else SHOWN
         return Opening(
-            judge(model, train, held_out), train, held_out, self._sensors, self._noise, shown,
+            before, train, held_out, self._sensors, self._noise, shown,
             shortened(train, SEARCHED), INSIDE, IN_BUILDING,
         )  # fmt: skip
 

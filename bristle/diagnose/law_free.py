@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 from ..data.channels import DRIVE
 from ..data.checks.levels import tells_a_bend
 from ..data.measurement import Measurement
-from ..identify.model import Model
+from ..errors import RecordError
+from ..identify.model import Model, Problem
 from ..identify.rig import DAMPER
+from ..physics.building import Building
+from .candidates import Trial
 from .conclusion import About, conclude
-from .damper import look_at_damper
+from .damper import look_at_damper, noise_is_all
 from .detail import detailed
+from .diagnosis import look_at_lines
+from .equilibrium import BuildingRuns
 from .inconsistent_runs import contradicted
-from .law_choice import Pair, choose, equivalents, search
+from .law_choice import Pair, choose, equivalents, search, simplest
 from .law_trials import LawTrial, not_finite, try_laws
 from .law_verdict import LawVerdict
 from .opening import (
-    BenchData,
     Insufficient,
+    Opening,
     Progress,
     Trials,
     bench_data,
@@ -34,17 +39,19 @@ def diagnose_laws(
     train: Sequence[Measurement],
     holdout: Sequence[Measurement],
     present: Model,
+    building: Building | None = None,
     *,
     named: str = "",
     say: Progress = silent,
     rule: DecisionRule = BENCH,
 ) -> Diagnosis:
-    """Return which law a damper on a test bench has, and which effects that law misses.
+    """Return which law a damper has, and which effects that law misses.
 
     Parameters
     ----------
     train, holdout : measurements to fit to, and those that decide
     present : the model as it is; laws have those of its effects that can join them
+    building : the building that the damper is in, None for a test bench
     named : the present law with its variant, "" where nobody chose one
     say : called with a few words at each stage
     rule : the numbers that decide
@@ -52,46 +59,107 @@ def diagnose_laws(
     Raises
     ------
     RecordError
-        If a run lacks a channel that is needed, or is too short for a fit.
+        If a run lacks a channel that is needed, is too short for a fit, or no run shows a damper.
     """
+    if building is not None:
+        runs = BuildingRuns(train, holdout, present, building, say, free=True)
+        return _in_building(runs, tells_a_bend(train), named, say, rule)
     data = bench_data(train, holdout, present, say)
     if isinstance(data, Insufficient):
         return Diagnosis("insufficient", (), data.reasons, sensors=data.faults, noise=data.noise)
     say("trying every law")
     rows = try_laws(data.problem, data.held_out, present, bends=tells_a_bend(train))
-    pairs = search(rows, Looks(data, say), rule)
-    chosen = choose(pairs, rule)
-    assert chosen.opened is not None
-    say(f"intervals of {chosen.row.law}")
-    finding = detailed(contradicted(chosen.finding, chosen.opened), chosen.opened)
+    looks = Looks(lambda trial: opened_with(trial, data), say)
+    sought = _sought(rows, looks, say, rule)
+    finding = contradicted(sought.chosen.finding, sought.opened)
+    finding = detailed(finding, sought.opened)
     driven = any(run.has(name) for run in (*train, *holdout) for name in DRIVE)
-    about = About(sensors=chosen.opened.faults, noise=data.noise, driven=driven)
-    laws = LawVerdict(
-        chosen.row, named, rows, tuple(pairs), tuple(equivalents(chosen, pairs, rows, rule)),
-        tuple(not_finite(data.problem, present)),
-    )  # fmt: skip
+    about = About(sensors=sought.opened.faults, noise=data.noise, driven=driven)
+    laws = sought.verdict(named, data.problem, present, rule)
     return replace(conclude({DAMPER: finding}, about), laws=laws)
 
 
+def _in_building(
+    runs: BuildingRuns, bends: bool, named: str, say: Progress, rule: DecisionRule
+) -> Diagnosis:
+    """Return the law of a building's damper and what it misses, beside what other sites miss."""
+    if runs.damper is None:
+        raise RecordError(
+            "no law of a damper can be sought: the runs have neither its force nor its command."
+        )
+    present = runs.part(DAMPER)
+    findings = look_at_lines(runs, say)
+    if runs.damper[0].reconstructed:  # the building's numbers are asked for with a law at hand
+        say("trying every law, with the building as its file has it")
+        first = try_laws(*runs.damper, present, bends=bends)
+        runs.suppose(simplest(first, rule).trial.model)
+    runs.correct(findings)
+    problem, held_out = runs.damper
+    say("trying every law")
+    rows = try_laws(problem, held_out, present, bends=bends)
+    sought = _sought(rows, Looks(runs.opened_with, say), say, rule)
+    runs.suppose(sought.chosen.row.trial.model)
+    found = sought.chosen.finding
+    excused = runs.excused(found, findings)
+    settled = excused if excused is not found else contradicted(found, sought.opened)
+    findings[DAMPER] = detailed(settled, sought.opened)
+    laws = sought.verdict(named, problem, present, rule)
+    return replace(conclude(findings, runs.about()), laws=laws)
+
+
+@dataclass(frozen=True)
+class _Sought:
+    """What the search for law and effects came to: `chosen` of `pairs`, and how all laws do."""
+
+    chosen: Pair
+    pairs: tuple[Pair, ...]
+    rows: tuple[LawTrial, ...]
+
+    @property
+    def opened(self) -> Opening:
+        """What the look at the chosen law began with."""
+        assert self.chosen.opened is not None
+        return self.chosen.opened
+
+    def verdict(
+        self, named: str, problem: Problem, present: Model, rule: DecisionRule
+    ) -> LawVerdict:
+        """Return what a verdict tells of the laws."""
+        equal = equivalents(self.chosen, self.pairs, self.rows, rule)
+        unfit = tuple(not_finite(problem, present))
+        return LawVerdict(self.chosen.row, named, self.rows, self.pairs, tuple(equal), unfit)
+
+
+def _sought(rows: tuple[LawTrial, ...], looks: Looks, say: Progress, rule: DecisionRule) -> _Sought:
+    """Search the effects that laws lack; return the pair that the runs ask for, and the others."""
+    pairs = search(rows, looks, rule)
+    chosen = choose(pairs, rule)
+    say(f"intervals of {chosen.row.law}")
+    return _Sought(chosen, tuple(pairs), rows)
+
+
 class Looks:
-    """What laws lack, on one bench's runs: a second look at a law takes up where the first ended.
+    """What laws lack, on one rig's runs: a second look at a law takes up where the first ended.
 
     Parameters
     ----------
-    data : the runs
+    opened_with : the trial of a law to what a look at the damper begins with
     say : called with a few words at each stage
     """
 
-    def __init__(self, data: BenchData, say: Progress = silent) -> None:
-        self.data, self.say = data, say
+    def __init__(self, opened_with: Callable[[Trial], Opening], say: Progress = silent) -> None:
+        self.opened_with, self.say = opened_with, say
         self.made: dict[str, Trials] = {}
 
     def __call__(self, row: LawTrial, pairs: bool) -> Pair:
         """Return what a law lacks: single effects alone, or pairs as well where none suffices."""
         made = self.made.get(row.law)
         if made is None:
+            opened = self.opened_with(row.trial)
+            if noise_is_all(opened):
+                return Pair(row, *look_at_damper(opened, self.say, pairs=pairs))
             self.say(f"effects that {row.law} lacks (error / noise {row.trial.z:.2f})")
-            made = Trials(opened_with(row.trial, self.data), self.say)
+            made = Trials(opened, self.say)
             self.made[row.law] = made
         elif pairs:
             self.say(f"two effects that {row.law} lacks")

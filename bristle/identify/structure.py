@@ -32,6 +32,9 @@ SLIDING = 3.0
 """Where dry friction may act, slower samples than so many standard deviations are left out: the
 base may be held there, and the force is then whatever holds it."""
 
+ANY_LAW = ""
+"""The name of a damper's law that is sought: samples count that every law tells."""
+
 BESIDE = 3
 """Samples on either side of such a one that are left out with it."""
 
@@ -260,8 +263,11 @@ def damper_run(
 
 
 def blind_at_rest(law: str) -> bool:
-    """Return whether a law tells nothing where the base may be held: it has a sign there."""
-    return base_and_variant(law)[0].has("sign")
+    """Return whether a law tells nothing where the base may be held: it has a sign there.
+
+    Of laws that are to be compared, ANY_LAW, one may.
+    """
+    return law == ANY_LAW or base_and_variant(law)[0].has("sign")
 
 
 def reconstructed(
@@ -332,7 +338,7 @@ def problems_of(
     Parameters
     ----------
     train, holdout : responses to fit to, and those that decide
-    building, law, linear_storeys : see `damper_run`
+    building, law, linear_storeys : see `damper_run`; the law may be ANY_LAW
     """
     both = (train, holdout)
     everything = [*train, *holdout]

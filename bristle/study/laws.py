@@ -24,7 +24,7 @@ ALL = "all"
 
 
 def refuse_in_building(law: str | None, in_building: bool) -> None:
-    """Refuse to compare all laws on a rig that is no test bench.
+    """Refuse to compare all laws, without their effects, on a rig that is no test bench.
 
     Raises
     ------
@@ -33,8 +33,9 @@ def refuse_in_building(law: str | None, in_building: bool) -> None:
     """
     if law == ALL and in_building:
         raise StudyError(
-            "all laws are compared on a test bench alone: in a building the law decides which "
-            "samples of the damper's force count. Name one law, or measure the damper on a bench."
+            "identify compares all laws on a test bench alone: in a building the law decides which "
+            "samples of the damper's force count. Name one law, or let diagnose seek it with its "
+            "effects (--law all)."
         )
 
 

@@ -21,7 +21,7 @@ from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified
 from .joining import as_named_here, refuse_effect, refuse_left_out
-from .laws import ALL, law_command, refuse_in_building, with_law
+from .laws import ALL, law_command, with_law
 from .rig import building_of
 from .study import Study
 
@@ -46,12 +46,11 @@ def diagnose_study(
     Raises
     ------
     StudyError
-        If the model was not identified before, the study cannot be written, all laws are asked for
-        in a building, or another law than the model's.
+        If the model was not identified before, the study cannot be written, or another law than
+        the model's is asked for.
     RecordError
         If a file cannot be read, or a channel that is needed is missing.
     """
-    refuse_in_building(law, study.settings.has_building)
     for why in study.usable_effects():
         say(f"left out: {why}")
     model, runs = study.model(), study.runs()
@@ -61,15 +60,12 @@ def diagnose_study(
             f"{law_command(study.folder, str(law))} ; to compare all of them:  "
             f"{command('diagnose', study.folder, '--law', ALL)}"
         )
+    known = runs.train, runs.holdout, as_model(model), building_of(study, model)
     with telling(say) if say is not tell else nullcontext():
         if law == ALL:
-            present = as_model(model)
-            found = diagnose_laws(runs.train, runs.holdout, present, named=model.law, say=say)
+            found = diagnose_laws(*known, named=model.law, say=say)
         else:
-            found = diagnose_rig(
-                runs.train, runs.holdout, as_model(model), building_of(study, model),
-                identified=_is_identified(model), say=say,
-            )  # fmt: skip
+            found = diagnose_rig(*known, identified=_is_identified(model), say=say)
     found = replace(found, sensors=(*found.sensors, *_turned(study)))
     if write:
         study.write_verdict(verdict_of(study, found))

@@ -259,8 +259,7 @@ def diagnose(
     Raises
     ------
     StudyError
-        If a law or an effect is not known, of a study nothing was identified before, or all laws
-        are asked for in a building.
+        If a law or an effect is not known, or of a study nothing was identified before.
     RecordError, PhysicsError
         If a file cannot be read, a channel is missing, or a run is too short; if the building's
         file is wrong.
@@ -293,10 +292,9 @@ def diagnose(
         )
     chosen = model_of(None if _is_all(model) else model, effects, DEFAULT)
     house = building_from(building)
-    refuse_in_building(ALL if _is_all(model) else None, house is not None)
     runs = _runs(given, holdout, channels, house)
     if _is_all(model):
-        return diagnose_laws(runs.train, runs.holdout, as_model(chosen))
+        return diagnose_laws(runs.train, runs.holdout, as_model(chosen), house)
     known = any(value.origin == "identified" for value in chosen.flat().values())
     return diagnose_rig(runs.train, runs.holdout, as_model(chosen), house, identified=known)
 
