@@ -1,6 +1,6 @@
 """What is learned where no effect of the library explains the error, and on runs that hide nothing.
 
-    python -m benchmarks learned --outside 24 --none 24
+    python -m benchmarks learned --outside 24 --none 24 --building 14 --clean 6
 
 makes what is missing of these figures, with the generator of the blind benchmark, and prints them;
 without a number it prints what is there.
@@ -8,30 +8,36 @@ without a number it prints what is there.
 outside    bench cases at 15 and 40 % with an effect that the library does not have: z on held-out
            runs before and after, and the closed form
 none       bench cases that hide nothing: nothing must be learned
+building   buildings that hide something in the isolation layer or a storey: the same figures
+clean      buildings that hide nothing: nothing must be learned at any of their lines
 """
 
 from __future__ import annotations
 
 import json
 import traceback
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
 
 from bristle.diagnose.candidates import Trial
+from bristle.diagnose.equilibrium import BuildingRuns
 from bristle.diagnose.learned.closed import closed_forms, name_of
 from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.effect_file import effect_text
 from bristle.diagnose.learned.fit import LearnedCurve, close, learn
-from bristle.diagnose.opening import Insufficient, Opening, opening
+from bristle.diagnose.opening import Insufficient, Opening, opening, silent
 from bristle.identify.model import Model
+from bristle.identify.rig import DAMPER
 from bristle.physics.user import defined
 
 from ._answers import Answer, Answers, ask
 from ._blind import cases
 from ._blind.plan import make_plan
 from ._blind.subject import measurements
+from ._houses import LAW, ODDITIES, SHARES, house
 from ._rows import Row
 
 SEED = 12
@@ -52,6 +58,7 @@ RIGHT = {
     },
     "jamming": {"speed": {"threshold", "levelling off"}},
     "power": {"speed": {"threshold"}},
+    **{one.name: one.right for one in ODDITIES if one.right},
 }  # fmt: skip
 """Signals and closed forms that name a hidden form; a fixture's resonance is no curve."""
 
@@ -63,35 +70,56 @@ def run() -> list[Row]:
 
 def main(given: list[str]) -> int:
     """Make what is missing of the figures, print them."""
-    return ask("learned", __doc__, ("outside", "none"), _answered, rows, given)
+    kinds = ("outside", "none", "building", "clean")
+    return ask("learned", __doc__, kinds, _answered, rows, given)
 
 
 def rows(done: dict[str, Answer]) -> list[Row]:
     """Return the rows of what has answers."""
+    of: dict[str, list[Answer]] = {}
+    for key, one in done.items():
+        of.setdefault(json.loads(key)[0], []).append(one)
     out = []
-    hidden = [one for key, one in done.items() if json.loads(key)[0] == "outside"]
-    if hidden:
-        z = np.array([one.get("z", np.inf) for one in hidden])
-        middle, share = float(np.median(z)), float(np.mean(z <= ADEQUATE))
-        before = float(np.median([one.get("z_before", np.inf) for one in hidden]))
-        text = f"{middle:.2f}, before {before:.2f} ({len(hidden)} cases)"
-        out.append(Row("learned: z of outside effects, median", text, "<= 1.2", middle / 1.2))
-        text = f"{share:.0%} of {len(hidden)}"
-        out.append(Row("learned: z <= 1.5", text, ">= 80 %", 0.8 / max(share, 1e-3)))
-        able = [one for one in hidden if one.get("form") in RIGHT]
-        named = float(np.mean([bool(one.get("named")) for one in able])) if able else 0.0
-        text = f"{named:.0%} of {len(able)}"
-        out.append(Row("learned: closed form named", text, ">= 60 %", 0.6 / max(named, 1e-3)))
-    clean = [one for key, one in done.items() if json.loads(key)[0] == "none"]
-    if clean:
-        wrong = sum(bool(one.get("learned")) or "error" in one for one in clean)
-        text = f"{wrong} of {len(clean)}"
-        out.append(Row("learned: curves where nothing is missing", text, "0", float(wrong)))
+    for kind, what in (("outside", "outside effects"), ("building", "what a building hides")):
+        out += _of_hidden(of.get(kind, []), what)
+    for kind, what in (("none", "curves"), ("clean", "curves in a building")):
+        if clean := of.get(kind, []):
+            wrong = sum(bool(one.get("learned")) or "error" in one for one in clean)
+            text = f"{wrong} of {len(clean)}"
+            out.append(Row(f"learned: {what} where nothing is missing", text, "0", float(wrong)))
+    return out
+
+
+def _of_hidden(hidden: list[Answer], what: str) -> list[Row]:
+    """Return the rows of cases that hide something; none without a case."""
+    if not hidden:
+        return []
+    z = np.array([one.get("z", np.inf) for one in hidden])
+    middle, share = float(np.median(z)), float(np.mean(z <= ADEQUATE))
+    before = float(np.median([one.get("z_before", np.inf) for one in hidden]))
+    text = f"{middle:.2f}, before {before:.2f} ({len(hidden)} cases)"
+    out = [Row(f"learned: z of {what}, median", text, "<= 1.2", middle / 1.2)]
+    text = f"{share:.0%} of {len(hidden)}"
+    out.append(Row(f"learned: z <= 1.5 of {what}", text, ">= 80 %", 0.8 / max(share, 1e-3)))
+    able = [one for one in hidden if one.get("form") in RIGHT]
+    named = float(np.mean([bool(one.get("named")) for one in able])) if able else 0.0
+    text = f"{named:.0%} of {len(able)}"
+    out.append(Row(f"learned: closed form of {what}", text, ">= 60 %", 0.6 / max(named, 1e-3)))
     return out
 
 
 def _answered(kind: str, number: int) -> Answer:
     """Return what was learned of a case; an error is an answer too."""
+    answer = _of_building if kind in ("building", "clean") else _of_bench
+    about, learned = answer(kind, number)
+    try:
+        return about | learned()
+    except Exception:  # whatever it is, it is the method's failure on this case
+        return about | {"error": traceback.format_exc()}
+
+
+def _of_bench(kind: str, number: int) -> tuple[Answer, Callable[[], Answer]]:
+    """Return a case of a bench, and what gives the answer to it."""
     able = [
         task
         for task in make_plan(SEED, 3 * (number + 1) + 12, kind)
@@ -99,19 +127,43 @@ def _answered(kind: str, number: int) -> Answer:
     ]
     task = able[number]
     about = {"effect": task.effect, "form": task.form, "strength": task.strength, "law": task.law}
-    try:
-        return about | _learned(cases.load(task), task.law)
-    except Exception:  # whatever it is, it is the method's failure on this case
-        return about | {"error": traceback.format_exc()}
+
+    def learned() -> Answer:
+        case = cases.load(task)
+        train, held_out = (
+            measurements(case.part(role), case.channels) for role in ("train", "holdout")
+        )
+        opened = opening(train, held_out, Model(task.law))
+        if isinstance(opened, Insufficient):
+            return {"learned": False, "why": list(opened.reasons)}
+        return _learned(opened, task.form)
+
+    return about, learned
 
 
-def _learned(case: cases.Recorded, law: str) -> Answer:
-    train, held_out = (
-        measurements(case.part(role), case.channels) for role in ("train", "holdout")
-    )
-    opened = opening(train, held_out, Model(law))
-    if isinstance(opened, Insufficient):
-        return {"learned": False, "why": list(opened.reasons)}
+def _of_building(kind: str, number: int) -> tuple[Answer, Callable[[], Answer]]:
+    """Return a case of a building, and what gives the answer to it."""
+    one = ODDITIES[number % len(ODDITIES)] if kind == "building" else None
+    share = SHARES[number // len(ODDITIES) % len(SHARES)]
+    form = one.name if one else ""
+    about = {"form": form, "strength": share, "at": one.site if one else ""}
+
+    def learned() -> Answer:
+        made = house(SEED + number, one, share)
+        runs = BuildingRuns(made.train, made.holdout, Model(LAW), made.building, silent)
+        sites = [site for site in runs.sites() if site != DAMPER]
+        openings = {site: runs.open_site(site) for site in sites}
+        able = {site: opened for site, opened in openings.items() if opened is not None}
+        if one is None:
+            told = [_learned(opened, "") for opened in able.values()]
+            return {"learned": any(answer["learned"] for answer in told)}
+        worst = max(able, key=lambda site: able[site].before.z)
+        return _learned(able[worst], form) | {"site": worst}
+
+    return about, learned
+
+
+def _learned(opened: Opening, form: str) -> Answer:
     before, told = opened.before.z, list[Answer]()
     with ExitStack() as stack:
         while len(told) < MOST and (not told or opened.before.z > ADEQUATE):
@@ -120,7 +172,7 @@ def _learned(case: cases.Recorded, law: str) -> Answer:
             if found.refused or found.curve is None or found.after is None:
                 told = told or [{"why": found.refused}]
                 break
-            one, text, trial = _closed(opened, found, found.curve, case.task.form)
+            one, text, trial = _closed(opened, found, found.curve, form)
             told.append(one)
             stack.enter_context(defined({name: text}))
             opened = replace(

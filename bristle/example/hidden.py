@@ -46,6 +46,7 @@ UNITS = {
     "fluid_mass": "kg", "mount_k": "N/m", "mount_c": "N.s/m", "mount_mass": "kg", "coil_tau": "s",
     "field_limit": "V", "spring_5": "N/m5", "rub": "N", "crack_drift": "m", "stop_gap": "m",
     "stop_k": "N/m", "bore_loss": "1", "bore_length": "m", "ripple": "N", "ripple_length": "m",
+    "brace_gap": "m", "brace_k": "N/m",
 }  # fmt: skip
 """Units of everything that `draw` of a hidden effect gives."""
 
@@ -130,6 +131,11 @@ def _ripple(rng: np.random.Generator, s: Scales) -> Values:
     }
 
 
+def _brace(rng: np.random.Generator, s: Scales) -> Values:
+    gap = rng.uniform(0.25, 0.35) * s.drift
+    return {"brace_gap": gap, "brace_k": rng.uniform(0.3, 0.5) * s.force / s.drift}
+
+
 FALLS = ("bingham", "lugre")  # laws whose drag dies out with speed
 
 HIDDEN = {
@@ -152,6 +158,8 @@ HIDDEN = {
         Hidden("worn_bore", BOTH, "a bore worn at mid-stroke", _bore, (), outside=True),
         Hidden("ripple", BOTH, "a thread on the rod that runs through the seal", _ripple, (),
                outside=True),
+        Hidden("loose_brace", TOWER, "a brace of the first storey that bears beyond its play",
+               _brace, (), outside=True),
     )
 }  # fmt: skip
 """What can be hidden, by name; where the library has it, by the library's name."""

@@ -34,7 +34,7 @@ MASSES, STIFFNESSES = (1.97, 1.23, 1.23), (1057.0, 1366.0, 1366.0)
 SPREAD = 0.12
 """Numbers of a rig lie up to this share off the table."""
 LARGEST_NOISE = 0.2
-LAYER = {"spring_5", "rub", "crack_drift", "stop_gap", "stop_k"}
+LAYER = {"spring_5", "rub", "crack_drift", "stop_gap", "stop_k", "brace_gap", "brace_k"}
 """What is hidden in the building, not in its damper."""
 SHOWN_IN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
 

@@ -87,6 +87,9 @@ class Tower:
             if "crack_drift" in self.hidden:
                 soft = 1.0 / (1.0 + (drift / self.hidden["crack_drift"]) ** 2)
             shear.append(f.stiffnesses[i] * (drift * soft + f.beta * rate))
+            if i == 1 and "brace_gap" in self.hidden:
+                taut = abs(drift) - self.hidden["brace_gap"]
+                shear[1] += self.hidden["brace_k"] * float(np.copysign(max(taut, 0.0), drift))
         shear.append(0.0)
         pushes = [(shear[i + 1] - shear[i]) / f.masses[i] - f.alpha * v[i] for i in range(3)]
         return pushes, force, rates
