@@ -82,7 +82,7 @@ ODDITIES = (
     Oddity("loose brace", 1, _brace, {"displacement": {"dead band"}}),
     Oddity("rub at mid-stroke", 0, _rub, {"displacement": {"bell"}}),
     Oddity("stiff wall", 2, _wall, {"displacement": {"cubic", "power"}}),
-    Oddity("bumper on one side", 0, _bumper, {}),
+    Oddity("bumper on one side", 0, _bumper, {"displacement": {"contact above"}}),
     Oddity("rub that grows outwards", 1, _rub_outwards, {"displacement": {"parabola", "power"}}),
     Oddity(
         "oil damper with an orifice", 2, _orifice,

@@ -37,6 +37,7 @@ class Form:
     text: str
     columns: tuple[str, ...]
     scales: Callable[[float, float], Array] | None = None
+    bent: bool = False
 
     def count(self) -> int:
         """Return how many numbers it has, the constant included."""
@@ -102,7 +103,10 @@ def _gaps(span: float, _step: float) -> Array:
 LINE = ("{s}",)
 """The columns of a line."""
 
-_POWERS = {"line": 1, "parabola": 2, "quadratic drag": 2, "cubic": 3, "dead band": 1}
+_GAPS = {"dead band": "of", "contact above": "beyond", "contact below": "beyond"}
+"""Forms that begin at a distance, and the word before it."""
+
+_POWERS = {"line": 1, "parabola": 2, "quadratic drag": 2, "cubic": 3, **dict.fromkeys(_GAPS, 1)}
 """By which power of the signal's unit the slope of a form is divided."""
 
 _TURN = "6.283185307179586 * {s} / {d}"
@@ -122,6 +126,12 @@ FORMS = (
     Form(
         "dead band", "c + m sgn(s) max(|s| - d, 0)",
         ("(max({s} - {d}, 0.0) + min({s} + {d}, 0.0))",), _gaps,
+    ),
+    Form(
+        "contact above", "c + m max(s - d, 0)", ("max({s} - {d}, 0.0)",), _gaps, bent=True,
+    ),
+    Form(
+        "contact below", "c + m min(s + d, 0)", ("min({s} + {d}, 0.0)",), _gaps, bent=True,
     ),
     Form(
         "ripple", "c + m sin(2 pi s/d) + n cos(2 pi s/d)", (f"sin({_TURN})", f"cos({_TURN})"),
@@ -155,7 +165,8 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     size = _spread(curve, y, weight)
     if not size > 0.0:
         return []
-    forms = [one for one in FORMS if not (curve.of_line and one.columns == LINE)]
+    straight = curve.of_line
+    forms = [one for one in FORMS if not (one.columns == LINE if straight else one.bent)]
     able = [one for one in forms if one.count() + curve.of_line + 1 <= len(s)]
     found = [_fitted(form, curve, y, weight, size) for form in able]
     # Less than the weights' own share tells no forms apart.
@@ -245,12 +256,15 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
     scale = {
         "ripple": f", pitch {quantity(d, along)}",
         "power": f" with exponent {plain(d, 2)}",
-        "dead band": f" of {quantity(d, along)}, then {plain(m)} {unit}{each}",
+        **{
+            name: f" {word} {quantity(d, along)}, then {plain(m)} {unit}{each}"
+            for name, word in _GAPS.items()
+        },
     }.get(found.name, f" over {quantity(d, along)}" if scaled else "")
     height = np.hypot(m, found.values[3]) if len(found.values) > 3 else abs(m)
     article = "an" if found.name[0] in "aeiou" else "a"
     tall = f", height {quantity(float(height), unit)}"
-    tall = tall if scale and found.name not in ("power", "dead band") else ""
+    tall = tall if scale and found.name not in ("power", *_GAPS) else ""
     return f"{article} {found.name}{scale}{tall}"
 
 

@@ -16,7 +16,7 @@ def curve_of(values, along="displacement", part="force", knots=KNOTS):
     return Curve(part, along, (), tuple(knots), tuple(values))
 
 
-@pytest.mark.parametrize("form", FORMS[1:], ids=lambda form: form.name)
+@pytest.mark.parametrize("form", [f for f in FORMS[1:] if not f.bent], ids=lambda f: f.name)
 def test_a_form_without_noise_comes_back(form):
     d = SCALES.get(form.name, 0.006)
     c, m, n = 0.4, 2.0, -1.1

@@ -103,6 +103,18 @@ def test_what_the_line_has_already_is_no_part_of_the_curve():
     assert [(name, unit) for name, _, unit in formula.parameters] == [("m", "N/m"), ("d", "m")]
 
 
+@pytest.mark.parametrize(
+    ("side", "name", "size"), [(1.0, "contact above", 300.0), (-1.0, "contact below", 300.0)]
+)
+def test_a_stop_on_one_side_is_told_with_its_side(side, name, size):
+    _, found = first_of(lambda x, v: side * size * np.maximum(side * x - 0.005, 0.0))
+    curve = found[0].curve
+    best = closed_forms(curve, [0.01] * len(curve.knots))[0]
+    assert best.name == name
+    assert best.values[1:] == pytest.approx((size, 0.005), rel=0.1)
+    assert f"a {name} beyond" in in_words(best, curve)
+
+
 def test_a_slope_beside_the_curve_is_the_line_s():
     knots = tuple(np.linspace(-0.012, 0.012, 11))
     bent = tuple(2e7 * np.array(knots) ** 3 - 500.0 * np.array(knots))

@@ -1,0 +1,71 @@
+"""The law of a building's damper, sought with its effects as on a bench."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from shaken import building, measured, shake
+
+from bristle.diagnose import law_trials
+from bristle.diagnose.equilibrium import BuildingRuns
+from bristle.diagnose.law_free import diagnose_laws
+from bristle.diagnose.opening import silent
+from bristle.errors import RecordError
+from bristle.identify.model import Model
+from bristle.identify.structure import ANY_LAW, blind_at_rest
+
+HOUSE = building(1, True, 3)
+FEW = ("tanh", "dahl")
+
+
+def damper(x, v):
+    """A damper's force [N], as the law tanh has it."""
+    return 1.2 * np.tanh(v / 0.02) + 8.0 * v
+
+
+def runs(**given):
+    made = [shake(HOUSE, seed, damper, samples=1500) for seed in (1, 2, 3)]
+    found = [measured(one, k, name=f"run{k}", **given) for k, one in enumerate(made)]
+    return found[:2], found[2:]
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Let there be two laws alone."""
+    monkeypatch.setattr(law_trials, "law_names", lambda: FEW)
+
+
+def test_the_law_of_the_damper_is_found_in_the_building(few):
+    found = diagnose_laws(*runs(), Model("lugre"), HOUSE, named="lugre")
+    assert (found.kind, found.effects, found.law) == ("none", (), "tanh")
+    assert set(found.findings) == {"storey1", "layer", "damper"}
+    assert [row.law for row in found.laws.rows] == ["tanh", "dahl"]
+    told = found.as_dict()
+    assert (told["law"], told["law_before"], told["force"]) == ("tanh", "lugre", "measured")
+
+
+def test_all_laws_are_held_against_the_samples_that_every_law_tells():
+    assert blind_at_rest(ANY_LAW)
+    assert not blind_at_rest("lugre")
+    sought, known = (
+        BuildingRuns(*runs(), Model("lugre"), HOUSE, silent, free=free).damper[0].runs[0]
+        for free in (True, False)
+    )
+    assert len(sought.force) < len(known.force)
+    assert np.min(np.abs(sought.v)) > np.min(np.abs(known.v))
+
+
+def test_without_a_damper_no_law_is_sought():
+    bare = runs(without=("force",))
+    with pytest.raises(RecordError, match="no law of a damper can be sought"):
+        diagnose_laws(*bare, Model("lugre"), HOUSE)
+
+
+def test_the_law_that_is_supposed_keeps_the_effects_of_the_other_sites():
+    present = Model("lugre", ("duffing", "gas_spring"), {"duffing.k_3": 1e6, "gas_spring.k": 9.0})
+    rig = BuildingRuns(*runs(), present, HOUSE, silent)
+    rig.suppose(Model("tanh", ("gas_spring",), {"gas_spring.k": 8.0}))
+    assert rig.part("damper").law == "tanh"
+    assert rig.part("damper").values == {"gas_spring.k": 8.0}
+    assert rig.part("layer").effects == ("duffing",)
+    assert rig.part("layer").values == {"duffing.k_3": 1e6}
