@@ -21,8 +21,9 @@ from .law_check import PARTS
 if TYPE_CHECKING:
     from .effect import Effect
 
-MIMICKED = ("force_bias", "late_drive")
-"""Faults of a sensor that an effect may look like: the force's zero, a drive on record late."""
+MIMICKED = ("force_bias", "late_drive", "limited_drive")
+"""Faults of a sensor that an effect may look like: the force's zero, a drive on record late, or one
+that was limited in slew or range behind its record."""
 
 
 FIELDS = {
