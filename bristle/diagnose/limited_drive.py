@@ -85,7 +85,8 @@ def limited_drive(
     if not able:
         return None
     found = min((_fitted(one, train, expected) for one in able), key=lambda one: one.cost)
-    if not found.value > rule.sure * found.std:
+    explained = promise(found.cost, at_first)
+    if explained < rule.share_when_clean or not found.value > rule.sure * found.std:
         return None
     right = train_right, _ = tuple(_felt(part, found) for part in (train, held_out))
     trial = judge(refine(found.model, train_right, 4), *right)
