@@ -88,10 +88,9 @@ def limited_drive(
     explained = promise(found.cost, at_first)
     if explained < rule.share_when_clean or not found.value > rule.sure * found.std:
         return None
-    right = train_right, _ = tuple(_felt(part, found) for part in (train, held_out))
-    trial = judge(refine(found.model, train_right, 4), *right)
-    fault = _told(found, train, held_out, drive)
-    told = ModelBasedFault(fault, *right, trial)
+    right, other = _felt(train, found), _felt(held_out, found)
+    trial = judge(refine(found.model, right, 4), right, other)
+    told = ModelBasedFault(_told(found, train, held_out, drive), right, other, trial)
     if not explains(trial, before, rule) or has_rival(told, before, train, "limited_drive", rule):
         return None
     return told
