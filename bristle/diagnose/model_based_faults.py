@@ -88,7 +88,16 @@ def explains(trial: Trial, before: Trial, rule: DecisionRule) -> bool:
 def has_rival(
     found: ModelBasedFault, before: Trial, train: Problem, fault: str, rule: DecisionRule
 ) -> bool:
-    """Return whether an effect that looks like the fault explains the runs as they are better."""
+    """Return whether an effect that looks like the fault explains the runs as they are better.
+
+    Parameters
+    ----------
+    found : the fault, the runs set right and the trial of them
+    before : the trial of the runs as they are, without further effects
+    train : the runs as they are, to fit to
+    fault : what effects say that they look like, one of `physics.effect_check.MIMICKED`
+    rule : the numbers that decide
+    """
     model = before.model
     own = found.trial.model
     cost = _loss(own, found.train)

@@ -75,7 +75,8 @@ def force_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out:
 def law_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: Any) -> None:
     """Do what `force_history` does where no effect is on, without the code of any effect.
 
-    The law knows the voltage of its own moment only, so a jump needs no care.
+    A law knows the voltage of its own moment only, so a jump needs no care, but where its command
+    lags: before a jump it follows what was held.
 
     Parameters
     ----------
@@ -87,9 +88,10 @@ def law_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: A
     before = Inputs(x[0], v[0], a[0], V[0], 0.0, 0.0, 0.0, False)
     out[0] = law_step(law, p, before, before, z, z1)[0]
     for k in range(1, len(x)):
-        now = Inputs(x[k], v[k], a[k], V[k], dt, 0.0, 0.0, False)
+        V1 = before_jump(V, k) if setup.lags else V[k]
+        now = Inputs(x[k], v[k], a[k], V1, dt, 0.0, 0.0, False)
         out[k] = law_step(law, p, before, now, z, z1)[0]
-        before = now
+        before = Inputs(x[k], v[k], a[k], V[k], dt, 0.0, 0.0, False)
         for i in range(setup.n_own):
             z[i] = z1[i]
 

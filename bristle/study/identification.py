@@ -25,9 +25,10 @@ from ..units import convert
 from .forms import FormError, form_of, forms_asked, in_form
 from .identified import Identified
 from .joining import refuse_left_out
-from .laws import ALL, all_laws, left_out_notes, refuse_in_building
+from .laws import all_laws, left_out_notes, refuse_in_building
 from .rig import rig_of
 from .runs import Runs
+from .settings import ALL
 from .study import Study
 
 Show = Callable[[int], None]

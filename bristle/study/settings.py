@@ -27,8 +27,12 @@ RIGS = ("bench", "structure")
 CUT_OFF = 18.0
 """Low-pass of measured and predicted force [Hz], as in Shirazi et al. (2012), section III-C."""
 _KEYS = (
-    "schema", "title", "notes", "rig", "cut_off", "rate", "mask", "split", "runs", "channels",
+    "schema", "title", "notes", "rig", "law", "cut_off", "rate", "mask", "split", "runs",
+    "channels",
 )  # fmt: skip
+ALL = "all"
+"""The word for all laws."""
+
 _CHANNEL_KEYS = ("column", "unit", "sign", "noise", "step")
 
 
@@ -39,6 +43,7 @@ class Settings:
     `cut_off` [Hz] of the low-pass on measured and predicted force, 0 for none; `rate` [Hz] to which
     runs that are sampled faster are decimated, 0 for none; `mask` whether isolated spikes count as
     not measured; `split` how files hold several runs, "" where they hold one (`data.pieces`);
+    `law` "all" where the law is sought together with its effects, "" where the model's is kept;
     `excluded` the runs that are left out, which are none of `runs`.
     """
 
@@ -52,6 +57,7 @@ class Settings:
     rate: float = 0.0
     mask: bool = False
     split: str = ""
+    law: str = ""
     excluded: tuple[RunFile, ...] = ()
 
     @property
@@ -87,6 +93,12 @@ def read_settings(path: Path) -> Settings:
     rig = toml.text((), data, "rig", "bench")
     if rig not in RIGS:
         toml.error(("rig",), f'rig = "{rig}"; "bench" or "structure" is right.')
+    law = toml.text((), data, "law")
+    if law not in ("", ALL):
+        toml.error(
+            ("law",),
+            f'law = "{law}"; "all" seeks the law. Without this line that of model.toml is kept.',
+        )
     cut_off = toml.number((), data, "cut_off")
     if cut_off is not None and cut_off < 0.0:
         toml.error(("cut_off",), f"cut_off = {cut_off} Hz; 0 for none, or a positive number.")
@@ -114,7 +126,7 @@ def read_settings(path: Path) -> Settings:
     toml.check()
     return Settings(
         title, rig, runs, channels, notes, CUT_OFF if cut_off is None else cut_off,
-        rate=rate or 0.0, mask=bool(mask), split=split, excluded=excluded,
+        rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded,
     )  # fmt: skip
 
 
@@ -128,6 +140,9 @@ def write_settings(path: Path, settings: Settings) -> None:
     document.add("notes", tomlkit.item(settings.notes))
     document["notes"].comment("free text of the lab, shown in the report")
     document.add("rig", tomlkit.item(settings.rig))
+    if settings.law:
+        document.add("law", tomlkit.item(settings.law))
+        document["law"].comment("sought with its effects; without this line the model's is kept")
     document.add("cut_off", tomlkit.item(settings.cut_off))
     document["cut_off"].comment("Hz, low-pass on measured and predicted force; 0 for none")
     if settings.rate:

@@ -36,7 +36,7 @@ class MeasuredTemperature(Effect):
     parameters = {
         "c_viscous": Parameter(0.01, "1/K", (-0.1, 0.1), "fall of the viscous part per kelvin"),
         "c_yield": Parameter(0.005, "1/K", (-0.1, 0.1), "fall of the yield part per kelvin"),
-        "T": Parameter(20.0, "degC", (-100.0, 300.0), "temperature of the run"),
+        "T": Parameter(30.0, "degC", (-100.0, 300.0), "temperature of the run"),
         "T_0": Parameter(20.0, "degC", (-100.0, 300.0), "temperature of the law's own values"),
     }
     assumed = ("T", "T_0")
