@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..data.model import StudyModel
-from ..identify.model import values_of_labels
+from ..identify.run_labels import values_of_labels
 from .closed_loop_result import KINDS, Predicted
 from .closed_loop_runs import Trial
 from .draws import Columns, Simulator, drawn_models

@@ -18,8 +18,8 @@ from ..fmu.build import build, plan
 from ..fmu.catalogue import component_of_law
 from ..identify.fit import Problem, Run
 from ..identify.instruments import true_motion
-from ..identify.model import values_of_labels
 from ..identify.prepare import prepare
+from ..identify.run_labels import values_of_labels
 from ..physics.building import paper_building, read_building
 from ..physics.drive import drive_named, state_for
 from ..physics.effect import EFFECTS

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.labels import Label, Labels
+from ..data.labels import Label
 from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
 from ..physics.laws import LAWS, Law
 from ..physics.parameter import CHOICES, Parameter
 from .bench import Bench
 from .instruments import earlier, pure_delay, shown_force, true_motion
+from .run_labels import told_by, values_of_labels
 
 Array = NDArray[np.float64]
 
@@ -235,22 +236,6 @@ class Problem:
         if run.measured is not None:
             noise = np.where(run.measured, noise, LOST * noise)
         return bias, noise, spread - bias
-
-
-def told_by(effect: type[Effect], parameter: str) -> str:
-    """Return the label of runs that a parameter of an effect is, or the mean of; else ""."""
-    return effect.labels.get(parameter) or effect.label_means.get(parameter, "")
-
-
-def values_of_labels(effects: Iterable[str], labels: Labels) -> dict[str, float]:
-    """Return the values of effects that are labels of a run, by the names of a model."""
-    known = {
-        f"{name}.{own}": labels[label]
-        for name in effects
-        for own, label in EFFECTS[name].labels.items()
-        if label in labels
-    }
-    return {name: value for name, value in known.items() if not isinstance(value, str)}
 
 
 def sizes(runs: list[Run]) -> dict[str, float]:
