@@ -46,11 +46,11 @@ def made(seed, command=steps, limit=None, effects=(), values=None):
     return Run(f"run_{seed}", DT, x, v, a, V, force, NOISE, np.zeros((2, N, 4)))
 
 
-def found(**how):
+def found(drive="voltage", **how):
     train, held_out = Problem([made(s, **how) for s in (1, 2, 3)]), Problem([made(4, **how)])
     model = fit(train, Model("bingham", (), LAW), with_std=False).model
     before = judge(model, train, held_out)
-    return before, limited_drive(before, train, held_out)
+    return before, limited_drive(before, train, held_out, drive)
 
 
 @pytest.mark.parametrize("command", [steps, sine])
@@ -81,6 +81,12 @@ def test_effects_are_no_limit(effect):
     before, told = found(effects=(name,), values=effect)
     assert before.z > 1.2
     assert told is None
+
+
+def test_a_current_is_told_in_its_own_unit():
+    _, told = found(drive="current", limit=("slew", 12.0))
+    assert told.fault.channel == "current"
+    assert told.fault.words.startswith("Current reaches the coil no faster than 12 A/s")
 
 
 def test_clean_runs_and_commands_that_are_held_show_none():
