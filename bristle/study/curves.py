@@ -221,8 +221,8 @@ def refuse_elsewhere(parts: Sequence[str], along: Sequence[str], place: Place) -
     pairs = product(parts or there, along or [*signals, *there])
     if not any(may_change(*pair, place) for pair in pairs):
         raise StudyError(
-            f"--as {','.join(parts)} --along {','.join(along)}: at {site_name(place.name)} another "
-            "part says the same along these signals. Leave one of the two options out."
+            f"--as {','.join(parts)} --along {','.join(along)}: at {site_name(place.name)} no such "
+            "part is learned along such a signal. Leave one of the two options out."
         )
 
 

@@ -147,7 +147,7 @@ def test_a_site_that_the_runs_do_not_show_is_refused(house):
     [
         ({"parts": ["yield"]}, "the isolation layer has no yield; there are force, friction"),
         ({"along": ["voltage"]}, "the isolation layer has no voltage; there are displacement"),
-        ({"parts": ["spring"], "along": ["displacement"]}, "another part says the same"),
+        ({"parts": ["spring"], "along": ["displacement"]}, "no such part is learned"),
     ],
 )
 def test_what_a_layer_does_not_have_is_refused(house, asked, told):

@@ -1,0 +1,48 @@
+"""A building's scenario carries the effects of its layer and storeys that are the user's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import tomlkit
+
+from bristle.bridge.in_building import House, Shaking, loads, write_scenario
+from bristle.bridge.scenario_files import part_text
+from bristle.data.model import new_model
+from bristle.diagnose.learned.curve import Curve
+from bristle.diagnose.learned.effect_file import effect_text
+from bristle.physics import user
+from bristle.physics.building import paper_building
+from bristle.trust import load_file
+
+TIME = 0.01 * np.arange(200)
+
+
+@pytest.fixture
+def spring(tmp_path):
+    """Return the file of an effect that was learned in the second storey."""
+    curve = Curve(
+        "force", "displacement", (), (-0.01, 0.0, 0.01), (-3.0, 0.0, 5.0), (1,), at="storey2"
+    )
+    file = tmp_path / "learned_1.py"
+    file.write_text(effect_text("learned_1", curve, "made for a test, 2026"), encoding="utf-8")
+    load_file(file, trust=True)
+    yield file
+    user.unload_effects()
+
+
+def test_the_structure_is_given_the_effect_s_file_and_values(spring, tmp_path):
+    own = loads(new_model("tanh", ("learned_1", "duffing")), paper_building())
+    assert own.effects == (spring,)
+    folder = tmp_path / "out"
+    folder.mkdir()
+    file, _ = write_scenario(
+        folder, ("a house", "# a test"), House(paper_building()),
+        Shaking("quake", TIME, np.sin(TIME)), own,
+        lambda given: part_text("damper", {"law": "tanh"}, given),
+    )  # fmt: skip
+    structure = tomlkit.parse(file.read_text(encoding="utf-8"))["components"]["structure"]
+    assert structure["effects"] == [str(spring)]
+    given = structure["parameters"]
+    assert (given["learned_1.on"], given["learned_1.which"]) == (True, 2.0)
+    assert [given[f"learned_1.curve[{k}]"] for k in (1, 2, 3)] == [-3.0, 0.0, 5.0]
