@@ -109,10 +109,12 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     """
     ranked = sorted(rows, key=lambda row: row.trial.z)
     first = best_of([row.trial for row in rows], rule)
-    best = _formed(next(row for row in rows if row.trial is first), rows, rule)
+    by_z = next(row for row in rows if row.trial is first)
+    best = _formed(by_z, rows, rule)
     plain = [row for row in ranked if not set(row.contains) - {CURVED}]
     straight = [row for row in plain if CURVED not in row.contains]
-    level = [row for row in ranked if not clearly_worse(row.trial, best.trial, rule)]
+    others = [row for row in ranked if row is best or row is not by_z]
+    level = [row for row in others if not clearly_worse(row.trial, best.trial, rule)]
     picked = [best, *straight[:1], min(level, key=lambda row: (row.fitted, row.trial.z))]
     if straight and clearly_worse(straight[0].trial, plain[0].trial, rule):
         picked.insert(1, plain[0])

@@ -115,6 +115,11 @@ def test_the_plain_error_judges_the_form_of_a_command_where_the_law_is_far_off(z
     assert found == [best, "lugre", "tanh", "bingham"]
 
 
+def test_the_straight_form_does_not_go_on_beside_the_parabola_that_it_gave_way_to():
+    rows = [row("modified_bouc_wen", 5.0), bent(5.1, 4.7), row("bingham", 9.0)]
+    assert [one.law for one in survivors(rows)] == ["modified_bouc_wen[quadratic]", "bingham"]
+
+
 def test_near_the_noise_z_judges_the_form_of_a_command():
     near = [row("modified_bouc_wen", 1.5), row("bingham", 4.0), bent(1.55, 1.4)]
     assert survivors(near)[0].law == "modified_bouc_wen"

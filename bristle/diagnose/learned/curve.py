@@ -94,6 +94,8 @@ def may_change(part: str, along: str) -> bool:
     """Return whether a curve along a signal may change a part: a command's map depends on it."""
     if PARTS[part].alone or along in PARTS:
         return part == along
+    if part == "friction" and along == "stroke":
+        return False  # each direction has a curve of its own already
     of_command = along in ("voltage", "recent_voltage")
     if part == "command":
         return of_command
@@ -155,7 +157,7 @@ class Curve:
         """Its value as a hook computes it from the table."""
         if self.part == SLIP:
             return force_source(len(self.knots))
-        return f"interpolate({self.signal.source}, KNOTS, p.curve)"
+        return self.signal.value or f"interpolate({self.signal.source}, KNOTS, p.curve)"
 
     @property
     def passive(self) -> bool:

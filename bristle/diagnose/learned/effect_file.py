@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from ...physics.drive import drive_named, unit_for
-from .along import MEMORIES
+from .along import GIVEN, MEMORIES
 from .curve import BOUND, Curve, Formula, bounds_of
 from .slip import SLIP
 
@@ -53,14 +53,20 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
         f'    expect = "an error that depends on {curve.of.cause or curve.signal.words}"',
         "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
     ]
-    if curve.held and not formula:
-        held = tuple(f"curve[{k + 1}]" for k in curve.held)
-        lines.append(f"    assumed = {held!r}  # the law has a constant already".replace("'", '"'))
+    held = _assumed(curve) if not formula else ()
+    if held:
+        lines.append(f"    assumed = {held!r}  # no fit moves them".replace("'", '"'))
     if parameters:
         lines += ["    parameters = {", *_declared(parameters), *_only_value(curve), "    }"]
     if table:
         lines += _table(curve)
     return "\n".join([*lines, "", *body]) + "\n"
+
+
+def _assumed(curve: Curve) -> tuple[str, ...]:
+    """Return the parameters that stay: knots at the law's own constant, where the way turns."""
+    held = tuple(f"curve[{k + 1}]" for k in curve.held)
+    return (*held, *(name for name, _ in curve.memory if name in GIVEN))
 
 
 def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
@@ -109,7 +115,7 @@ def _imports(
 
 def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
     """Return the class's first lines and its docstring."""
-    g = f"g = {formula.text if formula else 'curve(s)'},   s = {curve.signal.words}"
+    g = f"g = {formula.text if formula else 'curve(s)'},   s = {curve.signal.formula or curve.signal.words}"
     end = "." if formula else ", for beyond its ends the curve keeps its value."
     if curve.of.law:
         g, end = curve.of.law, "."
@@ -154,7 +160,7 @@ def _table(curve: Curve) -> list[str]:
 
 def _constant(name: str, curve: Curve, value: float, text: str) -> list[str]:
     """Return the lines of a constant that a part's expression uses; none where it does not."""
-    used = name in curve.of.expression
+    used = name in curve.of.expression or name in curve.source
     return ["", f"{name} = {value:.6g}", f'"""{text}"""'] if used else []
 
 
