@@ -71,7 +71,8 @@ class Along:
     for it, `source` their expression there; `history` gives it (n,) of a run and its memory's
     parameters, of which `memory` has the names; `states` and `advance` are the memory of the hook,
     `starts` as in `Effect`. `value` is the source of the curve's value where it is not that of one
-    signal, `formula` what the signal then is. `named` says whether a formula may take the place of a curve along it.
+    signal, `formula` what the signal then is. `named` says whether a formula may take the place of
+    a curve along it.
     """
 
     name: str

@@ -115,7 +115,8 @@ def _imports(
 
 def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
     """Return the class's first lines and its docstring."""
-    g = f"g = {formula.text if formula else 'curve(s)'},   s = {curve.signal.formula or curve.signal.words}"
+    along = curve.signal.formula or curve.signal.words
+    g = f"g = {formula.text if formula else 'curve(s)'},   s = {along}"
     end = "." if formula else ", for beyond its ends the curve keeps its value."
     if curve.of.law:
         g, end = curve.of.law, "."
