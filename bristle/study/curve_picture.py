@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..diagnose.learned.along import GIVEN
 from ..diagnose.learned.closed import ClosedForm, in_words, name_of
 from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.fit import LearnedCurve
@@ -79,7 +80,11 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
         axes.plot(
             across * s, up * np.array(best.curve), color=VERMILION, lw=1.4, ls="--", label=name
         )
-    axes.set_xlabel(f"{curve.signal.words} [{along}]" if along else curve.signal.words)
+    for name, value in curve.memory:
+        if name in GIVEN:
+            axes.axvline(across * value, color=PALE, lw=1.0)
+    words = curve.signal.formula or curve.signal.words
+    axes.set_xlabel(f"{words} [{along}]" if along else words)
     quantity_name = curve.of.words.split(" ", 1)[1] if unit not in ("", "1") else "g"
     axes.set_title(
         f"{quantity_name} [{unit}]" if unit not in ("", "1") else f"g in {curve.of.formula}"

@@ -30,8 +30,8 @@ FINE = 13
 RIPPLED = 33
 """The same along displacement, where a force may ripple."""
 
-POSITIONS = ("displacement", "stroke")
-"""Signals that are a displacement."""
+MANY = {"displacement": RIPPLED, "stroke": 2 * RIPPLED - 1}
+"""Knots of the spline that is looked at, along signals that need more than `FINE`."""
 
 SMOOTH = tuple(10.0**k for k in range(-6, 5))
 """Weights of the second differences that are tried, in terms of the curve's own information."""
@@ -113,7 +113,7 @@ def _spline(along: Along, values: Array) -> tuple[Array, Hats] | None:
     """Return the knots for a signal (n,) and their hat functions; None where it hardly varies."""
     if not float(np.ptp(values)) > 1e-9 * max(1e-300, float(np.max(np.abs(values)))):
         return None
-    knots = knots_of(values, RIPPLED if along.name in POSITIONS else FINE)
+    knots = knots_of(values, MANY.get(along.name, FINE))
     return (knots, hats_at(values, knots)) if len(knots) >= FEWEST else None
 
 

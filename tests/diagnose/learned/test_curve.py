@@ -86,6 +86,20 @@ def test_the_memory_of_the_hook_is_that_of_the_scan(along):
     assert np.max(np.abs(np.array(out) - expected)) < 0.02 * np.ptp(expected)
 
 
+def test_a_curve_for_each_direction_is_that_of_the_scan():
+    curve, now = curve_of("force", "stroke", 0.5), run()
+    with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
+        effect = EFFECTS["learned_9"]
+        p, force = effect.values_of({}), effect.hooks()["force"]
+        found = np.array([force(signals(now, k, STEP), (), p) for k in range(len(T))])
+        assert effect.assumed == ("curve[1]", "turn")
+        assert not effect.passive  # round a cycle it may give energy
+    along = ALONG["stroke"].history(now, dict(curve.memory))
+    expected = np.interp(along, curve.knots, curve.values)
+    moving = np.abs(now.v) > 3.0 * curve.slow  # nearer to rest one curve passes into the other
+    assert found[moving] == pytest.approx(expected[moving], abs=0.003)
+
+
 @pytest.mark.parametrize("closed", [False, True])
 def test_a_learned_effect_conforms_as_any_other(closed):
     curve = curve_of("fluid", "displacement", 0.5)
