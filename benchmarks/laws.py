@@ -22,9 +22,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from bristle.data.measurement import measurements_of_frame
+from bristle.data.measurement import Measurement, measurements_of_frame
 from bristle.identify.bench import Bench
-from bristle.identify.fit import Run, identify
+from bristle.identify.fit import identify
 from bristle.identify.model import Problem
 from bristle.identify.prepare import prepare
 from bristle.physics.laws import LAWS, laws_of
@@ -95,24 +95,30 @@ def truth_of(law: str, rng: np.random.Generator) -> dict[str, float]:
     return found
 
 
-def measured(law: str, values: dict[str, float], rng: np.random.Generator, name: str) -> Run:
-    """Return one run of a law, measured with noise and smoothed as any measurement is."""
+def recorded(
+    law: str,
+    values: dict[str, float],
+    rng: np.random.Generator,
+    name: str,
+    effects: Sequence[str] = (),
+) -> Measurement:
+    """Return one run of a law, and of effects with it, measured with noise."""
     t, x, v, a, V = motion(rng)
-    force = Bench(law, []).force(x, v, a, V, STEP / FINER, values)
+    force = Bench(law, list(effects)).force(x, v, a, V, STEP / FINER, values)
     seen = {"displacement [m]": x, "velocity [m/s]": v, "voltage [V]": V, "force [N]": force}
     frame = {"time [s]": t[::FINER]}
     for title, signal in seen.items():
         shown = signal[::FINER]
         noise = NOISE * np.std(shown) * rng.standard_normal(len(shown))
         frame[title] = shown if title.startswith("voltage") else shown + noise
-    return prepare(measurements_of_frame(pd.DataFrame(frame), name)[0])
+    return measurements_of_frame(pd.DataFrame(frame), name)[0]
 
 
 def case(law: str, seed: int) -> Case:
     """Return what `identify` finds of the truth of one seed."""
     rng = np.random.default_rng([seed, *law.encode()])
     truth = truth_of(law, rng)
-    problem = Problem([measured(law, truth, rng, f"run_{k}") for k in (1, 2)])
+    problem = Problem([prepare(recorded(law, truth, rng, f"run_{k}")) for k in (1, 2)])
     found = identify(problem, law)
     errors = {
         name: (found.model.value(name) - truth[name]) / max(std, 1e-300)

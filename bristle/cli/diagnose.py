@@ -23,8 +23,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
         "--law",
-        help="all: try every law, and name the law together with the effects that it misses; else "
-        "the model's law is kept",
+        help="all: try every law, and name the law together with the effects that it misses, as "
+        "where no law was chosen; the model's law: keep it",
     )
     parser.add_argument(
         "--dry-run", action="store_true", help="show the verdict; do not change verdict.json"
@@ -135,12 +135,22 @@ def _then(verdict: Verdict, folder: Path) -> str:
         return command("add", folder, *verdict["effects"][:count])
     if verdict["kind"] == "unknown":
         return (
+            f"{_other_laws(verdict, folder)}"
             f"{command('learn', folder)} , which learns what is missing;  "
             f"{_gaining(verdict, folder)}"
             f"{command('compare', folder)} , which shows where the residual is;  "
             "bristle effects new NAME  starts your own effect."
         )
     return command("report", folder)
+
+
+def _other_laws(verdict: Verdict, folder: Path) -> str:
+    """Return the command that seeks the law as well; "" where no other law leaves less."""
+    if not any(found.get("other_law") for found in verdict["findings"]):
+        return ""
+    return (
+        f"{command('diagnose', folder, '--law', 'all')} , which seeks the law with its effects;  "
+    )
 
 
 def _gaining(verdict: Verdict, folder: Path) -> str:

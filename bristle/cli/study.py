@@ -36,7 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where no known effect explains the error, learn a curve and go on",
     )  # fmt: skip
     auto.add_argument(
-        "--law", help="all: seek the law together with its effects; a name: take that law first"
+        "--law",
+        help="all: seek the law together with its effects, as where no law was chosen; a name: "
+        "take that law first",
     )
     auto.add_argument(
         "--greedy", action="store_true",
@@ -61,6 +63,10 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--correct", action="store_true",
         help="set right what can be: lines, and gain, zero or sign of a run that differs",
+    )  # fmt: skip
+    parser.add_argument(
+        "--exclude", nargs="+", action="extend", default=[], metavar="RUN",
+        help="from now on these runs are left out: role = \"exclude\" in study.toml",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     parser.set_defaults(act=_check)
@@ -100,7 +106,11 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         help="test runs, which no fit and no verdict sees: names among the data, or more files",
     )  # fmt: skip
     _add_runs(parser)
-    parser.add_argument("--law", help="the law that the model begins with; else lugre")
+    parser.add_argument(
+        "--law",
+        help="the law that the model begins with; else lugre, and on a test bench diagnose seeks "
+        "the law together with its effects",
+    )
     parser.add_argument("--title", default="", help="the study's title; else its name")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(act=_new)
@@ -132,12 +142,12 @@ def _add_runs(parser: argparse.ArgumentParser) -> None:
 def _new(arguments: argparse.Namespace) -> int:
     from ..data.channels import ChannelSpec
     from ..errors import StudyError
-    from ..physics.laws import DEFAULT, law_names
+    from ..physics.laws import law_names
     from ..study.create import create_study
     from ..study.run_facts import RunChoices
 
-    law = arguments.law or DEFAULT
-    if law not in law_names():
+    law = arguments.law
+    if law is not None and law not in law_names():
         raise StudyError(f'--law "{law}"; there are: {", ".join(law_names())}.')
     channels = channels_of(arguments.channel)
     if arguments.step is not None:
@@ -218,6 +228,10 @@ def _check(arguments: argparse.Namespace) -> int:
         study = study.with_mask()
         if not arguments.json:
             print(f"{study.folder / 'study.toml'}: mask = true; isolated spikes are masked.\n")
+    if arguments.exclude:
+        study = study.with_excluded(arguments.exclude)
+        if not arguments.json:
+            print(f"{study.folder / 'study.toml'}: {study.settings.excluded_text}\n")
     total = len(study.settings.runs)
     with Progress("checking the data", total, not arguments.json) as progress:
         found = check_data(study, progress.show)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.command_limits import JUMP
 from ..physics import damper
 from ..physics.inputs import Inputs, Setup
 from ..physics.laws import LAWS
@@ -24,29 +25,19 @@ law_step = damper.step_law
 
 _ONE_AT_A_TIME = Lock()
 
-JUMP = 8.0
-"""How many times the changes beside it a change of voltage exceeds that is a jump."""
-
 
 def before_jump(V: Any, k: int) -> float:
     """Return the voltage [V] just before sample k, to which it goes from sample k - 1.
 
     A step of a voltage falls on a sample, so what jumps there was held before; what is smooth is
-    linear between samples. A jump stands out against the changes before and after it.
+    linear between samples. A jump stands out against the changes before and after it, as in
+    `data.command_limits.jumps`.
     """
     change = JUMP * max(
         abs(V[k - 1] - V[k - 2]) if k > 1 else 0.0,
         abs(V[k + 1] - V[k]) if k + 1 < len(V) else 0.0,
     )
     return V[k - 1] if abs(V[k] - V[k - 1]) > change else V[k]  # type: ignore[no-any-return]
-
-
-def jumps(V: Array) -> NDArray[np.bool_]:
-    """Return at which samples of a voltage (n,) `before_jump` sees a jump."""
-    change = np.abs(np.diff(V, prepend=V[:1]))
-    beside = np.maximum(np.append(0.0, change[:-1]), np.append(change[1:], 0.0))
-    found: NDArray[np.bool_] = change > JUMP * beside
-    return found
 
 
 def force_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: Any) -> None:
@@ -84,7 +75,8 @@ def force_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out:
 def law_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: Any) -> None:
     """Do what `force_history` does where no effect is on, without the code of any effect.
 
-    The law knows the voltage of its own moment only, so a jump needs no care.
+    A law knows the voltage of its own moment only, so a jump needs no care, but where its command
+    lags: before a jump it follows what was held.
 
     Parameters
     ----------
@@ -96,9 +88,10 @@ def law_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: A
     before = Inputs(x[0], v[0], a[0], V[0], 0.0, 0.0, 0.0, False)
     out[0] = law_step(law, p, before, before, z, z1)[0]
     for k in range(1, len(x)):
-        now = Inputs(x[k], v[k], a[k], V[k], dt, 0.0, 0.0, False)
+        V1 = before_jump(V, k) if setup.lags else V[k]
+        now = Inputs(x[k], v[k], a[k], V1, dt, 0.0, 0.0, False)
         out[k] = law_step(law, p, before, now, z, z1)[0]
-        before = now
+        before = Inputs(x[k], v[k], a[k], V[k], dt, 0.0, 0.0, False)
         for i in range(setup.n_own):
             z[i] = z1[i]
 

@@ -228,7 +228,7 @@ def setup_of(
     return Setup(
         law_code(law), row(pack(law, values)), slots(on), slots(moving or [0]), len(moving),
         advances(effects), len(kind.states) if kind.exact() else 0, signed,
-        any(on) or not kind.exact() or bool(kind.felt),
+        any(on) or not kind.exact(), bool(kind.felt),
     )  # fmt: skip
 
 

@@ -157,25 +157,31 @@ def law_force_source(slots: Slots) -> str:
 
 
 def step_law_source(slots: Slots) -> str:
-    """Return `step_law`: a step of the law alone; force and friction at its end."""
+    """Return `step_law`: a step of the law alone; force and friction at its end.
+
+    The command of a law that lags moves on with the voltage's mean, else it is that of the end.
+    """
     middle = (
-        "m = record(Inputs, (0.5 * (begin.x + q.x), 0.5 * (begin.v + q.v), q.a, V, q.dt, q.energy, "
-        "halt, halts))"
+        "m = record(Inputs, (0.5 * (begin.x + q.x), 0.5 * (begin.v + q.v), q.a, {V}, q.dt, "
+        "q.energy, halt, halts))"
     )
-    return _law_steps(slots, "def step_law(law, p, begin, q, z, z1):", [middle])
+    return _law_steps(slots, "def step_law(law, p, begin, q, z, z1):", middle)
 
 
 def hold_law_source(slots: Slots) -> str:
     """Return `hold_law`: `step_law` with the inputs held over the step."""
-    return _law_steps(slots, "def hold_law(law, p, q, z, z1):", ["m = q"])
+    return _law_steps(slots, "def hold_law(law, p, q, z, z1):", "m = q")
 
 
-def _law_steps(slots: Slots, head: str, middle: list[str]) -> str:
+def _law_steps(slots: Slots, head: str, middle: str) -> str:
     def own(law: type[Law]) -> list[str]:
         lines = [f"k = {_values(slots, law)}"]
         if law.hook("advance") is not None:
             advanced = f"{law.name}_advance(m, {law_state(law)}, k)"
-            lines += [*middle, f"{_targets(law, 'z1')} = {advanced}"]
+            lines.append(middle.format(V="0.5 * (begin.V + V)" if law.felt else "V"))
+            lines.append(f"{_targets(law, 'z1')} = {advanced}")
+        if law.felt:
+            lines.append(f"k = {law_values(law, felt='z1', place=slots.law_parameters)}")
         lines += [f"s = {law_state(law).replace('z[', 'z1[')}", f"rest = {_forces(law, False)}"]
         return [*lines, *(_friction(f"{law.name}_limit(q, s, k)") if law.has("sign") else [])]
 

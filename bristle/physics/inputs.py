@@ -32,7 +32,7 @@ class Setup(NamedTuple):
     `moving` lists the slots of the states that move by `rate`, `n_moving` says how many; `advances`
     whether an effect moves its states by `advance`; `n_own` how many states, the first ones, the
     law itself moves by `advance`; `signed` whether its friction jumps with direction; `active`
-    whether more than the law is at work.
+    whether more than the law is at work; `lags` whether the command lags by a state of the law.
     """
 
     law: int
@@ -44,3 +44,4 @@ class Setup(NamedTuple):
     n_own: int
     signed: bool
     active: bool
+    lags: bool

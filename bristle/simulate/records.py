@@ -60,7 +60,8 @@ def damper_record() -> np.dtype[np.void]:
         [
             *((name, _INT) for name in ("law", "n_moving", "n_own", "on_structure", "first")),
             *((name, _FLOAT) for name in ("v_max", "stroke", "moving_mass", "sharing", *forces)),
-            *((name, _FLAG) for name in ("active", "advances", "signed", "measured", "jumps")),
+            *((name, _FLAG) for name in ("active", "advances", "signed", "lags")),
+            *((name, _FLAG) for name in ("measured", "jumps")),
             *_inputs(5),
             *((name, _FLOAT, (states,)) for name in ("state", "new_state")),
             ("p", _FLOAT, (damper.SLOTS.p_size,)),

@@ -156,7 +156,8 @@ class System:
         sticking = [i for i, signed in zip(pushed, signs, strict=True) if signed]
         for record, name, on in zip(found, names, pushed, strict=True):
             c, state = self.slaves[name].constants, self.slaves[name].state
-            _copy(record, c.setup, ("law", "n_moving", "n_own", "active", "advances", "signed"))
+            _copy(record, c.setup, ("law", "n_moving", "n_own"))
+            _copy(record, c.setup, ("active", "advances", "signed", "lags"))
             _copy(record, c, ("v_max", "stroke"))
             own = c.setup
             _fill(record, state=state, new_state=state, p=own.p, on=own.on, moving=own.moving)

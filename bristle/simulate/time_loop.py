@@ -378,8 +378,9 @@ def gather(slots: Any, s: Any, values: Any) -> None:
 def damper_constants(d: Any) -> damper.Constants:
     """Return what a damper's functions compute with."""
     setup = Setup(
-        d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.n_own, d.signed, d.active
-    )
+        d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.n_own, d.signed, d.active,
+        d.lags,
+    )  # fmt: skip
     return DamperConstants(setup, d.v_max, d.stroke, d.moving_mass, d.measured, True)
 
 

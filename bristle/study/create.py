@@ -8,7 +8,6 @@ from pathlib import Path
 
 from ..data.channels import ChannelSpec
 from ..data.guess import Guess
-from ..physics.laws import DEFAULT
 from .new import make_folder
 from .run_facts import RunChoices
 from .study import Study
@@ -32,7 +31,7 @@ def create_study(
     building: Path | str | None = None,
     channels: Mapping[str, ChannelSpec] | None = None,
     title: str = "",
-    law: str = DEFAULT,
+    law: str | None = None,
     runs: RunChoices | None = None,
 ) -> Created:
     """Make a study's folder from files; it appears when it is whole.
@@ -49,8 +48,11 @@ def create_study(
         The data file of the structure.
     channels : mapping
         Channels that are known; the others are guessed from the first file.
-    title, law : str
-        Title of the study, and the law that its model begins with.
+    title : str
+        Title of the study.
+    law : str
+        The law that its model begins with. None: "lugre", and on a test bench a diagnosis seeks the
+        law together with its effects.
     runs : RunChoices
         What is known of whole runs, and how files hold them.
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..diagnose.learned.along import GIVEN
 from ..diagnose.learned.closed import ClosedForm, in_words, name_of
 from ..diagnose.learned.curve import Curve
-from ..diagnose.learned.fit import LearnedCurve
+from ..diagnose.learned.fit import Closed, LearnedCurve
 from ..diagnose.learned.ring import RING, response
 from ..draw.style import BLUE, GREY, PALE, VERMILION, Page, look, png, short_z
 from ..quantity import scale
@@ -19,12 +19,27 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 
-def curve_png(found: LearnedCurve, forms: Sequence[ClosedForm]) -> bytes:
-    """Return a PNG of a learned curve with its 95 % band."""
-    return png(draw_curve(found, forms), 110)
+FINE = 1000
+"""Points at which a closed form is drawn: a ripple turns between two knots."""
 
 
-def draw_curve(found: LearnedCurve, forms: Sequence[ClosedForm]) -> Page:
+def curve_png(
+    found: LearnedCurve, forms: Sequence[ClosedForm], closed: Closed | None = None
+) -> bytes:
+    """Return a PNG of a learned curve with its 95 % band.
+
+    Parameters
+    ----------
+    found : the curve, kept
+    forms : fitted to it, the best first
+    closed : the form that its effect has in its place, None for none
+    """
+    return png(draw_curve(found, forms, closed), 110)
+
+
+def draw_curve(
+    found: LearnedCurve, forms: Sequence[ClosedForm], closed: Closed | None = None
+) -> Page:
     """Return the figure of a learned curve, drawn and not yet written."""
     assert found.curve is not None
     assert found.after is not None
@@ -32,9 +47,9 @@ def draw_curve(found: LearnedCurve, forms: Sequence[ClosedForm]) -> Page:
     with look():
         heading = f"{found.name}: {curve.words()}"
         said = (
-            f"z on held-out runs {short_z(found.before.z)} before, {short_z(found.after.z)} with "
-            "it."
+            f"z on held-out runs {short_z(found.before.z)} before, {short_z(found.after.z)} with it"
         )
+        said += f", {short_z(closed.trial.z)} with the formula." if closed is not None else "."
         if curve.part != RING:
             said += " The band is the 95 % interval of each value."
         page = Page(8.0, 3.6, heading, said)
@@ -77,12 +92,10 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
         best = forms[0]
         named = name_of(forms)
         name = in_words(named, curve) if named else f"nearest form: {best.name}"
-        axes.plot(
-            across * s, up * np.array(best.curve), color=VERMILION, lw=1.4, ls="--", label=name
-        )
-    for name, value in curve.memory:
-        if name in GIVEN:
-            axes.axvline(across * value, color=PALE, lw=1.0)
+        fine = np.linspace(s[0], s[-1], FINE)
+        axes.plot(across * fine, up * best.at(fine), color=VERMILION, lw=1.4, ls="--", label=name)
+    for given in (value for name, value in curve.memory if name in GIVEN):
+        axes.axvline(across * given, color=PALE, lw=1.0)
     words = curve.signal.formula or curve.signal.words
     axes.set_xlabel(f"{words} [{along}]" if along else words)
     quantity_name = curve.of.words.split(" ", 1)[1] if unit not in ("", "1") else "g"

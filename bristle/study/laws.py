@@ -15,12 +15,11 @@ from ..identify.model import Model
 from ..identify.rig import DAMPER, Rig
 from ..physics.effect import EFFECTS
 from ..physics.forms import LINEAR_FORM, split_form
-from ..physics.laws import base_and_variant
+from ..physics.laws import DEFAULT, base_and_variant
 from ..progress import tell
 from .runs import Runs
-
-ALL = "all"
-"""The word for all laws."""
+from .settings import ALL
+from .study import Study
 
 
 def refuse_in_building(law: str | None, in_building: bool) -> None:
@@ -36,6 +35,18 @@ def refuse_in_building(law: str | None, in_building: bool) -> None:
             "all laws are compared on a test bench alone: in a building the law decides which "
             "samples of the damper's force count. Name one law, or measure the damper on a bench."
         )
+
+
+def law_or_all(study: Study, law: str | None) -> str | None:
+    """Return what was asked for; where nothing was, "all" as long as nobody chose a law.
+
+    A study that was made without a law begins with a stand-in. Once its model has another law, or
+    an effect, that is what somebody or a verdict chose.
+    """
+    if law is not None or study.settings.law != ALL or study.settings.has_building:
+        return law
+    model = study.model()
+    return None if model.law != DEFAULT or model.effects else ALL
 
 
 def all_laws(rig: Rig, runs: Runs, present: Model) -> tuple[LawTrial, ...]:

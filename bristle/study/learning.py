@@ -21,8 +21,9 @@ from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
 from .identified import Identified
 from .joining import as_named_here, refuse_effect, refuse_left_out
-from .laws import ALL, law_command, refuse_in_building, with_law
+from .laws import law_command, law_or_all, refuse_in_building, with_law
 from .rig import building_of
+from .settings import ALL
 from .study import Study
 
 Say = Callable[[str], None]
@@ -39,7 +40,8 @@ def diagnose_study(
     Parameters
     ----------
     study : the folder, opened
-    law : "all" seeks the law together with its effects; None, or the model's own, keeps it
+    law : "all" seeks the law together with its effects, the model's own keeps it; None seeks it
+        where nobody chose one (`laws.law_or_all`)
     write : whether to write verdict.json
     say : called with a few words at each stage
 
@@ -51,6 +53,7 @@ def diagnose_study(
     RecordError
         If a file cannot be read, or a channel that is needed is missing.
     """
+    law = law_or_all(study, law)
     refuse_in_building(law, study.settings.has_building)
     for why in study.usable_effects():
         say(f"left out: {why}")
@@ -225,7 +228,8 @@ def complete(
     Parameters
     ----------
     study : the folder, opened
-    law : "all" first seeks the law together with its effects; another name is taken first
+    law : "all" first seeks the law together with its effects; another name is taken first; None
+        seeks it where nobody chose one (`laws.law_or_all`)
     greedy : whether to go on where the verdict is unknown, by the effect that lowers the held-out
         error most, as long as one does so by enough and beyond chance
     curves : whether to go on where the verdict is unknown, by learning a curve
@@ -241,13 +245,14 @@ def complete(
             if on_step is not None:
                 on_step()
 
+    law = law_or_all(study, law)
     free = law == ALL
     other = None if law in (ALL, study.model().law) else law
     if not free and (other or not _is_identified(study.model())):
         say("identifying the model")
         stepped(identify_study(study, law=other, table=False).step)
     while True:
-        found = diagnose_study(study, law=ALL if free else None, say=say)
+        found = diagnose_study(study, law=ALL if free else study.model().law, say=say)
         if free:
             found = _with_law_taken(study, found, stepped)
         free = False

@@ -33,11 +33,11 @@ from .inputs import (
     model_of,
     runs_of,
 )
-from .laws import ALL, all_laws, left_out_notes, refuse_in_building, with_law
+from .laws import all_laws, left_out_notes, refuse_in_building, with_law
 from .learning import diagnose_study
 from .run_file import ROLES, TEST
 from .runs import Runs
-from .settings import CUT_OFF
+from .settings import ALL, CUT_OFF
 from .study import Study
 
 
@@ -236,9 +236,10 @@ def diagnose(
     data : Study, path, pattern, frame, mapping of arrays, Measurement, or several of these
         The runs, see `bristle.identify`; or a study, or its folder.
     model : str, path, StudyModel or Identified, optional
-        What `identify` returned, or a law, which is then identified on the way; else the study's,
-        else "lugre". With "all", on a test bench, the law is sought together with the effects:
-        `law` of the result is the one that the verdict is about, `laws` tells how all do.
+        What `identify` returned, or a law, which is then identified on the way; else the study's.
+        With "all", and on a test bench where none is chosen, the law is sought together with the
+        effects: `law` of the result is the one that the verdict is about, `laws` tells how all do.
+        In a building "lugre" stands in where none is chosen.
     effects : str or list of str
         Effects that the model has on top.
     holdout : as data, optional
@@ -293,9 +294,10 @@ def diagnose(
         )
     chosen = model_of(None if _is_all(model) else model, effects, DEFAULT)
     house = building_from(building)
-    refuse_in_building(ALL if _is_all(model) else None, house is not None)
+    free = _is_all(model) or (model is None and not effects and house is None)
+    refuse_in_building(ALL if free else None, house is not None)
     runs = _runs(given, holdout, channels, house)
-    if _is_all(model):
+    if free:
         return diagnose_laws(runs.train, runs.holdout, as_model(chosen))
     known = any(value.origin == "identified" for value in chosen.flat().values())
     return diagnose_rig(runs.train, runs.holdout, as_model(chosen), house, identified=known)

@@ -11,6 +11,7 @@ from scipy.optimize import brentq
 
 from bristle.identify import bench
 from bristle.identify.bench import Bench, before_jump, compiled_history
+from bristle.physics.law import laws_of
 from tests.physics.rigs import force_at
 
 DT = 0.002
@@ -95,14 +96,16 @@ def test_threads_that_ask_at_once_get_one_function_and_leave_nothing_behind(tmp_
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("law", ["bingham", "lugre"])
+@pytest.mark.parametrize("law", [law.name for law in laws_of() if law.exact()])
 def test_a_law_alone_has_the_force_that_it_has_among_effects_that_are_off(law: str) -> None:
     t = DT * np.arange(1500)
     x, v, a = 0.01 * np.sin(9.0 * t), 0.09 * np.cos(9.0 * t), -0.81 * np.sin(9.0 * t)
     V = 2.0 + np.sin(3.0 * t) + np.where(t > 1.0, 1.5, 0.0)
     rig = Bench(law, [])
-    values = {"bristle_deflection_0": 2e-4}
+    values = {"bristle_deflection_0": 2e-4, "deflection_0": 2e-4}
     alone = rig.force(x, v, a, V, DT, values)
     rig._history = compiled_history(effects=True)
     assert np.array_equal(alone, rig.force(x, v, a, V, DT, values))
+    rig._setup = rig._setup._replace(active=True)  # as if an effect were on
+    assert rig.force(x, v, a, V, DT, values) == pytest.approx(alone, abs=1e-12 * np.ptp(alone))
     assert np.ptp(alone) > 1.0

@@ -15,12 +15,13 @@ from bristle.errors import StudyError
 from bristle.identify.fit import Model
 from bristle.physics.building import paper_building
 from bristle.study import learning
-from bristle.study.laws import law_command, with_law
+from bristle.study.create import create_study
+from bristle.study.laws import law_command, law_or_all, with_law
 from bristle.study.learning import MOST_EFFECTS, complete, diagnose_study
 from bristle.study.public import diagnose, identify
 from bristle.study.study import Study
 from tests.independent.generate import make_case
-from tests.study.made import bench_run
+from tests.study.made import bench_run, write_runs
 from tests.study.test_learning import UNITS, study_of
 
 NOISE = np.random.default_rng(1).standard_normal(6000) ** 2
@@ -40,6 +41,8 @@ def verdict(kind, z, *gains):
 
 class Folder:
     """A study in name alone: it counts the effects of its model."""
+
+    settings = SimpleNamespace(law="", has_building=False)
 
     def __init__(self):
         self.names = []
@@ -109,6 +112,30 @@ def test_a_model_takes_another_law_with_the_effects_that_can_join_it():
         "identify", "rig", "--law", "lugre_standard", "--command", "quadratic",
     ]  # fmt: skip
     assert law_command("rig", "dahl").endswith("rig --law dahl")
+
+
+def test_a_law_that_nobody_chose_is_sought_until_the_model_has_another_or_an_effect(tmp_path):
+    files = write_runs(tmp_path / "lab", seconds=2.0)
+    free = create_study(tmp_path / "free", files).study
+    assert 'law = "all"' in (free.folder / "study.toml").read_text()
+    assert (free.model().law, law_or_all(free, None)) == ("lugre", "all")
+    assert law_or_all(free, "lugre") == "lugre"
+    free.add_step("add gas_spring", "by hand", new_model("lugre", ("gas_spring",)), {}, {})
+    assert law_or_all(free, None) is None
+    free.add_step("identify tanh", "by hand", new_model("tanh"), {}, {})
+    assert law_or_all(free, None) is None
+    assert law_or_all(free, "all") == "all"
+    chosen = create_study(tmp_path / "chosen", files, law="lugre").study
+    assert "law" not in (chosen.folder / "study.toml").read_text()
+    assert law_or_all(chosen, None) is None
+
+
+def test_study_toml_takes_all_laws_or_none(tmp_path):
+    path = create_study(tmp_path / "rig", write_runs(tmp_path / "lab", seconds=2.0)).study.folder
+    text = (path / "study.toml").read_text()
+    (path / "study.toml").write_text(text.replace('law = "all"', 'law = "dahl"'))
+    with pytest.raises(StudyError, match=r'line 5.*law = "dahl"; "all" seeks the law'):
+        Study(path).settings  # noqa: B018
 
 
 @pytest.fixture(scope="module")

@@ -60,18 +60,23 @@ _NUMPY: dict[str, Any] = {
 class ClosedForm:
     """A form fitted to a curve: `left` the share of its variation that remains, as RMS.
 
-    `values` in the order c, m, d (and what the form has more), SI; `curve` (k,) at the knots.
+    `values` in the order c, m, d (and what the form has more), SI.
     """
 
     form: Form
     values: tuple[float, ...]
     left: float
-    curve: tuple[float, ...]
 
     @property
     def name(self) -> str:
         """The form's name."""
         return self.form.name
+
+    def at(self, s: Array) -> Array:
+        """Return the form's value (n,) along its signal (n,)."""
+        scale = self.values[2] if self.form.scales is not None else 1.0
+        found: Array = self.form.at(s, scale) @ np.array(self.values[:2] + self.values[3:])
+        return found
 
 
 def _lengths(span: float, step: float) -> Array:
@@ -182,7 +187,7 @@ def _fitted(form: Form, s: Array, y: Array, weight: Array, size: float) -> Close
         if best is None or left < best.left:
             own = tuple(map(float, found))
             values = (*own[:2], *(() if len(own) < 2 else (float(d),)), *own[2:])
-            best = ClosedForm(form, values, left, tuple(map(float, at)))
+            best = ClosedForm(form, values, left)
     assert best is not None
     return best
 
