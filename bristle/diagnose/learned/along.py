@@ -72,7 +72,7 @@ class Along:
     parameters, of which `memory` has the names; `states` and `advance` are the memory of the hook,
     `starts` as in `Effect`. `value` is the source of the curve's value where it is not that of one
     signal, `formula` what the signal then is. `named` says whether a formula may take the place of
-    a curve along it.
+    a curve along it; `contains` the signal whose curves are special cases of those along it.
     """
 
     name: str
@@ -88,6 +88,7 @@ class Along:
     value: str = ""
     formula: str = ""
     named: bool = True
+    contains: str = ""
 
     def memories(
         self, dt: float, length: float, stroke: float, top: float
@@ -201,7 +202,7 @@ ALONG = {
             "stroke", "m", "displacement and direction", ("x", "v"), "q.x",
             lambda run, memory: np.where(run.v > 0.0, run.x, 2.0 * memory["turn"] - run.x),
             memory=("turn",), value=_STROKE,
-            formula="x where v > 0, else 2 turn - x", named=False,
+            formula="x where v > 0, else 2 turn - x", named=False, contains="displacement",
         ),
         Along("velocity", "m/s", "velocity", ("v",), "q.v", lambda run, _: run.v),
         Along("speed", "m/s", "speed", ("v",), "abs(q.v)", lambda run, _: np.abs(run.v)),

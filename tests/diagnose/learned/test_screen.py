@@ -170,3 +170,4 @@ def test_one_curve_of_a_kind_is_fitted():
     kinds = [(one.curve.part, one.curve.along) for one in kept]
     assert kinds[0] == ("fluid", "displacement")
     assert len(set(kinds)) == len(kinds) <= 4
+    assert ("fluid", "stroke") not in kinds  # it contains the one along displacement
