@@ -17,7 +17,7 @@ from ..physics import damper as _damper  # noqa: F401  (it generates what is hel
 from ..physics.codegen import hold
 from ..physics.inputs import Inputs
 from ..physics.linear import Row
-from ..physics.tuples import record
+from ..physics.tuples import NO_EFFECT, record
 from .switching import limited, sign
 
 STILL = 1e-3
@@ -77,7 +77,7 @@ def estimate_states(law: int, p: Row, v: float, V: float, dt: float, z: Row) -> 
     z : (k,) states of the law, moved on in place
     """
     now = record(Inputs, (0.0, v, 0.0, V, dt, 0.0, 0.0, False))
-    advance_law(law, p, now, 1.0, z, z)
+    advance_law(law, p, now, NO_EFFECT, z, z)
 
 
 def affine_voltage(

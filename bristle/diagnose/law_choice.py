@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from ..physics.forms import CURVED
+from ..physics.forms import CURVED, split_form
 from .candidates import Trial, joinable
 from .evidence import Difference, paired
 from .finding import Finding
@@ -109,10 +109,12 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     """
     ranked = sorted(rows, key=lambda row: row.trial.z)
     first = best_of([row.trial for row in rows], rule)
-    best = next(row for row in rows if row.trial is first)
+    by_z = next(row for row in rows if row.trial is first)
+    best = _formed(by_z, rows, rule)
     plain = [row for row in ranked if not set(row.contains) - {CURVED}]
     straight = [row for row in plain if CURVED not in row.contains]
-    level = [row for row in ranked if not clearly_worse(row.trial, best.trial, rule)]
+    others = [row for row in ranked if row is best or row is not by_z]
+    level = [row for row in others if not clearly_worse(row.trial, best.trial, rule)]
     picked = [best, *straight[:1], min(level, key=lambda row: (row.fitted, row.trial.z))]
     if straight and clearly_worse(straight[0].trial, plain[0].trial, rule):
         picked.insert(1, plain[0])
@@ -123,6 +125,23 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     ]
     picked += front
     return list({row.law: row for row in picked}.values())[: rule.most_laws]
+
+
+def _formed(best: LawTrial, rows: Sequence[LawTrial], rule: DecisionRule) -> LawTrial:
+    """Return the best law in the form of its command that its plain error asks for.
+
+    Only where the law leaves many times the noise: the runs with the least noise then decide by z.
+    """
+    if best.trial.z <= rule.coarse:
+        return best
+    forms = [row for row in rows if _plain_name(row) == _plain_name(best)]
+    least = min(forms, key=lambda row: row.trial.rms)
+    return least if least.trial.rms < (1.0 - rule.law_gain) * best.trial.rms else best
+
+
+def _plain_name(row: LawTrial) -> str:
+    """Return the name of a law with its variant, without the form of its command."""
+    return split_form(row.law)[0]
 
 
 def simplest(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> LawTrial:

@@ -125,6 +125,15 @@ class DecisionRule:
     Trades and found: as `gain`.
     """
 
+    coarse: float = 3.0
+    """z above which the form of a law's command is judged by the plain error.
+
+    A law that leaves many times the noise is judged by the quietest runs, since z divides by the
+    noise; the form shows where the force is large. Trades: if higher, a straight line stays where
+    the force bends with the command; if lower, a parabola imitates a missing effect. Found: stated,
+    and seen on published measurements.
+    """
+
     most_laws: int = 4
     """Largest number of laws whose effects are searched. Trades: computing time. Found: stated."""
 

@@ -133,16 +133,32 @@ LINEAR, QUADRATIC = 0, 1
 
 
 def entered(form: int, p: Row, place: int, quantity: int, V: float) -> float:
-    """Return a quantity at V [V] whose dependence on the command was chosen.
+    """Return a quantity at V [V] that a user chose to give by a table over the command.
 
     Parameters
     ----------
-    form : `QUADRATIC`, or the number of knots of a table
+    form : number of the table's knots
     p : flat parameters, from `place` on: the knots [V] of a table, then the numbers of each
         quantity, `MOST_KNOTS` of room for each
     quantity : which one it is among those of the law
     """
     own = place + MOST_KNOTS * (quantity + 1)
-    if form == QUADRATIC:
-        return rising(p[own], p[own + 1], p[own + 2], V)
     return climb(V, p[place : place + form], p[own : own + form])
+
+
+def chosen_source(linear: str, place: int, quantity: int, V: str) -> str:
+    """Return the source of a quantity whose dependence on the command may be chosen.
+
+    The parabola stands in the source itself: a call of `entered` takes as long as a whole step of
+    a simple law.
+
+    Parameters
+    ----------
+    linear : source of the law's own dependence
+    place, quantity : as of `entered`
+    V : source of the voltage [V]
+    """
+    own = place + MOST_KNOTS * (quantity + 1)
+    bent = f"rising(p[{own}], p[{own + 1}], p[{own + 2}], {V})"
+    table = f"entered(form, p, {place}, {quantity}, {V})"
+    return f"({linear} if form == {LINEAR} else {bent} if form == {QUADRATIC} else {table})"

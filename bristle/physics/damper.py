@@ -31,9 +31,9 @@ evaluate: Any = None
 felt_voltage: Any = None
 hold_law: Any = None
 inner_motion: Any = None
+law_factors: Any = None
 law_force: Any = None
 series_element: Any = None
-slip_length_factor: Any = None
 step_law: Any = None
 
 _GENERATED = {
@@ -42,10 +42,10 @@ _GENERATED = {
     "felt_voltage": source.voltage_source,
     "hold_law": source.hold_law_source,
     "inner_motion": source.motion_source,
+    "law_factors": source.law_factors_source,
     "law_force": source.law_force_source,
     "net_force": source.net_force_source,
     "series_element": source.series_source,
-    "slip_length_factor": source.slip_length_source,
     "step_law": source.step_law_source,
 }
 
@@ -58,8 +58,8 @@ def regenerate() -> None:
 
 
 hold(
-    globals(), "advance_law", "evaluate", "felt_voltage", "hold_law", "inner_motion", "law_force",
-    "series_element", "slip_length_factor", "step_law",
+    globals(), "advance_law", "evaluate", "felt_voltage", "hold_law", "inner_motion", "law_factors",
+    "law_force", "series_element", "step_law",
 )  # fmt: skip
 regenerate()
 
@@ -98,7 +98,7 @@ def step(
             0.5 * (xs + xe), 0.5 * (vs + ve), end.a, V, end.dt, end.energy, end.stick_force,
             end.sticks,
         )  # fmt: skip
-        advance_law(setup.law, setup.p, inner, slip_length_factor(setup, inner, z0), z0, moved)
+        advance_law(setup.law, setup.p, inner, law_factors(setup, inner, z0), z0, moved)
         for i in range(n_own):  # the law's share of the heat is that of the middle
             z1[i] = 0.5 * (z0[i] + moved[i])
     if setup.advances:

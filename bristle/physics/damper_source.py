@@ -51,17 +51,16 @@ def voltage_source(slots: Slots) -> str:
     return "\n".join(lines)
 
 
-def slip_length_source(slots: Slots) -> str:
-    """Return `slip_length_factor`: the factor on the travel before sliding, at a motion."""
-    q = {name: name for name in ("x", "v", "dt", "energy", "rod_x", "rod_v")}
+def law_factors_source(slots: Slots) -> str:
+    """Return `law_factors`: what effects make of the law's `FACTORS` at a motion."""
+    q = {name: name for name in ("x", "v", "a", "V", "dt", "energy", "rod_x", "rod_v")}
     lines = [
-        "def slip_length_factor(setup, now, z):",
+        "def law_factors(setup, now, z):",
         "    p, on = setup.p, setup.on",
         _NOW,
         *_ROD,
-        "    slip_length = 1.0",
-        *switched(slots, "reach", "slip_length *= {call}", **q),
-        "    return slip_length",
+        *_factors(slots, q),
+        f"    return {', '.join(FACTORS)}",
     ]
     return "\n".join(lines)
 
@@ -83,19 +82,23 @@ def _values(slots: Slots, law: type[Law], factors: Mapping[str, str] | None = No
 
 
 def advance_law_source(slots: Slots) -> str:
-    """Return `advance_law`: the law's own states after a step at the motion of `now`, exactly."""
+    """Return `advance_law`: the law's own states after a step at the motion of `now`, exactly.
+
+    `factors` are those of `FACTORS` over the step, 1 where no effect changes them.
+    """
 
     def own(law: type[Law]) -> list[str]:
         if law.hook("advance") is None:
             return []
         return [
-            f"k = {_values(slots, law, {'slip_length': 'slip_length'})}",
+            f"k = {_values(slots, law, _ALL_FACTORS)}",
             f"{_targets(law, 'z_next')} = {law.name}_advance(now, {law_state(law)}, k)",
         ]
 
     lines = [
-        "def advance_law(law, p, now, slip_length, z, z_next):",
+        "def advance_law(law, p, now, factors, z, z_next):",
         "    V = now.V",
+        f"    {', '.join(FACTORS)} = factors",
         FORM_OF_LAW,
         *switched_laws(slots, own),
         "    return",

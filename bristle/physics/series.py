@@ -35,8 +35,8 @@ SETTLE = 5e-3
 net_force: Any = None
 advance_law: Any = None
 felt_voltage: Any = None
-slip_length_factor: Any = None
-hold(globals(), "net_force", "advance_law", "felt_voltage", "slip_length_factor")
+law_factors: Any = None
+hold(globals(), "net_force", "advance_law", "felt_voltage", "law_factors")
 
 
 class Balance(NamedTuple):
@@ -88,7 +88,7 @@ def advance_series(
             middle = Inputs(
                 now.x - z[deflection], 0.5 * (was + found), now.a, V, h, now.energy, 0.0, False
             )
-            advance_law(setup.law, setup.p, middle, slip_length_factor(setup, middle, z), z, z)
+            advance_law(setup.law, setup.p, middle, law_factors(setup, middle, z), z, z)
 
 
 def balanced_speed(

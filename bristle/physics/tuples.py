@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from .command import rising
+from .command import chosen_source, rising
 from .forms import choosable
 from .parameter import climb, fields_of
 
@@ -21,6 +21,8 @@ FACTORS = ("slip_length", "yield_factor", "viscous_factor")
 stretch the travel before sliding, and change the yield force and the viscous part. The last two act
 on the forces that the law gives; only what balances forces inside of a law needs them."""
 
+NO_EFFECT = (1.0, 1.0, 1.0)
+"""The factors where no effect changes them."""
 
 FORM_STEP = 64
 """By how much codes of laws differ that differ in a chosen form alone; more laws there are not."""
@@ -69,8 +71,8 @@ def law_values(
     for k, (quantity, form) in enumerate(law.command.items()):
         table = law.tables.get(form.names()[0])
         source = form.source(given.__getitem__, repr(table.knots) if table else "", V)
-        chosen = f" if form == 0 else entered(form, p, {place}, {k}, {V})"
-        given[quantity] = f"({source}{chosen})" if quantity in free else source
+        free_form = quantity in free
+        given[quantity] = chosen_source(source, place, k, V) if free_form else source
     given.update({name: (factors or {}).get(name, "1.0") for name in FACTORS})
     return made(f"{law.base.name}_P", [given[name] for name in law.seen()])
 

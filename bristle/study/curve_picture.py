@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..diagnose.learned.along import GIVEN
 from ..diagnose.learned.closed import ClosedForm, in_words, name_of
 from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.fit import Closed, LearnedCurve
@@ -93,7 +94,10 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
         name = in_words(named, curve) if named else f"nearest form: {best.name}"
         fine = np.linspace(s[0], s[-1], FINE)
         axes.plot(across * fine, up * best.at(fine), color=VERMILION, lw=1.4, ls="--", label=name)
-    axes.set_xlabel(f"{curve.signal.words} [{along}]" if along else curve.signal.words)
+    for given in (value for name, value in curve.memory if name in GIVEN):
+        axes.axvline(across * given, color=PALE, lw=1.0)
+    words = curve.signal.formula or curve.signal.words
+    axes.set_xlabel(f"{words} [{along}]" if along else words)
     quantity_name = curve.of.words.split(" ", 1)[1] if unit not in ("", "1") else "g"
     axes.set_title(
         f"{quantity_name} [{unit}]" if unit not in ("", "1") else f"g in {curve.of.formula}"

@@ -100,6 +100,31 @@ def test_a_parabola_goes_on_where_a_straight_line_is_clearly_worse():
     assert "lugre" in [one.law for one in survivors(rows)]
 
 
+def bent(z, rms):
+    """Return the best law of `MIMICS` with a parabola, its error in z and its plain one."""
+    formed = row("modified_bouc_wen[quadratic]", z)
+    return replace(formed, trial=replace(formed.trial, rms=rms))
+
+
+@pytest.mark.parametrize(
+    ("z", "rms", "goes_on"), [(5.1, 4.7, True), (5.1, 4.89, False), (5.1, 5.1, False)]
+)
+def test_the_plain_error_judges_the_form_of_a_command_where_the_law_is_far_off(z, rms, goes_on):
+    found = [one.law for one in survivors([*MIMICS, bent(z, rms)])]
+    best = "modified_bouc_wen[quadratic]" if goes_on else "modified_bouc_wen"
+    assert found == [best, "lugre", "tanh", "bingham"]
+
+
+def test_the_straight_form_does_not_go_on_beside_the_parabola_that_it_gave_way_to():
+    rows = [row("modified_bouc_wen", 5.0), bent(5.1, 4.7), row("bingham", 9.0)]
+    assert [one.law for one in survivors(rows)] == ["modified_bouc_wen[quadratic]", "bingham"]
+
+
+def test_near_the_noise_z_judges_the_form_of_a_command():
+    near = [row("modified_bouc_wen", 1.5), row("bingham", 4.0), bent(1.55, 1.4)]
+    assert survivors(near)[0].law == "modified_bouc_wen"
+
+
 def test_nothing_more_is_searched_where_a_plain_law_lacks_nothing():
     rows = [row("dahl", 1.0), row("lugre", 1.0), row("bouc_wen", 1.0), row("bingham", 4.0)]
     look, asked = looker(pair("dahl", 1.0))

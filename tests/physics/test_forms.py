@@ -13,7 +13,7 @@ from rigs import Bench
 from bristle import units
 from bristle.errors import PhysicsError
 from bristle.physics import damper
-from bristle.physics.command import MOST_KNOTS, rising
+from bristle.physics.command import MOST_KNOTS, chosen_source, rising
 from bristle.physics.damper import DamperModel
 from bristle.physics.effect import effects_of
 from bristle.physics.forms import choosable, joined_form, split_form
@@ -70,7 +70,7 @@ def test_hooks_and_generated_code_agree_on_the_form(name: str, form: str) -> Non
             code = damper.generate(
                 "quantity",
                 "def quantity(form, p, V):\n"
-                f"    return entered(form, p, {damper.SLOTS.law_parameters}, {k}, V)",
+                f"    return {chosen_source('0.0', damper.SLOTS.law_parameters, k, 'V')}",
                 damper.SLOTS,
             )
             seen = code(setup.law // 64, setup.p, V)

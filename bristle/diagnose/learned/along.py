@@ -43,14 +43,24 @@ _TRAVEL = """    if q.v * z.way < 0.0:
     return z.travel + abs(q.v) * q.dt, way"""
 
 
+_STROKE = """(
+            0.5 * (1.0 + tanh(q.v / SLOW)) * interpolate(q.x, KNOTS, p.curve)
+            + 0.5 * (1.0 - tanh(q.v / SLOW)) * interpolate(2.0 * p.turn - q.x, KNOTS, p.curve)
+        )"""
+
 MEMORIES = {
     "tau": ("s", "time over which it fades"),
     "way": ("m", "travel that wears it down"),
     "early": ("s", "age up to which it hardly changes"),
+    "turn": ("m", "displacement at which the way back begins"),
     "frequency": ("Hz", "natural frequency of the mode"),
     "damping": ("1", "damping ratio of the mode"),
 }
 """Unit and meaning of the parameters of a memory."""
+
+
+GIVEN = ("turn",)
+"""Those of them that the motion gives: nothing seeks or fits them."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +70,9 @@ class Along:
     `name` and `unit` as in a verdict; `words` for sentences; `needs` the signals that a hook reads
     for it, `source` their expression there; `history` gives it (n,) of a run and its memory's
     parameters, of which `memory` has the names; `states` and `advance` are the memory of the hook,
-    `starts` as in `Effect`.
+    `starts` as in `Effect`. `value` is the source of the curve's value where it is not that of one
+    signal, `formula` what the signal then is. `named` says whether a formula may take the place of
+    a curve along it; `contains` the signal whose curves are special cases of those along it.
     """
 
     name: str
@@ -73,19 +85,26 @@ class Along:
     starts: tuple[tuple[str, str], ...] = ()
     advance: str = ""
     memory: tuple[str, ...] = ()
+    value: str = ""
+    formula: str = ""
+    named: bool = True
+    contains: str = ""
 
-    def memories(self, dt: float, length: float, stroke: float) -> list[dict[str, float]]:
+    def memories(
+        self, dt: float, length: float, stroke: float, top: float
+    ) -> list[dict[str, float]]:
         """Return the parameters of its memory to look at.
 
         Parameters
         ----------
         dt, length : step and length of the runs [s]
-        stroke : their RMS displacement [m]
+        stroke, top : their RMS displacement and the largest one [m]
         """
         grids = {
             "tau": [tau for tau in TIMES if 2.0 * dt <= tau <= length / 3.0],
             "way": [share * stroke for share in WAYS],
             "early": [EARLY],
+            "turn": [top],
         }
         return [
             dict(zip(self.memory, node, strict=True))
@@ -105,7 +124,7 @@ class Along:
             "way": (0.3 * WAYS[0] * stroke, 3.0 * WAYS[-1] * stroke),
             "early": (0.05 * EARLY, 50.0 * EARLY),
         }
-        return {name: known[name] for name in self.memory}
+        return {name: known[name] for name in self.memory if name not in GIVEN}
 
 
 def faded(signal: Array, dt: float, tau: float, begin: float) -> Array:
@@ -179,6 +198,12 @@ ALONG = {
     one.name: one
     for one in (
         Along("displacement", "m", "displacement", ("x",), "q.x", lambda run, _: run.x),
+        Along(
+            "stroke", "m", "displacement and direction", ("x", "v"), "q.x",
+            lambda run, memory: np.where(run.v > 0.0, run.x, 2.0 * memory["turn"] - run.x),
+            memory=("turn",), value=_STROKE,
+            formula="x where v > 0, else 2 turn - x", named=False, contains="displacement",
+        ),
         Along("velocity", "m/s", "velocity", ("v",), "q.v", lambda run, _: run.v),
         Along("speed", "m/s", "speed", ("v",), "abs(q.v)", lambda run, _: np.abs(run.v)),
         Along("acceleration", "m/s2", "acceleration", ("a",), "q.a", lambda run, _: run.a),

@@ -145,6 +145,8 @@ def may_change(part: str, along: str, place: Place = AT_DAMPER) -> bool:
         return part == along
     if at.along and along not in at.along:
         return False
+    if part == "friction" and along == "stroke":
+        return False  # each direction has a curve of its own already
     of_command = along in ("voltage", "recent_voltage")
     if part == "command":
         return of_command
@@ -224,7 +226,7 @@ class Curve:
         """Its value as a hook computes it from the table."""
         if self.part == SLIP:
             return force_source(len(self.knots))
-        return f"interpolate({self.signal.source}, KNOTS, p.curve)"
+        return self.signal.value or f"interpolate({self.signal.source}, KNOTS, p.curve)"
 
     @property
     def passive(self) -> bool:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from ...physics.drive import drive_named, unit_for
-from .along import MEMORIES
+from .along import GIVEN, MEMORIES
 from .curve import BOUND, Curve, Formula, bounds_of
 from .slip import SLIP
 
@@ -55,11 +55,9 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
         f'    expect = "an error that depends on {curve.of.cause or curve.signal.words}"',
         "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
     ]
-    if curve.held and not formula:
-        held = tuple(f"curve[{k + 1}]" for k in curve.held)
-        known = "stiffness or damping" if curve.of_line else "a constant"
-        whose = "line" if curve.place.is_line else "law"
-        lines.append(f"    assumed = {held!r}  # the {whose} has {known} already".replace("'", '"'))
+    held = _assumed(curve) if not formula else ()
+    if held:
+        lines.append(f"    assumed = {held!r}  # no fit moves them".replace("'", '"'))
     if parameters or only:
         lines += [
             "    parameters = {",
@@ -70,6 +68,12 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     if table:
         lines += _table(curve)
     return "\n".join([*lines, "", *body]) + "\n"
+
+
+def _assumed(curve: Curve) -> tuple[str, ...]:
+    """Return the parameters that stay: knots at the law's own constant, where the way turns."""
+    held = tuple(f"curve[{k + 1}]" for k in curve.held)
+    return (*held, *(name for name, _ in curve.memory if name in GIVEN))
 
 
 def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
@@ -128,7 +132,8 @@ def _imports(
 
 def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
     """Return the class's first lines and its docstring."""
-    g = f"g = {formula.text if formula else 'curve(s)'},   s = {curve.signal.words}"
+    along = curve.signal.formula or curve.signal.words
+    g = f"g = {formula.text if formula else 'curve(s)'},   s = {along}"
     ends = formula is None or formula.ends
     end = ", for beyond its ends the curve keeps its value." if ends else "."
     if curve.of.law:
@@ -174,7 +179,7 @@ def _table(curve: Curve) -> list[str]:
 
 def _constant(name: str, curve: Curve, value: float, text: str) -> list[str]:
     """Return the lines of a constant that a part's expression uses; none where it does not."""
-    used = name in curve.of.expression
+    used = name in curve.of.expression or name in curve.source
     return ["", f"{name} = {value:.6g}", f'"""{text}"""'] if used else []
 
 

@@ -9,8 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .residual import Residual
+from .rule import LEARN
 
 Array = NDArray[np.float64]
+
+HELD = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+"""By what share of its own information a parameter of the model is held where it is."""
 
 
 class Hats(NamedTuple):
@@ -49,6 +53,20 @@ class Normal:
         self.sides = np.array([self._weighted[one].T @ residual.r[one] for one in self._spans])
         self.powers = np.add.reduceat(weight * residual.r**2, begins)
         self.count = float(weight.sum())
+        self._held = 0.0
+        self._hold(LEARN.unsteady)
+
+    def _hold(self, unsteady: float) -> None:
+        """Hold the model's parameters as firmly as it takes for a fit to do without a stretch.
+
+        Where the runs hardly tell some of them apart, a linear step without a stretch takes them
+        far away: what is left there then says nothing of a curve.
+        """
+        most = unsteady * float(self.powers.sum()) / self.count
+        for share in HELD:
+            self._held = share
+            if self.without_curve() <= most:
+                return
 
     def with_curve(self, column: Array, hats: Hats, free: list[int]) -> Normal:
         """Return the equations with a curve's values at its `free` knots.
@@ -134,6 +152,9 @@ class Normal:
         return float(missed.sum() / self.count)
 
     def ridge(self) -> Array:
-        """Return what makes the equations solvable (p, p), too small to be felt."""
+        """Return what makes the equations solvable (p, p), and holds the model's parameters."""
         size = np.diag(self.grams.sum(axis=0))
-        return np.asarray(np.diag(1e-9 * np.maximum(size, 1e-9 * max(float(size.max()), 1e-300))))
+        least = 1e-9 * np.maximum(size, 1e-9 * max(float(size.max()), 1e-300))
+        known = self.residual.known.shape[1]
+        least[:known] = np.maximum(least[:known], self._held * size[:known])
+        return np.asarray(np.diag(least))

@@ -20,6 +20,8 @@ class Promise:
 def distinct(found: Sequence[Promise], count: int, near: float = LEARN.near) -> list[Promise]:
     """Return the best promises of different parts and signals, those near the best one alone.
 
+    A curve that contains a better one of the same part is left out.
+
     Parameters
     ----------
     found : the best first
@@ -28,6 +30,7 @@ def distinct(found: Sequence[Promise], count: int, near: float = LEARN.near) -> 
     """
     first: dict[tuple[str, str], Promise] = {}
     for one in found:
-        if one.loss <= near * found[0].loss:
+        special = (one.curve.part, one.curve.signal.contains)
+        if one.loss <= near * found[0].loss and special not in first:
             first.setdefault((one.curve.part, one.curve.along), one)
     return list(first.values())[:count]

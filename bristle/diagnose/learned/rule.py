@@ -41,6 +41,14 @@ class LearnRule:
     where a formula is right. Found: blind seeds.
     """
 
+    unsteady: float = 1.5
+    """Times its mean squared residual that a model may have on a stretch which a fit left out.
+
+    Beyond it the model's parameters are held for the scan. Trades: if higher, a scan says nothing
+    where the runs hardly tell parameters apart; if lower, a curve that the parameters have taken up
+    in part is missed. Found: stated, and seen on published measurements.
+    """
+
     follows: float = 0.12
     """Largest share of a curve's variation that a closed form may leave to be the curve's name.
 

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from .along import ALONG, Along
+from .along import ALONG, GIVEN, Along
 from .curve import Curve, may_change
 from .modes import best_mode
 from .normal import Hats, Normal, hats_at
@@ -30,6 +30,9 @@ FINE = 13
 
 RIPPLED = 33
 """The same along displacement, where a force may ripple."""
+
+MANY = {"displacement": RIPPLED, "stroke": 2 * RIPPLED - 1}
+"""Knots of the spline that is looked at, along signals that need more than `FINE`."""
 
 SMOOTH = tuple(10.0**k for k in range(-6, 5))
 """Weights of the second differences that are tried, in terms of the curve's own information."""
@@ -78,7 +81,7 @@ def promises(
     remembering = [
         one
         for one in distinct(kept, len(kept), np.inf)
-        if one.curve.memory and one.curve.part != RING
+        if set(dict(one.curve.memory)).difference(GIVEN) and one.curve.part != RING
     ][:TUNED]
     kept += [_tuned(known, one) for one in remembering]
     return sorted(kept, key=lambda one: rule.weighed(one.loss, one.curve.memory))
@@ -117,7 +120,7 @@ def _spline(along: Along, values: Array, rest: bool) -> tuple[Array, Hats] | Non
     """
     if not float(np.ptp(values)) > 1e-9 * max(1e-300, float(np.max(np.abs(values)))):
         return None
-    knots = knots_of(values, RIPPLED if along.name == "displacement" else FINE)
+    knots = knots_of(values, MANY.get(along.name, FINE))
     if rest and len(knots) > 2 and knots[1] < 0.0 < knots[-2]:
         knots[np.argmin(np.abs(knots))] = 0.0
     return (knots, hats_at(values, knots)) if len(knots) >= FEWEST else None
@@ -135,9 +138,10 @@ def signals(
     """
     step = residual.runs[0].dt
     length = min(len(run.x) for run in residual.runs) * step
+    top = max(float(np.max(run.x)) for run in residual.runs)
     offered = (one for one in ALONG.values() if residual.place.offers(one.needs))
     for along in (one for one in offered if not names or one.name in names):
-        for memory in along.memories(step, length, _stroke(residual)):
+        for memory in along.memories(step, length, _stroke(residual), top):
             yield along, memory, _values(residual, along, memory)
 
 

@@ -89,7 +89,7 @@ class ModifiedBoucWen(Law):
 
     name = "modified_bouc_wen"
     parts = ("yield", "bristle", "viscous", "spring")
-    contains = ("spring", "lag", "series element")
+    contains = ("spring", "lag")  # a dashpot in series never springs back: mounts and gaps join
     source = "Spencer, Dyke, Sain & Carlson (1997), J. Eng. Mech. 123(3), 230-238, eqs. 5 to 10"
     states = {"deflection": "m", "inner": "m", "command": "V"}
     starts = {"command": "V"}

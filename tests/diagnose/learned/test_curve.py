@@ -23,7 +23,7 @@ STEP = 0.002  # s
 T = STEP * np.arange(1500)
 NONE = np.zeros((0, len(T), 4))
 PAIRS = [(part, along) for part in PARTS for along in ALONG if may_change(part, along)]
-MEMORY = {"tau": 0.2, "way": 0.004, "early": 0.02}
+MEMORY = {"tau": 0.2, "way": 0.004, "early": 0.02, "turn": 0.011}
 
 
 def run() -> Run:
@@ -62,7 +62,7 @@ def test_every_part_along_every_signal_is_an_effect(part, along):
         hook = effect.hooks()[PARTS[part].hook]
         assert np.isfinite(hook(signals(run(), 700, STEP), z, p))
         assert effect.parameters["curve[2]"].value == pytest.approx(0.08)
-        assert effect.assumed == ("curve[1]",)
+        assert effect.assumed[0] == "curve[1]"
     assert "learned_9" not in EFFECTS
 
 
@@ -84,6 +84,20 @@ def test_the_memory_of_the_hook_is_that_of_the_scan(along):
             out.append(shown(z, p))
     expected = ALONG[along].history(now, dict(curve.memory))
     assert np.max(np.abs(np.array(out) - expected)) < 0.02 * np.ptp(expected)
+
+
+def test_a_curve_for_each_direction_is_that_of_the_scan():
+    curve, now = curve_of("force", "stroke", 0.5), run()
+    with defined({"learned_9": effect_text("learned_9", curve, "made for a test, 2026")}):
+        effect = EFFECTS["learned_9"]
+        p, force = effect.values_of({}), effect.hooks()["force"]
+        found = np.array([force(signals(now, k, STEP), (), p) for k in range(len(T))])
+        assert effect.assumed == ("curve[1]", "turn")
+        assert not effect.passive  # round a cycle it may give energy
+    along = ALONG["stroke"].history(now, dict(curve.memory))
+    expected = np.interp(along, curve.knots, curve.values)
+    moving = np.abs(now.v) > 3.0 * curve.slow  # nearer to rest one curve passes into the other
+    assert found[moving] == pytest.approx(expected[moving], abs=0.003)
 
 
 @pytest.mark.parametrize("closed", [False, True])
