@@ -1,0 +1,338 @@
+"""How large each effect may still be, on runs that do not show it, and from what size it is named.
+
+Law and known effects are refitted: what their sensitivities can take up does not count.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..identify.bench import jumps
+from ..identify.model import Model, Problem
+from ..identify.residuals import Expected, residuals
+from ..identify.search_context import Search
+from ..identify.start_grid import initial_guesses
+from ..physics.effect import EFFECTS
+from .rule import BENCH, DecisionRule
+
+Array = NDArray[np.float64]
+
+CLIP = 2.0
+"""Normalised residuals beyond this count as this, as in a fit."""
+
+LOOK = 3.0
+"""How many standard deviations a change has at which an effect is looked at first."""
+
+TURNS = 5
+"""How often a limit is found anew with the change that the effect makes there."""
+
+ALIKE = 0.05
+"""Relative change of a size below which it is found."""
+
+ONE_SIDED, TWO_SIDED = 1.645, 1.96
+"""Standard deviations of a 95 % limit."""
+
+NINE_OF_TEN = 1.282
+"""Standard deviations above the mean that 9 of 10 stay below."""
+
+GROWS = 1.1
+"""By what factor a change must grow with twice the size to be the effect's own."""
+
+POWERS = (0.2, 2.0)
+"""Least and largest power of the size with which a change may grow."""
+
+SMALLEST, LARGEST = 1e-4, 1e3
+"""Sizes between which an effect is looked at, over that of a first guess."""
+
+BLOCK = 250
+"""Samples, longer than a residual's correlation."""
+
+
+@dataclass(frozen=True)
+class EffectLimit:
+    """What runs say of the size of an effect that they do not show.
+
+    `largest` is the size of `parameter` [SI] that they still allow at 95 %, its lower limit where
+    the effect vanishes as it grows (`falls`); `share` the part of the force RMS that such an effect
+    leaves once law and known effects are fitted again. `named` and `named_share` are those from
+    which 9 of 10 verdicts would name the effect, None beyond the parameter's bounds. `others` are
+    the values of the effect's other parameters for which all this holds. `why` says why the runs
+    cannot show the effect; the sizes are then None.
+    """
+
+    effect: str
+    parameter: str = ""
+    unit: str = "1"
+    falls: bool = False
+    largest: float | None = None
+    share: float | None = None
+    named: float | None = None
+    named_share: float | None = None
+    others: tuple[tuple[str, float], ...] = ()
+    why: str = ""
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what verdict.json holds."""
+        if self.why:
+            return {"effect": self.effect, "why": self.why}
+        return {
+            "effect": self.effect, "parameter": self.parameter, "unit": self.unit,
+            "side": "above" if self.falls else "below", "limit95": self.largest,
+            "share": self.share, "named_from": self.named, "named_share": self.named_share,
+            "others": dict(self.others),
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Known:
+    """What all limits of some runs are found with: the model's residuals and sensitivities.
+
+    `names` of the model's free parameters; `held_out` how many samples decide a verdict.
+    """
+
+    problem: Problem
+    model: Model
+    expected: Expected
+    held_out: int
+    rule: DecisionRule = BENCH
+
+    @cached_property
+    def search(self) -> Search:
+        """The model with its free parameters."""
+        return Search(self.problem, self.model, self.expected, self.model.free())
+
+    @cached_property
+    def left(self) -> Array:
+        """The normalised residuals (n,) of the model, those far out clipped."""
+        return np.clip(self.plain, -CLIP, CLIP)
+
+    @cached_property
+    def counts(self) -> Array:
+        """1 for each sample (n,), 0 where the command jumps: no clock says on which side it is."""
+        parts = [~jumps(run.V)[run.skip :] for run in self.problem.runs]
+        return np.concatenate(parts).astype(float)
+
+    @cached_property
+    def plain(self) -> Array:
+        """The normalised residuals (n,) of the model as they are, of the samples that count."""
+        return self.counts * self.search.residuals(self.search.start)
+
+    @cached_property
+    def own(self) -> Array:
+        """What the model's own parameters change (n, p), each column of length one."""
+        if not self.search.names:
+            return np.zeros((len(self.plain), 0))
+        columns = self.counts[:, None] * self.search.sensitivities()
+        return columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal columns (n, p) that span what the model's own parameters change."""
+        return np.linalg.qr(self.own)[0]
+
+    @cached_property
+    def noise(self) -> tuple[Array, Array]:
+        """The force's own noise (n,) and draws (d, n) of the motion's, as residuals have them."""
+        pairs = list(zip(self.problem.runs, self.expected, strict=True))
+        own = np.concatenate([run.noise / e[1][run.skip :] for run, e in pairs])
+        count = min(len(e[2]) for _, e in pairs)
+        drawn = [
+            np.concatenate([e[2][d][run.skip :] / e[1][run.skip :] for run, e in pairs])
+            for d in range(count)
+        ]
+        return self.counts * own, self.counts * np.array(drawn).reshape(count, len(own))
+
+    @cached_property
+    def size(self) -> float:
+        """The norm of the normalised force."""
+        parts = [
+            (run.force / e[1])[run.skip :]
+            for run, e in zip(self.problem.runs, self.expected, strict=True)
+        ]
+        return float(np.linalg.norm(np.concatenate(parts)))
+
+    def beyond(self, change: Array) -> Array:
+        """Return what of a change (n,) the model's own parameters do not take up."""
+        kept: Array = change - self.basis @ (self.basis.T @ change)
+        return kept
+
+    def scatter(self, direction: Array) -> float:
+        """Return the standard deviation of a direction's (n,) product with the residual."""
+        if float(np.mean(np.minimum(self.plain**2, CLIP**2))) > self.rule.misfit**2:
+            sums = np.add.reduceat(direction * self.left, np.arange(0, len(direction), BLOCK))
+            return float(np.linalg.norm(sums))
+        own, drawn = self.noise
+        moved = np.clip(drawn, -CLIP, CLIP) @ direction
+        more = float(np.var(moved, ddof=1)) if len(moved) > 1 else 0.0
+        return sqrt(float(np.sum((direction * own) ** 2)) + more)
+
+
+class Sized:
+    """An effect in a model with one number for its size: 1 is that of a first guess, 0 is none."""
+
+    def __init__(self, name: str, known: Known) -> None:
+        effect, self.known = EFFECTS[name], known
+        self.name, self.parameter = name, effect.amount.removeprefix("1/")
+        self.falls = effect.amount.startswith("1/")
+        self.key = f"{name}.{self.parameter}"
+        self.model = _first_guess(name, known.model, known.problem)
+        self.one = self.model.value(self.key)
+        low, self.high = self.model.bounds(self.key)
+        self.signed = low < 0.0
+        self.low = low if low > 0.0 else 0.0
+        at_zero = not self.falls and self.low == 0.0
+        self._without = self._counted(self._with(0.0)) if at_zero else known.plain
+
+    def value(self, size: float) -> float:
+        """Return the parameter's value [SI] at a size, within its bounds."""
+        return float(np.clip(self._wanted(size), self.low, self.high))
+
+    def change(self, size: float) -> Array:
+        """Return by how much the effect changes the normalised residuals (n,) at a size."""
+        return self._counted(self._with(self.value(size))) - self._without
+
+    def _counted(self, model: Model) -> Array:
+        known = self.known
+        return known.counts * residuals(known.problem, model, known.expected)
+
+    def ended(self, size: float) -> bool:
+        """Return whether a bound keeps the parameter from a size."""
+        return not self.low <= self._wanted(size) <= self.high
+
+    def _wanted(self, size: float) -> float:
+        return self.one / size if self.falls else self.one * size
+
+    def _with(self, value: float) -> Model:
+        return replace(self.model, values={**self.model.values, self.key: value})
+
+
+def effect_limits(known: Known, names: Sequence[str]) -> list[EffectLimit]:
+    """Return what runs allow of each effect, those without a parameter for their size left out.
+
+    Parameters
+    ----------
+    known : the runs, the fitted model, what a true model would show
+    names : of effects that can join the model
+    """
+    return [limit_of(Sized(name, known)) for name in names if EFFECTS[name].amount]
+
+
+def limit_of(sized: Sized) -> EffectLimit:
+    """Return what runs allow of one effect."""
+    known, rule = sized.known, sized.known.rule
+    first = sized.change(1.0)
+    raw, kept = float(np.linalg.norm(first)), float(np.linalg.norm(known.beyond(first)))
+    if raw < rule.silent * known.size:
+        return EffectLimit(sized.name, why="these runs do not excite it")
+    if kept < rule.absorbed * raw:
+        return EffectLimit(sized.name, why=f"{_taker(known, first)} takes it up")
+    size = _allowed(sized, _resolved(sized, LOOK / kept))
+    share = float(np.linalg.norm(known.beyond(sized.change(size)))) / known.size
+    named = _named(sized, size)
+    others = tuple(
+        (name, sized.model.value(f"{sized.name}.{name}"))
+        for name in EFFECTS[sized.name].parameters
+        if name != sized.parameter and sized.model.value(f"{sized.name}.{name}")
+    )
+    return EffectLimit(
+        sized.name, sized.parameter, EFFECTS[sized.name].parameters[sized.parameter].unit,
+        sized.falls, sized.value(size), share, *named, others,
+    )  # fmt: skip
+
+
+def _allowed(sized: Sized, size: float) -> float:
+    """Return the largest size that the runs allow at 95 %.
+
+    Parameters
+    ----------
+    sized : the effect
+    size : where it is looked at first, resolved
+    """
+    known, least = sized.known, size
+    for _ in range(TURNS):
+        change = known.beyond(sized.change(size))
+        length = float(np.linalg.norm(change))
+        if length == 0.0:
+            return LARGEST
+        direction = change / length
+        best, std = -float(direction @ known.left), known.scatter(direction)
+        wanted = abs(best) + TWO_SIDED * std if sized.signed else best + ONE_SIDED * std
+        wanted = max(wanted, std)  # a best size far below zero would allow none at all
+        if abs(wanted / length - 1.0) <= ALIKE or (size == least and wanted < length):
+            break
+        size = max(_sized_for(sized, size, length, wanted), least)
+    return size
+
+
+def _sized_for(sized: Sized, size: float, length: float, wanted: float) -> float:
+    """Return the size at which an effect's change has another length, by its power law there.
+
+    A play or a short travel changes less than in proportion.
+    """
+    half = float(np.linalg.norm(sized.known.beyond(sized.change(0.5 * size))))
+    power = float(np.clip(np.log2(length / max(half, 1e-300)), *POWERS))
+    return float(np.clip(size * (wanted / length) ** (1.0 / power), SMALLEST, LARGEST))
+
+
+def _resolved(sized: Sized, size: float) -> float:
+    """Return a size, raised to where the effect's change grows with it.
+
+    Below that the steps of the integration decide: a lag of less than half a sample, a play that
+    the rod crosses within one.
+    """
+    known, size = sized.known, float(np.clip(size, SMALLEST, 1.0))
+    half = np.linalg.norm(known.beyond(sized.change(0.5 * size)))
+    while size < 1.0:
+        whole = np.linalg.norm(known.beyond(sized.change(size)))
+        if whole >= GROWS * half:
+            break
+        size, half = 2.0 * size, whole
+    return size
+
+
+def _named(sized: Sized, size: float) -> tuple[float | None, float | None]:
+    """Return the value and the share of the force from which 9 of 10 verdicts name an effect.
+
+    A verdict asks that z on held-out runs falls by `rule.gain`, which scatters with the noise.
+
+    Parameters
+    ----------
+    sized : the effect
+    size : where it is looked at first
+    """
+    known = sized.known
+    asked = known.held_out * ((1.0 + known.rule.gain) ** 2 - 1.0)
+    wanted = NINE_OF_TEN + sqrt(NINE_OF_TEN**2 + asked)
+    wanted *= sqrt(len(known.plain) / known.held_out)
+    for turn in range(TURNS + 1):
+        length = float(np.linalg.norm(known.beyond(sized.change(size))))
+        if length == 0.0 or sized.ended(size) or not SMALLEST < size < LARGEST:
+            return None, None
+        if turn == TURNS or abs(wanted / length - 1.0) <= ALIKE:
+            break
+        size = _sized_for(sized, size, length, wanted)
+    return sized.value(size), length / known.size
+
+
+def _taker(known: Known, change: Array) -> str:
+    """Return the name of the parameter whose change is the most like an effect's."""
+    alike = np.abs(known.own.T @ change)
+    return known.search.names[int(np.argmax(alike))]
+
+
+def _first_guess(name: str, model: Model, problem: Problem) -> Model:
+    """Return a model with an effect at its default shape, scaled to the rig."""
+    guess, effect = initial_guesses(name, model, problem)[0], EFFECTS[name]
+    if effect.start_shares:
+        return guess
+    scaled = {
+        f"{name}.{own}": problem.scaled(model.law, f"{name}.{own}") for own in effect.parameters
+    }
+    return replace(guess, values={**guess.values, **model.values, **scaled})
