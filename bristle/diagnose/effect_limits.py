@@ -5,7 +5,7 @@ Law and known effects are refitted: what their sensitivities can take up does no
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import sqrt
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..identify.bench import jumps
 from ..identify.model import Model, Problem
 from ..identify.residuals import Expected, residuals
+from ..identify.search import loss
 from ..identify.search_context import Search
 from ..identify.start_grid import initial_guesses
 from ..physics.effect import EFFECTS
@@ -27,11 +28,11 @@ Array = NDArray[np.float64]
 CLIP = 2.0
 """Normalised residuals beyond this count as this, as in a fit."""
 
-LOOK = 3.0
+LOOK = 0.1
 """How many standard deviations a change has at which an effect is looked at first."""
 
-TURNS = 5
-"""How often a limit is found anew with the change that the effect makes there."""
+TURNS = 6
+"""Sizes that are tried between two that a limit lies between."""
 
 ALIKE = 0.05
 """Relative change of a size below which it is found."""
@@ -45,8 +46,8 @@ NINE_OF_TEN = 1.282
 GROWS = 1.1
 """By what factor a change must grow with twice the size to be the effect's own."""
 
-POWERS = (0.2, 2.0)
-"""Least and largest power of the size with which a change may grow."""
+STEP = 2.0
+"""Factor by which a size is raised until it is beyond what is sought."""
 
 SMALLEST, LARGEST = 1e-4, 1e3
 """Sizes between which an effect is looked at, over that of a first guess."""
@@ -184,10 +185,9 @@ class Sized:
         self.key = f"{name}.{self.parameter}"
         self.model = _first_guess(name, known.model, known.problem)
         self.one = self.model.value(self.key)
-        low, self.high = self.model.bounds(self.key)
-        self.signed = low < 0.0
-        self.low = low if low > 0.0 else 0.0
-        at_zero = not self.falls and self.low == 0.0
+        self.low, self.high = self.model.bounds(self.key)
+        self.signed = self.low < 0.0 and not self.falls
+        at_zero = not self.falls and self.low <= 0.0
         self._without = self._counted(self._with(0.0)) if at_zero else known.plain
 
     def value(self, size: float) -> float:
@@ -233,7 +233,8 @@ def limit_of(sized: Sized) -> EffectLimit:
         return EffectLimit(sized.name, why="these runs do not excite it")
     if kept < rule.absorbed * raw:
         return EffectLimit(sized.name, why=f"{_taker(known, first)} takes it up")
-    size = _allowed(sized, _resolved(sized, LOOK / kept))
+    least = _resolved(sized, LOOK / kept)
+    size = _allowed(sized, least)
     share = float(np.linalg.norm(known.beyond(sized.change(size)))) / known.size
     named = _named(sized, size)
     others = tuple(
@@ -247,38 +248,68 @@ def limit_of(sized: Sized) -> EffectLimit:
     )  # fmt: skip
 
 
-def _allowed(sized: Sized, size: float) -> float:
-    """Return the largest size that the runs allow at 95 %.
+def _allowed(sized: Sized, least: float) -> float:
+    """Return the largest size that the runs allow at 95 %: the profile of the likelihood over it.
 
     Parameters
     ----------
     sized : the effect
-    size : where it is looked at first, resolved
+    least : where it is looked at first, resolved
     """
-    known, least = sized.known, size
-    for _ in range(TURNS):
-        change = known.beyond(sized.change(size))
+    apart = (TWO_SIDED if sized.signed else ONE_SIDED) ** 2
+    return max(
+        _end(sized, least, sign, apart) for sign in ((1.0, -1.0) if sized.signed else (1.0,))
+    )
+
+
+def _end(sized: Sized, least: float, sign: float, apart: float) -> float:
+    """Return the size at which a likelihood has fallen so far below its best.
+
+    Parameters
+    ----------
+    sized, least : the effect, and the size at which it is looked at first
+    sign : of the effect
+    apart : twice the fall of the logarithm of the likelihood
+    """
+    known, lowest = sized.known, 0.0
+
+    def above(size: float) -> float:
+        """Return twice the logarithm of the likelihood, over `apart`, with its sign turned."""
+        change = known.beyond(sized.change(sign * size))
         length = float(np.linalg.norm(change))
         if length == 0.0:
+            return 0.0
+        rise = 2.0 * float(np.sum(loss(known.plain + change) - loss(known.plain)))
+        return rise / (apart * known.scatter(change / length) ** 2)
+
+    if not sized.change(sign).any():
+        return 0.0  # it has one sign alone
+    size = low = least
+    found = above(least)
+    while found < lowest + 1.0:
+        if size >= LARGEST:
             return LARGEST
-        direction = change / length
-        best, std = -float(direction @ known.left), known.scatter(direction)
-        wanted = abs(best) + TWO_SIDED * std if sized.signed else best + ONE_SIDED * std
-        wanted = max(wanted, std)  # a best size far below zero would allow none at all
-        if abs(wanted / length - 1.0) <= ALIKE or (size == least and wanted < length):
+        lowest, low, size = min(lowest, found), size, min(STEP * size, LARGEST)
+        found = above(size)
+    if low == size:
+        return least
+    return _crossing(lambda at: above(at) - lowest - 1.0, low, size)
+
+
+def _crossing(rising: Callable[[float], float], low: float, high: float) -> float:
+    """Return where a function between two sizes is zero: regula falsi (Illinois) in logarithms."""
+    at_low, at_high = rising(low), rising(high)
+    for _ in range(TURNS):
+        share = -at_low / (at_high - at_low) if at_high > at_low else 0.5
+        size = low * (high / low) ** min(max(share, 0.05), 0.95)
+        at = rising(size)
+        if at < 0.0:
+            low, at_low, at_high = size, at, 0.5 * at_high
+        else:
+            high, at_high, at_low = size, at, 0.5 * at_low
+        if high / low <= 1.0 + ALIKE:
             break
-        size = max(_sized_for(sized, size, length, wanted), least)
-    return size
-
-
-def _sized_for(sized: Sized, size: float, length: float, wanted: float) -> float:
-    """Return the size at which an effect's change has another length, by its power law there.
-
-    A play or a short travel changes less than in proportion.
-    """
-    half = float(np.linalg.norm(sized.known.beyond(sized.change(0.5 * size))))
-    power = float(np.clip(np.log2(length / max(half, 1e-300)), *POWERS))
-    return float(np.clip(size * (wanted / length) ** (1.0 / power), SMALLEST, LARGEST))
+    return high
 
 
 def _resolved(sized: Sized, size: float) -> float:
@@ -311,14 +342,17 @@ def _named(sized: Sized, size: float) -> tuple[float | None, float | None]:
     asked = known.held_out * ((1.0 + known.rule.gain) ** 2 - 1.0)
     wanted = NINE_OF_TEN + sqrt(NINE_OF_TEN**2 + asked)
     wanted *= sqrt(len(known.plain) / known.held_out)
-    for turn in range(TURNS + 1):
-        length = float(np.linalg.norm(known.beyond(sized.change(size))))
-        if length == 0.0 or sized.ended(size) or not SMALLEST < size < LARGEST:
+
+    def beyond(size: float) -> float:
+        return float(np.linalg.norm(known.beyond(sized.change(size)))) / wanted - 1.0
+
+    low = size
+    while beyond(size) < 0.0:
+        if sized.ended(size) or size >= LARGEST:
             return None, None
-        if turn == TURNS or abs(wanted / length - 1.0) <= ALIKE:
-            break
-        size = _sized_for(sized, size, length, wanted)
-    return sized.value(size), length / known.size
+        low, size = size, STEP * size
+    size = _crossing(beyond, low, size) if low < size else size
+    return (None, None) if sized.ended(size) else (sized.value(size), wanted / known.size)
 
 
 def _taker(known: Known, change: Array) -> str:
