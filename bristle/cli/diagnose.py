@@ -145,10 +145,12 @@ def _then(verdict: Verdict, folder: Path) -> str:
 
 
 def _other_laws(verdict: Verdict, folder: Path) -> str:
-    """Return the command that tries the other laws of a test bench; "" where they were tried."""
-    if verdict.get("laws") or [found["site"] for found in verdict["findings"]] != ["damper"]:
+    """Return the command that seeks the law as well; "" where no other law leaves less."""
+    if not any(found.get("other_law") for found in verdict["findings"]):
         return ""
-    return f"{command('diagnose', folder, '--law', 'all')} , which tries the other laws;  "
+    return (
+        f"{command('diagnose', folder, '--law', 'all')} , which seeks the law with its effects;  "
+    )
 
 
 def _gaining(verdict: Verdict, folder: Path) -> str:

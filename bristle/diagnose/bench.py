@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from ..data.channels import DRIVE
+from ..data.checks.levels import tells_a_bend
 from ..data.measurement import Measurement
 from ..identify.model import Model
 from ..identify.structure import StructureProblem
 from .conclusion import About
 from .finding import Finding
+from .law_trials import better_law, try_laws
 from .opening import Insufficient, Opening, Progress, opening
+
+NOT_THE_LAW = "No other law leaves a smaller error: it is not the form of the law."
 
 
 class BenchRuns:
@@ -57,6 +62,18 @@ class BenchRuns:
     def excused(self, finding: Finding, _findings: Mapping[str, Finding]) -> Finding:
         """Return the damper's finding as it is."""
         return finding
+
+    def beside_other_laws(self, finding: Finding, opened: Opening) -> Finding:
+        """Return a finding that leaves an error with how much of it is the form of the law."""
+        judged = finding.before if finding.kind == "unknown" else finding.after
+        if finding.kind == "insufficient" or judged is None or judged.z <= opened.rule.clean:
+            return finding
+        self._say("trying every law")
+        bends = tells_a_bend(self._train)
+        laws = try_laws(opened.searched, opened.held_out, judged.model, bends=bends)
+        other = better_law(judged, laws, opened.rule)
+        told = NOT_THE_LAW if other is None else other.sentence()
+        return replace(finding, other_law=other, reasons=(*finding.reasons, told))
 
     def about(self) -> About:
         """Return what the verdict tells beside the damper's finding."""

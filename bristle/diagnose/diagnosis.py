@@ -104,7 +104,7 @@ def diagnose_rig(
         say("intervals")
         # What an instrument explains contradicts nothing.
         settled = excused if excused is not found else contradicted(found, opened)
-        findings[DAMPER] = detailed(settled, opened)
+        findings[DAMPER] = detailed(runs.beside_other_laws(settled, opened), opened)
     return conclude(findings, runs.about())
 
 

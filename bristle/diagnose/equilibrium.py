@@ -156,6 +156,10 @@ class BuildingRuns:
             finding = excused_by_sensor(finding, most, why)
         return finding
 
+    def beside_other_laws(self, finding: Finding, _opened: Opening) -> Finding:
+        """Return the damper's finding: the law decides which samples of a building count."""
+        return finding
+
     def about(self) -> About:
         """Return what the verdict tells beside the findings of the sites."""
         reconstructed = DAMPER in self._problems and self._problems[DAMPER][0].reconstructed

@@ -15,6 +15,7 @@ from .candidates import Trial
 from .decision import Decision
 from .experiments import Experiment
 from .faults import SensorFault
+from .law_trials import OtherLaw
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Finding:
     `std` is by parameter [SI], of what the data identify; `patterns` those of the residual;
     `untestable` the effects that the site's runs do not show; `experiment` the run that would
     distinguish alternatives, where the rig's motion can be chosen; `sensors` are faults that only
-    the model with the named effects shows; `together` is the best pair of effects that was tried.
+    the model with the named effects shows; `together` is the best pair of effects that was tried;
+    `other_law` the law that would leave less than the model's, where that was asked.
     """
 
     site: str
@@ -52,6 +54,7 @@ class Finding:
     experiment: Experiment | None = None
     sensors: tuple[SensorFault, ...] = ()
     together: Trial | None = None
+    other_law: OtherLaw | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return what verdict.json holds of the site."""
@@ -76,6 +79,8 @@ class Finding:
                 {"coordinate": one.coordinate, "share": round(one.share, 4), "p": one.p}
                 for one in self.patterns[:5]
             ]
+        if self.other_law is not None:
+            out["other_law"] = self.other_law.as_dict()
         if self.experiment is not None:
             out["separate_by"] = self.experiment.sentence()
         return out

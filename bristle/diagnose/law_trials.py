@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from os import cpu_count
@@ -20,7 +21,10 @@ from ..physics.effect import EFFECTS
 from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
 from ..physics.laws import base_and_variant, law_names
 from ..progress import Count
+from ..quantity import short_z
 from .candidates import Trial, judge
+from .decision import Z
+from .rule import BENCH, DecisionRule
 
 STARTS = 2
 """Starting points of each law."""
@@ -105,6 +109,49 @@ def try_laws(
 
         rows = [row for rows in pool.map(tried, names) for row in rows]
     return tuple(sorted(rows, key=lambda row: row.trial.z))
+
+
+@dataclass(frozen=True)
+class OtherLaw:
+    """A law that leaves less than the model's, with the same effects: `share` of the excess."""
+
+    law: str
+    z: float
+    share: float
+
+    def sentence(self) -> str:
+        """Return how much of the error is the form of the law."""
+        plain, form, _ = split_form(self.law)
+        bent = f" with a {form} command" if form not in ("", LINEAR_FORM) else ""
+        return (
+            f"The law {plain}{bent} leaves {Z} = {short_z(self.z)}: {100.0 * self.share:.0f} % of "
+            "what exceeds the noise is the form of the law."
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        plain, form, _ = split_form(self.law)
+        z, share = round(self.z, 4), round(self.share, 4)
+        return {"law": plain, "command": form or LINEAR_FORM, "z_holdout": z, "explained": share}
+
+
+def better_law(
+    judged: Trial, laws: Sequence[LawTrial], rule: DecisionRule = BENCH
+) -> OtherLaw | None:
+    """Return the law that leaves least in the place of a model's own; None where that does.
+
+    Parameters
+    ----------
+    judged : the model
+    laws : all laws with the model's effects, on the same runs
+    rule : the numbers that decide
+    """
+    able = [one for one in laws if one.trial.rms <= rule.most_rms * judged.rms]
+    best = min(able, key=lambda one: one.trial.z, default=None)
+    if best is None or best.trial.z > (1.0 - rule.gain) * judged.z:
+        return None
+    share = 1.0 - rule.excess(best.trial.z) / rule.excess(judged.z)
+    return OtherLaw(best.law, best.trial.z, share)
 
 
 def not_finite(problem: Problem, present: Model) -> list[str]:

@@ -7,8 +7,9 @@ import pytest
 
 from bristle.data.checks.levels import tells_a_bend
 from bristle.diagnose import law_trials
+from bristle.diagnose.candidates import Trial
 from bristle.diagnose.law_text import left_out
-from bristle.diagnose.law_trials import not_finite, try_laws
+from bristle.diagnose.law_trials import LawTrial, better_law, not_finite, try_laws
 from bristle.identify.fit import Model, Problem
 from bristle.identify.rig import bench_rig
 from bristle.study.inputs import measurements
@@ -55,6 +56,25 @@ def test_laws_have_those_of_the_present_effects_that_can_join_them(problems, few
     assert first.trial.effects == ("gas_spring",)
     assert first.trial.model.fixed == ("gas_spring.k",)  # what was held of another law is not
     assert first.trial.model.value("gas_spring.k") == 80.0
+
+
+def test_how_much_of_an_error_is_the_form_of_the_law_is_told():
+    def row(law, z, rms):
+        trial = Trial(Model("tanh"), z, z, rms, np.ones(1), np.ones(1))
+        return LawTrial(law, trial, rms, (z,))
+
+    judged = row("lugre", 3.0, 1.0).trial
+    # The z of dahl is lower still, but it serves the samples near rest at the cost of all others.
+    laws = [row("dahl", 1.2, 1.5), row("tanh[quadratic]", 2.0, 0.7), row("lugre", 3.0, 1.0)]
+    other = better_law(judged, laws)
+    assert other is not None
+    assert (other.law, other.z, other.share) == ("tanh[quadratic]", 2.0, pytest.approx(0.625))
+    assert other.sentence() == (
+        "The law tanh with a quadratic command leaves error / noise (z) = 2.00: 62 % of what "
+        "exceeds the noise is the form of the law."
+    )
+    assert other.as_dict()["command"] == "quadratic"
+    assert better_law(judged, laws[2:]) is None
 
 
 class Broken(Problem):
