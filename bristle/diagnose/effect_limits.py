@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.bench import jumps
-from ..identify.model import Model, Problem
+from ..identify.model import Model, Problem, steady
 from ..identify.residuals import Expected, residuals
 from ..identify.search import loss
 from ..identify.search_context import Search
@@ -27,6 +27,9 @@ Array = NDArray[np.float64]
 
 CLIP = 2.0
 """Normalised residuals beyond this count as this, as in a fit."""
+
+ABSORBED = 1e-3
+"""Share of a change that must be left; below that it is the error of the sensitivities."""
 
 LOOK = 0.1
 """How many standard deviations a change has at which an effect is looked at first."""
@@ -43,8 +46,9 @@ ONE_SIDED, TWO_SIDED = 1.645, 1.96
 NINE_OF_TEN = 1.282
 """Standard deviations above the mean that 9 of 10 stay below."""
 
-GROWS = 1.1
-"""By what factor a change must grow with twice the size to be the effect's own."""
+GROWS, GROWS_ROUGH = 1.1, 1.3
+"""By what factor a change must grow with twice the size to be the effect's own; of what makes the
+force rough, as impacts in a joint do."""
 
 STEP = 2.0
 """Factor by which a size is raised until it is beyond what is sought."""
@@ -63,9 +67,10 @@ class EffectLimit:
     `largest` is the size of `parameter` [SI] that they still allow at 95 %, its lower limit where
     the effect vanishes as it grows (`falls`); `share` the part of the force RMS that such an effect
     leaves once law and known effects are fitted again. `named` and `named_share` are those from
-    which 9 of 10 verdicts would name the effect, None beyond the parameter's bounds. `others` are
-    the values of the effect's other parameters for which all this holds. `why` says why the runs
-    cannot show the effect; the sizes are then None.
+    which 9 of 10 verdicts would name the effect, None beyond the parameter's bounds. `coarse`: the
+    steps of the integration tell no smaller size, and shares have no meaning. `others` are the
+    values of the effect's other parameters for which all this holds. `why` says why the runs cannot
+    show the effect; the sizes are then None.
     """
 
     effect: str
@@ -76,6 +81,7 @@ class EffectLimit:
     share: float | None = None
     named: float | None = None
     named_share: float | None = None
+    coarse: bool = False
     others: tuple[tuple[str, float], ...] = ()
     why: str = ""
 
@@ -87,7 +93,7 @@ class EffectLimit:
             "effect": self.effect, "parameter": self.parameter, "unit": self.unit,
             "side": "above" if self.falls else "below", "limit95": self.largest,
             "share": self.share, "named_from": self.named, "named_share": self.named_share,
-            "others": dict(self.others),
+            "coarse": self.coarse, "others": dict(self.others),
         }  # fmt: skip
 
 
@@ -130,8 +136,9 @@ class Known:
         """What the model's own parameters change (n, p), each column of length one."""
         if not self.search.names:
             return np.zeros((len(self.plain), 0))
-        columns = self.counts[:, None] * self.search.sensitivities()
-        return columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        columns: Array = self.counts[:, None] * self.search.sensitivities()
+        columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        return columns
 
     @cached_property
     def basis(self) -> Array:
@@ -213,39 +220,56 @@ class Sized:
         return replace(self.model, values={**self.model.values, self.key: value})
 
 
-def effect_limits(known: Known, names: Sequence[str]) -> list[EffectLimit]:
-    """Return what runs allow of each effect, those without a parameter for their size left out.
+def effect_limits(
+    known: Known, names: Sequence[str], hidden: Sequence[str] = ()
+) -> tuple[EffectLimit, ...]:
+    """Return what runs allow of each effect, by name; those without an `amount` are left out.
 
     Parameters
     ----------
     known : the runs, the fitted model, what a true model would show
     names : of effects that can join the model
+    hidden : those of them that the runs cannot show
     """
-    return [limit_of(Sized(name, known)) for name in names if EFFECTS[name].amount]
+    sizes = (Sized(name, known) for name in sorted(names) if EFFECTS[name].amount)
+    return tuple(
+        EffectLimit(one.name, why=_why_hidden(one)) if one.name in hidden else limit_of(one)
+        for one in sizes
+    )
 
 
 def limit_of(sized: Sized) -> EffectLimit:
     """Return what runs allow of one effect."""
-    known, rule = sized.known, sized.known.rule
+    known, effect = sized.known, EFFECTS[sized.name]
     first = sized.change(1.0)
-    raw, kept = float(np.linalg.norm(first)), float(np.linalg.norm(known.beyond(first)))
-    if raw < rule.silent * known.size:
-        return EffectLimit(sized.name, why="these runs do not excite it")
-    if kept < rule.absorbed * raw:
-        return EffectLimit(sized.name, why=f"{_taker(known, first)} takes it up")
+    kept = float(np.linalg.norm(known.beyond(first)))
+    if kept <= ABSORBED * float(np.linalg.norm(first)):
+        return EffectLimit(sized.name, why=_why_hidden(sized))
     least = _resolved(sized, LOOK / kept)
     size = _allowed(sized, least)
+    coarse = size == least
     share = float(np.linalg.norm(known.beyond(sized.change(size)))) / known.size
-    named = _named(sized, size)
     others = tuple(
         (name, sized.model.value(f"{sized.name}.{name}"))
-        for name in EFFECTS[sized.name].parameters
+        for name in effect.parameters
         if name != sized.parameter and sized.model.value(f"{sized.name}.{name}")
     )
     return EffectLimit(
-        sized.name, sized.parameter, EFFECTS[sized.name].parameters[sized.parameter].unit,
-        sized.falls, sized.value(size), share, *named, others,
+        sized.name, sized.parameter, effect.parameters[sized.parameter].unit, sized.falls,
+        sized.value(size), None if coarse else share,
+        *((None, None) if coarse else _named(sized, size)), coarse, others,
     )  # fmt: skip
+
+
+def _why_hidden(sized: Sized) -> str:
+    """Return why the runs cannot show an effect: what does not move, or what takes it up."""
+    known = sized.known
+    change = sized.change(1.0)
+    if np.linalg.norm(change) > known.rule.silent * known.size and known.search.names:
+        alike = np.abs(known.own.T @ change)
+        return f"{known.search.names[int(np.argmax(alike))]} of the model takes it up"
+    still = steady(known.problem) and "V" in EFFECTS[sized.name].needs
+    return "the command does not move" if still else "this motion does not excite it"
 
 
 def _allowed(sized: Sized, least: float) -> float:
@@ -319,10 +343,11 @@ def _resolved(sized: Sized, size: float) -> float:
     the rod crosses within one.
     """
     known, size = sized.known, float(np.clip(size, SMALLEST, 1.0))
+    grows = GROWS_ROUGH if EFFECTS[sized.name].joint else GROWS
     half = np.linalg.norm(known.beyond(sized.change(0.5 * size)))
     while size < 1.0:
         whole = np.linalg.norm(known.beyond(sized.change(size)))
-        if whole >= GROWS * half:
+        if whole >= grows * half:
             break
         size, half = 2.0 * size, whole
     return size
@@ -353,12 +378,6 @@ def _named(sized: Sized, size: float) -> tuple[float | None, float | None]:
         low, size = size, STEP * size
     size = _crossing(beyond, low, size) if low < size else size
     return (None, None) if sized.ended(size) else (sized.value(size), wanted / known.size)
-
-
-def _taker(known: Known, change: Array) -> str:
-    """Return the name of the parameter whose change is the most like an effect's."""
-    alike = np.abs(known.own.T @ change)
-    return known.search.names[int(np.argmax(alike))]
 
 
 def _first_guess(name: str, model: Model, problem: Problem) -> Model:

@@ -214,13 +214,6 @@ class DecisionRule:
     Trades: if higher, more effects are reported as not testable. Found: the method.
     """
 
-    absorbed: float = 0.02
-    """Share of an effect's change that must be left when the model is refitted for it to show.
-
-    Trades: if higher, more effects are reported as taken up; if lower, limits of effects that
-    nobody could tell from the law. Found: the method, the accuracy of the sensitivities.
-    """
-
     tells: float = 4.0
     """Standard deviations between rivals below which a proposed run separates them only by luck.
 
