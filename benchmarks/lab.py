@@ -5,7 +5,7 @@
 makes what is missing of `--each` cases per fault, with the generator of the blind benchmark, and
 prints how many are named with channel, run and value; without a number it prints what is there.
 Each case is checked as it is, too: what is said of those is a false alarm. Only the last
-two faults need a model, which is fitted.
+four faults need a model, which is fitted.
 
 hum       a sinusoid at 50 or 60 Hz, off by up to 0.04 %, of 3 to 10 % of the channel's RMS
 line      the same at a frequency between 25 and 200 Hz that is none of the mains
@@ -15,6 +15,8 @@ sign      one run's channel turned
 zero      15 or 40 % of the channel's RMS added to one run's force or velocity
 clock     the clock of the force's logger 100 to 1000 ppm fast or slow
 apart     one run's force 4 to 20 ms late or early: two loggers that did not start together
+slew      a command that reaches the coil no faster than 5 to 40 V/s, recorded before that
+range     one that reaches it up to 50 to 80 % of the largest command only
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bristle.data.checks.differing_runs import check_differing_runs
 from bristle.data.checks.finding import Finding
@@ -41,14 +44,29 @@ from ._blind.plan import Task, make_plan
 from ._blind.subject import measurements
 from ._rows import Row
 
+Array = NDArray[np.float64]
+
 SEED = 23
-FAULTS = ("hum", "line", "average", "gain", "sign", "zero", "clock", "apart")
+FAULTS = ("hum", "line", "average", "gain", "sign", "zero", "clock", "apart", "slew", "range")
 BY_MODEL = ("clock", "apart")
 """Faults that show only beside a model, which is fitted."""
 
+OF_COMMAND = ("slew", "range")
+"""Faults of the command, which show beside a model too; what the damper does with it is made anew.
+"""
+
 CLEAN = "clean"
 GOAL = 0.9
-NEAR = {"line": 1e-3, "gain": 0.05, "sign": 0.0, "bias": 0.1, "clock": 0.2, "delay": 0.2}
+NEAR = {
+    "line": 1e-3,
+    "gain": 0.05,
+    "sign": 0.0,
+    "bias": 0.1,
+    "clock": 0.2,
+    "delay": 0.2,
+    "slew": 0.1,
+    "range": 0.05,
+}
 """Share by which a told value may be off."""
 
 
@@ -93,8 +111,10 @@ def _jobs(each: int) -> Iterator[tuple[str, int]]:
 def _answered(fault: str, number: int) -> Answer:
     """Return whether what is planted is named and nothing else; an error is wrong."""
     try:
-        runs = _runs(number)
         rng = np.random.default_rng([SEED, number, len(fault)])
+        if fault in OF_COMMAND:
+            return _limits(fault, number, rng)
+        runs = _runs(number)
         if fault == CLEAN:
             found = _found(runs)
             told = _told_by_model(runs, number)
@@ -128,6 +148,42 @@ def _clocks(fault: str, number: int, runs: list[Measurement], rng: np.random.Gen
     right = len(told) == 1 and (told[0].fault, told[0].run) == (kind, name) and near[0]
     said = [[one.run, one.channel, one.words] for one in told]
     return {"right": right, "planted": [name, "force", kind, size], "said": said}
+
+
+def _limits(fault: str, number: int, rng: np.random.Generator) -> Answer:
+    """Return whether a model tells that the command was limited between its record and the coil."""
+    case = cases.make(_task(number))
+    most = max(float(np.max(np.abs(run.volts))) for run in case.plan)
+    size = float(
+        rng.uniform(0.5, 0.8) * most if fault == "range" else 10.0 ** rng.uniform(0.7, 1.6)
+    )
+    runs = []
+    for k, (run, shown) in enumerate(zip(case.plan, case.runs, strict=True)):
+        felt = replace(run, volts=_felt(run.volts, run.step, fault, size))
+        made = case.perform(felt, 100 * number + k, shown["name"])
+        runs.append({**made, "voltage": made["voltage"] + run.command() - felt.command()})
+    told = _told_by_model(measurements(runs, case.channels), number)
+    near = [abs(one.value - size) <= NEAR[fault] * size for one in told]
+    right = len(told) == 1 and (told[0].channel, told[0].fault) == ("voltage", fault) and near[0]
+    said = [[one.run, one.channel, one.words] for one in told]
+    return {"right": right, "planted": ["", "voltage", fault, size], "said": said}
+
+
+def _felt(volts: Array, step: float, fault: str, size: float) -> Array:
+    """Return a command (n, m) V at m equal points of each sample interval as it reaches the coil.
+
+    Both ends of an interval are among its points.
+    """
+    if fault == "range":
+        return np.clip(volts, -size, size)
+    out = np.empty_like(volts)
+    most, y = size * step / (volts.shape[1] - 1), float(volts[0, 0])
+    for k, row in enumerate(volts.tolist()):
+        out[k, 0] = y
+        for j, target in enumerate(row[1:], 1):
+            y += min(max(target - y, -most), most)
+            out[k, j] = y
+    return out
 
 
 def _late(run: Measurement, size: float, fault: str, rng: np.random.Generator) -> Measurement:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..data.model import StudyModel
+from ..identify.run_labels import values_of_labels
 from .closed_loop_result import KINDS, Predicted
 from .closed_loop_runs import Trial
 from .draws import Columns, Simulator, drawn_models
@@ -91,6 +92,7 @@ def figures_of(
         If the model as it is cannot be simulated.
     """
     house, bench = place
+    model = model.with_values(values_of_labels(model.effects, trial.labels), origin="measured")
     generator = np.random.default_rng([7, number])
     with tempfile.TemporaryDirectory() as folder:
         simulator = Simulator(model, house, bench, trial.shaking, Path(folder))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.labels import Labels
 from ..data.measurement import Measurement
 from ..identify.drive import smooth_steps
 from .in_building import Shaking, shaking_of
@@ -24,13 +25,15 @@ class Trial:
     """A run to predict: what drives it, what was measured, and the samples that count.
 
     `measured` maps a response to its values (n,) and their noise; `window` (n,) says which samples
-    are judged; `noise` are standard deviations of the ground's acceleration and of the command.
+    are judged; `noise` are standard deviations of the ground's acceleration and of the command;
+    `labels` is what is known of the whole run.
     """
 
     shaking: Shaking
     measured: dict[str, tuple[Array, float]]
     window: NDArray[np.bool_]
     noise: tuple[float, float]
+    labels: Labels = field(default_factory=dict)
 
 
 def trial_of(
@@ -51,7 +54,7 @@ def trial_of(
         shaking = replace(shaking, command=smooth)
     window = (run.time >= judged[0]) & (run.time <= judged[1])
     ground = run.noise.get("ground_acceleration", 0.0)
-    return Trial(shaking, _measured(run), window, (ground, left))
+    return Trial(shaking, _measured(run), window, (ground, left), run.labels)
 
 
 def _measured(run: Measurement) -> dict[str, tuple[Array, float]]:

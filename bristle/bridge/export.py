@@ -19,6 +19,7 @@ from ..fmu.catalogue import component_of_law
 from ..identify.fit import Problem, Run
 from ..identify.instruments import true_motion
 from ..identify.prepare import prepare
+from ..identify.run_labels import values_of_labels
 from ..physics.building import paper_building, read_building
 from ..physics.drive import drive_named, state_for
 from ..physics.effect import EFFECTS
@@ -178,7 +179,7 @@ def _bench(
         files.append(signal_file(time, values, title, unit, folder / f"{name}.csv"))
         signal = {"kind": "csv", "file": files[-1].name}
         parts.append(part_text(name, {"fmu": "SignalSource"}, signal))
-    starts = _start_values(damper, run)
+    starts = _start_values(damper, run) | values_of_labels(damper.effects, run.labels)
     if not measurement.drive:
         starts[drive.name] = 0.0
     parts.append(part_text("damper", {"fmu": fmu.name}, starts))

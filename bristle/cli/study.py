@@ -64,6 +64,10 @@ def _add_check(parser: argparse.ArgumentParser) -> None:
         "--correct", action="store_true",
         help="set right what can be: lines, and gain, zero or sign of a run that differs",
     )  # fmt: skip
+    parser.add_argument(
+        "--exclude", nargs="+", action="extend", default=[], metavar="RUN",
+        help="from now on these runs are left out: role = \"exclude\" in study.toml",
+    )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     parser.set_defaults(act=_check)
 
@@ -224,6 +228,10 @@ def _check(arguments: argparse.Namespace) -> int:
         study = study.with_mask()
         if not arguments.json:
             print(f"{study.folder / 'study.toml'}: mask = true; isolated spikes are masked.\n")
+    if arguments.exclude:
+        study = study.with_excluded(arguments.exclude)
+        if not arguments.json:
+            print(f"{study.folder / 'study.toml'}: {study.settings.excluded_text}\n")
     total = len(study.settings.runs)
     with Progress("checking the data", total, not arguments.json) as progress:
         found = check_data(study, progress.show)

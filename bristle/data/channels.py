@@ -11,6 +11,7 @@ from typing import NamedTuple
 from ..errors import RecordError
 from ..physics.drive import DRIVES
 from ..units import parse as parse_unit
+from .labels import TEMPERATURE
 
 PLAIN = {
     "time": "s",
@@ -21,6 +22,7 @@ PLAIN = {
     **{drive.name: drive.unit for drive in DRIVES.values()},
     "ground_acceleration": "m/s2",
     "holding_force": "N",
+    TEMPERATURE: "degC",
 }
 """Channels with their SI units; those of the levels of a structure come on top."""
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..quantity import plain, quantity
 from .channels import channel_unit
+from .command_limits import LIMITS, limited
 from .line_removal import without_lines
 from .table import Array
 
@@ -29,8 +30,14 @@ FAULTS = {
     "delay": "s by which it is late",
     "clock": "seconds that its clock gains per second",
     "line": "Hz of a sinusoid that is taken off",
+    "range": "the most of a command that reaches the coil, in its SI unit",
+    "slew": "the most by which a command changes at the coil, per second",
 }
 """Faults that can be set right, and what their value is."""
+
+
+LEFT_OUT = 'leave it out: role = "exclude" in its [[runs]] of study.toml'
+"""How a run is left out, for what names a run that does not belong."""
 
 
 class Correction(NamedTuple):
@@ -55,6 +62,8 @@ class Correction(NamedTuple):
             "delay": f"{self.channel} is moved ahead by {plain(1e3 * value)} ms",
             "clock": f"the clock of {self.channel} is set right by {plain(1e6 * value)} ppm",
             "line": f"a line at {plain(value, 4)} Hz is taken off {self.channel}",
+            "range": f"{self.channel} reaches the coil up to {quantity(value, unit, 4)}",
+            "slew": f"{self.channel} reaches the coil no faster than {plain(value, 4)} {unit}/s",
         }[self.fault]
 
 
@@ -68,6 +77,8 @@ def wrong_value(fault: str, value: float) -> str:
         return "-1 is right."
     if fault == "line" and value <= 0.0:
         return "a frequency in Hz is right."
+    if fault in LIMITS and value <= 0.0:
+        return "a positive number is right."
     if fault == "clock" and abs(value) > 0.01:
         return "100 ppm are 1e-4; no clock is off by a hundredth."
     return ""
@@ -90,7 +101,7 @@ def set_right(
         own = [one for one in corrections if one.channel == name]
         lines = [one.value for one in own if one.fault == "line" and one.value < 0.5 / step]
         y = without_lines(y, step, lines) if lines else y
-        for kind in ("bias", "gain", "sign", "clock", "delay"):
+        for kind in ("bias", "gain", "sign", "clock", "delay", *LIMITS):
             for one in own:
                 y = _without(y, step, one) if one.fault == kind else y
         out[name] = y
@@ -106,6 +117,8 @@ def _without(y: Array, step: float, correction: Correction) -> Array:
         return y / value
     if correction.fault == "sign":
         return -y
+    if correction.fault in LIMITS:
+        return limited(y, step, correction.fault, value)
     at = np.arange(len(y), dtype=float)
     shown = at * (1.0 + value) if correction.fault == "clock" else at + value / step
     return np.interp(shown, at, y)

@@ -8,6 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..quantity import plain, quantity
 
 Label: TypeAlias = float | str
@@ -15,6 +18,23 @@ Labels: TypeAlias = Mapping[str, Label]
 
 UNITS = {"temperature": "degC", "frequency": "Hz", "amplitude": "m"}
 """Labels that have a unit, in which study.toml gives them."""
+
+
+TEMPERATURE = "temperature"
+"""The label that is a channel's mean where a run has one of that name."""
+
+
+def mean_temperature(values: NDArray[np.float64]) -> tuple[float | None, str]:
+    """Return the mean of a temperature (n,) [degC] over a run, None without any, and a note of it.
+
+    A slow logger leaves fields empty: they do not count. Tenths of a kelvin are what a sensor
+    knows.
+    """
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return None, "temperature: no value in the whole run"
+    mean, low, high = (round(float(one), 1) for one in (known.mean(), known.min(), known.max()))
+    return mean, f"temperature: {mean:g} °C, the mean of the run, from {low:g} to {high:g} °C"
 
 
 def label_text(name: str, value: Label, unit: str = "") -> str:

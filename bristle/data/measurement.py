@@ -20,7 +20,7 @@ from .channels import DRIVE, ChannelSpec, channel_unit
 from .corrections import Correction, set_right
 from .decimate import decimated
 from .guess import guess_channels, specs, too_few_rows
-from .labels import Labels
+from .labels import TEMPERATURE, Labels, mean_temperature
 from .noise import Noise, estimate_noise
 from .read import read_table
 from .sampling import Even, Sampling, evenly
@@ -225,6 +225,14 @@ def measurements_of(
             continue
         units[channel] = channel_unit(channel)
         values[channel] = _in_si(table, channel, spec)
+    labels = dict(known.labels)
+    warm = values.pop(TEMPERATURE, None)
+    if warm is not None:
+        units.pop(TEMPERATURE)
+        mean, text = mean_temperature(warm)
+        notes.append(text)
+        if mean is not None:
+            labels.setdefault(TEMPERATURE, mean)
     if not values:
         raise RecordError(f"{table.source}: no channel besides time is named. There is nothing.")
     spikes = spikes_of(time, values, mask=known.mask)
@@ -249,7 +257,7 @@ def measurements_of(
         out.append(
             Measurement(
                 name, piece, parts, units, measured, noise, facts, even.sampling, table.source,
-                tuple(notes), labels=known.labels, spikes=() if known.mask else spikes,
+                tuple(notes), labels=labels, spikes=() if known.mask else spikes,
                 lost=fewer.lost[number - 1],
             )
         )  # fmt: skip

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.corrections import LEFT_OUT
 from ..identify.model import Model, Problem, Run
 from ..identify.residuals import residuals
 from ..identify.search import z_scale
@@ -281,7 +282,9 @@ def _late(late: float, std: float, where: str, run: str) -> SensorFault:
     than = " than in the other runs" if run else ""
     late_words = f"{plain(1e3 * abs(late), 3)} ms {'later' if late > 0.0 else 'earlier'}{than}"
     words = (
-        f"{where} the force is on record {late_words}: the two loggers did not start together."
+        f"{where} the force is on record {late_words}: the two loggers did not start together. "
+        f'Set it right in study.toml: correct = [{{channel = "force", fault = "delay", value = '
+        f"{late:.3g}}}], or {LEFT_OUT}."
         if run
         else f"{where} the force is {plain(1e3 * abs(late), 3)} ms {way} relative to the motion."
     )

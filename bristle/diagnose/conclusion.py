@@ -9,6 +9,7 @@ from ..identify.rig import DAMPER
 from ..physics.effect import EFFECTS, Effect, effects_of, plain_name
 from . import verdict_text
 from .decision import Z
+from .effect_words import effect_words
 from .faults import SensorFault, instruments_of
 from .finding import Finding
 from .load_cell import FORCE_GAIN
@@ -72,6 +73,7 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     reasons = [
         *_reasons(parts, kind),
         *filter(None, map(low_pass_text, parts)),
+        *(text for part in parts for text in effect_words(part)),
         *about.notes,
         *(_without_load_cell(a) for a in alike.values()),
     ]

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.command_limits import LIMITS
 from ..data.corrections import Correction, set_right
 from ..data.measurement import Measurement
 from .clipping import beyond_range
@@ -43,8 +44,8 @@ def _corrected(run: Measurement, faults: Sequence[SensorFault]) -> Measurement:
             channels[fault.channel] = values - fault.value
         elif fault.fault == "delay":
             channels[fault.channel] = earlier(values, fault.value / run.step)
-        elif fault.fault == "clock":
-            known = [Correction(fault.channel, "clock", fault.value)]
+        elif fault.fault in ("clock", *LIMITS):
+            known = [Correction(fault.channel, fault.fault, fault.value)]
             channels |= set_right({fault.channel: values}, run.step, known)
         elif fault.fault in ("lag", "high-pass", "derived"):
             del channels[fault.channel]  # displacement says the same, without it

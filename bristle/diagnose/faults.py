@@ -17,7 +17,8 @@ class SensorFault:
     how late] is a velocity that was computed from the displacement, "unrelated" (0) one of another
     motion. `std` is the uncertainty of `value`; `words` a sentence; `either` the channel that may
     have it instead, as far as the data tell; `run` the run whose channel it is, "" for all.
-    "clock" [s/s] is what the channel's clock gains on that of the motion.
+    "clock" [s/s] is what the channel's clock gains on that of the motion. "range" [the channel's
+    unit] and "slew" [that per second] limit a command between its record and the coil.
     """
 
     channel: str

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 
+from ..data.corrections import LEFT_OUT
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.model import Run
 from ..identify.search import z_scale
@@ -93,7 +94,8 @@ def inconsistent_runs(
     worst = ", ".join(f"{name} ({z[name]:.3g})" for name in bad)
     return (
         f"One model does not explain all runs: its {Z} is largest in {worst}, while it explains "
-        f"{_list(good)}. Were they taken on one rig, with one setting?"
+        f"{_list(good)}. Were they taken on one rig, with one setting? If a run does not belong, "
+        f"{LEFT_OUT}."
     )
 
 
@@ -132,7 +134,8 @@ def groups(
     named = "; ".join(_list([run.name for run in group]) for group in found)
     return (
         "One model does not explain all runs together. With separate values it explains "
-        f"each of these groups: {named}. Were they taken on one rig, with one setting?"
+        f"each of these groups: {named}. Were they taken on one rig, with one setting? If a run "
+        f"does not belong, {LEFT_OUT}."
     )
 
 

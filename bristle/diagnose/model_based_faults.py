@@ -65,26 +65,39 @@ def model_based_fault(
     if before.z < 1.0 + rule.gain:
         return None
     found = _zero_of_force(before, train, held_out, rule)
-    explains = found is not None and _explains(found.trial, before, rule)
-    if found and explains and not _rival(found, before, train, "force_bias", rule):
+    if (
+        found
+        and explains(found.trial, before, rule)
+        and not has_rival(found, before, train, "force_bias", rule)
+    ):
         return found
     found = _late_drive(before, train, held_out, drive, rule)
-    if found and _explains(found.trial, before, rule):
+    if found and explains(found.trial, before, rule):
         sure = before.z > rule.plain
-        return found if sure or not _rival(found, before, train, "late_drive", rule) else None
+        return found if sure or not has_rival(found, before, train, "late_drive", rule) else None
     return None
 
 
-def _explains(trial: Trial, before: Trial, rule: DecisionRule) -> bool:
+def explains(trial: Trial, before: Trial, rule: DecisionRule) -> bool:
+    """Return whether a model with a fault set right lacks nearly nothing of what it did before."""
     share = 1.0 - max(trial.z**2 - 1.0, 0.0) / (before.z**2 - 1.0)
     least = rule.share_when_clean if trial.z < rule.clean else rule.share
     return 1.0 - trial.z / before.z > rule.gain and share > least
 
 
-def _rival(
+def has_rival(
     found: ModelBasedFault, before: Trial, train: Problem, fault: str, rule: DecisionRule
 ) -> bool:
-    """Return whether an effect that looks like the fault explains the runs as they are better."""
+    """Return whether an effect that looks like the fault explains the runs as they are better.
+
+    Parameters
+    ----------
+    found : the fault, the runs set right and the trial of them
+    before : the trial of the runs as they are, without further effects
+    train : the runs as they are, to fit to
+    fault : what effects say that they look like, one of `physics.effect_check.MIMICKED`
+    rule : the numbers that decide
+    """
     model = before.model
     own = found.trial.model
     cost = _loss(own, found.train)
@@ -97,8 +110,8 @@ def _rival(
         return any(_loss(one.model, train) < cost * (1.0 - rule.margin) for one in found_there)
 
 
-def _promise(cost: float, before: float) -> float:
-    """Return which part of the loss above that of a true model is gone."""
+def promise(cost: float, before: float) -> float:
+    """Return which part of the mean loss above that of a true model is gone."""
     return (before - cost) / max(before - HUBER_AT_ONE, 1e-6)
 
 
@@ -118,7 +131,7 @@ def _zero_of_force(
         return None  # an offset of its own would be that one
     base = before.model
     offset = float(np.median(_left(base, train)))
-    if _promise(_loss(base, _shifted(train, offset)), _loss(base, train)) < rule.promise:
+    if promise(_loss(base, _shifted(train, offset)), _loss(base, train)) < rule.promise:
         return None
     own = f"{carrier.name}.{carrier.offset}"
     others = tuple(f"{carrier.name}.{n}" for n in carrier.parameters if n != carrier.offset)
@@ -184,7 +197,7 @@ def _late_drive(
             return None
         moved = _moved(train, late)
         model = refine(model, moved, 4)
-        if turn == 0 and _promise(_loss(model, moved), at_first) < rule.promise:
+        if turn == 0 and promise(_loss(model, moved), at_first) < rule.promise:
             return None
     bend = cost(late + dt) + cost(late - dt) - 2.0 * cost(late)
     std = dt * float(np.sqrt(2.0 / max(bend, 1e-12)))

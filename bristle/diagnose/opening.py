@@ -22,6 +22,7 @@ from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .clocks import clock_faults
 from .corrected import corrected
 from .faults import SensorFault, words_of
+from .limited_drive import limited_drive
 from .model_based_faults import model_based_fault
 from .remaining_residual import patterns_of
 from .rule import BENCH, DecisionRule
@@ -193,6 +194,10 @@ def opened_with(before: Trial, data: BenchData) -> Opening:
             problem, held_out = problem.with_free_zero(), held_out.with_free_zero()
             before = judge(before.model, problem, held_out)
     else:
+        capped = limited_drive(before, problem, held_out, problem.runs[0].drive)
+        if capped is not None:
+            faults.append(capped.fault)
+            problem, held_out, before = capped.train, capped.held_out, capped.trial
         apart = clock_faults(before, problem, held_out)
         if apart is not None:
             faults += apart.faults

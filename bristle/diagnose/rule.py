@@ -411,3 +411,7 @@ SENSOR = replace(BENCH, gain=0.03, clean=1.05, share=0.9)
 
 DRIVE = replace(SENSOR, least_delay=0.25)
 """A drive that is late on record, which only a model shows."""
+
+LIMITED = replace(SENSOR, margin=0.003)
+"""A drive that was limited in slew or range: a bend or a lag looks much like it, so that an effect
+that leaves hardly less is taken instead."""

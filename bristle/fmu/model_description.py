@@ -64,6 +64,8 @@ def unit_definitions(names: Iterable[str]) -> Element:
         }
         if unit.factor != 1.0:
             exponents["factor"] = repr(unit.factor)
+        if unit.offset != 0.0:
+            exponents["offset"] = repr(unit.offset)
         SubElement(SubElement(definitions, "Unit", name=name), "BaseUnit", exponents)
     return definitions
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.command_limits import JUMP
 from ..physics import damper
 from ..physics.inputs import Inputs, Setup
 from ..physics.laws import LAWS
@@ -24,29 +25,19 @@ law_step = damper.step_law
 
 _ONE_AT_A_TIME = Lock()
 
-JUMP = 8.0
-"""How many times the changes beside it a change of voltage exceeds that is a jump."""
-
 
 def before_jump(V: Any, k: int) -> float:
     """Return the voltage [V] just before sample k, to which it goes from sample k - 1.
 
     A step of a voltage falls on a sample, so what jumps there was held before; what is smooth is
-    linear between samples. A jump stands out against the changes before and after it.
+    linear between samples. A jump stands out against the changes before and after it, as in
+    `data.command_limits.jumps`.
     """
     change = JUMP * max(
         abs(V[k - 1] - V[k - 2]) if k > 1 else 0.0,
         abs(V[k + 1] - V[k]) if k + 1 < len(V) else 0.0,
     )
     return V[k - 1] if abs(V[k] - V[k - 1]) > change else V[k]  # type: ignore[no-any-return]
-
-
-def jumps(V: Array) -> NDArray[np.bool_]:
-    """Return at which samples of a voltage (n,) `before_jump` sees a jump."""
-    change = np.abs(np.diff(V, prepend=V[:1]))
-    beside = np.maximum(np.append(0.0, change[:-1]), np.append(change[1:], 0.0))
-    found: NDArray[np.bool_] = change > JUMP * beside
-    return found
 
 
 def force_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: Any) -> None:

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..check.channel import shown
+from ..data.command_limits import jumps
 from ..data.measurement import Measurement
 from ..physics.effect import EFFECTS, Effect
-from .bench import jumps
 
 Array = NDArray[np.float64]
 

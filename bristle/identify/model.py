@@ -16,6 +16,7 @@ from ..physics.laws import LAWS, Law
 from ..physics.parameter import CHOICES, Parameter
 from .bench import Bench
 from .instruments import earlier, pure_delay, shown_force, true_motion
+from .run_labels import told_by, values_of_labels
 
 Array = NDArray[np.float64]
 
@@ -152,7 +153,23 @@ class Problem:
 
         Not those that a part of the law takes up whole.
         """
-        return [effect.name for effect in effects_of("damper", law) if not absorbed(effect, law)]
+        return [
+            effect.name
+            for effect in effects_of("damper", law)
+            if not absorbed(effect, law) and self.tells(effect)
+        ]
+
+    def tells(self, effect: type[Effect]) -> bool:
+        """Return whether the runs have the labels that an effect takes, and differ in them."""
+        names = {*effect.labels.values(), *effect.label_means.values()}
+        known = [self._numbers(name) for name in names]
+        return all(len({*one}) > 1 and max(one) - min(one) >= effect.label_span for one in known)
+
+    def _numbers(self, label: str) -> list[float]:
+        """Return the numbers of a label, one per run; none where a run lacks it."""
+        found = [run.labels.get(label, "") for run in self.runs]
+        numbers = [one for one in found if not isinstance(one, str)]
+        return numbers if len(numbers) == len(found) else []
 
     def size(self, unit: str) -> float:
         """Return the typical size on this rig of a parameter of some unit, in SI."""
@@ -165,9 +182,11 @@ class Problem:
     def scaled(self, law: str, name: str) -> float:
         """Return a parameter's default brought to the size of this rig, within its bounds."""
         declared = parameter(law, name)
-        effect = name.partition(".")[0] if "." in name else ""
+        effect, _, own = name.partition(".") if "." in name else ("", "", "")
         if effect and EFFECTS[effect].of_this_rig():
             return declared.value
+        if effect and (numbers := self._numbers(told_by(EFFECTS[effect], own))):
+            return float(np.clip(np.mean(numbers), *declared.bounds))
         reference = REFERENCE.get(declared.unit)
         value = declared.value * (self.size(declared.unit) / reference if reference else 1.0)
         return min(max(value, declared.bounds[0]), declared.bounds[1])
@@ -186,7 +205,8 @@ class Problem:
             e = run.draws[draw]
             x, v, a, V = x + e[:, 0], v + e[:, 1], a + e[:, 2], V + e[:, 3]
         v, a = true_motion(model.effects, model.values, v, a, run.dt)
-        late, values = pure_delay(model.effects, model.values)
+        own = values_of_labels(model.effects, run.labels)
+        late, values = pure_delay(model.effects, {**model.values, **own} if own else model.values)
         if late > 0.0:
             x, v, a, V = earlier((x, v, a, V), late, run.dt)
         force = self.bench(model).force(x, v, a, V, run.dt, values)
@@ -231,7 +251,7 @@ def sizes(runs: list[Run]) -> dict[str, float]:
         "N/V": force / V, "N/(m.V)": force / (x * V), "N.s/(m.V)": force / (v * V),
         "N/V2": force / V**2, "N/(m.V2)": force / (x * V**2), "N.s/(m.V2)": force / (v * V**2),
         "1/m": 1.0 / x,
-        "s": 0.05, "1": 1.0,
+        "s": 0.05, "1": 1.0, "1/K": 0.01,
     }  # fmt: skip
 
 

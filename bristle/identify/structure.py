@@ -94,6 +94,7 @@ class StructureProblem(Problem):
             effect.key("damper")
             for effect in effects_of("damper", law)
             if not absorbed(effect, law)
+            and self.tells(effect)
             and not (self.reconstructed and "structure" in effect.sites)
         ]
 

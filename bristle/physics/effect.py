@@ -139,6 +139,11 @@ class Effect:
         Parameters that count for laws with bristles alone; with others a fit leaves them.
     assumed
         Parameters that measurements hardly tell: no fit moves them.
+    labels, label_means, label_span
+        Parameters that are no property of the damper but known of each run: {parameter: label}, by
+        the labels of `[[runs]]` in study.toml. The one is the run's own number, the other the mean
+        of the training runs. No fit moves them, so `assumed` names them, too. The effect is tried
+        where all runs have the labels and differ in them, by `label_span` at the least.
     contact
         Its `force` is dry friction, which carries what holds the motion (`q.halt`), or the push of
         a stop. In a structure it is found together with the motion, whatever its stiffness, and
@@ -172,6 +177,7 @@ class Effect:
     start_ties
         Parameters whose start follows from the others: a static method `tie(p, sizes)` gives their
         values, in this order, as a tuple; `sizes` are the rig's (`Sizes`).
+    A static method `in_words(p)` says what its values mean, in a sentence for the verdict.
     A static method `yield_share(p)` says by what the law's own yield force is divided at a start,
     for an effect that the law has taken up in part.
 
@@ -234,6 +240,9 @@ class Effect:
     starts: ClassVar[dict[str, str]] = {}
     bristles: ClassVar[tuple[str, ...]] = ()
     assumed: ClassVar[tuple[str, ...]] = ()
+    labels: ClassVar[dict[str, str]] = {}
+    label_means: ClassVar[dict[str, str]] = {}
+    label_span: ClassVar[float] = 0.0
     contact: ClassVar[bool] = False
     shows: ClassVar[str] = "force"
     own: ClassVar[bool] = False

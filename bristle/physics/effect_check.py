@@ -21,8 +21,9 @@ from .law_check import PARTS
 if TYPE_CHECKING:
     from .effect import Effect
 
-MIMICKED = ("force_bias", "late_drive")
-"""Faults of a sensor that an effect may look like: the force's zero, a drive on record late."""
+MIMICKED = ("force_bias", "late_drive", "limited_drive")
+"""Faults of a sensor that an effect may look like: the force's zero, a drive on record late, or one
+that was limited in slew or range behind its record."""
 
 
 FIELDS = {
@@ -31,7 +32,7 @@ FIELDS = {
     **dict.fromkeys(("laws", "acts_on", "needs", "bristles", "assumed", "joint", "late"), TEXTS),
     **dict.fromkeys(("sites", "excludes", "start_ties", "mimics", "faults"), TEXTS),
     **dict.fromkeys(("contact", "passive", "zero_at_rest"), SWITCH),
-    **dict.fromkeys(("states", "starts", "lookalikes"), TEXT_BY_NAME),
+    **dict.fromkeys(("states", "starts", "lookalikes", "labels", "label_means"), TEXT_BY_NAME),
     **dict.fromkeys(("start_grid", "start_limits"), ANY_BY_NAME),
     "parameters": PARAMETERS,
     "tables": TABLES,
@@ -88,6 +89,9 @@ def check_search(effect: type[Effect], where: str) -> None:
             )
         if not all(isinstance(values, tuple) and values for values in grid.values()):
             raise PhysicsError(f"{where}: {field} holds a tuple of numbers for each parameter.")
+    told = [name for name in (*effect.labels, *effect.label_means) if name not in effect.assumed]
+    if told:
+        raise PhysicsError(f"{where}: labels names {told}, which assumed must name as well.")
     if effect.start_grid and effect.start_shares:
         raise PhysicsError(f"{where}: start_grid or start_shares is right, not both.")
     for name, limits in effect.start_limits.items():

@@ -174,6 +174,8 @@ def _tiles(content: Content) -> str:
     held_out = f"{count} of them held out" if count else "its last part held out"
     test = sum(run.role == TEST for run in runs)
     held_out += f", {test} test run{'s' * (test > 1)}" if test else ""
+    out = len(content.study.settings.excluded)
+    held_out += f"; {out} left out" if out else ""
     pairs.append((f"{len(runs)} run{'s' * (len(runs) > 1)}", held_out))
     return html.tiles(pairs)
 

@@ -12,6 +12,7 @@ from ..compare.tables import run_table
 from ..data.labels import label_text
 from ..draw.style import MINUS, percent
 from ..quantity import plain, quantity, times_ten
+from ..study.reading import name_of_run
 from ..study.run_file import TEST
 
 if TYPE_CHECKING:
@@ -101,6 +102,8 @@ def data_table(study: Study, measured: Sequence[Measurement]) -> tuple[list[str]
                 *([_known(study, run)] if labelled else []),
             ]
         )  # fmt: skip
+    for one in study.settings.excluded:
+        rows.append([name_of_run(one), "left out", *["-"] * (len(header) - 2)])
     return header, rows
 
 

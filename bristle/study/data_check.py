@@ -129,7 +129,9 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
     level = ""
     if study.settings.has_building:
         level = damper_level(runs.all)
-    findings = [Finding("split", "warning", note) for note in runs.notes]
+    left_out = study.settings.excluded_text
+    findings = [Finding("split", "warning", note) for note in runs.notes if note != left_out]
+    findings += [Finding("left out", "note", left_out)] if left_out else []
     findings += [Finding("split", "warning", note) for note in (test.notes if test else ())]
     for done, run in enumerate(every, 1):
         findings += _check_run(run, level)

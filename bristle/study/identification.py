@@ -134,6 +134,7 @@ def identify_model(study: Study, model: StudyModel, task: FitTask) -> Identified
     left_out = tuple(f"Left out: {why}" for why in study.usable_effects())
     model = _with_choices(model, task.begin)
     runs = study.runs()
+    model = _with_labels(model, runs.train)
     found = identify_on_rig(rig_of(study, model, runs), runs, model, task)
     return replace(found, notes=(*found.notes, *left_out))
 
@@ -255,6 +256,20 @@ def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
     """Return the model with the choices of a form, such as a storey's number, that were found."""
     chosen = {n: v for n, v in begin.items() if n.endswith(".which") and n in model.flat()}
     return model.with_values(chosen, origin="assumed") if chosen else model
+
+
+def _with_labels(model: StudyModel, runs: Sequence[Measurement]) -> StudyModel:
+    """Return the model with what is known of runs at their mean, unless it was set by hand."""
+    found = {}
+    for name in model.effects:
+        effect = EFFECTS[name]
+        for own, label in {**effect.labels, **effect.label_means}.items():
+            numbers = [y for run in runs if not isinstance(y := run.labels.get(label, ""), str)]
+            parameter = f"{name}.{own}"
+            left = model.flat()[parameter].value == effect.parameters[own].value
+            if left and len(numbers) == len(runs):
+                found[parameter] = float(np.mean(numbers))
+    return model.with_values(found, origin="measured") if found else model
 
 
 def _of_law(model: StudyModel, law: str | None) -> StudyModel:

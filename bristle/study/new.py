@@ -27,7 +27,7 @@ from ..units import canonical
 from .history import History, Step
 from .roles import for_test, roles_of
 from .run_facts import Facts, RunChoices, facts_of
-from .run_file import TEST, RunFile
+from .run_file import EXCLUDE, TEST, RunFile
 from .settings import ALL, Settings, write_settings
 
 _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<unit>[^@]*))?")
@@ -87,14 +87,17 @@ def make_folder(
     of_file = dict(zip(names, about, strict=True))
     is_test = dict(zip(names, closed, strict=True))
     listed, said = roles_of([one.name for one in found], [is_test[one.file] for one in found])
+    every = [_with_facts(a, b, of_file) for a, b in zip(found, listed, strict=True)]
     settings = Settings(
-        title or folder.name, rig,
-        tuple(_with_facts(a, b, of_file) for a, b in zip(found, listed, strict=True)),
+        title or folder.name, rig, tuple(run for run in every if run.role != EXCLUDE),
         specs, comments={guess.channel: _comment(guess) for guess in guesses},
         mask=choices.mask, split=choices.split, law=ALL if law is None and rig == "bench" else "",
+        excluded=tuple(run for run in every if run.role == EXCLUDE),
         rate=_rate([one for one in found if not is_test[one.file]], choices, notes),
     )  # fmt: skip
     _refuse_one_role(settings.runs)
+    if settings.excluded:
+        notes.append(settings.excluded_text.removesuffix("."))
     notes += said if not any(one.role for one in about) else []
     notes += _twins(found, is_test)
     data = dict(zip(names, map(Path, files), strict=True))

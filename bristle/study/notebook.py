@@ -104,6 +104,7 @@ def study_html(study: Study) -> str:
         html.paragraphs(
             f"{study.folder}: {len(settings.runs)} runs, {held_out} of them held out"
             f"{f', {test} for the test at the end' if test else ''}.",
+            settings.excluded_text,
             f"Verdict: {verdict.get('words')}" if verdict else "",
         ),
         html.table(

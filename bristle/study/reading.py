@@ -49,6 +49,23 @@ def name_of_run(run: RunFile) -> str:
     return f"{stem} run {run.piece}" if run.piece else stem
 
 
+def place_of_run(folder: Path, settings: Settings, name: str) -> tuple[str, int]:
+    """Return file and piece of the run with a name, or of that with a part of this name.
+
+    Raises
+    ------
+    StudyError
+        If no run has such a name.
+    """
+    names = {name_of_run(run): (run.file, run.piece) for run in settings.runs}
+    own = [one for one in names if name == one or name.startswith((f"{one} (", f"{one}, "))]
+    if not own:
+        raise StudyError(
+            f'{folder / "study.toml"}: no run is called "{name}"; there are {", ".join(names)}.'
+        )
+    return names[max(own, key=len)]
+
+
 def _measured(
     folder: Path, settings: Settings, run: RunFile, tables: Sequence[Table]
 ) -> list[Measurement]:

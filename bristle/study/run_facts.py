@@ -14,7 +14,7 @@ from ..data.labels import UNITS, Label, label_text
 from ..data.titles import title, unit_or_none
 from ..errors import StudyError, UnitError
 from ..units import convert, same_dimension
-from .run_file import ROLES
+from .run_file import EXCLUDE, ROLES
 
 _NUMBER = r"\d+(?:[.,p]\d+)?"  # "1p5" stands for 1.5 where a point would end a name
 _UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|C"
@@ -271,8 +271,9 @@ def _facts(header: Sequence[str], row: Sequence[str], file: int, where: str) -> 
         column = title(k, text)
         name = column.name.strip().lower().replace(" ", "_")
         if name == "role":
-            if value not in ROLES:
-                raise StudyError(f'{where}: role is "{value}"; {" or ".join(ROLES)} is right.')
+            if value not in (*ROLES, EXCLUDE):
+                right = f"{', '.join(ROLES)} or {EXCLUDE}"
+                raise StudyError(f'{where}: role is "{value}"; {right} is right.')
             found = replace(found, role=value)
             continue
         target = PLAIN.get(name, "") if name in DRIVE else UNITS.get(name, "")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..data.channels import DRIVE, PLAIN, ChannelSpec, is_channel
+from ..data.command_limits import LIMITS
 from ..data.corrections import FAULTS, Correction, wrong_value
 from ..data.files import Toml
 from ..data.labels import UNITS, Label
@@ -18,13 +19,18 @@ TEST = "test"
 """The role of runs that no choice sees: neither a fit nor a verdict reads them."""
 
 ROLES = ("train", "holdout", TEST)
+"""The roles of runs that are read."""
+
+EXCLUDE = "exclude"
+"""The role of runs that are left out: nothing reads them."""
+
 _RUN_KEYS = ("file", "piece", "role", *DRIVE, *UNITS, "labels", "correct")
 _CORRECTION_KEYS = Correction._fields
 
 
 @dataclass(frozen=True)
 class RunFile:
-    """One `[[runs]]`: the file, relative to the study, and its role, one of `ROLES`.
+    """One `[[runs]]`: the file, relative to the study, and its role, of `ROLES` or `EXCLUDE`.
 
     `levels` of a command that the file does not hold, by channel, in its unit; `labels` what else
     is known of the whole run; `piece` its number in a file of several runs, from 1, else 0;
@@ -65,8 +71,9 @@ def read_runs(toml: Toml, folder: Path, split: bool) -> tuple[RunFile, ...]:
             continue
         toml.known(keys, table, _RUN_KEYS)
         file, role = toml.text(keys, table, "file"), toml.text(keys, table, "role", "train")
-        if role not in ROLES:
-            toml.error((*keys, "role"), f'role = "{role}"; "train", "holdout" or "test" is right.')
+        if role not in (*ROLES, EXCLUDE):
+            right = ", ".join(f'"{one}"' for one in ROLES)
+            toml.error((*keys, "role"), f'role = "{role}"; {right} or "{EXCLUDE}" is right.')
         if not file:
             toml.error(keys, 'a run has no file; file = "data/run_1.csv" is right.')
         elif not (folder / file).is_file():
@@ -135,6 +142,8 @@ def _corrections(toml: Toml, keys: KeyPath, table: Mapping[str, Any]) -> tuple[C
             toml.error(here, unknown("fault", fault, FAULTS))
         elif value is None:
             toml.error(here, f"{fault} has no value: {FAULTS[fault]}.")
+        elif fault in LIMITS and channel not in DRIVE:
+            toml.error(here, f"{fault} is of a command ({', '.join(DRIVE)}), not of {channel}.")
         elif wrong := wrong_value(fault, value):
             toml.error(here, f"{fault} = {written(value)}: {wrong}")
         else:

@@ -14,7 +14,14 @@ from ..data.pieces import wrong_split
 from ..errors import RecordError, UnitError
 from ..findings import unknown, written
 from ..units import same_dimension
-from .run_file import RunFile, check_levels, corrections_as_toml, read_runs, run_as_toml
+from .run_file import (
+    EXCLUDE,
+    RunFile,
+    check_levels,
+    corrections_as_toml,
+    read_runs,
+    run_as_toml,
+)
 
 RIGS = ("bench", "structure")
 CUT_OFF = 18.0
@@ -36,7 +43,8 @@ class Settings:
     `cut_off` [Hz] of the low-pass on measured and predicted force, 0 for none; `rate` [Hz] to which
     runs that are sampled faster are decimated, 0 for none; `mask` whether isolated spikes count as
     not measured; `split` how files hold several runs, "" where they hold one (`data.pieces`);
-    `law` "all" where the law is sought together with its effects, "" where the model's is kept.
+    `law` "all" where the law is sought together with its effects, "" where the model's is kept;
+    `excluded` the runs that are left out, which are none of `runs`.
     """
 
     title: str
@@ -50,12 +58,19 @@ class Settings:
     mask: bool = False
     split: str = ""
     law: str = ""
+    excluded: tuple[RunFile, ...] = ()
 
     @property
     def drive(self) -> str:
         """The channel that commands the damper, "" where none was measured."""
         there = {*self.channels, *(name for run in self.runs for name in run.levels)}
         return next((name for name in DRIVE if name in there), "")
+
+    @property
+    def excluded_text(self) -> str:
+        """The sentence that tells which runs are left out, "" where none is."""
+        names = ", ".join(run.name for run in self.excluded)
+        return f'Left out by role = "{EXCLUDE}" in study.toml: {names}.' if names else ""
 
     @property
     def has_building(self) -> bool:
@@ -96,7 +111,11 @@ def read_settings(path: Path) -> Settings:
     split = toml.text((), data, "split")
     if split and (wrong := wrong_split(split)):
         toml.error(("split",), f"split = {written(split)}; {wrong}")
-    runs = read_runs(toml, path.parent, bool(split))
+    listed = read_runs(toml, path.parent, bool(split))
+    runs = tuple(run for run in listed if run.role != EXCLUDE)
+    excluded = tuple(run for run in listed if run.role == EXCLUDE)
+    if listed and not runs:
+        toml.error(("runs",), f'every run has role = "{EXCLUDE}": some for training are needed.')
     channels = {
         name: _channel(toml, name, table)
         for name, table in toml.table((), data, "channels").items()
@@ -107,7 +126,7 @@ def read_settings(path: Path) -> Settings:
     toml.check()
     return Settings(
         title, rig, runs, channels, notes, CUT_OFF if cut_off is None else cut_off,
-        rate=rate or 0.0, mask=bool(mask), split=split, law=law,
+        rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded,
     )  # fmt: skip
 
 
@@ -135,7 +154,7 @@ def write_settings(path: Path, settings: Settings) -> None:
     if settings.split:
         document.add("split", tomlkit.item(settings.split))
     runs = tomlkit.aot()
-    for run in settings.runs:
+    for run in (*settings.runs, *settings.excluded):
         runs.append(run_as_toml(run))
     document.add("runs", runs)
     channels = tomlkit.table(is_super_table=True)
@@ -166,19 +185,40 @@ def with_mask(text: str) -> str:
     return "\n".join([*lines[:first], line, *lines[first:]])
 
 
-def with_corrections(text: str, found: Mapping[int, Sequence[Correction]]) -> str:
+def with_excluded(text: str, files: Sequence[tuple[str, int]]) -> str:
+    """Return the text of a study.toml with runs left out from now on, all else as it was.
+
+    Parameters
+    ----------
+    text : of the file
+    files : file and piece of each run, its piece 0 where the file holds one
+    """
+    import tomlkit
+
+    document: Any = tomlkit.parse(text)
+    for table in document["runs"]:
+        if (table["file"], table.get("piece", 0)) in files:
+            before = table.get("role", "train")
+            table["role"] = EXCLUDE
+            table["role"].comment(f"was {before}")
+    return tomlkit.dumps(document)
+
+
+def with_corrections(text: str, found: Mapping[tuple[str, int], Sequence[Correction]]) -> str:
     """Return the text of a study.toml with more corrections of runs, all else as it was.
 
     Parameters
     ----------
     text : of the file
-    found : corrections by the place of the run in `[[runs]]`
+    found : corrections by file and piece of the run, its piece 0 where the file holds one
     """
     import tomlkit
 
     document: Any = tomlkit.parse(text)
-    for place, corrections in found.items():
-        table = document["runs"][place]
+    for table in document["runs"]:
+        corrections = found.get((table["file"], table.get("piece", 0)))
+        if corrections is None:
+            continue
         known = [Correction(**one) for one in table.unwrap().get("correct", [])]
         table["correct"] = corrections_as_toml([*known, *corrections])
     return tomlkit.dumps(document)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -23,10 +23,10 @@ from ..physics.user import Loaded, waiting
 from ..trust import can_do_without, load
 from .history import History, Step
 from .new import make_folder
-from .reading import name_of_run, read_runs
+from .reading import place_of_run, read_runs
 from .run_file import ROLES, TEST
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
-from .settings import Settings, read_settings, with_corrections, with_mask
+from .settings import Settings, read_settings, with_corrections, with_excluded, with_mask
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -183,6 +183,8 @@ class Study:
         """
         (train, idle), (holdout, other) = (usable(self.read(role)) for role in ROLES[:2])
         idle = (*idle, *other)
+        if self.settings.excluded:
+            idle = (*idle, self.settings.excluded_text)
         if sum(run.role != TEST for run in self.settings.runs) == 1:
             split = split_in_time([*train, *holdout])
             return replace(split, notes=(*split.notes, *idle))
@@ -291,10 +293,7 @@ class Study:
 
     def with_mask(self) -> Study:
         """Write `mask = true` into study.toml, and return the study as it is then."""
-        path = self.folder / "study.toml"
-        with self.writing():
-            write_whole(path, with_mask(path.read_text(encoding="utf-8-sig")))
-        return Study(self.folder)
+        return self._with_settings(with_mask)
 
     def with_corrections(self, found: Mapping[str, Sequence[Correction]]) -> Study:
         """Write corrections into study.toml, and return the study as it is then.
@@ -308,17 +307,35 @@ class Study:
         StudyError
             If no run has such a name.
         """
-        path = self.folder / "study.toml"
-        names = [name_of_run(run) for run in self.settings.runs]
-        places: dict[int, list[Correction]] = {}
+        places: dict[tuple[str, int], list[Correction]] = {}
         for name, corrections in found.items():
-            own = [one for one in names if name == one or name.startswith((f"{one} (", f"{one}, "))]
-            if not own:
-                raise StudyError(f'{path}: no run is called "{name}".')
-            known = places.setdefault(names.index(max(own, key=len)), [])
+            known = places.setdefault(place_of_run(self.folder, self.settings, name), [])
             known += [one for one in corrections if not any(map(one.is_like, known))]
+        return self._with_settings(lambda text: with_corrections(text, places))
+
+    def with_excluded(self, names: Sequence[str]) -> Study:
+        """Write `role = "exclude"` for runs into study.toml, and return the study as it is then.
+
+        Parameters
+        ----------
+        names : of the runs, or of parts of them
+
+        Raises
+        ------
+        StudyError
+            If no run has such a name, or none would be left.
+        """
+        places = [place_of_run(self.folder, self.settings, name) for name in names]
+        if len({*places}) == len(self.settings.runs):
+            path = self.folder / "study.toml"
+            raise StudyError(f"{path}: these are all runs; some for training are needed.")
+        return self._with_settings(lambda text: with_excluded(text, places))
+
+    def _with_settings(self, change: Callable[[str], str]) -> Study:
+        """Write study.toml with its text changed, and return the study as it is then."""
+        path = self.folder / "study.toml"
         with self.writing():
-            write_whole(path, with_corrections(path.read_text(encoding="utf-8-sig"), places))
+            write_whole(path, change(path.read_text(encoding="utf-8-sig")))
         return Study(self.folder)
 
     def verdict(self) -> dict[str, Any] | None:

@@ -29,6 +29,7 @@ LIBRARY = {
         "stribeck", "flattening", "presliding", "gas_spring", "coil_lag", "remanence",
         "saturation", "temperature", "backlash", "mount_compliance", "quadratic_damping",
         "fluid_inertia", "asymmetry", "base_friction", "duffing", "end_stop",
+        "measured_temperature",
     ),
     "structure": ("base_friction", "duffing", "storey_softening", "end_stop"),
     "sensor": ("delay", "velocity_sensor"),

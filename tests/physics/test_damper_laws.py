@@ -141,6 +141,7 @@ def test_what_a_law_contains_is_not_offered_twice(law: str, effect: type) -> Non
     lacks = {
         "coil_lag": "command", "remanence": "command", "saturation": "command",
         "presliding": "sign", "stribeck": "yield", "temperature": "yield", "flattening": "viscous",
+        "measured_temperature": "yield",
     }.get(effect.name, "")  # fmt: skip
     contained = (effect.kind or effect.name) in kind.contains
     assert effect.joins(kind) == (not contained and (not lacks or kind.has(lacks)))

@@ -88,7 +88,7 @@ def test_settings_come_back_as_written(folder: Path) -> None:
         ('rig = "bench"', 'rig = "bensch"', 'line 4: rig = "bensch"'),
         ('title = "rig A"', "title = 5", "line 2: title = 5"),
         ('title = "rig A"', 'titel = "x"', 'line 2: there is no key "titel".* "title"'),
-        ('role = "holdout"', 'role = "seen"', 'line 12: role = "seen"; "train", "holdout" or'),
+        ('role = "holdout"', 'role = "seen"', 'line 12: role = "seen"; "train", "holdout",'),
         ("run_2.csv", "run_9.csv", "line 11: there is no file"),
         ("run_2.csv", "run_1.csv", "line 11: .* listed twice"),
         ("[channels.force]", "[channels.forse]", 'line 18: there is no channel "forse".*"force"'),

@@ -15,7 +15,7 @@ from math import log
 import numpy as np
 
 from ...quantity import plain, quantity
-from ..corrections import Correction
+from ..corrections import LEFT_OUT, Correction
 from ..force_shapes import RunForces, fitted_forces, force_parts
 from ..measurement import Measurement
 from ..relation import derivative_relation
@@ -97,7 +97,7 @@ def _motion(runs: Sequence[Measurement]) -> Iterator[Finding]:
                 "warning",
                 f"velocity shows {plain(float(zero) * rms)} m/s more than in the other runs: its "
                 "mean is not the way that the displacement went.",
-                "Give the run a correction, or leave it out.",
+                f"Give the run a correction, or {LEFT_OUT}.",
                 run.name,
                 "velocity",
                 abs(float(zero)),
@@ -120,7 +120,7 @@ def _turned(run: Measurement) -> Finding:
         "run sign",
         "error",
         f"{turned} has the opposite sign of that in the other runs.",
-        "Give the run a correction, or leave it out.",
+        f"Give the run a correction, or {LEFT_OUT}.",
         run.name,
         turned,
         1.0,
@@ -138,14 +138,14 @@ def _of_motion(run: Measurement, ratio: float, runs: Sequence[Measurement]) -> F
     if not channel:
         return Finding(
             "run gain", "warning", f"{text}: one of the two has another gain in this run.",
-            "Look up the ranges of both instruments, or leave the run out.", run.name, "velocity",
+            f"Look up the ranges of both instruments, or {LEFT_OUT}.", run.name, "velocity",
             abs(log(ratio)),
         )  # fmt: skip
     value = ratio if channel == "velocity" else 1.0 / ratio
     return Finding(
         "run gain", "warning",
         f"{text}; by its noise, {channel} shows {plain(value, 4)} times what it should.",
-        "Give the run a correction, or leave it out.", run.name, channel, abs(log(ratio)),
+        f"Give the run a correction, or {LEFT_OUT}.", run.name, channel, abs(log(ratio)),
         (Correction(channel, "gain", value),),
     )  # fmt: skip
 
@@ -221,7 +221,7 @@ def _of_gain(run: Measurement, gain: float) -> Finding:
     if gain < 0.0 and 0.8 < -gain < 1.25:
         return Finding(
             "run sign", "error", "force has the opposite sign of that in the other runs.",
-            "Give the run a correction, or leave it out.", run.name, "force", 1.0,
+            f"Give the run a correction, or {LEFT_OUT}.", run.name, "force", 1.0,
             (Correction("force", "sign", -1.0),),
         )  # fmt: skip
     turned = (Correction("force", "sign", -1.0),) if gain < 0.0 else ()
@@ -230,7 +230,7 @@ def _of_gain(run: Measurement, gain: float) -> Finding:
         "run gain", "warning",
         f"force is {plain(gain, 3)} times what the other runs say at the same motion and command: "
         "another range of the load cell, another temperature, or another damper.",
-        "Give the run a correction if the load cell's range was another, else leave it out.",
+        f"Give the run a correction if the load cell's range was another, else {LEFT_OUT}.",
         run.name, "force", abs(log(abs(gain))), corrections,
     )  # fmt: skip
 
@@ -240,7 +240,7 @@ def _of_zero(run: Measurement, zero: float, share: float, rms: float) -> Finding
         "run zero", "warning",
         f"force shows {quantity(zero, 'N', 3, rms)} more than in the other runs, whatever the "
         "motion and the command: the load cell was not set to zero, or a preload acted.",
-        "Give the run a correction, or leave it out.", run.name, "force", share,
+        f"Give the run a correction, or {LEFT_OUT}.", run.name, "force", share,
         (Correction("force", "bias", zero),),
     )  # fmt: skip
 

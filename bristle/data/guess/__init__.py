@@ -7,17 +7,22 @@ the doubt is said, for either of the two columns could be wrong.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...units import parse as parse_unit
 from ..channels import ChannelSpec, meaning, quantity_of_unit
+from ..labels import TEMPERATURE
 from ..table import Table
 from .bench import bench_guesses
 from .candidates import Search, candidate_of
 from .fitting import fit_signs, fit_units
 from .levels import structure_guesses
+
+_KELVIN = parse_unit("K").dimension
+_AT_DAMPER = frozenset({"damper", "oil", "fluid", "mrf", "mr", "housing"})
 
 FEWEST = 10
 """Rows of numbers below which no column is taken for the time."""
@@ -70,7 +75,22 @@ def guess_channels(
         Guess(channel, one.column.text, one.unit, one.sign, one.reason, one.doubt)
         for channel, one in found.items()
     ]
-    return ([time] if time else []) + guesses
+    known = {taken, *(guess.column for guess in guesses)}
+    return ([time] if time else []) + guesses + _find_temperature(table, known)
+
+
+def _find_temperature(table: Table, known: set[str]) -> list[Guess]:
+    """Return the guess of the damper's temperature in a list, none where none or several may be."""
+    able = [
+        column
+        for column in table.columns
+        if column.text not in known and column.unit and column.unit.dimension == _KELVIN
+    ]
+    at_damper = [one for one in able if _AT_DAMPER & {*re.split(r"[^a-z]+", one.name.lower())}]
+    chosen = at_damper if len(able) > 1 else able
+    if len(chosen) != 1 or chosen[0].unit is None:
+        return []
+    return [Guess(TEMPERATURE, chosen[0].text, chosen[0].unit.name, 1, "its unit")]
 
 
 def left_out(table: Table, guesses: list[Guess]) -> list[str]:

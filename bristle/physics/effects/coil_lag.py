@@ -35,7 +35,7 @@ class CoilLag(Effect):
         "eddy": Parameter(0.0, "1", (0.0, 0.95), "second time constant by the first"),
     }
     start_grid = {"tau": (0.1, 0.5, 2.0)}
-    mimics = ("late_drive",)
+    mimics = ("late_drive", "limited_drive")
 
     @staticmethod
     def voltage(q, z, p):

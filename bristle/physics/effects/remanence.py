@@ -52,7 +52,7 @@ class Remanence(Effect):
         ),
     }
     start_grid = {"width": (0.3, 1.0), "turn": (0.1, 1.0)}
-    mimics = ("late_drive",)
+    mimics = ("late_drive", "limited_drive")
 
     @staticmethod
     def voltage(q, z, p):

@@ -25,7 +25,7 @@ class Saturation(Effect):
         "shape": Parameter(2.0, "1", (1.0, 6.0), "sharpness of the bend"),
     }
     start_grid = {"V_s": (0.2, 0.4, 1.0)}
-    mimics = ("late_drive",)
+    mimics = ("late_drive", "limited_drive")
 
     @staticmethod
     def voltage(q, z, p):

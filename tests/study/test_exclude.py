@@ -1,0 +1,78 @@
+"""A run that does not belong is left out, and every place that counts runs says so."""
+
+from __future__ import annotations
+
+import pytest
+from made import write_runs
+
+from bristle.cli import main
+from bristle.errors import StudyError
+from bristle.report.study_tables import data_table
+from bristle.study.notebook import study_html
+from bristle.study.study import Study
+
+
+@pytest.fixture
+def folder(tmp_path):
+    files = write_runs(tmp_path / "lab", count=4, seconds=2.0)
+    Study.create(tmp_path / "rig", files, law="bingham_standard")
+    return tmp_path / "rig"
+
+
+def test_an_excluded_run_is_read_by_nothing_and_said_to_be_left_out(folder, capsys):
+    path = folder / "study.toml"
+    before = path.read_text(encoding="utf-8")
+    capsys.readouterr()
+    assert main(["study", "check", str(folder), "--exclude", "run_3"]) == 0
+    assert 'Left out by role = "exclude" in study.toml: data/run_3.csv.' in capsys.readouterr().out
+    text = path.read_text(encoding="utf-8")
+    assert text == before.replace(
+        'file = "data/run_3.csv"\nrole = "train"',
+        'file = "data/run_3.csv"\nrole = "exclude" # was train',
+    )
+    (folder / "data" / "run_3.csv").write_text("no numbers\n", encoding="utf-8")  # not read
+    study = Study(folder)
+    assert [run.name for run in study.read()] == ["run_1", "run_2", "run_4"]
+    assert "run_3" in study.runs().notes[-1]
+    rows = data_table(study, study.read())[1]
+    assert rows[-1][:2] == ["run_3", "left out"]
+    assert len(rows) == 4
+    assert "data/run_3.csv" in study_html(study)
+
+
+def test_corrections_reach_their_run_behind_one_that_is_left_out(folder):
+    study = Study(folder).with_excluded(["run_1"])
+    from bristle.data.corrections import Correction
+
+    study = study.with_corrections({"run_4": [Correction("force", "gain", 1.2)]})
+    assert [len(run.corrections) for run in study.settings.runs] == [0, 0, 1]
+
+
+def test_names_that_are_no_run_and_leaving_out_all_are_refused(folder):
+    study = Study(folder)
+    with pytest.raises(StudyError, match='no run is called "run_9"; there are run_1'):
+        study.with_excluded(["run_9"])
+    with pytest.raises(StudyError, match="these are all runs"):
+        study.with_excluded(["run_1", "run_2", "run_3", "run_4"])
+    path = folder / "study.toml"
+    text = path.read_text(encoding="utf-8")
+    every = text.replace('role = "train"', 'role = "exclude"')
+    path.write_text(every.replace('role = "holdout"', 'role = "exclude"'), encoding="utf-8")
+    with pytest.raises(StudyError, match="every run has role"):
+        Study(folder)
+    path.write_text(text.replace('role = "train"', 'role = "left"', 1), encoding="utf-8")
+    with pytest.raises(StudyError, match='"train", "holdout", "test" or "exclude" is right'):
+        Study(folder)
+
+
+def test_a_table_of_runs_leaves_runs_out(tmp_path):
+    files = write_runs(tmp_path / "lab", count=4, seconds=2.0)
+    table = tmp_path / "runs.csv"
+    roles = ("train", "holdout", "exclude", "train")
+    lines = [f"{file.name},{role}" for file, role in zip(files, roles, strict=True)]
+    table.write_text("\n".join(["file,role", *lines]), encoding="utf-8")
+    words = ["study", "new", str(tmp_path / "rig"), "--data", *map(str, files)]
+    assert main([*words, "--runs", str(table)]) == 0
+    settings = Study(tmp_path / "rig").settings
+    assert [run.file for run in settings.excluded] == ["data/run_3.csv"]
+    assert len(settings.runs) == 3
