@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.bench import jumps
+from ..data.command_limits import jumps
 from ..identify.model import Model, Problem, steady
 from ..identify.residuals import Expected, residuals
 from ..identify.search import loss
