@@ -53,6 +53,9 @@ force rough, as impacts in a joint do."""
 STEP = 2.0
 """Factor by which a size is raised until it is beyond what is sought."""
 
+AHEAD = 6
+"""Sizes beyond the first one that are looked at where that one is excluded already."""
+
 SMALLEST, LARGEST = 1e-4, 1e3
 """Sizes between which an effect is looked at, over that of a first guess."""
 
@@ -310,6 +313,12 @@ def _end(sized: Sized, least: float, sign: float, apart: float) -> float:
         return 0.0  # it has one sign alone
     size = low = least
     found = above(least)
+    if found >= 1.0:  # a rough likelihood may fall again
+        ahead = [least * STEP**k for k in range(1, AHEAD + 1)]
+        beyond = [above(one) for one in ahead]
+        best = int(np.argmin(beyond))
+        if beyond[best] < lowest:
+            size, found = ahead[best], beyond[best]
     while found < lowest + 1.0:
         if size >= LARGEST:
             return LARGEST
