@@ -93,6 +93,34 @@ def quantity(value: float, unit: str, digits: int = 3, size: float | None = None
     return f"{plain(factor * value, digits)} {'' if shown == '1' else shown}".rstrip()
 
 
+_FINE: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "m": ((0.0, 1e9, "nm"), (1e-6, 1e6, "µm"), (1e-3, 1e3, "mm"), (10.0, 1.0, "m")),
+    "m/s": ((0.0, 1e3, "mm/s"), (1.0, 1.0, "m/s")),
+    "s": ((0.0, 1e6, "µs"), (1e-4, 1e3, "ms"), (1.0, 1.0, "s")),
+    "kg": ((0.0, 1e3, "g"), (1.0, 1.0, "kg")),
+    "V": ((0.0, 1e3, "mV"), (0.1, 1.0, "V")),
+    "N/m": ((0.0, 1.0, "N/m"), (1e3, 1e-3, "kN/m"), (1e6, 1e-6, "MN/m")),
+}
+
+
+def fine_quantity(value: float, unit: str, digits: int = 2) -> str:
+    """Return a value that stands alone with the unit that suits it: "1.4 ms", "20 µm".
+
+    Parameters
+    ----------
+    value : float
+        In `unit`.
+    unit : str
+        An SI unit, or any other, which is then kept; "1" for none.
+    digits : int
+        Significant digits.
+    """
+    for least, factor, shown in reversed(_FINE.get(unit, ())):
+        if abs(value) >= least:
+            return f"{plain(factor * value, digits)} {shown}"
+    return quantity(value, unit, digits)
+
+
 def short_z(z: float) -> str:
     """Return z as text, with the digits that tell it from 1."""
     return f"{z:.2f}" if z < 10.0 else plain(z)

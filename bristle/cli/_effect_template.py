@@ -43,6 +43,9 @@ class {cls}(Effect):
         "v_s": Parameter(2e-3, "m/s", (1e-5, 1.0), "speed over which it builds up"),
     }}
 
+    # How much of the effect there is: at zero it is gone. Verdicts tell how large it may still be.
+    amount = "f_s"
+
     # Initial guesses of a fit, as factors on the values: start_grid = {{"v_s": (0.3, 1.0, 3.0)}}.
     # The docstring of bristle.physics.effect.Effect describes further data for search and verdict
     # (lookalikes, family, mimics, ...).

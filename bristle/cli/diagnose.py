@@ -70,6 +70,7 @@ def text(verdict: Verdict, folder: Path) -> str:
     if verdict.get("laws"):
         lines += ["", *law_lines(verdict["laws"])]
     lines += _trials(verdict)
+    lines += _limits(verdict)
     if hidden := untestable(verdict):
         lines += ["", f"Not testable with these runs: {', '.join(hidden)}."]
     if separating(verdict):
@@ -114,6 +115,21 @@ def _trials(verdict: Verdict) -> list[str]:
         z = row["z_train"], row["z_holdout"]
         lines.append(f"  {'with ' + row['effect']:34} {z[0]:>12.3f} {z[1]:>12.3f}{note}")
     return [*lines, "  A true model has z = 1: its only error is the noise."]
+
+
+def _limits(verdict: Verdict) -> list[str]:
+    """Return the table of what the runs still allow of each effect."""
+    from ..diagnose.verdict_text import LIMITS, LIMITS_NOTE, limit_rows
+
+    rows = limit_rows(verdict)
+    if not rows:
+        return []
+    table = [list(LIMITS), *rows]
+    wide = [max(len(row[k]) for row in table) for k in range(3)]
+    lines = [
+        f"  {row[0]:{wide[0]}}  {row[1]:{wide[1]}}  {row[2]:>{wide[2]}}  {row[3]}" for row in table
+    ]
+    return ["", *lines, f"  {LIMITS_NOTE}"]
 
 
 def _next(verdict: Verdict, folder: Path) -> str:

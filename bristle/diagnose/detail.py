@@ -15,6 +15,7 @@ from ..data.labels import Labels, varying
 from ..identify.fit import Run, intervals_of, multistart_refit
 from ..identify.search_context import is_rough
 from .candidates import SHOWN, joinable, judge
+from .effect_limits import EffectLimit, Known, effect_limits
 from .experiments import separating
 from .finding import Finding
 from .limits import detectable, untestable
@@ -62,7 +63,20 @@ def _with_limits(found: Finding, opened: Opening) -> Finding:
     if found.kind == "ambiguous" and opened.scope.choose_motion:
         members = [t.model for t in found.trials if set(t.effects) & set(found.effects)]
         experiment = separating(members, opened.problem)
-    return replace(found, detectable=visible, untestable=tuple(hidden), experiment=experiment)
+    found = replace(found, detectable=visible, untestable=tuple(hidden), experiment=experiment)
+    return replace(found, limits=_limits(found, opened))
+
+
+def _limits(found: Finding, opened: Opening) -> tuple[EffectLimit, ...]:
+    """Return how large each further effect may be beside the model that a finding names."""
+    if found.kind == "insufficient" or found.after is None:
+        return ()
+    model = (found.after if found.kind == "effect" else opened.before).model
+    problem = opened.searched
+    deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
+    known = Known(problem, model, problem.expectation(model), deciding, opened.rule)
+    able = [name for name in _able(found, opened) if name not in model.effects]
+    return effect_limits(known, able, found.untestable)
 
 
 def _able(found: Finding, opened: Opening) -> list[str]:

@@ -13,6 +13,7 @@ from ..identify.model import Model
 from ..identify.rig import DAMPER
 from .candidates import Trial
 from .decision import Decision
+from .effect_limits import EffectLimit
 from .experiments import Experiment
 from .faults import SensorFault
 from .law_trials import OtherLaw
@@ -32,7 +33,8 @@ class Finding:
     `untestable` the effects that the site's runs do not show; `experiment` the run that would
     distinguish alternatives, where the rig's motion can be chosen; `sensors` are faults that only
     the model with the named effects shows; `together` is the best pair of effects that was tried;
-    `other_law` the law that would leave less than the model's, where that was asked.
+    `other_law` the law that would leave less than the model's, where that was asked; `limits` how
+    large each further effect may be beside `model`.
     """
 
     site: str
@@ -55,6 +57,7 @@ class Finding:
     sensors: tuple[SensorFault, ...] = ()
     together: Trial | None = None
     other_law: OtherLaw | None = None
+    limits: tuple[EffectLimit, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Return what verdict.json holds of the site."""
@@ -81,6 +84,8 @@ class Finding:
             ]
         if self.other_law is not None:
             out["other_law"] = self.other_law.as_dict()
+        if self.limits:
+            out["limits"] = [one.as_dict() for one in self.limits]
         if self.experiment is not None:
             out["separate_by"] = self.experiment.sentence()
         return out

@@ -14,6 +14,7 @@ from ..identify.rig import DAMPER
 from ..physics.effect import EFFECTS
 from . import verdict_text
 from .candidates import Trial
+from .effect_limits import EffectLimit
 from .experiments import Experiment
 from .faults import SensorFault
 from .finding import Finding
@@ -133,6 +134,11 @@ class Diagnosis:
         """The largest of the sites' smallest shares of the force that would have been seen."""
         known = [f.detectable for f in self.findings.values() if np.isfinite(f.detectable)]
         return max(known, default=float("nan"))
+
+    @property
+    def limits(self) -> dict[str, tuple[EffectLimit, ...]]:
+        """By site, how large each effect that is not named may still be."""
+        return {site: found.limits for site, found in self.findings.items() if found.limits}
 
     @property
     def patterns(self) -> tuple[ResidualPattern, ...]:

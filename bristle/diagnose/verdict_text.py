@@ -12,6 +12,7 @@ from ..compare.names import joined, name_of, site_name
 from ..identify.rig import DAMPER
 from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
 from ..physics.effect import EFFECTS
+from ..quantity import fine_quantity
 from .law_text import law_name, law_sentences
 from .rule import BENCH, DecisionRule
 
@@ -170,6 +171,38 @@ def _absorbing(name: str, sites: Sequence[str], verdict: Verdict) -> list[str]:
     return (
         [f"the law's {part} force takes it up"] if part and DAMPER in sites and not offered else []
     )
+
+
+LIMITS = ("effect", "still possible (95 %)", "of the force", "named 9 times of 10 from")
+"""Columns of the table of limits."""
+
+LIMITS_NOTE = (
+    "Still possible: the size that these runs do not exclude, law and known effects refitted. Of "
+    "the force: what such an effect leaves of it; - where the sampling tells no smaller size."
+)
+
+
+def limit_rows(verdict: Verdict) -> list[list[str]]:
+    """Return the cells of the table of limits, a row per effect; see `LIMITS`."""
+    findings = verdict.get("findings") or []
+    rows = []
+    for found in findings:
+        site = f" ({found['site']})" if len(findings) > 1 else ""
+        for one in found.get("limits") or []:
+            rows.append([f"{one['effect']}{site}", *_limit_cells(one)])
+    return rows
+
+
+def _limit_cells(limit: Mapping[str, Any]) -> list[str]:
+    if limit.get("why"):
+        return [str(limit["why"]), "-", "-"]
+    unit = limit["unit"]
+    named = limit["named_from"]
+    return [
+        f"{limit['parameter']} {limit['side']} {fine_quantity(limit['limit95'], unit)}",
+        f"{100.0 * limit['share']:.2g} %" if limit["share"] is not None else "-",
+        fine_quantity(named, unit) if named is not None else "-",
+    ]
 
 
 def separating(verdict: Verdict) -> str:

@@ -199,6 +199,9 @@ class Effect:
     mass
         The parameter [kg] of a mass that moves with the rod; beside a building's model it is part
         of the moving mass.
+    amount
+        The parameter that says how much of the effect there is: at zero it is gone. "1/NAME" where
+        it vanishes as the parameter grows. Limits are told in it; without it, as shares alone.
 
     Examples
     --------
@@ -261,6 +264,7 @@ class Effect:
     faults: ClassVar[tuple[str, ...]] = ()
     offset: ClassVar[str] = ""
     mass: ClassVar[str] = ""
+    amount: ClassVar[str] = ""
     _elsewhere: ClassVar[dict[str, type[Effect]]]
     State: ClassVar[Any]
     Values: ClassVar[Any]

@@ -28,7 +28,7 @@ that was limited in slew or range behind its record."""
 
 FIELDS = {
     **dict.fromkeys(("name", "site", "kind", "shows", "source", "expect"), TEXT),
-    **dict.fromkeys(("family", "absorbed_by", "offset", "mass"), TEXT),
+    **dict.fromkeys(("family", "absorbed_by", "offset", "mass", "amount"), TEXT),
     **dict.fromkeys(("laws", "acts_on", "needs", "bristles", "assumed", "joint", "late"), TEXTS),
     **dict.fromkeys(("sites", "excludes", "start_ties", "mimics", "faults"), TEXTS),
     **dict.fromkeys(("contact", "passive", "zero_at_rest"), SWITCH),
@@ -113,6 +113,11 @@ def check_verdict(effect: type[Effect], where: str) -> None:
     for field, name, unit in (("offset", effect.offset, "N"), ("mass", effect.mass, "kg")):
         if name and (name not in effect.parameters or effect.parameters[name].unit != unit):
             raise PhysicsError(f"{where}: {field} = {name!r}; a parameter in {unit} is right.")
+    if effect.amount and effect.amount.removeprefix("1/") not in effect.parameters:
+        raise PhysicsError(
+            f'{where}: amount = {effect.amount!r}; a parameter, or "1/" and a parameter, is right: '
+            f"there are {list(effect.parameters)}."
+        )
     others = [parameter for name, parameter in effect.parameters.items() if name != effect.offset]
     if effect.offset and not all(p.bounds[0] <= 0.0 <= p.bounds[1] for p in others):
         raise PhysicsError(f"{where}: offset asks that all other parameters may be zero.")

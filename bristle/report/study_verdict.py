@@ -6,9 +6,12 @@ from ..data.channels import channel_unit, is_channel
 from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
 from ..diagnose.verdict_text import (
     HEADINGS,
+    LIMITS,
+    LIMITS_NOTE,
     Verdict,
     about,
     drive_of,
+    limit_rows,
     sentences,
     separating,
     untestable,
@@ -98,6 +101,11 @@ def untold_section(verdict: Verdict | None) -> str:
         ),
         html.table(["effect", "what it does", "what it would look like"], hidden),
     ] if hidden else []  # fmt: skip
+    limits = limit_rows(verdict or {})
+    if limits:
+        parts.append("<h3>How large each effect may still be</h3>")
+        parts.append(html.table(list(LIMITS), limits))
+        parts.append(html.paragraphs(LIMITS_NOTE, kind="soft"))
     experiment = separating(verdict or {})
     if experiment:
         parts.append("<h3>The experiment that would distinguish them</h3>")
@@ -105,4 +113,4 @@ def untold_section(verdict: Verdict | None) -> str:
     if not parts:
         none = "No diagnosis has been made of this model, so its missing effects are unknown."
         parts = [html.paragraphs(none if verdict is None else "The diagnosis names nothing.")]
-    return html.section("What could not be tested", *parts)
+    return html.section("What these runs exclude, and what they cannot show", *parts)

@@ -23,6 +23,7 @@ class Asymmetry(Effect):
         "residual in step with the force's size: of one sign in one direction, of the other in the "
         "other"
     )
+    amount = "ratio"
     parameters = {
         "ratio": Parameter(0.15, "1", (-0.9, 0.9), "largest change of the force, as a share"),
         "v_s": Parameter(1e-3, "m/s", (1e-6, 1.0), "speed over which the difference sets in"),

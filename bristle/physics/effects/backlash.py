@@ -26,6 +26,7 @@ class Backlash(Effect):
     states = {"compression": "m", "joint_velocity": "m/s"}
     joint = ("compression", "joint_velocity")
     assumed = ("c",)  # felt while a gap closes, for less than a sample
+    amount = "gap"
     parameters = {
         "gap": Parameter(2e-4, "m", (0.0, 0.05), "half the play"),
         "k": Parameter(1e5, "N/m", (1e3, 1e9), "stiffness of the closed joint"),

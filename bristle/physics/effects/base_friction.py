@@ -27,6 +27,7 @@ class BaseFriction(Effect):
     )
     expect = "an error with the sign of the velocity; motion smaller than predicted, or none at all"
     states = {"share": "1"}
+    amount = "limit"
     parameters = {
         "limit": Parameter(0.5, "N", (0.0, 1e7), "friction force at high speed"),
         "slow": Parameter(1.0, "1", (0.1, 3.0), "friction as v -> 0 by that at high speed"),

@@ -28,6 +28,7 @@ class CoilLag(Effect):
     expect = "error just after each change of voltage, too much force falling, too little rising"
     states = {"voltage": "V", "field": "V"}
     starts = {"voltage": "V", "field": "V"}
+    amount = "tau"
     parameters = {
         "tau": Parameter(0.02, "s", (1e-4, 1.0), "time constant of the coil, L/R"),
         "fall": Parameter(1.0, "1", (0.1, 10.0), "how much longer it takes to fall than to rise"),

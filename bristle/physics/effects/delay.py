@@ -31,6 +31,7 @@ class Delay(Effect):
     expect = "the whole residual follows the rate of the force, whatever the motion and voltage"
     states = {"half": "N", "low": "N", **{f"past_{k}": "N" for k in range(SLOTS)}}
     starts = dict.fromkeys(states, "value")
+    amount = "time"
     parameters = {
         "time": Parameter(0.005, "s", (0.0, 0.2), "how late the force is shown"),
         "filtered": Parameter(0.5, "1", (0.0, 1.0), "share of the time that a filter takes"),

@@ -25,6 +25,7 @@ class Duffing(Effect):
         "Kelly (1997), Earthquake-Resistant Design with Rubber"
     )
     expect = "a force in phase with base displacement that grows faster than it"
+    amount = "k_3"
     parameters = {
         "k_3": Parameter(1e6, "N/m3", (-1e10, 1e10), "coefficient, at X_r for every shape"),
         "shape": Parameter(3.0, "1", (2.0, 7.0), "exponent: 3 cubic, 5 late in the stroke"),

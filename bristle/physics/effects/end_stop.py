@@ -25,6 +25,7 @@ class EndStop(Effect):
         "(1975), J. Appl. Mech. 42(2), 440-445"
     )
     expect = "spikes of force and acceleration at the largest displacements"
+    amount = "k"
     parameters = {
         "clearance": Parameter(0.02, "m", (1e-4, 10.0), "travel before contact, to either side"),
         "k": Parameter(5e3, "N/m", (0.0, 1e9), "stiffness of the buffer, at D_r for every shape"),

@@ -25,6 +25,7 @@ class Flattening(Effect):
         "laws in one)"
     )
     expect = "too much predicted force at high speed, in both directions, at every voltage alike"
+    amount = "1/v_f"
     parameters = {
         "v_f": Parameter(0.5, "m/s", (1e-3, 1e3), "speed over which the force falls"),
         "shape": Parameter(1.0, "1", (0.0, 6.0), "0 exponential, 1 rational, larger: slower fall"),

@@ -36,6 +36,7 @@ class FluidInertia(Effect):
     )
     expect = "a force in phase with acceleration, largest at the highest frequencies"
     states = {"v_1": "m/s", "v_2": "m/s", "v_3": "m/s", "v_4": "m/s"}
+    amount = "m_f"
     parameters = {
         "m_f": Parameter(0.3, "kg", (0.0, 1e4), "mass that moves with the piston"),
         "m_h": Parameter(0.0, "kg", (0.0, 1e4), "what the memory weighs at 20 rad/s"),

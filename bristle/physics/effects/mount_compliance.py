@@ -28,6 +28,7 @@ class MountCompliance(Effect):
     )
     states = {"compression": "m", "joint_velocity": "m/s"}
     joint = ("compression", "joint_velocity")
+    amount = "1/k"
     parameters = {
         "k": Parameter(2e4, "N/m", (1e2, 1e9), "stiffness of the mount"),
         "hard": Parameter(0.0, "1", (0.0, 1e4), "growth of the stiffness per square millimetre"),

@@ -22,6 +22,7 @@ class Presliding(Effect):
     source = "Dahl (1976), AIAA Journal 14(12), 1675-1682"
     expect = "after each reversal the force turns over a short travel instead of at once"
     states = {"direction": "1"}
+    amount = "x_s"
     parameters = {
         "x_s": Parameter(5e-4, "m", (1e-7, 0.1), "travel over which the yield force builds up"),
         "shape": Parameter(1.0, "1", (0.0, 3.0), "0 elastic-plastic, 1 Dahl, above: a long tail"),

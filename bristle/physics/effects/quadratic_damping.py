@@ -27,6 +27,7 @@ class QuadraticDamping(Effect):
         "(1913), VDI-Forschungsheft 131"
     )
     expect = "missing force in the direction of motion that grows steeply with speed"
+    amount = "c_2"
     parameters = {
         "c_2": Parameter(100.0, "N.s2/m2", (0.0, 1e7), "coefficient, at V_r for every shape"),
         "shape": Parameter(2.0, "1", (1.0, 3.5), "exponent: 2 turbulent, 1 a dashpot"),

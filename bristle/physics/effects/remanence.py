@@ -41,6 +41,7 @@ class Remanence(Effect):
     )
     expect = "at one voltage two forces, the larger one while the voltage falls"
     states = {"voltage": "V", "second": "V", "third": "V", "fourth": "V"}
+    amount = "width"
     parameters = {
         "width": Parameter(0.5, "V", (0.0, 10.0), "half the width of the loop"),
         "spread": Parameter(

@@ -19,6 +19,7 @@ class Saturation(Effect):
     zero_at_rest = True
     source = "Froelich-Kennelly form; Bozorth (1951), Ferromagnetism, ch. 11"
     expect = "too much predicted force at the highest voltages and too little at middle ones"
+    amount = "1/V_s"
     parameters = {
         "V_s": Parameter(8.0, "V", (0.05, 1e4), "voltage at which the field saturates"),
         "shape": Parameter(2.0, "1", (1.0, 6.0), "sharpness of the bend"),

@@ -27,6 +27,7 @@ class StoreySoftening(Effect):
         "storey drifts larger, and floor accelerations lower and slower, in strong shaking only"
     )
     states = {"elastic": "m"}
+    amount = "1/d_half"
     parameters = {
         "d_half": Parameter(
             0.01, "m", (1e-4, 10.0), "drift at which the secant stiffness has halved"

@@ -27,6 +27,7 @@ class Stribeck(Effect):
         "Control 40(3), 419-425"
     )
     expect = "excess force in the direction of motion at the lowest speeds, gone at higher speed"
+    amount = "rise"
     parameters = {
         "rise": Parameter(0.3, "1", (0.0, 5.0), "excess of the yield force as v -> 0"),
         "v_s": Parameter(0.01, "m/s", (1e-4, 1.0), "speed over which the excess dies out"),

@@ -36,6 +36,7 @@ class Temperature(Effect):
     )
     expect = "the force declines through a run, the faster the more energy it dissipates"
     states = {"heat": "J", "kept": "J"}
+    amount = "1/E_0"
     parameters = {
         "E_0": Parameter(4.0, "J", (1e-3, 1e9), "heat at which the viscous part has fallen to 1/e"),
         "tau": Parameter(60.0, "s", (0.1, 1e5), "time constant of cooling"),

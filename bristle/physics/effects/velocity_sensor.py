@@ -27,6 +27,7 @@ class VelocitySensor(Effect):
     )
     states = {"low": "m/s", "rate": "m/s", "drift": "m/s"}
     starts = {"low": "value"}
+    amount = "tau"
     parameters = {
         "gain": Parameter(1.0, "1", (0.2, 5.0), "shown by true velocity"),
         "tau": Parameter(0.005, "s", (0.0, 0.2), "time constant of the low-pass"),

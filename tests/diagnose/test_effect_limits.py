@@ -1,0 +1,109 @@
+"""How large effects may still be: intervals of a fit, noise, what no run shows, and the words."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bristle.cli.diagnose import _limits
+from bristle.diagnose.effect_limits import EffectLimit, Known, Sized, effect_limits, limit_of
+from bristle.diagnose.verdict_text import limit_rows
+from bristle.identify.fit import Model, intervals_of
+from bristle.identify.search_context import refine
+from bristle.physics.effect import EFFECTS
+from tests.diagnose.test_limits import VALUES, problem_of, steady, steps
+
+SPRING = "gas_spring"
+
+
+@pytest.fixture(scope="module")
+def known():
+    """Return two runs of a Bingham damper, the law fitted to them."""
+    problem = problem_of(steps)
+    model = refine(Model("bingham", (), VALUES), problem)
+    return Known(problem, model, problem.expectation(model), 6000)
+
+
+def test_the_limit_of_a_linear_effect_is_that_of_a_fit_with_it(known):
+    limit = limit_of(Sized(SPRING, known))
+    joined = Model("bingham", (SPRING,), {**known.model.values, "gas_spring.k": 1.0}, fixed=(
+        "gas_spring.preload", "gas_spring.k_2", "gas_spring.k_3",
+    ))  # fmt: skip
+    fitted = refine(joined, known.problem)
+    std = intervals_of(known.problem, fitted).std["gas_spring.k"]
+    # A normal estimate, cut off at zero: the end lies 0.5 to 3 deviations above what was found.
+    assert 0.5 * std < limit.largest - max(fitted.value("gas_spring.k"), 0.0) < 3.0 * std
+    assert (limit.parameter, limit.unit, limit.falls, limit.coarse) == ("k", "N/m", False, False)
+
+
+def test_a_tenth_of_the_noise_allows_a_tenth(known):
+    problem = problem_of(steps, noise=1e-3)
+    model = refine(Model("bingham", (), VALUES), problem)
+    finer = Known(problem, model, problem.expectation(model), 6000)
+    wide, narrow = (limit_of(Sized("fluid_inertia", one)).largest for one in (known, finer))
+    assert 4.0 < wide / narrow < 25.0  # the noise of both is drawn anew
+
+
+def test_what_is_named_is_far_above_what_is_allowed_and_leaves_the_gain_of_the_rule(known):
+    limit = limit_of(Sized("quadratic_damping", known))
+    assert limit.named > 2.0 * limit.largest
+    assert limit.named_share > limit.share
+    sized = Sized("quadratic_damping", known)
+    left = known.beyond(sized.change(limit.named / sized.one))
+    z = np.sqrt(1.0 + np.mean(left**2))  # error over noise if that is missing
+    assert 1.02 < z < 1.05
+
+
+def test_an_effect_that_vanishes_as_its_parameter_grows_is_limited_from_below(known):
+    limit = limit_of(Sized("saturation", known))
+    assert limit.falls
+    assert limit.largest > limit.named > 0.0  # V_s; the smaller, the more of the effect
+    assert limit.as_dict()["side"] == "above"
+
+
+def test_no_play_is_limited_below_what_the_steps_of_the_integration_tell(known):
+    limit = limit_of(Sized("backlash", known))
+    assert limit.coarse
+    assert (limit.share, limit.named) == (None, None)
+    lag = limit_of(Sized("coil_lag", known))
+    assert 1e-4 < lag.largest < 4e-3  # s; a sample is 2 ms
+
+
+def test_what_hides_an_effect_is_told():
+    problem = problem_of(steady)
+    model = refine(Model("bingham", (), VALUES, ("f_v", "c_v")), problem)
+    still = Known(problem, model, problem.expectation(model), 6000)
+    found = {one.effect: one for one in effect_limits(still, ("coil_lag", SPRING), ("coil_lag",))}
+    assert found["coil_lag"].why == "the command does not move"
+    assert found[SPRING].why == ""
+    sprung = {**VALUES, "gas_spring.k": 50.0, "gas_spring.k_3": 1e4}
+    both = Model("bingham", (SPRING,), sprung, ("f_v", "c_v", "gas_spring.k_2"))
+    taken = Known(problem, both, problem.expectation(both), 6000)
+    assert limit_of(Sized("duffing", taken)).why == "gas_spring.k_3 of the model takes it up"
+
+
+def test_every_effect_says_how_much_there_is_of_it():
+    for name, effect in EFFECTS.items():
+        if not effect.own:
+            assert effect.amount.removeprefix("1/") in effect.parameters, name
+
+
+def test_the_table_has_units_as_people_write_them():
+    limits = [
+        EffectLimit("coil_lag", "tau", "s", False, 1.4e-3, 2e-4, 0.011, 2e-3),
+        EffectLimit("mount_compliance", "k", "N/m", True, 2.1e7, None, None, None, True),
+        EffectLimit("base_friction", why="f_c of the model takes it up"),
+    ]
+    verdict = {"findings": [{"site": "damper", "limits": [one.as_dict() for one in limits]}]}
+    assert limit_rows(verdict) == [
+        ["coil_lag", "tau below 1.4 ms", "0.02 %", "11 ms"],
+        ["mount_compliance", "k above 21 MN/m", "-", "-"],
+        ["base_friction", "f_c of the model takes it up", "-", "-"],
+    ]
+    table = _limits(verdict)
+    assert table[1].split() == [
+        "effect", "still", "possible", "(95", "%)", "of", "the", "force", "named", "9", "times",
+        "of", "10", "from",
+    ]  # fmt: skip
+    assert len(table) == 6
+    assert _limits({"findings": [{"site": "damper"}]}) == []
