@@ -261,7 +261,10 @@ def test_a_bad_effect_of_ones_own_is_left_out_with_a_note(
     nothing = Diagnosis("none", (), ("Nothing is missing.",))
     monkeypatch.setattr(learning, "diagnose_rig", lambda *given, **more: nothing)
     study = Study(bench.folder)
-    assert learning.diagnose_study(study, law=study.model().law, write=False, say=said.append) == nothing
+    assert (
+        learning.diagnose_study(study, law=study.model().law, write=False, say=said.append)
+        == nothing
+    )
     assert len(said) == 1
     assert "own_spring.py, line" in said[0]
     assert "ZeroDivisionError" in said[0]
