@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from .along import GIVEN
+
 
 @dataclass(frozen=True)
 class LearnRule:
@@ -25,6 +27,13 @@ class LearnRule:
 
     Trades: if higher, memories are missed; if lower, a short memory stands for a plain signal.
     Found: blind seeds.
+    """
+
+    direction: float = 1.25
+    """The same of a curve for each direction, which has twice the values.
+
+    Trades: if higher, a force that differs on the way out and back is missed; if lower, two curves
+    without a name stand for one that has a name. Found: blind seeds.
     """
 
     worth: float = 0.1
@@ -55,15 +64,17 @@ class LearnRule:
     Trades: if higher, wrong names; if lower, curves without a name. Found: blind seeds.
     """
 
-    def weighed(self, loss: float, memory: Sequence[object]) -> float:
+    def weighed(self, loss: float, memory: Sequence[tuple[str, float]]) -> float:
         """Return a mean squared residual, raised by what its memory must pay.
 
         Parameters
         ----------
         loss : where the curve was not fitted
-        memory : the times and travels of its memory
+        memory : the times and travels of its memory, and what the motion gives, by name
         """
-        return loss * self.memory ** len(memory)
+        for name, _ in memory:
+            loss *= self.direction if name in GIVEN else self.memory
+        return loss
 
 
 LEARN = LearnRule()
