@@ -14,6 +14,7 @@ from ..compare.prediction import run_predictions
 from ..data.labels import Labels, varying
 from ..identify.fit import Run, intervals_of, multistart_refit
 from ..identify.search_context import is_rough
+from ..physics.effect import exclude
 from .candidates import SHOWN, joinable, judge
 from .effect_limits import EffectLimit, Known, effect_limits
 from .experiments import separating
@@ -75,7 +76,11 @@ def _limits(found: Finding, opened: Opening) -> tuple[EffectLimit, ...]:
     problem = opened.searched
     deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
     known = Known(problem, model, problem.expectation(model), deciding, opened.rule)
-    able = [name for name in _able(found, opened) if name not in model.effects]
+    able = [
+        name
+        for name in _able(found, opened)
+        if not any(name == one or exclude(name, one) for one in model.effects)
+    ]
     return effect_limits(known, able, found.untestable)
 
 
