@@ -16,7 +16,8 @@ from ..identify.fit import Run, intervals_of, multistart_refit
 from ..identify.search_context import is_rough
 from ..physics.effect import exclude
 from .candidates import SHOWN, joinable, judge
-from .effect_limits import EffectLimit, Known, effect_limits
+from .effect_limits import EffectLimit, effect_limits
+from .effect_size import Known
 from .experiments import separating
 from .finding import Finding
 from .limits import detectable, untestable

@@ -6,27 +6,21 @@ Law and known effects are refitted: what their sensitivities can take up does no
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 from math import sqrt
+from os import cpu_count
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.command_limits import jumps
-from ..identify.model import Model, Problem, steady
-from ..identify.residuals import Expected, residuals
+from ..identify.model import steady
 from ..identify.search import loss
-from ..identify.search_context import Search
-from ..identify.start_grid import initial_guesses
 from ..physics.effect import EFFECTS
-from .rule import BENCH, DecisionRule
+from .effect_size import CLIP, Known, Sized
 
 Array = NDArray[np.float64]
-
-CLIP = 2.0
-"""Normalised residuals beyond this count as this, as in a fit."""
 
 ABSORBED = 1e-3
 """Share of a change that must be left; below that it is the error of the sensitivities."""
@@ -34,10 +28,10 @@ ABSORBED = 1e-3
 LOOK = 0.1
 """How many standard deviations a change has at which an effect is looked at first."""
 
-TURNS = 6
+TURNS = 4
 """Sizes that are tried between two that a limit lies between."""
 
-ALIKE = 0.05
+ALIKE = 0.1
 """Relative change of a size below which it is found."""
 
 ONE_SIDED, TWO_SIDED = 1.645, 1.96
@@ -53,14 +47,17 @@ force rough, as impacts in a joint do."""
 STEP = 2.0
 """Factor by which a size is raised until it is beyond what is sought."""
 
+NEARLY = 0.1
+"""By how much a likelihood may differ, of its fall, from that of a change in proportion."""
+
+STRAIGHT = 2
+"""How often a size is sought in proportion to its change."""
+
 AHEAD = 6
 """Sizes beyond the first one that are looked at where that one is excluded already."""
 
 SMALLEST, LARGEST = 1e-4, 1e3
 """Sizes between which an effect is looked at, over that of a first guess."""
-
-BLOCK = 250
-"""Samples, longer than a residual's correlation."""
 
 
 @dataclass(frozen=True)
@@ -100,129 +97,6 @@ class EffectLimit:
         }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Known:
-    """What all limits of some runs are found with: the model's residuals and sensitivities.
-
-    `names` of the model's free parameters; `held_out` how many samples decide a verdict.
-    """
-
-    problem: Problem
-    model: Model
-    expected: Expected
-    held_out: int
-    rule: DecisionRule = BENCH
-
-    @cached_property
-    def search(self) -> Search:
-        """The model with its free parameters."""
-        return Search(self.problem, self.model, self.expected, self.model.free())
-
-    @cached_property
-    def left(self) -> Array:
-        """The normalised residuals (n,) of the model, those far out clipped."""
-        return np.clip(self.plain, -CLIP, CLIP)
-
-    @cached_property
-    def counts(self) -> Array:
-        """1 for each sample (n,), 0 where the command jumps: no clock says on which side it is."""
-        parts = [~jumps(run.V)[run.skip :] for run in self.problem.runs]
-        return np.concatenate(parts).astype(float)
-
-    @cached_property
-    def plain(self) -> Array:
-        """The normalised residuals (n,) of the model as they are, of the samples that count."""
-        return self.counts * self.search.residuals(self.search.start)
-
-    @cached_property
-    def own(self) -> Array:
-        """What the model's own parameters change (n, p), each column of length one."""
-        if not self.search.names:
-            return np.zeros((len(self.plain), 0))
-        columns: Array = self.counts[:, None] * self.search.sensitivities()
-        columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-        return columns
-
-    @cached_property
-    def basis(self) -> Array:
-        """Orthonormal columns (n, p) that span what the model's own parameters change."""
-        return np.linalg.qr(self.own)[0]
-
-    @cached_property
-    def noise(self) -> tuple[Array, Array]:
-        """The force's own noise (n,) and draws (d, n) of the motion's, as residuals have them."""
-        pairs = list(zip(self.problem.runs, self.expected, strict=True))
-        own = np.concatenate([run.noise / e[1][run.skip :] for run, e in pairs])
-        count = min(len(e[2]) for _, e in pairs)
-        drawn = [
-            np.concatenate([e[2][d][run.skip :] / e[1][run.skip :] for run, e in pairs])
-            for d in range(count)
-        ]
-        return self.counts * own, self.counts * np.array(drawn).reshape(count, len(own))
-
-    @cached_property
-    def size(self) -> float:
-        """The norm of the normalised force."""
-        parts = [
-            (run.force / e[1])[run.skip :]
-            for run, e in zip(self.problem.runs, self.expected, strict=True)
-        ]
-        return float(np.linalg.norm(np.concatenate(parts)))
-
-    def beyond(self, change: Array) -> Array:
-        """Return what of a change (n,) the model's own parameters do not take up."""
-        kept: Array = change - self.basis @ (self.basis.T @ change)
-        return kept
-
-    def scatter(self, direction: Array) -> float:
-        """Return the standard deviation of a direction's (n,) product with the residual."""
-        if float(np.mean(np.minimum(self.plain**2, CLIP**2))) > self.rule.misfit**2:
-            sums = np.add.reduceat(direction * self.left, np.arange(0, len(direction), BLOCK))
-            return float(np.linalg.norm(sums))
-        own, drawn = self.noise
-        moved = np.clip(drawn, -CLIP, CLIP) @ direction
-        more = float(np.var(moved, ddof=1)) if len(moved) > 1 else 0.0
-        return sqrt(float(np.sum((direction * own) ** 2)) + more)
-
-
-class Sized:
-    """An effect in a model with one number for its size: 1 is that of a first guess, 0 is none."""
-
-    def __init__(self, name: str, known: Known) -> None:
-        effect, self.known = EFFECTS[name], known
-        self.name, self.parameter = name, effect.amount.removeprefix("1/")
-        self.falls = effect.amount.startswith("1/")
-        self.key = f"{name}.{self.parameter}"
-        self.model = _first_guess(name, known.model, known.problem)
-        self.one = self.model.value(self.key)
-        self.low, self.high = self.model.bounds(self.key)
-        self.signed = self.low < 0.0 and not self.falls
-        at_zero = not self.falls and self.low <= 0.0
-        self._without = self._counted(self._with(0.0)) if at_zero else known.plain
-
-    def value(self, size: float) -> float:
-        """Return the parameter's value [SI] at a size, within its bounds."""
-        return float(np.clip(self._wanted(size), self.low, self.high))
-
-    def change(self, size: float) -> Array:
-        """Return by how much the effect changes the normalised residuals (n,) at a size."""
-        return self._counted(self._with(self.value(size))) - self._without
-
-    def _counted(self, model: Model) -> Array:
-        known = self.known
-        return known.counts * residuals(known.problem, model, known.expected)
-
-    def ended(self, size: float) -> bool:
-        """Return whether a bound keeps the parameter from a size."""
-        return not self.low <= self._wanted(size) <= self.high
-
-    def _wanted(self, size: float) -> float:
-        return self.one / size if self.falls else self.one * size
-
-    def _with(self, value: float) -> Model:
-        return replace(self.model, values={**self.model.values, self.key: value})
-
-
 def effect_limits(
     known: Known, names: Sequence[str], hidden: Sequence[str] = ()
 ) -> tuple[EffectLimit, ...]:
@@ -234,11 +108,14 @@ def effect_limits(
     names : of effects that can join the model
     hidden : those of them that the runs cannot show
     """
-    sizes = (Sized(name, known) for name in sorted(names) if EFFECTS[name].amount)
-    return tuple(
-        EffectLimit(one.name, why=_why_hidden(one)) if one.name in hidden else limit_of(one)
-        for one in sizes
-    )
+    known.basis, known.noise, known.size  # noqa: B018  # made before threads ask for them
+
+    def found(name: str) -> EffectLimit:
+        one = Sized(name, known)
+        return EffectLimit(name, why=_why_hidden(one)) if name in hidden else limit_of(one)
+
+    with ThreadPoolExecutor(cpu_count()) as pool:
+        return tuple(pool.map(found, (name for name in sorted(names) if EFFECTS[name].amount)))
 
 
 def limit_of(sized: Sized) -> EffectLimit:
@@ -309,8 +186,12 @@ def _end(sized: Sized, least: float, sign: float, apart: float) -> float:
         rise = 2.0 * float(np.sum(loss(known.plain + change) - loss(known.plain)))
         return rise / (apart * known.scatter(change / length) ** 2)
 
-    if not sized.change(sign).any():
+    first = known.beyond(sized.change(sign * least))
+    if not first.any() and not sized.change(sign).any():
         return 0.0  # it has one sign alone
+    straight, lowest_there = _if_linear(known, first / least, apart)
+    if least < straight < LARGEST and abs(above(straight) - lowest_there - 1.0) <= NEARLY:
+        return straight
     size = low = least
     found = above(least)
     if found >= 1.0:  # a rough likelihood may fall again
@@ -327,6 +208,25 @@ def _end(sized: Sized, least: float, sign: float, apart: float) -> float:
     if low == size:
         return least
     return _crossing(lambda at: above(at) - lowest - 1.0, low, size)
+
+
+def _if_linear(known: Known, slope: Array, apart: float) -> tuple[float, float]:
+    """Return where a likelihood ends, and its best, if the change is in proportion to the size.
+
+    Parameters
+    ----------
+    known : the runs
+    slope : (n,) change per size
+    apart : twice the fall of the logarithm of the likelihood, the unit of what is returned
+    """
+    near = slope[np.abs(known.plain) <= CLIP]  # beyond, the robust loss is straight
+    sharp, size = float(near @ near), float(np.linalg.norm(slope))
+    if sharp == 0.0:
+        return LARGEST, 0.0
+    unit = apart * known.scatter(slope / size) ** 2
+    push = float(slope @ known.left)
+    lowest = -(push**2) / sharp if push < 0.0 else 0.0
+    return (-push + sqrt(push**2 + sharp * (lowest + unit))) / sharp, lowest / unit
 
 
 def _crossing(rising: Callable[[float], float], low: float, high: float) -> float:
@@ -362,7 +262,7 @@ def _resolved(sized: Sized, size: float) -> float:
     return size
 
 
-def _named(sized: Sized, size: float) -> tuple[float | None, float | None]:
+def _named(sized: Sized, least: float) -> tuple[float | None, float | None]:
     """Return the value and the share of the force from which 9 of 10 verdicts name an effect.
 
     A verdict asks that z on held-out runs falls by `rule.gain`, which scatters with the noise.
@@ -370,9 +270,9 @@ def _named(sized: Sized, size: float) -> tuple[float | None, float | None]:
     Parameters
     ----------
     sized : the effect
-    size : where it is looked at first
+    least : where it is looked at first
     """
-    known = sized.known
+    known, size = sized.known, least
     asked = known.held_out * ((1.0 + known.rule.gain) ** 2 - 1.0)
     wanted = NINE_OF_TEN + sqrt(NINE_OF_TEN**2 + asked)
     wanted *= sqrt(len(known.plain) / known.held_out)
@@ -380,21 +280,14 @@ def _named(sized: Sized, size: float) -> tuple[float | None, float | None]:
     def beyond(size: float) -> float:
         return float(np.linalg.norm(known.beyond(sized.change(size)))) / wanted - 1.0
 
-    low = size
+    for _ in range(STRAIGHT):  # in proportion, as a rule
+        size = float(np.clip(size / (1.0 + beyond(size)), SMALLEST, LARGEST))
+        if not sized.ended(size) and abs(beyond(size)) <= ALIKE:
+            return sized.value(size), wanted / known.size
+    low = size = least
     while beyond(size) < 0.0:
         if sized.ended(size) or size >= LARGEST:
             return None, None
         low, size = size, STEP * size
     size = _crossing(beyond, low, size) if low < size else size
     return (None, None) if sized.ended(size) else (sized.value(size), wanted / known.size)
-
-
-def _first_guess(name: str, model: Model, problem: Problem) -> Model:
-    """Return a model with an effect at its default shape, scaled to the rig."""
-    guess, effect = initial_guesses(name, model, problem)[0], EFFECTS[name]
-    if effect.start_shares:
-        return guess
-    scaled = {
-        f"{name}.{own}": problem.scaled(model.law, f"{name}.{own}") for own in effect.parameters
-    }
-    return replace(guess, values={**guess.values, **model.values, **scaled})

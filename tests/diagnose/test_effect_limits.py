@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from bristle.cli.diagnose import _limits
-from bristle.diagnose.effect_limits import EffectLimit, Known, Sized, effect_limits, limit_of
+from bristle.diagnose.effect_limits import EffectLimit, effect_limits, limit_of
+from bristle.diagnose.effect_size import Known, Sized
 from bristle.diagnose.verdict_text import limit_rows
 from bristle.identify.fit import Model, intervals_of
 from bristle.identify.search_context import refine

@@ -1,0 +1,163 @@
+"""An effect beside a fitted model with one number for its size, and what it changes on some runs.
+
+What the model's own parameters can take up of a change is left out by their sensitivities.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.command_limits import jumps
+from ..identify.model import Model, Problem
+from ..identify.residuals import Expected, residuals
+from ..identify.search_context import Search
+from ..identify.start_grid import initial_guesses
+from ..physics.effect import EFFECTS
+from .rule import BENCH, DecisionRule
+
+Array = NDArray[np.float64]
+
+CLIP = 2.0
+"""Normalised residuals beyond this count as this, as in a fit."""
+
+BLOCK = 250
+"""Samples, longer than a residual's correlation."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """What all limits of some runs are found with: the model's residuals and sensitivities.
+
+    `names` of the model's free parameters; `held_out` how many samples decide a verdict.
+    """
+
+    problem: Problem
+    model: Model
+    expected: Expected
+    held_out: int
+    rule: DecisionRule = BENCH
+
+    @cached_property
+    def search(self) -> Search:
+        """The model with its free parameters."""
+        return Search(self.problem, self.model, self.expected, self.model.free())
+
+    @cached_property
+    def left(self) -> Array:
+        """The normalised residuals (n,) of the model, those far out clipped."""
+        return np.clip(self.plain, -CLIP, CLIP)
+
+    @cached_property
+    def counts(self) -> Array:
+        """1 for each sample (n,), 0 where the command jumps: no clock says on which side it is."""
+        parts = [~jumps(run.V)[run.skip :] for run in self.problem.runs]
+        return np.concatenate(parts).astype(float)
+
+    @cached_property
+    def plain(self) -> Array:
+        """The normalised residuals (n,) of the model as they are, of the samples that count."""
+        return self.counts * self.search.residuals(self.search.start)
+
+    @cached_property
+    def own(self) -> Array:
+        """What the model's own parameters change (n, p), each column of length one."""
+        if not self.search.names:
+            return np.zeros((len(self.plain), 0))
+        columns: Array = self.counts[:, None] * self.search.sensitivities()
+        columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        return columns
+
+    @cached_property
+    def basis(self) -> Array:
+        """Orthonormal columns (n, p) that span what the model's own parameters change."""
+        return np.linalg.qr(self.own)[0]
+
+    @cached_property
+    def noise(self) -> tuple[Array, Array]:
+        """The force's own noise (n,) and draws (d, n) of the motion's, as residuals have them."""
+        pairs = list(zip(self.problem.runs, self.expected, strict=True))
+        own = np.concatenate([run.noise / e[1][run.skip :] for run, e in pairs])
+        count = min(len(e[2]) for _, e in pairs)
+        drawn = [
+            np.concatenate([e[2][d][run.skip :] / e[1][run.skip :] for run, e in pairs])
+            for d in range(count)
+        ]
+        return self.counts * own, self.counts * np.array(drawn).reshape(count, len(own))
+
+    @cached_property
+    def size(self) -> float:
+        """The norm of the normalised force."""
+        parts = [
+            (run.force / e[1])[run.skip :]
+            for run, e in zip(self.problem.runs, self.expected, strict=True)
+        ]
+        return float(np.linalg.norm(np.concatenate(parts)))
+
+    def beyond(self, change: Array) -> Array:
+        """Return what of a change (n,) the model's own parameters do not take up."""
+        kept: Array = change - self.basis @ (self.basis.T @ change)
+        return kept
+
+    def scatter(self, direction: Array) -> float:
+        """Return the standard deviation of a direction's (n,) product with the residual."""
+        if float(np.mean(np.minimum(self.plain**2, CLIP**2))) > self.rule.misfit**2:
+            sums = np.add.reduceat(direction * self.left, np.arange(0, len(direction), BLOCK))
+            return float(np.linalg.norm(sums))
+        own, drawn = self.noise
+        moved = np.clip(drawn, -CLIP, CLIP) @ direction
+        more = float(np.var(moved, ddof=1)) if len(moved) > 1 else 0.0
+        return sqrt(float(np.sum((direction * own) ** 2)) + more)
+
+
+class Sized:
+    """An effect in a model with one number for its size: 1 is that of a first guess, 0 is none."""
+
+    def __init__(self, name: str, known: Known) -> None:
+        effect, self.known = EFFECTS[name], known
+        self.name, self.parameter = name, effect.amount.removeprefix("1/")
+        self.falls = effect.amount.startswith("1/")
+        self.key = f"{name}.{self.parameter}"
+        self.model = _first_guess(name, known.model, known.problem)
+        self.one = self.model.value(self.key)
+        self.low, self.high = self.model.bounds(self.key)
+        self.signed = self.low < 0.0 and not self.falls
+        at_zero = not self.falls and self.low <= 0.0
+        self._without = self._counted(self._with(0.0)) if at_zero else known.plain
+
+    def value(self, size: float) -> float:
+        """Return the parameter's value [SI] at a size, within its bounds."""
+        return float(np.clip(self._wanted(size), self.low, self.high))
+
+    def change(self, size: float) -> Array:
+        """Return by how much the effect changes the normalised residuals (n,) at a size."""
+        return self._counted(self._with(self.value(size))) - self._without
+
+    def _counted(self, model: Model) -> Array:
+        known = self.known
+        return known.counts * residuals(known.problem, model, known.expected)
+
+    def ended(self, size: float) -> bool:
+        """Return whether a bound keeps the parameter from a size."""
+        return not self.low <= self._wanted(size) <= self.high
+
+    def _wanted(self, size: float) -> float:
+        return self.one / size if self.falls else self.one * size
+
+    def _with(self, value: float) -> Model:
+        return replace(self.model, values={**self.model.values, self.key: value})
+
+
+def _first_guess(name: str, model: Model, problem: Problem) -> Model:
+    """Return a model with an effect at its default shape, scaled to the rig."""
+    guess, effect = initial_guesses(name, model, problem)[0], EFFECTS[name]
+    if effect.start_shares:
+        return guess
+    scaled = {
+        f"{name}.{own}": problem.scaled(model.law, f"{name}.{own}") for own in effect.parameters
+    }
+    return replace(guess, values={**guess.values, **model.values, **scaled})
