@@ -119,7 +119,7 @@ def _trials(verdict: Verdict) -> list[str]:
 
 def _limits(verdict: Verdict) -> list[str]:
     """Return the table of what the runs still allow of each effect."""
-    from ..diagnose.verdict_text import LIMITS, LIMITS_NOTE, limit_rows
+    from ..diagnose.verdict_text import LIMITS, LIMITS_NOTES, limit_rows
 
     rows = limit_rows(verdict)
     if not rows:
@@ -129,7 +129,7 @@ def _limits(verdict: Verdict) -> list[str]:
     lines = [
         f"  {row[0]:{wide[0]}}  {row[1]:{wide[1]}}  {row[2]:>{wide[2]}}  {row[3]}" for row in table
     ]
-    return ["", *lines, f"  {LIMITS_NOTE}"]
+    return ["", *lines, *(f"  {note}" for note in LIMITS_NOTES)]
 
 
 def _next(verdict: Verdict, folder: Path) -> str:

@@ -56,6 +56,9 @@ STRAIGHT = 2
 AHEAD = 6
 """Sizes beyond the first one that are looked at where that one is excluded already."""
 
+ROUGHEST = 1e-2
+"""Size below which the impacts of a joint are those of the integration, over a first guess."""
+
 SMALLEST, LARGEST = 1e-4, 1e3
 """Sizes between which an effect is looked at, over that of a first guess."""
 
@@ -251,8 +254,9 @@ def _resolved(sized: Sized, size: float) -> float:
     Below that the steps of the integration decide: a lag of less than half a sample, a play that
     the rod crosses within one.
     """
-    known, size = sized.known, float(np.clip(size, SMALLEST, 1.0))
-    grows = GROWS_ROUGH if EFFECTS[sized.name].joint else GROWS
+    known, rough = sized.known, bool(EFFECTS[sized.name].joint)
+    grows, smallest = (GROWS_ROUGH, ROUGHEST) if rough else (GROWS, SMALLEST)
+    size = float(np.clip(size, smallest, 1.0))
     half = np.linalg.norm(known.beyond(sized.change(0.5 * size)))
     while size < 1.0:
         whole = np.linalg.norm(known.beyond(sized.change(size)))

@@ -176,9 +176,9 @@ def _absorbing(name: str, sites: Sequence[str], verdict: Verdict) -> list[str]:
 LIMITS = ("effect", "still possible (95 %)", "of the force", "named 9 times of 10 from")
 """Columns of the table of limits."""
 
-LIMITS_NOTE = (
-    "Still possible: the size that these runs do not exclude, law and known effects refitted. Of "
-    "the force: what such an effect leaves of it; - where the sampling tells no smaller size."
+LIMITS_NOTES = (
+    "Still possible: the size that these runs do not exclude, law and known effects refitted.",
+    "Of the force: what such an effect leaves of it; - where the sampling tells no smaller size.",
 )
 
 

@@ -7,7 +7,7 @@ from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
 from ..diagnose.verdict_text import (
     HEADINGS,
     LIMITS,
-    LIMITS_NOTE,
+    LIMITS_NOTES,
     Verdict,
     about,
     drive_of,
@@ -105,7 +105,7 @@ def untold_section(verdict: Verdict | None) -> str:
     if limits:
         parts.append("<h3>How large each effect may still be</h3>")
         parts.append(html.table(list(LIMITS), limits))
-        parts.append(html.paragraphs(LIMITS_NOTE, kind="soft"))
+        parts.append(html.paragraphs(" ".join(LIMITS_NOTES), kind="soft"))
     experiment = separating(verdict or {})
     if experiment:
         parts.append("<h3>The experiment that would distinguish them</h3>")

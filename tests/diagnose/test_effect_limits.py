@@ -106,5 +106,5 @@ def test_the_table_has_units_as_people_write_them():
         "effect", "still", "possible", "(95", "%)", "of", "the", "force", "named", "9", "times",
         "of", "10", "from",
     ]  # fmt: skip
-    assert len(table) == 6
+    assert len(table) == 7
     assert _limits({"findings": [{"site": "damper"}]}) == []
