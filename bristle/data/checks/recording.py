@@ -9,6 +9,7 @@ import numpy as np
 from ...quantity import plain, quantity
 from ..channels import DRIVE
 from ..corrections import Correction
+from ..interpolated import interpolated
 from ..measurement import Measurement
 from ..moving_average import moving_average
 from ..spectral_lines import SpectralLine, spectral_lines
@@ -27,6 +28,7 @@ def check_recording(run: Measurement) -> Iterator[Finding]:
         yield _of_lines(run, [line for line in lines if line.channel == channel])
     if run.sampling.resampled:
         return  # its samples are means of others
+    yield from _interpolated(run)
     for channel, values in run.channels.items():
         found = None if channel in DRIVE else moving_average(values, run.step)
         if found is not None:
@@ -41,6 +43,25 @@ def check_recording(run: Measurement) -> Iterator[Finding]:
                 run.name,
                 channel,
                 found.length * run.step,
+            )
+
+
+def _interpolated(run: Measurement) -> Iterator[Finding]:
+    """Yield the channels that were interpolated to the run's rate; a command may be straight."""
+    for channel, values in run.channels.items():
+        of_one = 0.0 if channel in DRIVE else interpolated(values)
+        if of_one:
+            rate = plain(run.sampling.rate / of_one, 3)
+            yield Finding(
+                "interpolated",
+                "warning",
+                f"{channel} is interpolated: {rate} samples per second were measured, those "
+                "between lie on straight lines. Their noise is no measured one, and what is "
+                f"faster than {plain(0.5 * run.sampling.rate / of_one, 3)} Hz is not in them.",
+                f"Store what was measured, or set rate = {rate} in study.toml.",
+                run.name,
+                channel,
+                of_one,
             )
 
 
