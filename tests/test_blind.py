@@ -226,6 +226,7 @@ def test_every_form_that_is_called_the_same_is_one_of_the_generators():
     assert {"stribeck", "presliding", "backlash", "temperature", "saturation"} <= other
 
 
+@pytest.mark.slow  # of the generator; a quarter of a minute
 def test_every_fault_of_the_plan_is_planted_on_its_channel():
     for task in plan.make_plan(5, 30, "fault"):
         made = generate.make_case(
