@@ -15,6 +15,16 @@ _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "J": ((0.0, 1.0, "J"), (2e3, 1e-3, "kJ"), (2e6, 1e-6, "MJ")),
 }
 
+# The same for a value that stands alone, and may be small.
+_FINE: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "m": ((0.0, 1e9, "nm"), (1e-6, 1e6, "µm"), (1e-3, 1e3, "mm"), (10.0, 1.0, "m")),
+    "m/s": ((0.0, 1e3, "mm/s"), (1.0, 1.0, "m/s")),
+    "s": ((0.0, 1e6, "µs"), (1e-4, 1e3, "ms"), (1.0, 1.0, "s")),
+    "kg": ((0.0, 1e3, "g"), (1.0, 1.0, "kg")),
+    "V": ((0.0, 1e3, "mV"), (0.1, 1.0, "V")),
+    "N/m": ((0.0, 1.0, "N/m"), (1e3, 1e-3, "kN/m"), (1e6, 1e-6, "MN/m")),
+}
+
 
 def plain(value: float, digits: int = 3) -> str:
     """Return a number with some significant digits and without a power of ten.
@@ -58,7 +68,7 @@ def typed(value: float) -> str:
     return plain(value, 6) if few_zeros else tick(value)
 
 
-def scale(unit: str, size: float) -> tuple[float, str]:
+def scale(unit: str, size: float, fine: bool = False) -> tuple[float, str]:
     """Return the factor and the unit in which values in an SI unit are shown.
 
     Parameters
@@ -67,15 +77,20 @@ def scale(unit: str, size: float) -> tuple[float, str]:
         The unit that values are in.
     size : float
         How large they are on this rig, in that unit: one page has one unit.
+    fine : bool
+        Whether a value stands alone: then it has the unit that suits it, ms, µm or g.
     """
     found = (1.0, unit)
-    for least, factor, shown in _SCALES.get(unit, ()):
+    known = _SCALES | _FINE if fine else _SCALES
+    for least, factor, shown in known.get(unit, ()):
         if abs(size) >= least:
             found = factor, shown
     return found
 
 
-def quantity(value: float, unit: str, digits: int = 3, size: float | None = None) -> str:
+def quantity(
+    value: float, unit: str, digits: int = 3, size: float | None = None, fine: bool = False
+) -> str:
     """Return a value with its unit: "220 N", "1.3 kN", "110 mm/s".
 
     Parameters
@@ -88,37 +103,11 @@ def quantity(value: float, unit: str, digits: int = 3, size: float | None = None
         Significant digits.
     size : float, optional
         How large such values are on this rig; else the value itself decides on the unit.
+    fine : bool
+        As in `scale`.
     """
-    factor, shown = scale(unit, value if size is None else size)
+    factor, shown = scale(unit, value if size is None else size, fine)
     return f"{plain(factor * value, digits)} {'' if shown == '1' else shown}".rstrip()
-
-
-_FINE: dict[str, tuple[tuple[float, float, str], ...]] = {
-    "m": ((0.0, 1e9, "nm"), (1e-6, 1e6, "µm"), (1e-3, 1e3, "mm"), (10.0, 1.0, "m")),
-    "m/s": ((0.0, 1e3, "mm/s"), (1.0, 1.0, "m/s")),
-    "s": ((0.0, 1e6, "µs"), (1e-4, 1e3, "ms"), (1.0, 1.0, "s")),
-    "kg": ((0.0, 1e3, "g"), (1.0, 1.0, "kg")),
-    "V": ((0.0, 1e3, "mV"), (0.1, 1.0, "V")),
-    "N/m": ((0.0, 1.0, "N/m"), (1e3, 1e-3, "kN/m"), (1e6, 1e-6, "MN/m")),
-}
-
-
-def fine_quantity(value: float, unit: str, digits: int = 2) -> str:
-    """Return a value that stands alone with the unit that suits it: "1.4 ms", "20 µm".
-
-    Parameters
-    ----------
-    value : float
-        In `unit`.
-    unit : str
-        An SI unit, or any other, which is then kept; "1" for none.
-    digits : int
-        Significant digits.
-    """
-    for least, factor, shown in reversed(_FINE.get(unit, ())):
-        if abs(value) >= least:
-            return f"{plain(factor * value, digits)} {shown}"
-    return quantity(value, unit, digits)
 
 
 def short_z(z: float) -> str:

@@ -82,16 +82,20 @@ def law_lines(rows: Sequence[Verdict]) -> list[str]:
     """Return the table of laws as text, from its rows as verdict.json has them."""
     from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
 
-    table = [list(HEADER), *law_table(rows)]
-    wide = [max(len(cells[k]) for cells in table) for k in range(len(HEADER))]
-    lines = [
+    lines = _aligned([list(HEADER), *law_table(rows)])
+    return [*lines, *wrap(TABLE_NOTE, 98, initial_indent="  ", subsequent_indent="  ")]
+
+
+def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
+    """Return the lines of a table, its first two columns to the left."""
+    wide = [max(len(cells[k]) for cells in table) for k in range(len(table[0]))]
+    return [
         "  " + "  ".join(
             cell.ljust(width) if k < 2 else cell.rjust(width)
             for k, (cell, width) in enumerate(zip(cells, wide, strict=True))
         )
         for cells in table
     ]  # fmt: skip
-    return [*lines, *wrap(TABLE_NOTE, 98, initial_indent="  ", subsequent_indent="  ")]
 
 
 def _trials(verdict: Verdict) -> list[str]:
@@ -124,12 +128,8 @@ def _limits(verdict: Verdict) -> list[str]:
     rows = limit_rows(verdict)
     if not rows:
         return []
-    table = [list(LIMITS), *rows]
-    wide = [max(len(row[k]) for row in table) for k in range(3)]
-    lines = [
-        f"  {row[0]:{wide[0]}}  {row[1]:{wide[1]}}  {row[2]:>{wide[2]}}  {row[3]}" for row in table
-    ]
-    return ["", *lines, *(f"  {note}" for note in LIMITS_NOTES)]
+    notes = (f"  {note}" for note in LIMITS_NOTES)
+    return ["", *_aligned([list(LIMITS), *rows]), *notes]
 
 
 def _next(verdict: Verdict, folder: Path) -> str:

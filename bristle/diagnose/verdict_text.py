@@ -12,7 +12,7 @@ from ..compare.names import joined, name_of, site_name
 from ..identify.rig import DAMPER
 from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
 from ..physics.effect import EFFECTS
-from ..quantity import fine_quantity
+from ..quantity import quantity
 from .law_text import law_name, law_sentences
 from .rule import BENCH, DecisionRule
 
@@ -173,12 +173,13 @@ def _absorbing(name: str, sites: Sequence[str], verdict: Verdict) -> list[str]:
     )
 
 
-LIMITS = ("effect", "still possible (95 %)", "of the force", "named 9 times of 10 from")
+LIMITS = ("effect", "still possible (95 %)", "of the force", "to be named from, about")
 """Columns of the table of limits."""
 
 LIMITS_NOTES = (
     "Still possible: the size that these runs do not exclude, law and known effects refitted.",
     "Of the force: what such an effect leaves of it; - where the sampling tells no smaller size.",
+    "To be named from: the size at which 9 of 10 verdicts would name it, as the rule predicts.",
 )
 
 
@@ -199,9 +200,9 @@ def _limit_cells(limit: Mapping[str, Any]) -> list[str]:
     unit = limit["unit"]
     named = limit["named_from"]
     return [
-        f"{limit['parameter']} {limit['side']} {fine_quantity(limit['limit95'], unit)}",
+        f"{limit['parameter']} {limit['side']} {quantity(limit['limit95'], unit, 2, fine=True)}",
         f"{100.0 * limit['share']:.2g} %" if limit["share"] is not None else "-",
-        fine_quantity(named, unit) if named is not None else "-",
+        quantity(named, unit, 2, fine=True) if named is not None else "-",
     ]
 
 
