@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.model import steady
-from ..identify.search import loss
+from ..identify.search import HUBER, loss
 from ..physics.effect import EFFECTS
-from .effect_size import CLIP, Known, Sized
+from .effect_size import Known, Sized
 
 Array = NDArray[np.float64]
 
@@ -222,7 +222,7 @@ def _if_linear(known: Known, slope: Array, apart: float) -> tuple[float, float]:
     slope : (n,) change per size
     apart : twice the fall of the logarithm of the likelihood, the unit of what is returned
     """
-    near = slope[np.abs(known.plain) <= CLIP]  # beyond, the robust loss is straight
+    near = slope[np.abs(known.plain) <= HUBER]  # beyond, the robust loss is straight
     sharp, size = float(near @ near), float(np.linalg.norm(slope))
     if sharp == 0.0:
         return LARGEST, 0.0

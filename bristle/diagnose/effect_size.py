@@ -14,19 +14,14 @@ from numpy.typing import NDArray
 
 from ..data.command_limits import jumps
 from ..identify.model import Model, Problem
-from ..identify.residuals import Expected, residuals
+from ..identify.residuals import BLOCK, Expected, drawn_noise, residuals
+from ..identify.search import HUBER
 from ..identify.search_context import Search
 from ..identify.start_grid import initial_guesses
 from ..physics.effect import EFFECTS
 from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
-
-CLIP = 2.0
-"""Normalised residuals beyond this count as this, as in a fit."""
-
-BLOCK = 250
-"""Samples, longer than a residual's correlation."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +45,7 @@ class Known:
     @cached_property
     def left(self) -> Array:
         """The normalised residuals (n,) of the model, those far out clipped."""
-        return np.clip(self.plain, -CLIP, CLIP)
+        return np.clip(self.plain, -HUBER, HUBER)
 
     @cached_property
     def counts(self) -> Array:
@@ -80,14 +75,8 @@ class Known:
     @cached_property
     def noise(self) -> tuple[Array, Array]:
         """The force's own noise (n,) and draws (d, n) of the motion's, as residuals have them."""
-        pairs = list(zip(self.problem.runs, self.expected, strict=True))
-        own = np.concatenate([run.noise / e[1][run.skip :] for run, e in pairs])
-        count = min(len(e[2]) for _, e in pairs)
-        drawn = [
-            np.concatenate([e[2][d][run.skip :] / e[1][run.skip :] for run, e in pairs])
-            for d in range(count)
-        ]
-        return self.counts * own, self.counts * np.array(drawn).reshape(count, len(own))
+        own, drawn = drawn_noise(self.problem, self.expected)
+        return self.counts * own, self.counts * drawn
 
     @cached_property
     def size(self) -> float:
@@ -105,11 +94,11 @@ class Known:
 
     def scatter(self, direction: Array) -> float:
         """Return the standard deviation of a direction's (n,) product with the residual."""
-        if float(np.mean(np.minimum(self.plain**2, CLIP**2))) > self.rule.misfit**2:
+        if float(np.mean(np.minimum(self.plain**2, HUBER**2))) > self.rule.misfit**2:
             sums = np.add.reduceat(direction * self.left, np.arange(0, len(direction), BLOCK))
             return float(np.linalg.norm(sums))
         own, drawn = self.noise
-        moved = np.clip(drawn, -CLIP, CLIP) @ direction
+        moved = np.clip(drawn, -HUBER, HUBER) @ direction
         more = float(np.var(moved, ddof=1)) if len(moved) > 1 else 0.0
         return sqrt(float(np.sum((direction * own) ** 2)) + more)
 
@@ -126,8 +115,7 @@ class Sized:
         self.one = self.model.value(self.key)
         self.low, self.high = self.model.bounds(self.key)
         self.signed = self.low < 0.0 and not self.falls
-        at_zero = not self.falls and self.low <= 0.0
-        self._without = self._counted(self._with(0.0)) if at_zero else known.plain
+        self._without = self._counted(self.without())
 
     def value(self, size: float) -> float:
         """Return the parameter's value [SI] at a size, within its bounds."""
@@ -135,7 +123,7 @@ class Sized:
 
     def change(self, size: float) -> Array:
         """Return by how much the effect changes the normalised residuals (n,) at a size."""
-        return self._counted(self._with(self.value(size))) - self._without
+        return self._counted(self.with_value(self.value(size))) - self._without
 
     def _counted(self, model: Model) -> Array:
         known = self.known
@@ -148,7 +136,13 @@ class Sized:
     def _wanted(self, size: float) -> float:
         return self.one / size if self.falls else self.one * size
 
-    def _with(self, value: float) -> Model:
+    def without(self) -> Model:
+        """Return the model with none of the effect: at zero where its parameter may be zero."""
+        at_zero = not self.falls and self.low <= 0.0
+        return self.with_value(0.0) if at_zero else self.known.model
+
+    def with_value(self, value: float) -> Model:
+        """Return the model with the effect at a value of its parameter [SI]."""
         return replace(self.model, values={**self.model.values, self.key: value})
 
 

@@ -26,7 +26,7 @@ from .model import (
     steady,
     without,
 )  # fmt: skip
-from .residuals import Expected, residuals
+from .residuals import BLOCK, Expected, drawn_noise, residuals
 from .search import HUBER_AT_ONE, descend, jacobian, loss
 from .starts import start_model, start_models
 
@@ -52,7 +52,6 @@ Array = NDArray[np.float64]
 _ALIKE = 1e-3  # relative difference of costs below which two starts have come to the same end
 _WEAK = 1e-6  # a singular value of the scaled Jacobian below this share of the largest is none
 _MISFIT = 1.15  # z above which a residual is more than noise
-_BLOCK = 250  # samples, longer than a residual's correlation
 _FINAL_DRAWS = 24  # draws of the motion for bias and intervals of what is reported
 _ENDS = 6  # searches from beside the best point where the loss is rough
 _ASIDE = {"N/m": 0.4, "kg": 0.4}  # by what share, by unit: what a joint's spikes hardly tell
@@ -234,18 +233,12 @@ def _intervals(scaled: Scaled, theta: Array) -> tuple[Array, tuple[str, ...]]:
     values, vectors = np.linalg.eigh(A)
     weak = values <= _WEAK**2 * values[-1]
     inverse = (vectors * np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, values))) @ vectors.T
-    pairs = list(zip(scaled.problem.runs, scaled.expected, strict=True))
-    own = np.concatenate([run.noise / e[1][run.skip :] for run, e in pairs])
+    own, drawn = drawn_noise(scaled.problem, scaled.expected)
     B = (J * (own**2)[:, None]).T @ J
-    count = min(len(spread) for _, _, spread in scaled.expected)
-    if count > 1:
-        drawn = [
-            np.concatenate([e[2][d][run.skip :] / e[1][run.skip :] for run, e in pairs])
-            for d in range(count)
-        ]
+    if len(drawn) > 1:
         scores = np.array([J.T @ np.clip(e, -2.0, 2.0) for e in drawn])
         scores -= scores.mean(axis=0)
-        B = B + scores.T @ scores / (count - 1)
+        B = B + scores.T @ scores / (len(drawn) - 1)
     if float(np.mean(loss(r))) > _MISFIT**2 * HUBER_AT_ONE:
         B = _scores_of_blocks(J, r)
     covariance = inverse @ B @ inverse
@@ -259,7 +252,7 @@ def _intervals(scaled: Scaled, theta: Array) -> tuple[Array, tuple[str, ...]]:
 def _scores_of_blocks(J: Array, r: Array) -> Array:
     """Return the covariance (p, p) of J' psi, from blocks of samples taken as independent."""
     scores = J * np.clip(r, -2.0, 2.0)[:, None]
-    edges = np.arange(0, len(r), min(_BLOCK, max(1, len(r) // 20)))
+    edges = np.arange(0, len(r), min(BLOCK, max(1, len(r) // 20)))
     sums = np.add.reduceat(scores, edges, axis=0)
     sums -= sums.mean(axis=0)
     B: Array = sums.T @ sums

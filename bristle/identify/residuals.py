@@ -108,3 +108,25 @@ def residuals(problem: Problem, model: Model, expected: Expected) -> Array:
 def robust_z(problem: Problem, model: Model, draws: int = 12) -> float:
     """Return z, the robust RMS of residual over expected noise: 1 for a true model."""
     return z_scale(residuals(problem, model, problem.expectation(model, draws)))
+
+
+def drawn_noise(problem: Problem, expected: Expected) -> tuple[Array, Array]:
+    """Return a true model's noise as residuals have it, divided by what is expected of it.
+
+    Parameters
+    ----------
+    problem : the runs
+    expected : what a true model would show on each run; see `Problem.expectation`
+
+    Returns
+    -------
+    (n,) standard deviation of the force's own noise; (d, n) draws of the motion's
+    """
+    pairs = list(zip(problem.runs, expected, strict=True))
+    own = np.concatenate([run.noise / e[1][run.skip :] for run, e in pairs])
+    count = min(len(spread) for _, _, spread in expected)
+    drawn = [
+        np.concatenate([e[2][d][run.skip :] / e[1][run.skip :] for run, e in pairs])
+        for d in range(count)
+    ]
+    return own, np.array(drawn).reshape(count, len(own))
