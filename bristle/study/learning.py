@@ -14,7 +14,8 @@ from ..diagnose.decision import missing
 from ..diagnose.faults import SensorFault
 from ..diagnose.law_free import diagnose_laws
 from ..errors import StudyError
-from ..findings import command
+from ..findings import command, unknown
+from ..physics.laws import law_names
 from ..progress import tell, telling
 from .curves import LearnedEffect, learn_effect
 from .history import Step
@@ -58,6 +59,8 @@ def diagnose_study(
         say(f"left out: {why}")
     model, runs = study.model(), study.runs()
     if law not in (None, ALL, model.law):
+        if law not in law_names():
+            raise StudyError(unknown("law", str(law), (*law_names(), ALL)))
         raise StudyError(
             f"the study's model has the law {model.law}. To take another one:  "
             f"{law_command(study.folder, str(law))} ; to compare all of them:  "

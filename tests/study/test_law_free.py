@@ -128,6 +128,12 @@ def test_a_law_that_nobody_chose_is_sought_until_the_model_has_another_or_an_eff
     assert law_or_all(chosen, None) is None
 
 
+def test_a_law_that_there_is_not_is_told_with_those_that_there_are(tmp_path):
+    study = create_study(tmp_path / "rig", write_runs(tmp_path / "lab", seconds=2.0)).study
+    with pytest.raises(StudyError, match=r'no law "bingam"\. Did you mean "bingham"'):
+        diagnose_study(study, law="bingam")
+
+
 def test_study_toml_takes_all_laws_or_none(tmp_path):
     path = create_study(tmp_path / "rig", write_runs(tmp_path / "lab", seconds=2.0)).study.folder
     text = (path / "study.toml").read_text()
