@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..compare.names import site_name
 from ..diagnose.learned.along import GIVEN
 from ..diagnose.learned.closed import ClosedForm, in_words, name_of
 from ..diagnose.learned.curve import Curve
@@ -45,7 +46,8 @@ def draw_curve(
     assert found.after is not None
     curve = found.curve
     with look():
-        heading = f"{found.name}: {curve.words()}"
+        where = f" at {site_name(curve.at)}" if curve.place.is_line else ""
+        heading = f"{found.name}: {curve.words()}{where}"
         said = (
             f"z on held-out runs {short_z(found.before.z)} before, {short_z(found.after.z)} with it"
         )

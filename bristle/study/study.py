@@ -1,5 +1,7 @@
 """A study: a folder with measurements, the model held against them, and how it came to be."""
 
+# Longer than 300 lines: whatever reads or writes the folder is one class, for one lock guards it.
+
 from __future__ import annotations
 
 import hashlib

@@ -248,7 +248,7 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
     if found.name == "constant":
         return f"a constant, {quantity(found.values[0], unit)}"
     m, d, scaled = found.values[1], found.values[2], found.form.scales is not None
-    each = "" if along == "1" else f" per {along}"
+    rate = unit if along == "1" else canonical(f"{unit}/({along})")
     if found.name == "line":
         physical = _PHYSICAL.get((curve.part, curve.along))
         if physical:
@@ -256,13 +256,13 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
                 f"proportional to {curve.signal.words}: {physical[0]} of {plain(m)} {physical[1]}"
             )
         if unit == "1":
-            return f"a line of slope {plain(m)}{each}"
-        return f"a line, {plain(m)} {unit}{each}"
+            return f"a line of slope {plain(m)}" + ("" if along == "1" else f" per {along}")
+        return f"a line, {plain(m)} {rate}"
     scale = {
         "ripple": f", pitch {quantity(d, along)}",
         "power": f" with exponent {plain(d, 2)}",
         **{
-            name: f" {word} {quantity(d, along)}, then {plain(m)} {unit}{each}"
+            name: f" {word} {quantity(d, along)}, then {plain(m)} {rate}"
             for name, word in _GAPS.items()
         },
     }.get(found.name, f" over {quantity(d, along)}" if scaled else "")
