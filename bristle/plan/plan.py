@@ -25,6 +25,7 @@ from .knowledge import Question
 from .motions import Waveform
 from .outcome import Outcome, outcomes
 from .planned_test import Signals, Test
+from .purposes import cost_of
 from .questions import SizedRival, effects_beside, open_parts, rivals
 from .rig_limits import RigLimits, limits_of_runs, with_given
 from .search import Planner
@@ -203,8 +204,9 @@ def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:
     """Return the plan that serves a goal."""
     goal, limits = found.goal, planner.limits
     tests = planner.plan()
-    gain = float(np.exp(goal.value(()) - goal.value(tests)))
     after = goal.with_tests(tests)[: found.count]
+    costs = [cost_of(found.purposes.figures(one)) for one in (found.known, after)]
+    gain = float(np.exp(costs[0] - costs[1]))
     return Plan(
         name, tuple(one.test for one in tests),
         tuple(one.test.signals(limits) for one in tests),
