@@ -37,7 +37,8 @@ _SHOWN_IN = {"displacement": "mm"}
 """Units of the files where they are not those of the SI."""
 _KEYS = ("schema", "rig", "study", "rate", "command", "runs")
 _RUN_KEYS = ("name", "file", "role", "about")
-_NAME = re.compile(r"[A-Za-z0-9][\w.+-]*")
+NAME = re.compile(r"[A-Za-z0-9][\w.+-]*")
+"""Names that runs, and their files, can have."""
 _OFF = 0.01
 """Share by which the rate of a file may differ from that of plan.toml."""
 
@@ -196,7 +197,7 @@ def _listed(toml: Toml, folder: Path) -> list[dict[str, str]]:
         toml.known(keys, table, _RUN_KEYS)
         one = {key: toml.text(keys, table, key) for key in _RUN_KEYS}
         one["role"] = one["role"] or ROLES[0]
-        if not _NAME.fullmatch(one["name"]):
+        if not NAME.fullmatch(one["name"]):
             toml.error(
                 (*keys, "name"),
                 f'name = "{one["name"]}"; letters, digits, _ . + and - are right, as in plan_1.',
@@ -268,7 +269,7 @@ def _refuse_wrong(plan: PlanFolder) -> None:
         raise StudyError("a plan has at least one run.")
     wanted = {plan.motion, *([plan.command] if plan.command else [])}
     for run in plan.runs:
-        if not _NAME.fullmatch(run.name) or names.count(run.name) > 1:
+        if not NAME.fullmatch(run.name) or names.count(run.name) > 1:
             raise StudyError(f'run "{run.name}": a name of its own, which a file can have, is due.')
         if run.role not in ROLES:
             raise StudyError(f'{run.name}: role "{run.role}"; "train" or "holdout" is right.')
