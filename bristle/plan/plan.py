@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -93,6 +93,7 @@ class Plan:
     limits: RigLimits
     drive: str
     gain: float
+    rig: ClassVar[str] = "bench"
 
     @property
     def worth(self) -> bool:
@@ -140,14 +141,18 @@ class Plan:
         StudyError
             If the folder is there already or cannot be written.
         """
-        from .picture import plan_files
-
         path = Path(folder)
         write_plan(
-            PlanFolder("bench", self.study, self.limits.rate, tuple(self.runs())), path,
-            plan_files(self),
+            PlanFolder(self.rig, self.study, self.limits.rate, tuple(self.runs())), path,
+            self.files(),
         )  # fmt: skip
         return path
+
+    def files(self) -> dict[str, str | bytes]:
+        """Return the further files of the plan's folder by name."""
+        from .picture import plan_files
+
+        return plan_files(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
