@@ -11,15 +11,16 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any
 
+from ..compare.names import site_name
 from ..data.measurement import Measurement
 from ..diagnose.rule import BENCH
+from ..identify.rig import DAMPER
 from ..identify.structure import StructureProblem
 from .goal import Purposes, Stated
 from .knowledge import Known
-from .measured_force import with_measured_force
+from .measured_force import of_one_force, with_measured_force
 from .outcome import Outcome
 from .planned_test import Signals
-from .questions import AT
 from .shaking_table import FORCE, Columns, ShakingTable
 
 HELPS = 1.5
@@ -39,39 +40,38 @@ class Added:
 
     `channel` of the sensor; `outcome` with the tests alone (`now`) and with the sensor too
     (`then`); `factor` by which it helps; `settles` whether a verdict can tell with it, and cannot
-    without; `further` how many other figures it helps with.
+    without.
     """
 
     channel: str
     outcome: Outcome
     factor: float
     settles: bool
-    further: int = 0
 
     def sentence(self) -> str:
         """Return what the sensor would show, as an engineer would say it."""
-        one, begin = self.outcome, f"{_named(self.channel)} would"
+        one = self.outcome
+        site, _, name = one.name.partition(": ")
+        where = f"{name} at {site_name(site)}"
         now, then = (one.shown(value) for value in (one.now, one.then))
-        if one.purpose == "separate":
-            site, _, pair = one.name.partition(": ")
-            does = "settle it" if self.settles else "help"
-            text = f"{begin} {does}, {pair.replace(AT, f' at {site}{AT}')}: {then} apart, not {now}"
+        change = f"from {now} to {then}" if isfinite(one.now) else f"to {then}"
+        if self.settles:
+            does = f"settle {where}: with it they are {then} apart; a verdict needs {BENCH.tells:g}"
+        elif one.purpose == "separate":
+            does = f"raise the distance of {where} {change}"
         elif one.purpose == "see":
-            text = f"{begin} {'show' if not isfinite(one.now) else 'lower'} the smallest visible "
-            text += f"{one.what} of {one.name}" + (
-                f": {then}" if not isfinite(one.now) else f" from {now} to {then}"
-            )
+            place = f" in place of {now}" if isfinite(one.now) else ""
+            does = f"lower the smallest visible {where}: {one.what} {then}{place}"
         else:
-            text = f"{begin} lower the {one.what} of {one.name} from {now} to {then}"
-        if self.further:
-            text += f", and help with {self.further} other figure{'s' * (self.further > 1)}"
-        return f"{text}."
+            does = f"lower the {one.what} of {where} {change}"
+        much = "" if self.settles or self.factor >= HELPS else ", and no other sensor does more"
+        return f"{_named(self.channel)} would {does}{much}."
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
         return {
             "channel": self.channel, "settles": self.settles,
-            "factor": self.factor if isfinite(self.factor) else None, "further": self.further,
+            "factor": self.factor if isfinite(self.factor) else None,
             "outcome": self.outcome.as_dict(), "sentence": self.sentence(),
         }  # fmt: skip
 
@@ -97,6 +97,8 @@ def added_sensors(
 ) -> list[Added]:
     """Return what sensors that the study lacks would add, the most useful one first.
 
+    Those that help by `HELPS` or more; of others the best one alone.
+
     Parameters
     ----------
     table : simulates the tests
@@ -109,21 +111,22 @@ def added_sensors(
     without = {site: one.purposes.figures(then[site]) for site, one in stand.items()}
     plain_values = {
         (site, one.purpose, one.name): one.value for site, own in without.items() for one in own
-    }
+    } | {(DAMPER, "separate", pair): inf for pair in of_one_force(stand)}
     out = []
     for channel in table.lacking():
         sites = [show([table.measured(*test, (channel,))]) for test in tests]
         values = _values(stand, sites)
-        if channel == FORCE and "damper" in stand:
-            values |= with_measured_force(stand["damper"], sites)
+        if channel == FORCE and DAMPER in stand:
+            values |= with_measured_force(stand[DAMPER], sites)
         helps = {
             key: plain_values[key] / value
             for key, value in values.items()
-            if value > 0.0 and plain_values.get(key, 0.0) >= HELPS * value
+            if 0.0 < value < inf and plain_values.get(key, 0.0) > value
         }
         if helps:
             out.append(_told(channel, helps, values, stand, rows))
-    return sorted(out, key=lambda one: (not one.settles, -one.factor))
+    out.sort(key=lambda one: (not one.settles, -one.factor))
+    return [one for one in out if one.settles or one.factor >= HELPS] or out[:1]
 
 
 def _values(stand: Mapping[str, Stated], sites: Sequence[Sites]) -> dict[Key, float]:
@@ -178,7 +181,7 @@ def _told(
         row = replace(row, now=distances[0], then=distances[1])
     else:
         row = replace(row, now=row.then, then=row.then / factor)
-    return Added(channel, row, factor, bool(settled), len(helps) - 1)
+    return Added(channel, row, factor, bool(settled))
 
 
 def _visible(row: Outcome, purposes: Purposes, name: str, sizes: tuple[float, float]) -> Outcome:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge.in_building import House
-from ..data.measurement import Measurement
 from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.opening import Opening, median_noise
-from ..errors import RecordError, StudyError
-from ..identify.structure import StructureProblem
-from ..physics.building import frequencies
+from ..errors import StudyError
+from ..identify.rig import DAMPER
 from ..physics.drive import DRIVES
 from ..progress import tell
 from ..quantity import plain, quantity
@@ -26,19 +24,22 @@ from ..study.identification import as_model
 from ..study.rig import building_of
 from ..study.study import Study
 from .added_sensors import Added, added_sensors
-from .building_sites import SiteWish, default_wishes, largest_motion, purposes_at
+from .building_sites import SiteWish, default_wishes, purposes_at
 from .folder import PlannedRun
 from .goal import Measured, Stated, stated
-from .ground import displacement_of, records_at_hand, scalable
+from .ground import records_at_hand, scalable
 from .knowledge import Known
+from .measured_force import of_one_force
 from .motions import Waveform
 from .outcome import Outcome, outcomes
 from .plan import Plan, Wish
-from .planned_test import Signals, Test
+from .planned_test import Signals
 from .purposes import cost_of
-from .rig_limits import RESERVE, SLOWEST, RigLimits, with_given
-from .search import LEAST, Goal, Planner, Seen
-from .shaking_table import Columns, ShakingTable
+from .rig_limits import with_given
+from .search import Goal
+from .shaking_limits import limits_of_shaking
+from .shaking_table import ShakingTable
+from .table_planner import DRAWS, TablePlanner
 
 Array = NDArray[np.float64]
 
@@ -46,17 +47,11 @@ CANDIDATES, IMPROVED = 64, 10
 """Tests that are looked at, and evaluations in which a picked one is improved: each is a run of the
 building, simulated and smoothed."""
 
-DRAWS = 4
-"""Draws of the smoother's error that planned runs are judged with."""
+ONE_FORCE = "distance, if they have exactly the forms of the model"
+"""The figure of rivals that add up to one force while the damper's is not measured."""
 
-LONGEST = 30.0
-"""Longest test [s] where nobody says."""
-
-TRIES, GENTLE, STEEP = 6, 0.97, 0.3
-"""How often a motion beyond a limit is made smaller, how far below that limit, at the most by."""
-
-RECORDS = 0.5
-"""Share of the tests that are looked at with a recorded ground motion."""
+TIE = 0.01
+"""Weight of how well parameters are known, where purposes leave a choice."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +90,16 @@ class BuildingPlan(Plan):
         """Return the plan as an engineer would say it."""
         return [*super().sentences(), *(one.sentence() for one in self.sensors)]
 
+    @property
+    def worth(self) -> bool:
+        """Whether the tests would show what the runs at hand do not, with a sensor if need be."""
+        return super().worth or any(one.settles for one in self.sensors)
+
+    def _why(self, one: Outcome) -> str:
+        if one.what == ONE_FORCE:
+            return "they add up to one force while the damper's is not measured; no motion helps."
+        return super()._why(one)
+
     def files(self) -> dict[str, str | bytes]:
         """Return the further files of the plan's folder by name."""
         from .building_picture import building_files
@@ -113,68 +118,6 @@ def _words(motion: Waveform, signals: Signals) -> str:
         return motion.words(peak)
     factor = float(np.max(np.abs(signals.x)) / np.max(np.abs(motion.record)))
     return f"{motion.name} times {plain(factor, 2)}, {peak}"
-
-
-@dataclass(frozen=True)
-class TablePlanner(Planner):
-    """Finds the tests of a building on its table; `places` has the site of each question.
-
-    `table` simulates them; `show` returns the sites of runs that were not measured yet; `records`
-    are motions that may be scaled.
-    """
-
-    table: ShakingTable | None = None
-    show: Callable[[list[Measurement]], dict[str, StructureProblem]] | None = None
-    places: tuple[str, ...] = ()
-    records: tuple[Waveform, ...] = ()
-    nothing_kept: ClassVar[str] = (
-        "no ground motion stays within the limits and moves the building: a larger stroke, speed "
-        "or acceleration of the table, or a larger stroke of the damper or drift, is needed."
-    )
-
-    def response(self, test: Test) -> tuple[Signals, Columns]:
-        """Return what a test prescribes, and every output of the simulation."""
-        assert self.table is not None
-        signals = test.signals(self.limits, self.rate)
-        columns = self.table.response(signals)
-        assert columns is not None
-        return signals, columns
-
-    def _look(self, test: Test) -> Seen | None:
-        assert self.table is not None
-        for _ in range(TRIES):
-            signals = test.signals(self.limits, self.rate)
-            columns = self.table.response(signals) if test.share >= LEAST**2 else None
-            if columns is None:
-                return None
-            most = self.table.excess(columns, self.limits)
-            if most <= 1.0:
-                return self._judged(test, signals, columns)
-            test = test.smaller(max(STEEP, GENTLE / most))
-        return None
-
-    def _judged(self, test: Test, signals: Signals, columns: Columns) -> Seen | None:
-        """Return a test that keeps the limits as it would be seen, None where nothing moves."""
-        assert self.table is not None
-        assert self.show is not None
-        try:
-            found = self.show([self.table.measured(signals, columns)])
-        except RecordError:  # the base does not move
-            return None
-        normals, samples = [], []
-        for site, asked in zip(self.places, self.goal.asked, strict=True):
-            runs = found[site].runs if site in found else []
-            normals.append(asked.of(runs, DRAWS))
-            samples.append(sum(len(run.x) - run.skip for run in runs))
-        return Seen(test, signals, tuple(normals), tuple(samples))
-
-    def _motion(self, which: float, at: float, seed: int) -> Waveform:
-        """Return a motion by two numbers between 0 and 1: a record, or its kind and frequency."""
-        if not self.records or which >= RECORDS:
-            low = RECORDS if self.records else 0.0
-            return super()._motion((which - low) / (1.0 - low), at, seed)
-        count = len(self.records)
-        return self.records[min(int(which / RECORDS * count), count - 1)]
 
 
 def plan_building(
@@ -270,7 +213,8 @@ def _joint(stand: Mapping[str, Stated]) -> Goal:
             count = len(one.goal.asked)
             total.append(one.goal.cost(found[first : first + count]))
             first += count
-        return float(np.mean(total))
+        spread = [np.log([*one.deviations().values()]).mean() for one in found if one.deviations()]
+        return float(np.mean(total) + TIE * np.mean(spread or [0.0]))
 
     return Goal(asked, known, cost)
 
@@ -288,6 +232,8 @@ def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -
             cost_of(one.purposes.figures(one.known)) - cost_of(one.purposes.figures(then[site]))
         )
         rows += at_site(site, outcomes(one.purposes, one.asked, one.known, then[site]))
+    alike = {f"{DAMPER}: {pair}" for pair in of_one_force(stand)}
+    rows = [_of_one_force(one) if one.name in alike else one for one in rows]
     shown = [planner.response(one.test) for one in tests]
     tell("looking at sensors")
     assert planner.table is not None
@@ -307,40 +253,6 @@ def at_site(site: str, rows: Sequence[Outcome]) -> list[Outcome]:
     return [replace(one, name=f"{site}: {one.name}") for one in rows]
 
 
-def limits_of_shaking(
-    runs: Sequence[Measurement], sites: Mapping[str, Opening], house: House
-) -> RigLimits:
-    """Return what table, building and amplifier have done already.
-
-    Parameters
-    ----------
-    runs : that were measured
-    sites : of the building, with their runs
-    house : the building
-    """
-    tones = frequencies(house.building)
-    low = max(SLOWEST, 0.3 * tones[0])
-    grounds = [(run["ground_acceleration"], run.step) for run in runs]
-    x = [displacement_of(one, step, low) for one, step in grounds]
-    v = [np.gradient(one, step) for one, (_, step) in zip(x, grounds, strict=True)]
-    reached = {
-        site: largest_motion([*one.problem.runs, *one.held_out.runs])[0] / RESERVE
-        for site, one in sites.items()
-    }
-    drifts = [most for site, most in reached.items() if site.startswith("storey")]
-    strokes = [most for site, most in reached.items() if not site.startswith("storey")]
-    commands = [run[run.drive] for run in runs if run.drive]
-    command = (0.0, 0.0)
-    if commands:
-        least = min(float(np.quantile(one, 0.001)) for one in commands)
-        most = max(float(np.quantile(one, 0.999)) for one in commands)
-        command = (max(0.0, least) if least > -0.02 * most else least, most)
-    return RigLimits(
-        max(float(np.max(np.abs(one))) for one in x) / RESERVE,
-        max(float(np.max(np.abs(one))) for one in v) / RESERVE,
-        max(float(np.quantile(np.abs(one), 0.999)) for one, _ in grounds) / RESERVE,
-        band=(low, max(1.3 * tones[-1], 2.0 * low)), command=command,
-        duration=min(LONGEST, max(run.duration for run in runs)), rate=1.0 / runs[0].step,
-        motions=("sweep", "multisine"), commands=("held", "switched", "random"),
-        damper_stroke=max(strokes, default=np.inf), drift=max(drifts, default=np.inf),
-    )  # fmt: skip
+def _of_one_force(row: Outcome) -> Outcome:
+    """Return the outcome of rivals that no motion tells apart."""
+    return replace(row, what=ONE_FORCE, settled=False)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..diagnose.conclusion import lookalikes
 from ..diagnose.effect_size import Known as Fitted
 from ..diagnose.learned.along import ALONG
 from ..diagnose.learned.place import Place
@@ -55,13 +56,35 @@ def default_wishes(verdict: Mapping[str, Any]) -> list[SiteWish]:
     """Return what a plan is for where nobody says: what the verdict leaves open, or else all."""
     findings = verdict.get("findings") or []
     out = []
-    for one in findings:
+    if verdict.get("kind") == "ambiguous" and verdict.get("force") == "reconstructed":
+        named = [name for one in findings if one["site"] == DAMPER for name in one["effects"]]
+        alike = [twin for name in named for twin in twins_of(name)]
+        if alike:
+            out.append(SiteWish(Wish(separate=tuple(dict.fromkeys([*named, *alike]))), (DAMPER,)))
+    for one in findings if not out else ():
         site, names = one["site"], tuple(dict.fromkeys(one.get("effects") or ()))
         if one["kind"] == "ambiguous" and len(names) > 1:
             out.append(SiteWish(Wish(separate=names), (site,)))
         elif one["kind"] == "unknown":
             out.append(SiteWish(Wish(learn=()), (site,)))
     return out or [SiteWish(Wish(see=(), sharpen=()))]
+
+
+def twins_of(name: str) -> list[str]:
+    """Return the effects that add up to one force with another while none is measured.
+
+    What a part of the damper's law does is there the effect itself, at the damper.
+    """
+    effect = EFFECTS[name]
+    moved = [effect.key(DAMPER)] if DAMPER in effect.sites and effect.site != DAMPER else []
+    twins = [[twin] if twin in EFFECTS else moved for twin in lookalikes((name,))]
+    return list(dict.fromkeys(one for own in twins for one in own))
+
+
+def are_twins(one: str, other: str) -> bool:
+    """Return whether two rivals add up to one force while the damper's is not measured."""
+    pairs = ((one, other), (other, one))
+    return any(name in EFFECTS and twin in twins_of(name) for name, twin in pairs)
 
 
 def able_at(site: str, opened: Opening) -> list[str]:
@@ -157,6 +180,8 @@ def _rivals(
         own = next((one for one in able if _asked_for(one, (name,))), "")
         if own:
             models[name] = _with_effect(own, opened)
+        elif plain_name(name) != name and plain_name(name) in able:
+            models[name] = _moved(name, _with_effect(plain_name(name), opened))
     if not models:
         return []
     if NONE in names or len(models) == 1:
@@ -170,6 +195,17 @@ def _with_effect(name: str, opened: Opening) -> Model:
         tell(f"fitting {name}")
         return joined(name, opened.before.model, opened.problem)
     return fitted_with(name, opened.before.model, opened.searched)
+
+
+def _moved(name: str, model: Model) -> Model:
+    """Return the model with an effect of the layer at the damper, where it does the same."""
+    layer = plain_name(name)
+    effects = tuple(name if one == layer else one for one in model.effects)
+    values = {
+        f"{name}.{key.partition('.')[2]}" if key.startswith(f"{layer}.") else key: value
+        for key, value in model.values.items()
+    }
+    return replace(model, effects=effects, values=values)
 
 
 def _own_parameters(site: str, model: Model) -> dict[str, str]:
@@ -201,7 +237,8 @@ def _refuse_unknown(
     there = sorted({name for names in able.values() for name in names})
     for name in (*(wish.see or ()), *(wish.separate or ())):
         law = wish.separate is not None and name in wish.separate and name in (*LAWS, NONE)
-        if not law and not any(_asked_for(one, (name,)) for one in there):
+        known = any(_asked_for(one, (name,)) for one in there)
+        if not law and not known and not any(name in twins_of(one) for one in there):
             _refuse_effect(name, there, sites)
     if wish.separate is not None and len(wish.separate) < 2:
         raise StudyError("--separate needs two or more rivals, such as  --separate gas_spring none")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from math import hypot, inf
@@ -17,10 +17,11 @@ from ..identify.rig import DAMPER
 from ..identify.structure import StructureProblem
 from ..physics.effect import EFFECTS
 from ..physics.laws import law_of_part
+from .building_sites import are_twins
 from .goal import Purposes, Stated
 from .knowledge import Asked, Known, Question, Rival
 from .purposes import seen
-from .questions import SizedRival
+from .questions import AT, SizedRival
 
 LAYER = "layer"
 BOTH = (DAMPER, LAYER)
@@ -28,6 +29,22 @@ DRAWS = 4
 """Draws of the smoother's error."""
 
 Key = tuple[str, str, str]
+
+
+def of_one_force(stand: Mapping[str, Stated]) -> set[str]:
+    """Return the pairs of rivals that no motion tells apart while the force is not measured.
+
+    Parameters
+    ----------
+    stand : the purposes of each site, with what the runs at hand say
+    """
+    if DAMPER not in stand:
+        return set()
+    problem = stand[DAMPER].asked[0].problem
+    if not (isinstance(problem, StructureProblem) and problem.reconstructed):
+        return set()
+    pairs = {rival.name for one in stand[DAMPER].purposes.rivals for rival in one.rivals}
+    return {pair for pair in pairs if are_twins(*pair.split(AT))}
 
 
 def with_measured_force(

@@ -124,14 +124,16 @@ class Plan:
 
     def _beyond(self) -> list[str]:
         """Return what no test within the limits settles."""
-        return [
-            f"{one.name}: no test within these limits tells them apart; at best they differ by "
+        return [f"{one.name}: {self._why(one)}" for one in self.outcomes if not one.settled]
+
+    def _why(self, one: Outcome) -> str:
+        """Return why no test within the limits settles something."""
+        if one.purpose != "separate":
+            return "no test within these limits shows it; the model takes it up."
+        return (
+            "no test within these limits tells them apart; at best they differ by "
             f"{plain(one.then, 2)} standard deviations."
-            if one.purpose == "separate"
-            else f"{one.name}: no test within these limits shows it; the model takes it up."
-            for one in self.outcomes
-            if not one.settled
-        ]
+        )
 
     def write(self, folder: Path | str) -> Path:
         """Write the tests as files for a controller, a picture each; return the folder.
