@@ -23,8 +23,8 @@ from .outcome import Outcome
 from .planned_test import Signals
 from .shaking_table import FORCE, Columns, ShakingTable
 
-HELPS = 1.5
-"""Factor from which on a sensor is said to help."""
+HELPS, SOME = 1.5, 1.15
+"""Factors from which on a sensor is said to help, and from which on the best one is named."""
 
 DRAWS = 4
 """Draws of the smoother's error."""
@@ -81,10 +81,15 @@ def _named(channel: str) -> str:
     if channel == FORCE:
         return "A load cell at the damper"
     level, _, kind = channel.partition("_")
-    place = "the base" if level == "base" else f"floor {level.removeprefix('floor')}"
+    place = place_of(level)
     if kind == "acceleration_absolute":
         return f"An accelerometer on {place}"
     return f"A {kind} of {place}"
+
+
+def place_of(level: str) -> str:
+    """Return a level of a building in words."""
+    return "the base" if level == "base" else f"floor {level.removeprefix('floor')}"
 
 
 def added_sensors(
@@ -126,7 +131,8 @@ def added_sensors(
         if helps:
             out.append(_told(channel, helps, values, stand, rows))
     out.sort(key=lambda one: (not one.settles, -one.factor))
-    return [one for one in out if one.settles or one.factor >= HELPS] or out[:1]
+    helping = [one for one in out if one.settles or one.factor >= HELPS]
+    return helping or [one for one in out[:1] if one.factor >= SOME]
 
 
 def _values(stand: Mapping[str, Stated], sites: Sequence[Sites]) -> dict[Key, float]:

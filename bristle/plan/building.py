@@ -23,7 +23,7 @@ from ..quantity import plain, quantity
 from ..study.identification import as_model
 from ..study.rig import building_of
 from ..study.study import Study
-from .added_sensors import Added, added_sensors
+from .added_sensors import Added, added_sensors, place_of
 from .building_sites import SiteWish, default_wishes, purposes_at
 from .folder import PlannedRun
 from .goal import Measured, Stated, stated
@@ -64,10 +64,13 @@ class BuildingPlan(Plan):
         The displacement of the first level [m] in each test, simulated with the study's model.
     sensors : tuple of Added
         What sensors that the study lacks would show besides, the most useful one first.
+    level : str
+        The first level.
     """
 
     predicted: tuple[Array, ...] = field(default=(), repr=False)
     sensors: tuple[Added, ...] = ()
+    level: str = "base"
     rig: ClassVar[str] = "structure"
 
     def runs(self) -> list[PlannedRun]:
@@ -81,7 +84,7 @@ class BuildingPlan(Plan):
                 channels[drive.name] = one.V
                 about += f", {test.command.words(drive.name, drive.unit)}"
             moved = quantity(float(np.max(np.abs(self.predicted[k]))), "m")
-            about += f"; its first level moves by {moved}"
+            about += f"; {place_of(self.level)} moves by {moved}"
             role = "holdout" if k % 2 else "train"
             out.append(PlannedRun(f"plan_{k + 1}", role, about, one.time, channels))
         return out
@@ -245,6 +248,7 @@ def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -
         tuple(one.test.signals(planner.limits) for one in tests), tuple(rows), planner.limits,
         study.drive, float(np.exp(np.mean(gains))),
         tuple(columns[f"structure.{level}_displacement"] for _, columns in shown), tuple(sensors),
+        level,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..draw.style import BLUE, GREEN, VERMILION, Page, look, png
 from ..physics.drive import DRIVES
 from ..quantity import quantity
+from .added_sensors import place_of
 from .picture import SHOWN, plan_text
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 def building_files(plan: BuildingPlan) -> dict[str, str | bytes]:
     """Return the further files of a plan's folder by name: pictures, and plan.md."""
     files: dict[str, str | bytes] = {
-        f"{run.name}.png": png(draw_shaking(run, moved, plan.drive), 110)
+        f"{run.name}.png": png(draw_shaking(run, moved, plan.drive, plan.level), 110)
         for run, moved in zip(plan.runs(), plan.predicted, strict=True)
     }
     text = plan_text(plan, _limits(plan))
@@ -42,25 +43,26 @@ def _limits(plan: BuildingPlan) -> list[str]:
     asked = [quantity(peak, unit) for peak, unit in zip(peaks, ("m", "m/s", "m/s2"), strict=True)]
     return [
         f"The tests ask the table for {asked[0]} to either side, {asked[1]} and {asked[2]} at the "
-        f"most, and move the first level by {quantity(moved, 'm')}, as the model predicts: nine "
-        "tenths of what the rig can do, or less. Each begins and ends at rest. Command the table "
-        "by its acceleration, or integrate it twice: the displacement comes back to zero."
+        f"most, and move {place_of(plan.level)} by {quantity(moved, 'm')}, as the model predicts: "
+        "nine tenths of what the rig can do, or less. Each begins and ends at rest. Command the "
+        "table by its acceleration, or integrate it twice: the displacement comes back to zero."
     ]
 
 
-def draw_shaking(run: PlannedRun, moved: Array, drive: str) -> Page:
+def draw_shaking(run: PlannedRun, moved: Array, drive: str, level: str) -> Page:
     """Return the picture of a planned test: ground, first level as predicted, command over time.
 
     Parameters
     ----------
     run : as the plan's folder holds it
     moved : (n,) displacement of the first level [m]
+    level : its name
     drive : the channel of the command, "" where there is none
     """
     every = max(1, len(run.time) // SHOWN)
     rows = [
         ("ground acceleration [m/s2]", run.signals["ground_acceleration"], BLUE),
-        ("displacement of the first level, predicted [mm]", 1e3 * moved, GREEN),
+        (f"displacement of {place_of(level)}, predicted [mm]", 1e3 * moved, GREEN),
     ]
     if drive in DRIVES:
         name, unit = DRIVES[drive].name, DRIVES[drive].unit

@@ -131,6 +131,8 @@ class Command:
     def words(self, name: str, unit: str) -> str:
         """Return the command in words; its name and unit as the study has them."""
         between = f"between {self.low:.3g} and {self.high:.3g} {unit}"
+        if self.low == self.high:
+            return f"{name} held at {self.high:.3g} {unit}"
         return {
             "held": f"{name} held at {self.high:.3g} {unit}",
             "switched": f"{name} switched {between} every {self.period:.3g} s",

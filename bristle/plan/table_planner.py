@@ -53,12 +53,12 @@ class TablePlanner(Planner):
         assert self.table is not None
         for _ in range(TRIES):
             signals = test.signals(self.limits, self.rate)
-            columns = self.table.response(signals) if test.share >= LEAST**2 else None
+            columns = self.table.response(signals)
             if columns is None:
                 return None
             most = self.table.excess(columns, self.limits)
             if most <= 1.0:
-                return self._judged(test, signals, columns)
+                return self._judged(test, signals, columns) if most >= LEAST else None
             test = test.smaller(max(STEEP, GENTLE / most))
         return None
 
