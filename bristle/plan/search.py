@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 CANDIDATES = 256
 """Tests that are looked at before the best ones are picked."""
 
-IMPROVED = 24
+IMPROVED = 40
 """Evaluations in which a picked test is improved."""
 
 LEAST = 0.04
