@@ -143,5 +143,17 @@ def sines(seed: int) -> list[PlannedRun]:
     )  # fmt: skip
 
 
+def few_sines(seed: int) -> list[PlannedRun]:
+    """Return eight sines of 4 s: four to fit to and four to judge by, at two levels."""
+    rng = np.random.default_rng([seed, 4])
+    f, low, high = float(rng.uniform(1.0, 2.0)), *sorted(rng.uniform(0.0, 8.0, 2).tolist())
+    tests = [
+        Test(Waveform("sine", 0.3, f), Command("held", 0.0, level), share, 4.0)
+        for level in (low, high)
+        for share in (0.9, 0.8, 0.45, 0.4)
+    ]
+    return _runs(tests, "sine")
+
+
 ORDINARY = {"chirp": chirps, "random": random_runs, "sines": sines}
 """Ordinary campaigns of 48 s by name."""
