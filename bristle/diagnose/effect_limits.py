@@ -128,7 +128,7 @@ def limit_of(sized: Sized) -> EffectLimit:
     kept = float(np.linalg.norm(known.beyond(first)))
     if kept <= ABSORBED * float(np.linalg.norm(first)):
         return EffectLimit(sized.name, why=_why_hidden(sized))
-    least = _resolved(sized, LOOK / kept)
+    least = resolved(sized, LOOK / kept)
     size = _allowed(sized, least)
     coarse = size == least
     share = float(np.linalg.norm(known.beyond(sized.change(size)))) / known.size
@@ -248,7 +248,7 @@ def _crossing(rising: Callable[[float], float], low: float, high: float) -> floa
     return high
 
 
-def _resolved(sized: Sized, size: float) -> float:
+def resolved(sized: Sized, size: float) -> float:
     """Return a size, raised to where the effect's change grows with it.
 
     Below that the steps of the integration decide: a lag of less than half a sample, a play that
