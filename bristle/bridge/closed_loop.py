@@ -14,7 +14,7 @@ import numpy as np
 from ..data.measurement import Measurement
 from ..data.model import StudyModel, read_model
 from ..data.model_draws import has_covariance
-from ..data.open_effects import OpenEffect
+from ..data.open_effects import OpenEffect, left_open
 from ..draw.style import percent
 from ..errors import StudyError
 from ..findings import command
@@ -29,7 +29,6 @@ from .closed_loop_figures import DRAWS, FEWEST, figures_of
 from .closed_loop_result import ClosedLoop, Predicted
 from .closed_loop_runs import Trial, begins_in_motion, trial_of
 from .in_building import House
-from .left_open import effects_left_open
 
 
 def closed_loop(
@@ -145,7 +144,7 @@ def _prepared(
         return [], []
     if draws < FEWEST:
         raise StudyError(f"--with-limits widens a band, for which --draws {FEWEST} is the least.")
-    return effects_left_open(study, model)
+    return left_open(study.verdict(), model, study.folder)
 
 
 def _refuse_other_command(study: Study, trials: Sequence[Trial]) -> None:

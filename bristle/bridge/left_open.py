@@ -14,12 +14,9 @@ from numpy.typing import NDArray
 
 from ..data.model import StudyModel
 from ..data.model_draws import drawn_models
-from ..data.open_effects import OpenEffect, open_effects
-from ..errors import BristleError, StudyError
-from ..findings import command
-from ..physics.forms import joined_form
+from ..data.open_effects import OpenEffect
+from ..errors import BristleError
 from ..progress import tell
-from ..study.study import Study
 from .closed_loop_runs import Trial
 from .closed_loop_sizes import Key, names_of, sizes_of
 from .draws import Simulator
@@ -31,47 +28,6 @@ Left = dict[str, dict[Key, Array]]
 
 SIZES = 6
 """Sizes of an effect that are drawn, each in a draw of the model's parameters."""
-
-
-def effects_left_open(study: Study, model: StudyModel) -> tuple[list[OpenEffect], list[str]]:
-    """Return the effects that a study's verdict does not exclude, and notes on the others.
-
-    Parameters
-    ----------
-    study : the study
-    model : its present model
-
-    Raises
-    ------
-    StudyError
-        If there is no verdict, it has no limits, or it is on another model than the present one.
-    """
-    verdict, again = study.verdict(), command("diagnose", study.folder)
-    if verdict is None:
-        raise StudyError(
-            f"{study.folder}: there is no verdict, whose limits --with-limits draws from:  {again}"
-        )
-    lacking = [name for name in verdict["effects"] if name not in model.effects]
-    if verdict["kind"] in ("effect", "ambiguous") and lacking:
-        raise StudyError(
-            f"{study.folder}: the verdict names {', '.join(lacking)}, and its limits hold beside "
-            f"it. First:  {command('add', study.folder, lacking[0])}  and  {again}"
-        )
-    if verdict.get("laws") and joined_form(verdict["law"], verdict["command"]) != model.law:
-        raise StudyError(
-            f"{study.folder}: the verdict's law is {verdict['law']}, and the model's {model.law}. "
-            f"Identify the one that is right, then:  {again}"
-        )
-    effects, unlimited = open_effects(verdict, model)
-    if not effects:
-        raise StudyError(f"{study.folder}: the verdict has no limits of effects. First:  {again}")
-    if not unlimited:
-        return effects, []
-    see = command("plan", study.folder, "--see", *unlimited)
-    return effects, [
-        f"the runs cannot show {', '.join(unlimited)}: no band has them. To make them visible:  "
-        f"{see}"
-    ]
 
 
 def changes_left_open(

@@ -9,10 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import sqrt
+from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
+from ..errors import StudyError
+from ..findings import command
 from ..physics.effect import EFFECTS, exclude
+from ..physics.forms import joined_form
 from ..units import convert
 from .study_model import StudyModel
 
@@ -46,15 +51,19 @@ class OpenEffect:
     def parts(self, count: int) -> list[float]:
         """Return sizes over the limit, each for an equal share of what may be.
 
+        Their mean square is that of all sizes, however few they are.
+
         Parameters
         ----------
         count : how many
         """
         normal = NormalDist()
         shares = [(k + 0.5) / count for k in range(count)]
-        if self.signed:
-            return [normal.inv_cdf(share) / POINT for share in shares]
-        return [normal.inv_cdf(0.5 * (1.0 + share)) / POINT for share in shares]
+        if not self.signed:
+            shares = [0.5 * (1.0 + share) for share in shares]
+        found = [normal.inv_cdf(share) for share in shares]
+        power = sum(one**2 for one in found) / count
+        return [one / (POINT * sqrt(power)) for one in found]
 
     def own(self, part: float) -> dict[str, float]:
         """Return the effect's parameters [SI] at a size over its limit, within their bounds.
@@ -123,6 +132,49 @@ def open_effects(
                 _others(finding["site"], name, one["others"]), one.get("moved") or {},
             )  # fmt: skip
     return list(found.values()), [name for name in dict.fromkeys(unlimited) if name not in found]
+
+
+def left_open(
+    verdict: Mapping[str, Any] | None, model: StudyModel, folder: Path
+) -> tuple[list[OpenEffect], list[str]]:
+    """Return the effects that a study's verdict does not exclude, and notes on the others.
+
+    Parameters
+    ----------
+    verdict : the content of its verdict.json, None where there is none
+    model : its present model
+    folder : the study's, for messages
+
+    Raises
+    ------
+    StudyError
+        If there is no verdict, it has no limits, or it is on another model than the present one.
+    """
+    again = command("diagnose", folder)
+    if verdict is None:
+        raise StudyError(
+            f"{folder}: there is no verdict, whose limits --with-limits draws from:  {again}"
+        )
+    lacking = [name for name in verdict["effects"] if name not in model.effects]
+    if verdict["kind"] in ("effect", "ambiguous") and lacking:
+        raise StudyError(
+            f"{folder}: the verdict names {', '.join(lacking)}, and its limits hold beside it. "
+            f"First:  {command('add', folder, lacking[0])}  and  {again}"
+        )
+    if verdict.get("laws") and joined_form(verdict["law"], verdict["command"]) != model.law:
+        raise StudyError(
+            f"{folder}: the verdict's law is {verdict['law']}, and the model's {model.law}. "
+            f"Identify the one that is right, then:  {again}"
+        )
+    effects, unlimited = open_effects(verdict, model)
+    if not effects:
+        raise StudyError(f"{folder}: the verdict has no limits of effects. First:  {again}")
+    if not unlimited:
+        return effects, []
+    return effects, [
+        f"the runs cannot show {', '.join(unlimited)}: no band has them. To make them visible:  "
+        f"{command('plan', folder, '--see', *unlimited)}"
+    ]
 
 
 def _clash(name: str, other: str) -> bool:
