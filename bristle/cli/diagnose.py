@@ -28,6 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "where no law was chosen; the model's law: keep it",
     )
     parser.add_argument(
+        "--limits", action="store_true",
+        help="fit the model again at the limit of every effect: exact where it is far from linear",
+    )  # fmt: skip
+    parser.add_argument(
         "--dry-run", action="store_true", help="show the verdict; do not change verdict.json"
     )
     add_trust(parser)
@@ -40,7 +44,9 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    found = diagnose_study(study, law=arguments.law, write=not arguments.dry_run)
+    found = diagnose_study(
+        study, law=arguments.law, profile=arguments.limits, write=not arguments.dry_run
+    )
     verdict = verdict_of(study, found)
     if arguments.json:
         print(json.dumps(verdict, indent=2, ensure_ascii=False))
