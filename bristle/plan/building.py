@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..bridge.in_building import House
+from ..compare.names import site_name
 from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.opening import Opening, median_noise
 from ..errors import StudyError
 from ..identify.rig import DAMPER
 from ..physics.drive import DRIVES
+from ..physics.effect import plain_name
 from ..progress import tell
 from ..quantity import plain, quantity
 from ..study.identification import as_model
@@ -32,7 +34,7 @@ from .knowledge import Known
 from .measured_force import of_one_force
 from .motions import Waveform
 from .outcome import Outcome, outcomes
-from .plan import Plan, Wish
+from .plan import Plan, Wish, errs, note_of_missing
 from .planned_test import Signals
 from .purposes import cost_of
 from .rig_limits import with_given
@@ -184,7 +186,8 @@ def plan_building(
             places=tuple(site for site, one in stand.items() for _ in one.goal.asked),
             records=tuple(waveforms),
         )  # fmt: skip
-        return _planned(study, stand, planner)
+        made = _planned(study, stand, planner)
+    return replace(made, notes=_notes(study, sites))
 
 
 def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:
@@ -198,6 +201,15 @@ def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:
     if not sites:
         raise StudyError(f"{study.folder}: no site of this building has runs that are held out.")
     return sites
+
+
+def _notes(study: Study, sites: Mapping[str, Opening]) -> tuple[str, ...]:
+    """Return what weakens a plan: an error that an effect would take away first."""
+    missing = note_of_missing(study, [plain_name(name) for name in study.model().effects])
+    if missing:
+        return missing
+    loud = {site: one.before.z for site, one in sites.items() if one.before.z > one.rule.clean}
+    return tuple(f"At {site_name(site)} the model {errs(z)}" for site, z in loud.items())
 
 
 def _stated(purposes: Any, opened: Opening, seed: int) -> Stated:
@@ -219,24 +231,18 @@ def _joint(stand: Mapping[str, Stated]) -> Goal:
         spread = [np.log([*one.deviations().values()]).mean() for one in found if one.deviations()]
         return float(np.mean(total) + TIE * np.mean(spread or [0.0]))
 
-    return Goal(asked, known, cost)
+    return Goal(asked, known, len(asked), cost)
 
 
 def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -> BuildingPlan:
     """Return the plan that serves the goals of the sites, and what sensors would add to it."""
-    goal = planner.goal
     tests = planner.plan()
-    after = goal.with_tests(tests)
-    then, rows, gains, first = {}, [], [], 0
-    for site, one in stand.items():
-        then[site] = after[first : first + one.count]
-        first += len(one.goal.asked)
-        gains.append(
-            cost_of(one.purposes.figures(one.known)) - cost_of(one.purposes.figures(then[site]))
-        )
-        rows += at_site(site, outcomes(one.purposes, one.asked, one.known, then[site]))
-    alike = {f"{DAMPER}: {pair}" for pair in of_one_force(stand)}
-    rows = [_of_one_force(one) if one.name in alike else one for one in rows]
+    then = _by_site(stand, planner.goal.with_tests(tests))
+    costs = [
+        cost_of(one.purposes.figures(one.known)) - cost_of(one.purposes.figures(then[site]))
+        for site, one in stand.items()
+    ]
+    rows = [one if one.settled else _or_beyond(one, stand, planner) for one in _rows(stand, then)]
     shown = [planner.response(one.test) for one in tests]
     tell("looking at sensors")
     assert planner.table is not None
@@ -246,10 +252,37 @@ def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -
     return BuildingPlan(
         study.name, tuple(one.test for one in tests),
         tuple(one.test.signals(planner.limits) for one in tests), tuple(rows), planner.limits,
-        study.drive, float(np.exp(np.mean(gains))),
-        tuple(columns[f"structure.{level}_displacement"] for _, columns in shown), tuple(sensors),
-        level,
+        study.drive, float(np.exp(np.mean(costs))),
+        predicted=tuple(columns[f"structure.{level}_displacement"] for _, columns in shown),
+        sensors=tuple(sensors), level=level,
     )  # fmt: skip
+
+
+def _by_site(stand: Mapping[str, Stated], found: Sequence[Known]) -> dict[str, list[Known]]:
+    """Return what is known of the questions of each site, with the fitted parameters."""
+    out, first = {}, 0
+    for site, one in stand.items():
+        out[site] = list(found[first : first + one.goal.count])
+        first += len(one.goal.asked)
+    return out
+
+
+def _rows(stand: Mapping[str, Stated], then: Mapping[str, Sequence[Known]]) -> list[Outcome]:
+    """Return what tests will show, site by site."""
+    rows = []
+    for site, one in stand.items():
+        rows += at_site(site, outcomes(one.purposes, one.asked, one.known, then[site]))
+    alike = {f"{DAMPER}: {pair}" for pair in of_one_force(stand)}
+    return [_of_one_force(one) if one.name in alike else one for one in rows]
+
+
+def _or_beyond(left: Outcome, stand: Mapping[str, Stated], planner: TablePlanner) -> Outcome:
+    """Return what a plan leaves open, with whether a test of its own would settle it."""
+    for one in planner.looked_at():
+        told = _rows(stand, _by_site(stand, planner.goal.with_tests([one, one])))
+        if any(other.name == left.name and other.settled for other in told):
+            return left
+    return replace(left, beyond=True)
 
 
 def at_site(site: str, rows: Sequence[Outcome]) -> list[Outcome]:

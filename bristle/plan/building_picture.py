@@ -11,7 +11,8 @@ from ..draw.style import BLUE, GREEN, VERMILION, Page, look, png
 from ..physics.drive import DRIVES
 from ..quantity import quantity
 from .added_sensors import place_of
-from .picture import SHOWN, plan_text
+from .outcome import OUTCOMES
+from .picture import SHOWN, outcomes_json, plan_text
 
 if TYPE_CHECKING:
     from .building import BuildingPlan
@@ -30,7 +31,7 @@ def building_files(plan: BuildingPlan) -> dict[str, str | bytes]:
     if plan.sensors:
         lines = [f"- {one.sentence()}" for one in plan.sensors]
         text += "\n".join(["", "## Sensors to add", "", *lines, ""])
-    return {**files, "plan.md": text}
+    return {**files, "plan.md": text, OUTCOMES: outcomes_json(plan)}
 
 
 def _limits(plan: BuildingPlan) -> list[str]:

@@ -252,31 +252,36 @@ def _share(measured: Array, planned: Array) -> float:
 def _of_command(name: str, aligned: _Aligned) -> list[str]:
     """Return how a measured command differs from the planned one: its range, then its time."""
     planned, measured = aligned.planned[name], aligned.measured[name]
-    share, out = _share(measured, planned), []
-    goal = planned
+    late = _late(measured, planned, aligned.step)
+    in_time, wanted = _shifted(measured, planned, late)
+    share, reached, clipped = _reached(in_time, wanted)
+    goal = np.minimum(planned, reached) if clipped else share * planned
+    wrong = _off(measured, goal)
+    if _off(*_shifted(measured, goal, late)) > DIFFERS:
+        wrong = _off(measured, planned)
+        return [f"the {name} was another one than planned for {_percent(wrong)} of the run"]
+    out = []
     if abs(share - 1.0) > DIFFERS:
-        top = float(np.max(planned))
-        reached = float(np.median(measured[planned >= top - EDGE * float(np.ptp(planned))]))
-        goal = np.minimum(planned, reached)
-        clipped = share < 1.0 and _off(measured, goal) < _off(measured, share * planned)
-        goal = goal if clipped else share * planned
-        factor, unit = scale(channel_unit(name), top)
+        factor, unit = scale(channel_unit(name), float(np.max(planned)))
         how = f"was clipped at {plain(factor * reached)} {unit}, " if clipped else "reached "
         out.append(f"the {name} {how}{_percent(share)} of what was planned")
-    wrong = _off(measured, goal)
-    if wrong <= DIFFERS:
-        return out
-    late, left = _late(measured, goal, aligned.step)
-    if late and left < 0.5 * wrong:
+    if late and wrong > DIFFERS:
         way = "late" if late > 0 else "early"
-        ms = plain(1e3 * abs(late) * aligned.step)
         out.append(
-            f"the {name} came {ms} ms {way}, and was another one than planned for "
-            f"{_percent(wrong)} of the run"
+            f"the {name} came {plain(1e3 * abs(late) * aligned.step)} ms {way}, and was another "
+            f"one than planned for {_percent(wrong)} of the run"
         )
-    else:
-        out.append(f"the {name} was another one than planned for {_percent(wrong)} of the run")
     return out
+
+
+def _reached(measured: Array, planned: Array) -> tuple[float, float, bool]:
+    """Return the share of a command that was reached, its upper level, and whether it is cut."""
+    share, top = _share(measured, planned), float(np.max(planned))
+    reached = float(np.median(measured[planned >= top - EDGE * float(np.ptp(planned))]))
+    if abs(share - 1.0) <= DIFFERS:
+        return 1.0, reached, False
+    clipped = _off(measured, np.minimum(planned, reached)) < _off(measured, share * planned)
+    return share, reached, share < 1.0 and clipped
 
 
 def _off(measured: Array, goal: Array) -> float:
@@ -285,17 +290,18 @@ def _off(measured: Array, goal: Array) -> float:
     return float(np.mean(np.abs(measured - goal) > OFF * size))
 
 
-def _late(measured: Array, goal: Array, step: float) -> tuple[int, float]:
-    """Return by how many samples a command is late, and the share of instants then left wrong."""
+def _late(measured: Array, goal: Array, step: float) -> int:
+    """Return by how many samples a command is late, less than 0 where it is early."""
     most = min(round(LATEST / step), goal.size // 4)
     lags = sorted(range(-most, most + 1), key=abs)
-    left = {
-        lag: _off(measured[max(lag, 0) : goal.size + min(lag, 0)],
-                  goal[max(-lag, 0) : goal.size - max(lag, 0)])
-        for lag in lags
-    }  # fmt: skip
-    best = min(left, key=lambda lag: (left[lag], abs(lag)))
-    return best, left[best]
+    return min(lags, key=lambda lag: _off(*_shifted(measured, goal, lag)))
+
+
+def _shifted(measured: Array, goal: Array, late: int) -> tuple[Array, Array]:
+    """Return a command that is late by some samples, and its goal, at the same instants."""
+    size = goal.size
+    own = slice(max(late, 0), size + min(late, 0))
+    return measured[own], goal[slice(max(-late, 0), size - max(late, 0))]
 
 
 def _words(channel: str) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from math import ceil
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,12 +12,14 @@ import numpy as np
 
 from ..diagnose.bench import BenchRuns
 from ..diagnose.opening import Opening
+from ..diagnose.rule import BENCH
 from ..errors import StudyError
+from ..findings import command, unknown
 from ..identify.model import Run
 from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS, plain_name
 from ..progress import tell
-from ..quantity import plain
+from ..quantity import plain, short_z
 from ..study.identification import as_model
 from ..study.study import Study
 from .folder import PlanFolder, PlannedRun, write_plan
@@ -29,6 +32,9 @@ from .purposes import cost_of
 from .questions import SizedRival, effects_beside, open_parts, rivals
 from .rig_limits import RigLimits, limits_of_runs, with_given
 from .search import Planner
+
+MANY = 10
+"""How many times as many tests as are planned are still told of."""
 
 GAINED = 0.1
 """Share by which a plan must lower its figures on average; below that nothing is left to gain."""
@@ -84,6 +90,8 @@ class Plan:
         The channel of the command, "" where there is none.
     gain : float
         By what factor the figures become smaller on average.
+    notes : tuple of str
+        What weakens the plan, in sentences.
     """
 
     study: str
@@ -93,6 +101,7 @@ class Plan:
     limits: RigLimits
     drive: str
     gain: float
+    notes: tuple[str, ...] = ()
     rig: ClassVar[str] = "bench"
 
     @property
@@ -117,23 +126,38 @@ class Plan:
         """Return the plan as an engineer would say it."""
         if not self.worth:
             return [
-                *self._beyond(),
+                *self.notes,
+                *self._left_open(),
                 "Nothing is left to gain: no test within these limits would show more.",
             ]
-        return [*(f"{run.name} ({run.role}): {run.about}." for run in self.runs()), *self._beyond()]
+        return [
+            *self.notes,
+            *(f"{run.name} ({run.role}): {run.about}." for run in self.runs()),
+            *self._left_open(),
+        ]
 
-    def _beyond(self) -> list[str]:
-        """Return what no test within the limits settles."""
+    def _left_open(self) -> list[str]:
+        """Return what the tests do not settle, and whether another one would."""
         return [f"{one.name}: {self._why(one)}" for one in self.outcomes if not one.settled]
 
     def _why(self, one: Outcome) -> str:
-        """Return why no test within the limits settles something."""
+        """Return why the tests do not settle something."""
+        if not one.beyond:
+            return f"not settled by these tests; --{one.purpose} it alone."
         if one.purpose != "separate":
             return "no test within these limits shows it; the model takes it up."
         return (
             "no test within these limits tells them apart; at best they differ by "
-            f"{plain(one.then, 2)} standard deviations."
+            f"{plain(one.then, 2)} standard deviations{self._more(one)}."
         )
+
+    def _more(self, one: Outcome) -> str:
+        """Return how many tests of this kind would tell rivals apart, "" where far too many."""
+        gained = one.then**2 - one.now**2
+        if one.purpose != "separate" or gained <= 0.0:
+            return ""
+        count = len(self.tests) * (BENCH.tells**2 - one.now**2) / gained
+        return f"; about {ceil(count)} such tests would" if count <= MANY * len(self.tests) else ""
 
     def write(self, folder: Path | str) -> Path:
         """Write the tests as files for a controller, a picture each; return the folder.
@@ -160,6 +184,7 @@ class Plan:
         """Return what json can hold."""
         return {
             "study": self.study, "gain": round(self.gain, 4), "worth": self.worth,
+            "notes": list(self.notes),
             "runs": [
                 {"name": run.name, "role": run.role, "about": run.about} for run in self.runs()
             ],
@@ -204,21 +229,66 @@ def plan_study(
         found.goal, rig, float(np.median([run.noise for run in runs])), _errors(runs[0]),
         1.0 / runs[0].dt, record, seed, runs[0].drive,
     )  # fmt: skip
-    return planned(study.name, found, planner, study.drive)
+    made = planned(study.name, found, planner, study.drive)
+    return replace(made, notes=_notes(study, opened))
+
+
+def _notes(study: Study, opened: Opening) -> tuple[str, ...]:
+    """Return what weakens a plan: an error that an effect would take away first."""
+    missing = note_of_missing(study, [plain_name(name) for name in study.model().effects])
+    if not missing and opened.before.z > opened.rule.clean:
+        return (f"The model {errs(opened.before.z)}",)
+    return missing
+
+
+def note_of_missing(study: Study, there: Sequence[str]) -> tuple[str, ...]:
+    """Return what is said of effects that a verdict names and a model lacks, nothing of others.
+
+    Parameters
+    ----------
+    study : with its verdict
+    there : the effects of the model
+    """
+    verdict = study.verdict() or {}
+    if verdict.get("kind") != "effect":
+        return ()
+    named = [name for name in map(plain_name, verdict["effects"]) if name in EFFECTS]
+    missing = [name for name in named if name not in there]
+    if not missing:
+        return ()
+    add = command("add", study.folder, *missing)
+    return (f"The model misses {', '.join(missing)}; a plan shows more after  {add} .",)
+
+
+def errs(z: float) -> str:
+    """Return what is said of a model's error over noise."""
+    return f"errs by {short_z(z)} times the noise; the plan counts that as noise."
 
 
 def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:
     """Return the plan that serves a goal."""
     goal, limits = found.goal, planner.limits
     tests = planner.plan()
-    after = goal.with_tests(tests)[: found.count]
+    after = goal.with_tests(tests)[: goal.count]
+    told = outcomes(found.purposes, found.asked, found.known, after)
+    told = [one if one.settled else _or_beyond(one, found, planner) for one in told]
     costs = [cost_of(found.purposes.figures(one)) for one in (found.known, after)]
     gain = float(np.exp(costs[0] - costs[1]))
     return Plan(
         name, tuple(one.test for one in tests),
         tuple(one.test.signals(limits) for one in tests),
-        tuple(outcomes(found.purposes, found.asked, found.known, after)), limits, drive, gain,
+        tuple(told), limits, drive, gain,
     )  # fmt: skip
+
+
+def _or_beyond(left: Outcome, found: Stated, planner: Planner) -> Outcome:
+    """Return what a plan leaves open, with whether a test of its own would settle it."""
+    for one in planner.looked_at():
+        after = found.goal.with_tests([one, one])[: found.goal.count]
+        told = outcomes(found.purposes, found.asked, found.known, after)
+        if any(other.name == left.name and other.settled for other in told):
+            return left
+    return replace(left, beyond=True)
 
 
 def _errors(run: Run) -> Any:
@@ -276,8 +346,6 @@ def parameters_of(free: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
     StudyError
         If a name is that of none.
     """
-    from ..findings import unknown
-
     out: list[str] = []
     for name in names:
         own = [one for one in free if one == name or one.startswith(f"{name}.")]
