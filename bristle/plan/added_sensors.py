@@ -56,7 +56,7 @@ class Added:
         now, then = (one.shown(value) for value in (one.now, one.then))
         change = f"from {now} to {then}" if isfinite(one.now) else f"to {then}"
         if self.settles:
-            does = f"settle {where}: with it they are {then} apart; a verdict needs {BENCH.tells:g}"
+            does = f"settle {name}: with it they are {then} apart; a verdict needs {BENCH.tells:g}"
         elif one.purpose == "separate":
             does = f"raise the distance of {where} {change}"
         elif one.purpose == "see":

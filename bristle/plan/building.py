@@ -200,6 +200,11 @@ def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:
             sites[site] = opened
     if not sites:
         raise StudyError(f"{study.folder}: no site of this building has runs that are held out.")
+    if DAMPER not in sites:
+        raise StudyError(
+            f"{study.folder}: neither a command nor the damper's force was measured; without its "
+            "damper no response of the building can be predicted."
+        )
     return sites
 
 

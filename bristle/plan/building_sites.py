@@ -264,8 +264,8 @@ def _refuse_effect(name: str, there: Sequence[str], sites: Mapping[str, Opening]
 def _learned_at(wishes: Sequence[SiteWish], sites: Mapping[str, Opening]) -> list[str]:
     """Return the sites at which a part without a form is to be learned: where the model errs."""
     named = [site for one in wishes if one.wish.learn is not None for site in one.sites]
-    worst = max(sites, key=lambda site: sites[site].before.z)
-    return named or [worst]
+    loud = [site for site, one in sites.items() if one.before.z > one.rule.clean]
+    return named or [max(loud, key=lambda site: sites[site].before.z) if loud else DAMPER]
 
 
 def _parts(
