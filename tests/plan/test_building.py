@@ -20,6 +20,7 @@ from bristle.data.measurement import Measurement
 from bristle.data.motion import GroundMotion, read_ground_motion
 from bristle.errors import RecordError, StudyError
 from bristle.example.make import Choice, make_building
+from bristle.example.perform import perform_plan
 from bristle.plan.added_sensors import Added
 from bristle.plan.building import ONE_FORCE, BuildingPlan
 from bristle.plan.building_sites import are_twins, default_wishes, twins_of
@@ -355,7 +356,7 @@ def test_a_load_cell_settles_what_no_motion_does(tmp_path: Path) -> None:
         assert np.max(np.abs(moved)) <= RESERVE * 0.009 * (1.0 + 1e-9)
         assert np.max(np.abs(one.a)) <= RESERVE * 2.0 * (1.0 + 1e-9)
     plan.write(tmp_path / "plan")
-    done = bristle.example.perform_plan(tmp_path / "tower", tmp_path / "plan")
+    done = perform_plan(tmp_path / "tower", tmp_path / "plan")
     assert len(done.runs) == len(plan.tests)
     seen = {run.name: run for role in ("train", "holdout") for run in study.read(role)}
     for k, moved in enumerate(plan.predicted, 1):
