@@ -135,9 +135,13 @@ def _next(verdict: Verdict, folder: Path) -> str:
 
 
 def _then(verdict: Verdict, folder: Path) -> str:
-    if verdict["kind"] in ("effect", "ambiguous"):
-        count = len(verdict["effects"]) if verdict["kind"] == "effect" else 1
-        return command("add", folder, *verdict["effects"][:count])
+    if verdict["kind"] == "ambiguous":
+        return (
+            f"{command('plan', folder)} , which writes a test that distinguishes them;  "
+            f"{command('add', folder, verdict['effects'][0])} , which takes the first."
+        )
+    if verdict["kind"] == "effect":
+        return command("add", folder, *verdict["effects"])
     if verdict["kind"] == "unknown":
         return (
             f"{_other_laws(verdict, folder)}"
@@ -146,7 +150,19 @@ def _then(verdict: Verdict, folder: Path) -> str:
             f"{command('compare', folder)} , which shows where the residual is;  "
             "bristle effects new NAME  starts your own effect."
         )
+    hidden = _not_excited(verdict)
+    if verdict["kind"] == "none" and hidden:
+        return (
+            f"{command('plan', folder, '--see', *hidden)} , which writes tests that show what "
+            f"these cannot;  {command('report', folder)}"
+        )
     return command("report", folder)
+
+
+def _not_excited(verdict: Verdict) -> list[str]:
+    """Return the effects that these runs cannot show, and others may."""
+    rows = [row for found in verdict["findings"] for row in found.get("limits", ())]
+    return sorted({row["effect"] for row in rows if row.get("why")})
 
 
 def _other_laws(verdict: Verdict, folder: Path) -> str:

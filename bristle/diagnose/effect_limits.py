@@ -155,7 +155,9 @@ def _why_hidden(sized: Sized) -> str:
     if np.linalg.norm(change) > known.rule.silent * known.size and known.search.names:
         alike = np.abs(known.own.T @ change)
         return f"{known.search.names[int(np.argmax(alike))]} of the model takes it up"
-    still = steady(known.problem) and "V" in EFFECTS[sized.name].needs
+    problem = known.problem
+    held = all(steady(problem.of([run])) for run in problem.runs)
+    still = held and "V" in EFFECTS[sized.name].needs
     return "the command does not move" if still else "this motion does not excite it"
 
 

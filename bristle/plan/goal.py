@@ -74,11 +74,6 @@ class Stated:
     known: tuple[Known, ...]
     goal: Goal = field(repr=False)
 
-    @property
-    def count(self) -> int:
-        """The number of questions."""
-        return len(self.asked)
-
 
 def stated(purposes: Purposes, problem: Problem, measured: Measured, z: float, seed: int) -> Stated:
     """Return the goal that purposes are.
@@ -105,7 +100,7 @@ def stated(purposes: Purposes, problem: Problem, measured: Measured, z: float, s
         parts = [found[k : k + width] for k in range(0, len(found), width)]
         return float(np.mean([cost_of(purposes.figures(one)) for one in parts]))
 
-    goal = Goal(tuple(a for one in sets for a in one), known * len(sets), cost)
+    goal = Goal(tuple(a for one in sets for a in one), known * len(sets), width, cost)
     return Stated(purposes, asked, known, goal)
 
 

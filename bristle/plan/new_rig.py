@@ -13,7 +13,7 @@ from ..data.files import Toml
 from ..diagnose.effect_size import Known as Fitted
 from ..errors import StudyError
 from ..findings import unknown
-from ..identify.model import Model, Problem, Run, law_parameters
+from ..identify.model import REFERENCE, Model, Problem, Run, law_parameters
 from ..identify.smooth import posterior_draws
 from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.laws import DEFAULT, law_names
@@ -202,11 +202,20 @@ def _stand_in(rig: NewRig) -> Run:
 def _scaled(rig: NewRig, problem: Problem) -> Model:
     """Return the law at the rig's size: its largest force is that of the data sheet."""
     declared = law_parameters(rig.law)
-    model = Model(rig.law, values={name: problem.scaled(rig.law, name) for name in declared})
+    values = {}
+    for name, one in declared.items():
+        per_command = one.unit.replace("(m.V)", "m").replace("/V", "")
+        values[name] = problem.scaled(rig.law, name)
+        if per_command != one.unit and per_command in REFERENCE:
+            grown = problem.size(per_command) / REFERENCE[per_command]
+            values[name] = one.value * grown * REFERENCE["V"] / problem.size("V")
+    model = Model(rig.law, values=values)
     peak = float(np.max(np.abs(problem.predict(model, problem.runs[0]))))
     factor = rig.force / peak if peak > 0.0 else 1.0
-    values = {
-        name: value * factor if declared[name].unit.startswith("N") else value
-        for name, value in model.values.items()
-    }
-    return replace(model, values=values)
+    return replace(
+        model,
+        values={
+            name: value * factor if declared[name].unit.startswith("N") else value
+            for name, value in values.items()
+        },
+    )

@@ -25,7 +25,8 @@ class Outcome:
 
     `purpose` one of `purposes.PURPOSES`; `name` of effect, rivals, parameter or coordinate;
     `what` the quantity is, in `unit`; `now` from the runs at hand, `then` with the tests too;
-    infinite where no run shows it. `settled` whether a verdict will be able to tell.
+    infinite where no run shows it. `settled` whether a verdict will be able to tell; `beyond`
+    whether no test that was looked at would.
     """
 
     purpose: str
@@ -35,6 +36,7 @@ class Outcome:
     now: float
     then: float
     settled: bool = True
+    beyond: bool = False
 
     def cells(self) -> list[str]:
         """Return the row of a table."""
@@ -55,6 +57,7 @@ class Outcome:
             "purpose": self.purpose, "name": self.name, "what": self.what, "unit": self.unit,
             "now": self.now if isfinite(self.now) else None,
             "then": self.then if isfinite(self.then) else None, "settled": self.settled,
+            "beyond": self.beyond,
         }  # fmt: skip
 
 
@@ -103,8 +106,6 @@ def _seen(effects: Sequence[SizedRival], now: Known, then: Known) -> list[Outcom
             sized.value(max(apart / found[name], one.least)) if shown else inf
             for found, shown in zip(near, visible, strict=True)
         ]
-        if one.limit is not None and one.limit.largest is not None:
-            limits[0] = one.limit.largest
         found = max(one.size * after[name], one.least)
         text = f"{sized.parameter}, limit at 95 %"
         if visible[1] and not sized.ended(found):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -116,21 +116,30 @@ class Plan:
         """Return the plan as an engineer would say it."""
         if not self.worth:
             return [
-                *self._beyond(),
+                *self._left_open(),
                 "Nothing is left to gain: no test within these limits would show more.",
             ]
-        return [*(f"{run.name} ({run.role}): {run.about}." for run in self.runs()), *self._beyond()]
-
-    def _beyond(self) -> list[str]:
-        """Return what no test within the limits settles."""
         return [
-            f"{one.name}: no test within these limits tells them apart; at best they differ by "
-            f"{plain(one.then, 2)} standard deviations."
-            if one.purpose == "separate"
-            else f"{one.name}: no test within these limits shows it; the model takes it up."
-            for one in self.outcomes
-            if not one.settled
+            *(f"{run.name} ({run.role}): {run.about}." for run in self.runs()),
+            *self._left_open(),
         ]
+
+    def _left_open(self) -> list[str]:
+        """Return what the tests do not settle, and whether another one would."""
+        out = []
+        for one in self.outcomes:
+            if one.settled:
+                continue
+            apart = f"at best they differ by {plain(one.then, 2)} standard deviations."
+            if not one.beyond:
+                out.append(f"{one.name}: not settled by these tests; --{one.purpose} it alone.")
+            elif one.purpose == "separate":
+                out.append(f"{one.name}: no test within these limits tells them apart; {apart}")
+            else:
+                out.append(
+                    f"{one.name}: no test within these limits shows it; the model takes it up."
+                )
+        return out
 
     def write(self, folder: Path | str) -> Path:
         """Write the tests as files for a controller, a picture each; return the folder.
@@ -204,14 +213,26 @@ def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:
     """Return the plan that serves a goal."""
     goal, limits = found.goal, planner.limits
     tests = planner.plan()
-    after = goal.with_tests(tests)[: found.count]
+    after = goal.with_tests(tests)[: goal.count]
+    told = outcomes(found.purposes, found.asked, found.known, after)
+    told = [one if one.settled else _or_beyond(one, found, planner) for one in told]
     costs = [cost_of(found.purposes.figures(one)) for one in (found.known, after)]
     gain = float(np.exp(costs[0] - costs[1]))
     return Plan(
         name, tuple(one.test for one in tests),
         tuple(one.test.signals(limits) for one in tests),
-        tuple(outcomes(found.purposes, found.asked, found.known, after)), limits, drive, gain,
+        tuple(told), limits, drive, gain,
     )  # fmt: skip
+
+
+def _or_beyond(left: Outcome, found: Stated, planner: Planner) -> Outcome:
+    """Return what a plan leaves open, with whether a test of its own would settle it."""
+    for one in planner.looked_at():
+        after = found.goal.with_tests([one, one])[: found.goal.count]
+        told = outcomes(found.purposes, found.asked, found.known, after)
+        if any(other.name == left.name and other.settled for other in told):
+            return left
+    return replace(left, beyond=True)
 
 
 def _errors(run: Run) -> Any:

@@ -29,6 +29,9 @@ SMALL = 0.0003
 SEEN = 0.003
 """Size, over that of a first guess, from which an effect that is seen is of no more use."""
 
+HIDDEN = 1e6
+"""What is not seen at all costs as much as a figure so many times what is enough."""
+
 LEAST = 1e-3
 """Share of an effect's change that must be left; below that it is the error of sensitivities."""
 
@@ -49,9 +52,7 @@ class Figure:
     @property
     def cost(self) -> float:
         """What a plan is to make small: the logarithm, no more than flat below what is enough."""
-        if self.value == inf:
-            return log(1e3)
-        return log(max(self.value, self.enough) / self.enough)
+        return log(min(max(self.value / self.enough, 1.0), HIDDEN))
 
 
 def wanted_distance(samples: int, held_out: int, rule: DecisionRule = BENCH) -> float:

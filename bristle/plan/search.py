@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 CANDIDATES = 256
 """Tests that are looked at before the best ones are picked."""
 
-IMPROVED = 24
+IMPROVED = 40
 """Evaluations in which a picked test is improved."""
 
 LEAST = 0.04
@@ -61,12 +61,14 @@ class Seen:
 class Goal:
     """What a plan is to reach.
 
-    `asked` the questions, several per purpose where parameters are drawn; `known` what the runs at
-    hand say of them; `cost` what is to become small, of what runs would say.
+    `asked` the questions, over and over where parameters are drawn, the `count` first ones with the
+    fitted ones; `known` what the runs at hand say of them; `cost` what is to become small, of what
+    runs would say.
     """
 
     asked: tuple[Asked, ...]
     known: tuple[Known, ...]
+    count: int
     cost: Callable[[Sequence[Known]], float]
 
     def with_tests(self, tests: Sequence[Seen]) -> list[Known]:
@@ -155,6 +157,10 @@ class Planner:
         twin = self.see(self.twin(one.test)) if exact else one
         return [one, twin or one]
 
+    def looked_at(self) -> list[Seen]:
+        """Return the tests that were looked at and keep the limits."""
+        return [one for one in self._seen.values() if one is not None]
+
     def see(self, test: Test) -> Seen | None:
         """Return a test as it would be seen, with less motion where that keeps force and heat.
 
@@ -192,7 +198,7 @@ class Planner:
         """Return whether a run keeps the limits of force and heat, by every model in question."""
         if np.isinf(self.limits.force) and np.isinf(self.limits.heat):
             return True
-        for asked in self.goal.asked:
+        for asked in self.goal.asked[: self.goal.count]:
             force = asked.problem.planned([run]).predict(asked.question.model, run)
             if np.max(np.abs(force)) > RESERVE * self.limits.force:
                 return False
