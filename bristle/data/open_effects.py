@@ -146,7 +146,7 @@ def open_effects(
             label = name if name not in found else f"{name} ({finding['site']})"
             found[label] = OpenEffect(
                 name, label, one["parameter"], float(one["limit95"]), one["side"] == "above",
-                _others(finding["site"], name, one["others"]), one.get("moved") or {},
+                _others(finding["site"], name, one["others"]), one["moved"],
             )  # fmt: skip
     return list(found.values()), [name for name in dict.fromkeys(unlimited) if name not in found]
 
@@ -182,6 +182,12 @@ def left_open(
         raise StudyError(
             f"{folder}: the verdict's law is {verdict['law']}, and the model's {model.law}. "
             f"Identify the one that is right, then:  {again}"
+        )
+    sized = [one for found in verdict["findings"] for one in found.get("limits") or []]
+    if any("moved" not in one for one in sized if not one.get("why")):
+        raise StudyError(
+            f"{folder}: an older version of bristle made the verdict, and it does not tell how its "
+            f"effects move the model's parameters. First:  {again}"
         )
     effects, unlimited = open_effects(verdict, model)
     if not effects:
