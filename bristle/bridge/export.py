@@ -210,14 +210,15 @@ def _motion_file(run: Run, fine: int, path: Path) -> Path:
 
 
 def _start_values(damper: StudyModel, run: Run) -> dict[str, float]:
-    """Return the start values of states that begin with a signal of the run."""
+    """Return the start values of states that begin with a signal or the load of the run."""
     drive = drive_named(run.drive)
     first = {"x": run.x[0], "v": run.v[0], "a": run.a[0], "V": run.V[0]}
     states = dict(LAWS[damper.base_law].starts)
     for name in damper.effects:
         own = {state_for(s, drive): signal for s, signal in EFFECTS[name].starts.items()}
         states |= {f"{name}.{state}": signal for state, signal in own.items()}
-    return {f"{name}_0": float(first[s]) for name, s in states.items() if s in first}
+    begun = {f"{name}_0": float(first[s]) for name, s in states.items() if s in first}
+    return begun | Problem([run]).carrying(as_model(damper), run)
 
 
 def prediction(model: StudyModel, run: Run, bench: bool = True) -> Array:

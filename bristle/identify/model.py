@@ -14,6 +14,7 @@ from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
 from ..physics.laws import LAWS, Law
 from ..physics.parameter import CHOICES, Parameter
+from .begin import carrying_state, start_under_load
 from .bench import Bench
 from .instruments import earlier, pure_delay, shown_force, true_motion
 from .run_labels import told_by, values_of_labels
@@ -41,7 +42,8 @@ class Run:
     `x`, `v`, `a`, `V`, `force` (n,) in SI, evenly spaced by `dt` [s]; `noise` the force channel's
     standard deviation [N]; `draws` (d, n, 4) draws of the error of x, v, a, V; `measured` (n,)
     False where a sample was filled in, None if none was. `drive` is the channel that V holds, in
-    its own unit; `labels` what is known of the whole run, such as a temperature.
+    its own unit; `labels` what is known of the whole run, such as a temperature; `rest` how many
+    samples at its begin the damper rests under load, 0 where it does not.
     """
 
     name: str
@@ -57,11 +59,13 @@ class Run:
     measured: NDArray[np.bool_] | None = None
     drive: str = "voltage"
     labels: Mapping[str, Label] = field(default_factory=dict)
+    rest: int = 0
 
     def of(self, part: slice) -> Self:
         """Return the run with these of its samples; `dt` and `skip` stay what they were."""
+        rest = 0 if part.start else len(range(self.rest)[part])
         return replace(
-            self, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
+            self, rest=rest, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
             force=self.force[part], draws=self.draws[:, part],
             measured=None if self.measured is None else self.measured[part],
         )  # fmt: skip
@@ -200,6 +204,30 @@ class Problem:
 
     def predict(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, or for one draw of its motion."""
+        carrying = self.carrying(model, run)
+        if carrying:
+            model = replace(model, values={**model.values, **carrying})
+        return self._force(model, run, draw)
+
+    def carrying(self, model: Model, run: Run) -> dict[str, float]:
+        """Return the start value of the state that carries the load of a run at rest, by name.
+
+        Nothing where the run does not begin so, or no state of the model does.
+        """
+        if not run.rest:
+            return {}
+        part = run.of(slice(0, run.rest))
+        late = slice(run.rest // 2, None)  # a series element has settled by then
+
+        def settled(start: Mapping[str, float]) -> float:
+            begun = replace(model, values={**model.values, **start})
+            return float(np.mean(self._force(begun, part)[late]))
+
+        load, stroke = float(np.mean(part.force[late])), float(np.ptp(run.x))
+        return start_under_load(carrying_state(model.law, model.effects), load, stroke, settled)
+
+    def _force(self, model: Model, run: Run, draw: int | None = None) -> Array:
+        """Return the model's force (n,) [N] for a run, its states beginning as the model says."""
         x, v, a, V = run.x, run.v, run.a, run.V
         if draw is not None:
             e = run.draws[draw]
