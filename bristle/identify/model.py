@@ -9,6 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.extra import Extra
 from ..data.labels import Label
 from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
@@ -17,7 +18,7 @@ from ..physics.parameter import CHOICES, Parameter
 from .begin import carrying_state, start_under_load
 from .bench import Bench
 from .instruments import earlier, pure_delay, shown_force, true_motion
-from .run_labels import told_by, values_of_labels
+from .run_labels import told_by, tracks_of, values_of_labels
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,8 @@ class Run:
     standard deviation [N]; `draws` (d, n, 4) draws of the error of x, v, a, V; `measured` (n,)
     False where a sample was filled in, None if none was. `drive` is the channel that V holds, in
     its own unit; `labels` what is known of the whole run, such as a temperature; `rest` how many
-    samples at its begin the damper rests under load, 0 where it does not.
+    samples at its begin the damper rests under load, 0 where it does not; `extra` its channels
+    besides those that bristle knows.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Run:
     drive: str = "voltage"
     labels: Mapping[str, Label] = field(default_factory=dict)
     rest: int = 0
+    extra: Mapping[str, Extra] = field(default_factory=dict)
 
     def of(self, part: slice) -> Self:
         """Return the run with these of its samples; `dt` and `skip` stay what they were."""
@@ -68,6 +71,7 @@ class Run:
             self, rest=rest, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
             force=self.force[part], draws=self.draws[:, part],
             measured=None if self.measured is None else self.measured[part],
+            extra={name: one.of(part) for name, one in self.extra.items()},
         )  # fmt: skip
 
 
@@ -164,10 +168,22 @@ class Problem:
         ]
 
     def tells(self, effect: type[Effect]) -> bool:
-        """Return whether the runs have the labels that an effect takes, and differ in them."""
+        """Return whether the runs have what an effect takes of them, and differ in it.
+
+        Labels of whole runs, and channels besides those that bristle knows.
+        """
+        if not all(self._moves(channel) for channel in effect.channels.values()):
+            return False
         names = {*effect.labels.values(), *effect.label_means.values()}
         known = [self._numbers(name) for name in names]
         return all(len({*one}) > 1 and max(one) - min(one) >= effect.label_span for one in known)
+
+    def _moves(self, channel: str) -> bool:
+        """Return whether all runs have an extra channel, and it varies in them."""
+        if not all(channel in run.extra for run in self.runs):
+            return False
+        values = np.concatenate([run.extra[channel].values for run in self.runs])
+        return float(np.ptp(values)) > 0.0
 
     def _numbers(self, label: str) -> list[float]:
         """Return the numbers of a label, one per run; none where a run lacks it."""
@@ -237,7 +253,8 @@ class Problem:
         late, values = pure_delay(model.effects, {**model.values, **own} if own else model.values)
         if late > 0.0:
             x, v, a, V = earlier((x, v, a, V), late, run.dt)
-        force = self.bench(model).force(x, v, a, V, run.dt, values)
+        tracks = tracks_of(model.effects, run.extra, run.name)
+        force = self.bench(model).force(x, v, a, V, run.dt, values, tracks)
         return shown_force(model.effects, values, force, run.dt)
 
     def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:

@@ -63,7 +63,7 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
         _noise_of_force(measurement), error, begin.first, None if known.all() else known,
-        drive or VOLTAGE.name, measurement.labels, begin.rest,
+        drive or VOLTAGE.name, measurement.labels, begin.rest, measurement.extra,
     )  # fmt: skip
 
 

@@ -1,10 +1,15 @@
-"""Parameters of effects that are known of each run, such as its temperature."""
+"""Parameters of effects that are known of each run: its temperature, a pressure at each sample."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
+import numpy as np
+from numpy.typing import NDArray
+
+from ..data.extra import Extra
 from ..data.labels import Labels
+from ..errors import RecordError
 from ..physics.effect import EFFECTS, Effect
 
 
@@ -22,3 +27,39 @@ def values_of_labels(effects: Iterable[str], labels: Labels) -> dict[str, float]
         if label in labels
     }
     return {name: value for name, value in known.items() if not isinstance(value, str)}
+
+
+def tracks_of(
+    effects: Iterable[str], extra: Mapping[str, Extra], run: str
+) -> dict[str, NDArray[np.float64]]:
+    """Return the values (n,) over a run of parameters that follow its channels, by name.
+
+    Parameters
+    ----------
+    effects : of a model
+    extra : the run's channels besides those that bristle knows
+    run : its name, for messages
+
+    Raises
+    ------
+    RecordError
+        If the run lacks a channel, or has it in another unit.
+    """
+    out = {}
+    for name in effects:
+        effect = EFFECTS[name]
+        for own, channel in effect.channels.items():
+            if channel not in extra:
+                raise RecordError(
+                    f"{run}: the effect {name} follows the channel {channel}, which this run does "
+                    "not hold: [extra] in study.toml names the column. Leave the run out, or the "
+                    "effect."
+                )
+            unit = effect.parameters[own].unit
+            if extra[channel].unit != unit:
+                raise RecordError(
+                    f"{run}: {channel} is in {extra[channel].unit}, and the effect {name} follows "
+                    f"it in {unit}: the unit in [extra.{channel}] of study.toml has changed."
+                )
+            out[f"{name}.{own}"] = extra[channel].values
+    return out

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..data.channels import DRIVE, PLAIN, ChannelSpec, channel_unit, is_channel
 from ..data.corrections import Correction
+from ..data.extra import refused_name
 from ..data.files import Toml, write_whole
 from ..data.pieces import wrong_split
 from ..errors import RecordError, UnitError
@@ -28,12 +29,13 @@ CUT_OFF = 18.0
 """Low-pass of measured and predicted force [Hz], as in Shirazi et al. (2012), section III-C."""
 _KEYS = (
     "schema", "title", "notes", "rig", "law", "cut_off", "rate", "mask", "split", "runs",
-    "channels",
+    "channels", "extra",
 )  # fmt: skip
 ALL = "all"
 """The word for all laws."""
 
 _CHANNEL_KEYS = ("column", "unit", "sign", "noise", "step")
+_EXTRA_KEYS = ("column", "unit", "sign")
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,8 @@ class Settings:
     runs that are sampled faster are decimated, 0 for none; `mask` whether isolated spikes count as
     not measured; `split` how files hold several runs, "" where they hold one (`data.pieces`);
     `law` "all" where the law is sought together with its effects, "" where the model's is kept;
-    `excluded` the runs that are left out, which are none of `runs`.
+    `excluded` the runs that are left out, which are none of `runs`; `extra` the channels besides
+    those that bristle knows.
     """
 
     title: str
@@ -59,6 +62,7 @@ class Settings:
     split: str = ""
     law: str = ""
     excluded: tuple[RunFile, ...] = ()
+    extra: dict[str, ChannelSpec] = field(default_factory=dict)
 
     @property
     def drive(self) -> str:
@@ -121,12 +125,15 @@ def read_settings(path: Path) -> Settings:
         for name, table in toml.table((), data, "channels").items()
         if _is_right(toml, name, table)
     }
+    extra = {
+        name: _extra(toml, name, table) for name, table in toml.table((), data, "extra").items()
+    }
     title, notes = toml.text((), data, "title", path.parent.name), toml.text((), data, "notes")
     check_levels(toml, runs, channels)
     toml.check()
     return Settings(
         title, rig, runs, channels, notes, CUT_OFF if cut_off is None else cut_off,
-        rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded,
+        rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded, extra=extra,
     )  # fmt: skip
 
 
@@ -157,14 +164,16 @@ def write_settings(path: Path, settings: Settings) -> None:
     for run in (*settings.runs, *settings.excluded):
         runs.append(run_as_toml(run))
     document.add("runs", runs)
-    channels = tomlkit.table(is_super_table=True)
-    for name, spec in settings.channels.items():
-        table = tomlkit.table()
-        for line in settings.comments.get(name, "").splitlines():
-            table.add(tomlkit.comment(line))
-        table.update(_as_toml(spec))
-        channels.add(name, table)
-    document.add("channels", channels)
+    for key, listed in (("channels", settings.channels), ("extra", settings.extra)):
+        channels = tomlkit.table(is_super_table=True)
+        for name, spec in listed.items():
+            table = tomlkit.table()
+            for line in settings.comments.get(name, "").splitlines():
+                table.add(tomlkit.comment(line))
+            table.update(_as_toml(spec))
+            channels.add(name, table)
+        if listed:
+            document.add(key, channels)
     write_whole(path, tomlkit.dumps(document))
 
 
@@ -244,6 +253,32 @@ def _is_right(toml: Toml, name: str, table: Any) -> bool:
     return True
 
 
+def _extra(toml: Toml, name: str, table: Any) -> ChannelSpec:
+    """Return where an extra channel is; its unit may be any, known or not."""
+    keys = ("extra", name)
+    if wrong := refused_name(name):
+        toml.error(keys, f'an extra channel cannot be called "{name}": {wrong}.')
+    if not isinstance(table, dict):
+        toml.error(keys, f'is {written(table)}; a table with column = "..." is right.')
+        return ChannelSpec()
+    toml.known(keys, table, _EXTRA_KEYS)
+    column, unit = toml.text(keys, table, "column"), toml.text(keys, table, "unit")
+    if not column:
+        toml.error(keys, 'column is missing: the title of the column, as in column = "p [bar]".')
+    if not unit:
+        toml.error(keys, 'unit is missing: that of the column, or "1" for a plain number.')
+    return ChannelSpec(column, unit, _sign(toml, keys, table))
+
+
+def _sign(toml: Toml, keys: tuple[str, ...], table: Mapping[str, Any]) -> int:
+    """Return the sign that a channel's values are multiplied with."""
+    sign = table.get("sign", 1)
+    if sign not in (1, -1) or isinstance(sign, bool):
+        toml.error((*keys, "sign"), f"sign = {written(sign)}; 1 or -1 is right.")
+        return 1
+    return int(sign)
+
+
 def _channel(toml: Toml, name: str, table: Mapping[str, Any]) -> ChannelSpec:
     keys = ("channels", name)
     toml.known(keys, table, _CHANNEL_KEYS)
@@ -260,11 +295,8 @@ def _channel(toml: Toml, name: str, table: Mapping[str, Any]) -> ChannelSpec:
                 toml.error((*keys, "unit"), f'unit = "{unit}": {name} is in {right} or the like.')
         except (UnitError, RecordError) as error:
             toml.error((*keys, "unit"), str(error))
-    sign = table.get("sign", 1)
-    if sign not in (1, -1) or isinstance(sign, bool):
-        toml.error((*keys, "sign"), f"sign = {written(sign)}; 1 or -1 is right.")
-        sign = 1
+    sign = _sign(toml, keys, table)
     noise = toml.number(keys, table, "noise")
     if noise is not None and noise < 0.0:
         toml.error((*keys, "noise"), f"noise = {noise}; a standard deviation is not negative.")
-    return ChannelSpec(column, unit, int(sign), noise, step)
+    return ChannelSpec(column, unit, sign, noise, step)
