@@ -51,6 +51,14 @@ class Extra:
     values: Array
     unit: str
 
+    @property
+    def known_unit(self) -> str:
+        """The unit as parameters of effects have it: "1" where bristle does not know it."""
+        try:
+            return parse(self.unit).name
+        except UnitError:
+            return "1"
+
     def of(self, part: slice) -> Extra:
         """Return some of its samples."""
         return replace(self, values=self.values[part])

@@ -46,20 +46,27 @@ def tracks_of(
         If the run lacks a channel, or has it in another unit.
     """
     out = {}
-    for name in effects:
-        effect = EFFECTS[name]
-        for own, channel in effect.channels.items():
-            if channel not in extra:
-                raise RecordError(
-                    f"{run}: the effect {name} follows the channel {channel}, which this run does "
-                    "not hold: [extra] in study.toml names the column. Leave the run out, or the "
-                    "effect."
-                )
-            unit = effect.parameters[own].unit
-            if extra[channel].unit != unit:
-                raise RecordError(
-                    f"{run}: {channel} is in {extra[channel].unit}, and the effect {name} follows "
-                    f"it in {unit}: the unit in [extra.{channel}] of study.toml has changed."
-                )
-            out[f"{name}.{own}"] = extra[channel].values
+    for parameter, channel in following(effects).items():
+        name, _, own = parameter.partition(".")
+        if channel not in extra:
+            raise RecordError(
+                f"{run}: the effect {name} follows the channel {channel}, which this run does not "
+                "hold: [extra] in study.toml names the column. Leave the run out, or the effect."
+            )
+        unit = EFFECTS[name].parameters[own].unit
+        if extra[channel].known_unit != unit:
+            raise RecordError(
+                f"{run}: {channel} is in {extra[channel].unit}, and the effect {name} follows it "
+                f"in {unit}: the unit in [extra.{channel}] of study.toml has changed."
+            )
+        out[parameter] = extra[channel].values
     return out
+
+
+def following(effects: Iterable[str]) -> dict[str, str]:
+    """Return the parameters of a model's effects that follow a channel, with the channel's name."""
+    return {
+        f"{name}.{own}": channel
+        for name in effects
+        for own, channel in EFFECTS[name].channels.items()
+    }

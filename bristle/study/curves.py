@@ -187,7 +187,7 @@ def learn_effect(
     if name in EFFECTS or (study.effects_folder / f"{name}.py").exists():
         raise StudyError(f'an effect is named "{name}" already. Another name is right.')
     site, opened = _opened(study, at)
-    refuse_elsewhere(parts, along, Place(site))
+    refuse_elsewhere(parts, along, Place(site), [*study.settings.extra])
     found = learn(opened, name, parts=parts, along=along)
     told = site if study.settings.has_building else ""
     if found.refused or found.curve is None:
@@ -201,8 +201,16 @@ def learn_effect(
     return _written(study, learned, found.curve) if write else learned
 
 
-def refuse_elsewhere(parts: Sequence[str], along: Sequence[str], place: Place) -> None:
+def refuse_elsewhere(
+    parts: Sequence[str], along: Sequence[str], place: Place, extra: Sequence[str] = ()
+) -> None:
     """Refuse parts and signals that curves do not have at a place.
+
+    Parameters
+    ----------
+    parts, along : that are asked for
+    place : where the curve is to act
+    extra : names of the channels that runs hold beside those that bristle knows
 
     Raises
     ------
@@ -211,6 +219,7 @@ def refuse_elsewhere(parts: Sequence[str], along: Sequence[str], place: Place) -
     """
     there = parts_at(place)
     signals = [one.name for one in ALONG.values() if place.offers(one.needs)]
+    signals += extra if not place.is_line else []
     for asked, known, option in ((parts, list(there), "--as"), (along, signals, "--along")):
         wrong = [one for one in asked if one not in known and one not in there]
         if wrong:

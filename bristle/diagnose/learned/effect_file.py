@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from ...physics.drive import drive_named, unit_for
-from .along import GIVEN, MEMORIES
+from .along import FOLLOWING, GIVEN, MEMORIES
 from .curve import BOUND, Curve, Formula, bounds_of
 from .slip import SLIP
 
@@ -40,6 +40,9 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     only = [*_only_value(curve), *_only_storey(curve)]
     kept = formula.positive if formula else ()
     table = formula is None and not curve.of.parameter
+    if curve.measured:
+        middle, text = 0.5 * (curve.knots[0] + curve.knots[-1]), curve.signal.words
+        parameters.append((FOLLOWING, middle, curve.along_unit, f"{text}, which runs tell"))
     if formula:
         parameters += [
             (n, value, unit, f"{n} in g = {formula.text}") for n, value, unit in formula.parameters
@@ -55,7 +58,7 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
         f'    expect = "an error that depends on {curve.of.cause or curve.signal.words}"',
         "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
     ]
-    held = _assumed(curve) if not formula else ()
+    held = _assumed(curve, table)
     if held:
         lines.append(f"    assumed = {held!r}  # no fit moves them".replace("'", '"'))
     if parameters or only:
@@ -70,10 +73,16 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     return "\n".join([*lines, "", *body]) + "\n"
 
 
-def _assumed(curve: Curve) -> tuple[str, ...]:
-    """Return the parameters that stay: knots at the law's own constant, where the way turns."""
+def _assumed(curve: Curve, table: bool) -> tuple[str, ...]:
+    """Return the parameters that stay: what a channel tells, and in a table some more.
+
+    These are knots at the law's own constant, and where the way turns.
+    """
+    follows = (FOLLOWING,) if curve.measured else ()
+    if not table:
+        return follows
     held = tuple(f"curve[{k + 1}]" for k in curve.held)
-    return (*held, *(name for name, _ in curve.memory if name in GIVEN))
+    return (*held, *(name for name, _ in curve.memory if name in GIVEN), *follows)
 
 
 def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
@@ -187,6 +196,7 @@ def _fields(curve: Curve) -> list[str]:
     """Return the lines of the class data that follow from part and signal."""
     along, part, drive = curve.signal, curve.of, drive_named(curve.drive)
     given: dict[str, object] = {
+        "channels": {FOLLOWING: curve.along} if curve.measured else {},
         "needs": tuple(dict.fromkeys((*along.needs, *part.needs, *_numbered(curve)))),
         "states": {name: unit_for(unit, drive) for name, unit in along.states},
         "starts": dict(along.starts),
