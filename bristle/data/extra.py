@@ -75,10 +75,15 @@ def refused_name(name: str) -> str:
     return ""
 
 
+def as_word(text: str) -> str:
+    """Return a text as a name has it: "Acc. pressure" is acc_pressure."""
+    plain_text = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
+    return re.sub(r"[^a-z0-9]+", "_", plain_text.lower()).strip("_")
+
+
 def name_of(column: Column, taken: Iterable[str]) -> str:
     """Return a name for the channel in a column, from its title, that none of `taken` has."""
-    plain_text = unicodedata.normalize("NFKD", column.name).encode("ascii", "ignore").decode()
-    name = re.sub(r"[^a-z0-9]+", "_", plain_text.lower()).strip("_") or "channel"
+    name = as_word(column.name) or "channel"
     name = name if name[0].isalpha() else f"channel_{name}"
     known, number = {*taken}, 2
     free = name
