@@ -245,7 +245,8 @@ def _as_toml(spec: ChannelSpec) -> dict[str, Any]:
 def _is_right(toml: Toml, name: str, table: Any) -> bool:
     keys = ("channels", name)
     if not is_channel(name):
-        toml.error(keys, unknown("channel", name, PLAIN))
+        besides = f"Any other channel goes into [extra.{name}]."
+        toml.error(keys, f"{unknown('channel', name, PLAIN)} {besides}")
         return False
     if not isinstance(table, dict):
         toml.error(keys, f'is {written(table)}; a table with column = "..." is right.')

@@ -16,7 +16,7 @@ from .clipping import clipped_share
 from .finding import Finding, Level
 
 _MOTIONLESS = "Check the cable and the column: is it the right one?"
-_HELD = 2.0  # samples per value from which a channel is one that was logged more slowly
+_HELD = 2  # samples per value from which a channel is one that was logged more slowly
 _COLOURS = {
     "low-passed": "it fades towards half the sampling rate: this is its level below",
     "blue": "it grows towards high frequencies, as after a numerical derivative: an upper limit",
@@ -60,7 +60,8 @@ def _extra(run: Measurement) -> Iterator[Finding]:
             do = "" if one.values[0] else _MOTIONLESS
             yield Finding("still", "note", text, do, run.name, name)
             continue
-        if 1 + np.count_nonzero(np.diff(one.values)) < len(one.values) / _HELD:
+        changes = np.flatnonzero(np.diff(one.values))
+        if np.median(np.diff(changes, prepend=-1)) >= _HELD:
             continue  # a slow logger repeats its last value
         share, level, stretches = clipped_share(one.values, estimate_noise(one.values).quantum)
         if share and not is_switched(one.values):
