@@ -208,10 +208,15 @@ def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Iden
 
 
 def _under_load(at: SiteModel) -> list[str]:
-    """Return the sentence that tells which runs begin at rest under load, if any does."""
-    held_out = at.site.holdout
-    runs = [*at.site.train.runs, *(held_out.runs if held_out else [])]
-    loads = {run.name: float(np.mean(run.force[: run.rest])) for run in runs if run.rest}
+    """Return the sentence that tells which runs begin under a load that the model carries."""
+    problems = (at.site.train, at.site.holdout)
+    loads = {
+        run.name: float(np.mean(run.force[: run.rest]))
+        for problem in problems
+        if problem is not None
+        for run in problem.runs
+        if problem.carrying(at.model, run)
+    }
     return [under_load_text(loads)] if loads else []
 
 
