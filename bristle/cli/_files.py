@@ -50,8 +50,14 @@ def _matches(pattern: str) -> list[str]:
     return [match for match in matches if Path(match).is_file()]
 
 
-def files_of(patterns: list[str]) -> list[str]:
-    """Return the files that patterns name, or that folders hold, each once, in order."""
+def files_of(patterns: list[str], option: str = "--data ") -> list[str]:
+    """Return the files that patterns name, or that folders hold, each once, in order.
+
+    Parameters
+    ----------
+    patterns : of the files
+    option : what stands before them on the command line, for messages
+    """
     from ..data.read import files_in
     from ..errors import StudyError
 
@@ -62,6 +68,6 @@ def files_of(patterns: list[str]) -> list[str]:
             continue
         files = _matches(pattern)
         if not files:
-            raise StudyError(f'--data "{pattern}": no file matches, seen from {Path.cwd()}.')
+            raise StudyError(f'{option}"{pattern}": no file matches, seen from {Path.cwd()}.')
         found += files
     return list(dict.fromkeys(found))

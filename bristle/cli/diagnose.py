@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..findings import command
 from ._consent import add_trust
+from ._table import aligned
 
 if TYPE_CHECKING:
     from ..diagnose.verdict_text import Verdict
@@ -82,20 +83,8 @@ def law_lines(rows: Sequence[Verdict]) -> list[str]:
     """Return the table of laws as text, from its rows as verdict.json has them."""
     from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
 
-    lines = _aligned([list(HEADER), *law_table(rows)])
+    lines = aligned([list(HEADER), *law_table(rows)])
     return [*lines, *wrap(TABLE_NOTE, 98, initial_indent="  ", subsequent_indent="  ")]
-
-
-def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of a table, its first two columns to the left."""
-    wide = [max(len(cells[k]) for cells in table) for k in range(len(table[0]))]
-    return [
-        "  " + "  ".join(
-            cell.ljust(width) if k < 2 else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(cells, wide, strict=True))
-        )
-        for cells in table
-    ]  # fmt: skip
 
 
 def _trials(verdict: Verdict) -> list[str]:
@@ -129,7 +118,7 @@ def _limits(verdict: Verdict) -> list[str]:
     if not rows:
         return []
     notes = (f"  {note}" for note in LIMITS_NOTES)
-    return ["", *_aligned([list(LIMITS), *rows]), *notes]
+    return ["", *aligned([list(LIMITS), *rows]), *notes]
 
 
 def _next(verdict: Verdict, folder: Path) -> str:

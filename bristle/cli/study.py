@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 from ._common import add_common_to_actions
 from ._consent import add_trust
+from ._extend import add_extend
 from ._files import channels_of, files_of, test_files
 
 if TYPE_CHECKING:
     from ..study.create import Created
     from ..study.data_check import DataCheck
 
-HELP = "studies of measurements: new, check, auto"
+HELP = "studies of measurements: new, extend, check, auto"
 
 _OLD = "first-look"
 
@@ -24,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study`."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     _add_new(commands.add_parser("new", help="make a study's folder from measurement files"))
+    add_extend(commands.add_parser("extend", help="add measured runs to a study"))
     _add_check(commands.add_parser("check", help="check the data, before any model"))
     # The name until 0.1; here for one release.
     _add_check(commands.add_parser(_OLD, description="The old name of `study check`."))

@@ -150,6 +150,13 @@ class Problem:
     def _made_of(self, runs: list[Run]) -> Problem:
         return Problem(runs)
 
+    def planned(self, runs: list[Run]) -> Problem:
+        """Return a problem for runs that were not measured yet: this rig's sizes are theirs."""
+        made = self.of(runs)
+        self.size("N")
+        made._sizes, made._benches = self._sizes, self._benches
+        return made
+
     def with_free_zero(self) -> Problem:
         """Return the same runs with the force's zero fitted along with every model."""
         made = self.of(self.runs)

@@ -17,6 +17,7 @@ from ..errors import StudyError
 from ..findings import command, unknown
 from ..physics.laws import law_names
 from ..progress import tell, telling
+from .added_runs import unknown_to_model
 from .curves import LearnedEffect, learn_effect
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
@@ -247,7 +248,8 @@ def complete(
     law = law_or_all(study, law)
     free = law == ALL
     other = None if law in (ALL, study.model().law) else law
-    if not free and (other or not _is_identified(study.model())):
+    stale = not _is_identified(study.model()) or bool(unknown_to_model(study))
+    if not free and (other or stale):
         say("identifying the model")
         stepped(identify_study(study, law=other, table=False).step)
     while True:

@@ -85,7 +85,7 @@ def make_folder(
         guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses
     } | {name: spec for name, spec in (channels or {}).items() if spec.step is not None}
     for table in tables:
-        _refuse_other_columns(table, guesses, first)
+        refuse_other_columns(table, guesses, first)
     taken = [guess.column for guess in guesses]
     extra = found_in(first, taken, specs)
     names = _names([Path(file) for file in files])
@@ -256,7 +256,20 @@ def _refuse_incomplete(
         )
 
 
-def _refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -> None:
+def refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -> None:
+    """Refuse a table that lacks columns of the first, or has them in other units.
+
+    Parameters
+    ----------
+    table : of a further run
+    guesses : the columns that are used
+    first : the table of the first run
+
+    Raises
+    ------
+    StudyError
+        Naming the column.
+    """
     there = {column.text: column for column in table.columns}
     for guess in guesses:
         if guess.column not in there:

@@ -213,6 +213,18 @@ def with_excluded(text: str, files: Sequence[tuple[str, int]]) -> str:
     return tomlkit.dumps(document)
 
 
+def with_runs(text: str, runs: Sequence[RunFile]) -> str:
+    """Return the text of a study.toml with more runs after its own, all else as it was."""
+    import tomlkit
+
+    document: Any = tomlkit.parse(text)
+    for run in runs:
+        table = run_as_toml(run)
+        table.add(tomlkit.nl())
+        document["runs"].append(table)
+    return tomlkit.dumps(document)
+
+
 def with_corrections(text: str, found: Mapping[tuple[str, int], Sequence[Correction]]) -> str:
     """Return the text of a study.toml with more corrections of runs, all else as it was.
 
