@@ -208,13 +208,8 @@ def _predicted(
         tell(f"simulating {trial.shaking.name}")
         now = figures_of(model, place, trial, draws, number, judged[-1].missed, effects)
         then = None
-<<<<<<< HEAD
         if before is not None and not following(before.effects):
-            drawn = draws if _has_covariance(before) else 0
-=======
-        if before is not None:
             drawn = draws if has_covariance(before) else 0
->>>>>>> main
             then = figures_of(before, place, trial, drawn, number, judged[-2].missed)
         rows += now.rows(trial, then)
         strokes.append(now.stroke)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.extra import Extra
 from ..identify.fit import Model, Problem, Run
+from ..identify.run_labels import at_means
 from ..identify.search_context import Search
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from .rule import BENCH, DecisionRule
@@ -98,7 +98,8 @@ def separating(models: Sequence[Model], problem: Problem) -> Experiment:
     dt = problem.runs[0].dt
     plans = []
     for plan in _plans(problem):
-        run = replace(_run(plan, dt, noise), extra=_held(problem.runs, plan.signals(dt)[0]))
+        run = _run(plan, dt, noise)
+        run = replace(run, extra=at_means([one.extra for one in problem.runs], len(run.x)))
         contrast = _contrast(rivals, run)
         far = contrast * float(np.sqrt(len(run.x)))
         plans.append(replace(plan, contrast=contrast, deviations=far))
@@ -125,13 +126,6 @@ def _plans(problem: Problem) -> list[Experiment]:
 def _run(plan: Experiment, dt: float, noise: float) -> Run:
     x, v, a, V = plan.signals(dt)
     return Run("plan", dt, x, v, a, V, np.zeros_like(x), noise, np.zeros((0, len(x), 4)), skip=0)
-
-
-def _held(runs: Sequence[Run], like: Array) -> dict[str, Extra]:
-    """Return the extra channels that all runs have at their mean, each (n,) as `like`."""
-    shared = [name for name in runs[0].extra if all(name in run.extra for run in runs)]
-    means = {n: float(np.mean([np.mean(run.extra[n].values) for run in runs])) for n in shared}
-    return {n: Extra(np.full_like(like, y), runs[0].extra[n].unit) for n, y in means.items()}
 
 
 class _Rival:

@@ -18,7 +18,7 @@ from ..physics.parameter import CHOICES, Parameter
 from .begin import carrying_state, start_under_load
 from .bench import Bench
 from .instruments import earlier, pure_delay, shown_force, true_motion
-from .run_labels import told_by, tracks_of, values_of_labels
+from .run_labels import at_means, told_by, tracks_of, values_of_labels
 
 Array = NDArray[np.float64]
 
@@ -151,8 +151,12 @@ class Problem:
         return Problem(runs)
 
     def planned(self, runs: list[Run]) -> Problem:
-        """Return a problem for runs that were not measured yet: this rig's sizes are theirs."""
-        made = self.of(runs)
+        """Return a problem for runs that were not measured yet: this rig's sizes are theirs.
+
+        So are the means of its extra channels.
+        """
+        own = [run.extra for run in self.runs]
+        made = self.of([replace(run, extra=at_means(own, len(run.x))) for run in runs])
         self.size("N")
         made._sizes, made._benches = self._sizes, self._benches
         return made

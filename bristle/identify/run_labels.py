@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +60,22 @@ def tracks_of(
                 f"in {unit}: the unit in [extra.{channel}] of study.toml has changed."
             )
         out[parameter] = extra[channel].values
+    return out
+
+
+def at_means(measured: Sequence[Mapping[str, Extra]], count: int) -> dict[str, Extra]:
+    """Return the extra channels that all runs have, at their mean, for a run that was not measured.
+
+    Parameters
+    ----------
+    measured : those of each measured run
+    count : samples of the other run
+    """
+    out = {}
+    for name, one in measured[0].items():
+        if all(name in run for run in measured):
+            mean = float(np.mean([np.mean(run[name].values) for run in measured]))
+            out[name] = Extra(np.full(count, mean), one.unit)
     return out
 
 

@@ -53,8 +53,8 @@ def first_of(hidden):
 
 
 def test_a_channel_besides_those_that_are_known_is_a_signal_as_well():
-    pressure = 2e6 + 1e6 * np.sin(0.7 * T)
-    hidden = 1.5 * np.tanh((pressure - 2e6) / 5e5)
+    pressure = 2e6 + 1e6 * np.sin(5.3 * T)
+    hidden = 1.5 * np.tanh((pressure - 2e6) / 1e6)
     plain = runs(lambda x, v, V, F: F + hidden)
     extra = {
         "oil_pressure": Extra(pressure, "Pa"),
