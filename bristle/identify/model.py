@@ -1,5 +1,7 @@
 """Runs, models, and how a model predicts a run and what it cannot know of it."""
 
+# Longer than 300 lines: what a model is, and what it predicts of a run, stand together.
+
 from __future__ import annotations
 
 from collections.abc import Mapping

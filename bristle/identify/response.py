@@ -230,8 +230,7 @@ def _response(
         a, m["ground_acceleration"], m["force"] if m.has("force") else None, V, noise_a,
         m.noise.get("force", 0.0), m.noise.get("ground_acceleration", 0.0), np.array(own),
         np.array([level["std"] for level in levels]),
-        np.array([error[:, :n] for error in errors]), left, drive, m.labels,
-        m.extra,
+        np.array([error[:, :n] for error in errors]), left, drive, m.labels, m.extra,
     )  # fmt: skip
 
 

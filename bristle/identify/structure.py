@@ -180,13 +180,7 @@ def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
     for run in problem.runs:
         assert isinstance(run, StructureRun)
         part = slice(run.skip, None, stride)
-        runs.append(
-            replace(
-                run, x=run.x[part], v=run.v[part], a=run.a[part], V=run.V[part],
-                force=run.force[part], draws=run.draws[:, part], skip=0, keep=run.keep[part],
-                extra={name: one.of(part) for name, one in run.extra.items()},
-            )
-        )  # fmt: skip
+        runs.append(replace(run.of(part), skip=0, keep=run.keep[part]))
     return problem.of([*runs])
 
 

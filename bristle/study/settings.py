@@ -7,14 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..data.channels import DRIVE, PLAIN, ChannelSpec, channel_unit, is_channel
+from ..data.channels import DRIVE, ChannelSpec
 from ..data.corrections import Correction
-from ..data.extra import refused_name
 from ..data.files import Toml, write_whole
 from ..data.pieces import wrong_split
-from ..errors import RecordError, UnitError
-from ..findings import unknown, written
-from ..units import same_dimension
+from ..findings import written
+from .channel_file import channel_as_toml, is_right_channel, read_channel, read_extra
 from .run_file import (
     EXCLUDE,
     RunFile,
@@ -33,9 +31,6 @@ _KEYS = (
 )  # fmt: skip
 ALL = "all"
 """The word for all laws."""
-
-_CHANNEL_KEYS = ("column", "unit", "sign", "noise", "step")
-_EXTRA_KEYS = ("column", "unit", "sign")
 
 
 @dataclass(frozen=True)
@@ -121,12 +116,12 @@ def read_settings(path: Path) -> Settings:
     if listed and not runs:
         toml.error(("runs",), f'every run has role = "{EXCLUDE}": some for training are needed.')
     channels = {
-        name: _channel(toml, name, table)
+        name: read_channel(toml, name, table)
         for name, table in toml.table((), data, "channels").items()
-        if _is_right(toml, name, table)
+        if is_right_channel(toml, name, table)
     }
     extra = {
-        name: _extra(toml, name, table) for name, table in toml.table((), data, "extra").items()
+        name: read_extra(toml, name, table) for name, table in toml.table((), data, "extra").items()
     }
     title, notes = toml.text((), data, "title", path.parent.name), toml.text((), data, "notes")
     check_levels(toml, runs, channels)
@@ -170,7 +165,7 @@ def write_settings(path: Path, settings: Settings) -> None:
             table = tomlkit.table()
             for line in settings.comments.get(name, "").splitlines():
                 table.add(tomlkit.comment(line))
-            table.update(_as_toml(spec))
+            table.update(channel_as_toml(spec))
             channels.add(name, table)
         if listed:
             document.add(key, channels)
@@ -243,73 +238,3 @@ def with_corrections(text: str, found: Mapping[tuple[str, int], Sequence[Correct
         known = [Correction(**one) for one in table.unwrap().get("correct", [])]
         table["correct"] = corrections_as_toml([*known, *corrections])
     return tomlkit.dumps(document)
-
-
-def _as_toml(spec: ChannelSpec) -> dict[str, Any]:
-    if spec.step is not None:
-        return {"step": spec.step}
-    found: dict[str, Any] = {"column": spec.column, "unit": spec.unit, "sign": spec.sign}
-    if spec.noise is not None:
-        found["noise"] = spec.noise
-    return found
-
-
-def _is_right(toml: Toml, name: str, table: Any) -> bool:
-    keys = ("channels", name)
-    if not is_channel(name):
-        besides = f"Any other channel goes into [extra.{name}]."
-        toml.error(keys, f"{unknown('channel', name, PLAIN)} {besides}")
-        return False
-    if not isinstance(table, dict):
-        toml.error(keys, f'is {written(table)}; a table with column = "..." is right.')
-        return False
-    return True
-
-
-def _extra(toml: Toml, name: str, table: Any) -> ChannelSpec:
-    """Return where an extra channel is; its unit may be any, known or not."""
-    keys = ("extra", name)
-    if wrong := refused_name(name):
-        toml.error(keys, f'an extra channel cannot be called "{name}": {wrong}.')
-    if not isinstance(table, dict):
-        toml.error(keys, f'is {written(table)}; a table with column = "..." is right.')
-        return ChannelSpec()
-    toml.known(keys, table, _EXTRA_KEYS)
-    column, unit = toml.text(keys, table, "column"), toml.text(keys, table, "unit")
-    if not column:
-        toml.error(keys, 'column is missing: the title of the column, as in column = "p [bar]".')
-    if not unit:
-        toml.error(keys, 'unit is missing: that of the column, or "1" for a plain number.')
-    return ChannelSpec(column, unit, _sign(toml, keys, table))
-
-
-def _sign(toml: Toml, keys: tuple[str, ...], table: Mapping[str, Any]) -> int:
-    """Return the sign that a channel's values are multiplied with."""
-    sign = table.get("sign", 1)
-    if sign not in (1, -1) or isinstance(sign, bool):
-        toml.error((*keys, "sign"), f"sign = {written(sign)}; 1 or -1 is right.")
-        return 1
-    return int(sign)
-
-
-def _channel(toml: Toml, name: str, table: Mapping[str, Any]) -> ChannelSpec:
-    keys = ("channels", name)
-    toml.known(keys, table, _CHANNEL_KEYS)
-    column, unit = toml.text(keys, table, "column"), toml.text(keys, table, "unit")
-    step = toml.number(keys, table, "step")
-    if step is not None and name != "time":
-        toml.error((*keys, "step"), "step belongs to [channels.time] alone.")
-    if not column and step is None:
-        toml.error(keys, 'column is missing: the title of the column, as in column = "F_kN".')
-    if unit:
-        try:
-            if not same_dimension(unit, channel_unit(name)):
-                right = channel_unit(name)
-                toml.error((*keys, "unit"), f'unit = "{unit}": {name} is in {right} or the like.')
-        except (UnitError, RecordError) as error:
-            toml.error((*keys, "unit"), str(error))
-    sign = _sign(toml, keys, table)
-    noise = toml.number(keys, table, "noise")
-    if noise is not None and noise < 0.0:
-        toml.error((*keys, "noise"), f"noise = {noise}; a standard deviation is not negative.")
-    return ChannelSpec(column, unit, sign, noise, step)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -251,3 +251,10 @@ def measured_signal(name: str, unit: str) -> Along:
 
     words = name.replace("_", " ")
     return Along(name, unit, words, (), f"p.{FOLLOWING}", history, measured=True)
+
+
+def measured_signals(runs: Sequence[Run]) -> list[Along]:
+    """Return the channels that all runs hold beside those that bristle knows, as signals."""
+    known = runs[0].extra
+    shared = [name for name in known if all(name in run.extra for run in runs)]
+    return [measured_signal(name, known[name].known_unit) for name in shared]

@@ -13,8 +13,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from ...identify.fit import Run
-from .along import ALONG, GIVEN, Along, measured_signal
+from .along import ALONG, GIVEN, Along, measured_signals
 from .curve import Curve, may_change
 from .modes import best_mode
 from .normal import Hats, Normal, hats_at
@@ -145,13 +144,6 @@ def signals(
     for along in (one for one in offered if not names or one.name in names):
         for memory in along.memories(step, length, _stroke(residual), top):
             yield along, memory, _values(residual, along, memory)
-
-
-def measured_signals(runs: Sequence[Run]) -> list[Along]:
-    """Return the channels that all runs hold beside those that bristle knows, as signals."""
-    known = runs[0].extra
-    shared = [name for name in known if all(name in run.extra for run in runs)]
-    return [measured_signal(name, known[name].known_unit) for name in shared]
 
 
 def _values(residual: Residual, along: Along, memory: dict[str, float]) -> Array:
