@@ -173,8 +173,7 @@ def _bench(
         wires[f"damper.{drive.name}"] = "drive.value"
     damper = model.at("damper", bench=True)
     for name in dict.fromkeys(following(damper.effects).values()):
-        one = run.extra[name]
-        rows[name] = (name, one.known_unit, one.values)
+        rows[name] = (name, run.extra[name].known_unit, run.extra[name].values)
         wires[f"damper.{input_of(name, damper.base_law, drive)}"] = f"{name}.value"
     effects = [EFFECTS[name] for name in damper.effects]
     if any("a" in effect.needs for effect in effects):

@@ -57,7 +57,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    signals = {name: name for name in (*ALONG, *study.settings.extra)}
+    signals = {name: name for name in (*ALONG, *study.settings.beside)}
     signals |= _of_command(study.drive)
     found = learn_effect(
         study,

@@ -162,6 +162,15 @@ class Read:
     known: Mapping[str, tuple[Array, Array, str]]
     notes: tuple[str, ...]
 
+    def beside(self, name: str, time: Array, values: Array, unit: str) -> Read:
+        """Return the same with one more channel, where it has values enough."""
+        there = np.isfinite(values) & np.isfinite(time)
+        try:
+            _refuse_holes(time, there)
+        except RecordError:  # its mean counts all the same, and is told
+            return self
+        return replace(self, known={**self.known, name: _in_order(time, values, there, unit)})
+
     def at(self, times: Array) -> dict[str, Extra]:
         """Return the channels at the samples of a run.
 
@@ -209,9 +218,16 @@ def read_extra(table: Table, time: Array, wanted: Mapping[str, ChannelSpec]) -> 
         if filled:
             share = plain(100.0 * filled / len(time), 2)
             notes.append(f"{name}: {share} % of its values are missing and are interpolated")
-        order = np.argsort(time[there], kind="stable")
-        found[name] = time[there][order], values[there][order], unit
+        found[name] = _in_order(time, values, there, unit)
     return Read(found, tuple(notes))
+
+
+def _in_order(
+    time: Array, values: Array, there: NDArray[np.bool_], unit: str
+) -> tuple[Array, Array, str]:
+    """Return the times and values that are there, in the order of time, and their unit."""
+    order = np.argsort(time[there], kind="stable")
+    return time[there][order], values[there][order], unit
 
 
 def _converted(table: Table, spec: ChannelSpec) -> tuple[Array, str]:

@@ -245,6 +245,8 @@ def measurements_of(
     spikes = spikes_of(time, values, mask=known.mask)
     notes += _masked(spikes) if known.mask else []
     extra = read_extra(table, time, known.extra)
+    if warm is not None:
+        extra = extra.beside(TEMPERATURE, time, warm, channel_unit(TEMPERATURE))
     even = evenly(time, values, table.lines, table.source, table.place)
     notes += [*extra.notes, *even.notes, *_what_is_missing([*values, *known.levels])]
     if known.corrections:

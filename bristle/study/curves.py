@@ -186,7 +186,7 @@ def learn_effect(
     if name in EFFECTS or (study.effects_folder / f"{name}.py").exists():
         raise StudyError(f'an effect is named "{name}" already. Another name is right.')
     site, opened = _opened(study, at)
-    refuse_elsewhere(parts, along, Place(site), [*study.settings.extra])
+    refuse_elsewhere(parts, along, Place(site), study.settings.beside)
     found = learn(opened, name, parts=parts, along=along)
     told = site if study.settings.has_building else ""
     if found.refused or found.curve is None:

@@ -10,6 +10,7 @@ from typing import Any
 from ..data.channels import DRIVE, ChannelSpec
 from ..data.corrections import Correction
 from ..data.files import Toml, write_whole
+from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
 from ..findings import written
 from .channel_file import channel_as_toml, is_right_channel, read_channel, read_extra
@@ -64,6 +65,12 @@ class Settings:
         """The channel that commands the damper, "" where none was measured."""
         there = {*self.channels, *(name for run in self.runs for name in run.levels)}
         return next((name for name in DRIVE if name in there), "")
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """The channels that no fit needs, and on which an error may depend."""
+        warm = (TEMPERATURE,) if TEMPERATURE in self.channels else ()
+        return (*self.extra, *warm)
 
     @property
     def excluded_text(self) -> str:

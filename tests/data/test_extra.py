@@ -176,6 +176,22 @@ def test_a_slow_logger_that_repeats_its_last_value_is_not_cut_off():
     assert not [one for one in check_channels(run, run["velocity"]) if one.channel == "p"]
 
 
+def test_a_temperature_is_a_coordinate_within_the_run_besides_its_mean():
+    warm = 20.0 + 3.0 * T
+    run = read_warm(table(T_oil__degC=np.where(np.arange(N) % 50 == 7, warm, np.nan)))
+    assert run.labels == {"temperature": 22.9}
+    assert run.extra["temperature"].unit == "degC"
+    np.testing.assert_allclose(run.extra["temperature"].values[7:957], warm[7:957], atol=1e-6)
+    few = read_warm(table(T_oil__degC=np.where(np.arange(N) < 30, warm, np.nan)))
+    assert list(few.labels) == ["temperature"]
+    assert not few.extra
+
+
+def read_warm(made: Table) -> Measurement:
+    (run,) = measurements_of(made)
+    return run
+
+
 def test_what_bare_data_hold_besides_is_kept_as_well():
     (run,) = measurements_of(table(p__bar=PRESSURE))
     assert run.extra["p"].unit == "Pa"

@@ -36,13 +36,11 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     formula : what stands for the table, None for the table itself
     """
     body = _hooks(curve, formula)
-    parameters: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
+    memory: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
+    parameters = [*memory, *_followed(curve)]
     only = [*_only_value(curve), *_only_storey(curve)]
     kept = formula.positive if formula else ()
     table = formula is None and not curve.of.parameter
-    if curve.measured:
-        middle, text = 0.5 * (curve.knots[0] + curve.knots[-1]), curve.signal.words
-        parameters.append((FOLLOWING, middle, curve.along_unit, f"{text}, which runs tell"))
     if formula:
         parameters += [
             (n, value, unit, f"{n} in g = {formula.text}") for n, value, unit in formula.parameters
@@ -71,6 +69,14 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     if table:
         lines += _table(curve)
     return "\n".join([*lines, "", *body]) + "\n"
+
+
+def _followed(curve: Curve) -> list[Declared]:
+    """Return the parameter that follows a measured channel; none where the curve follows none."""
+    if not curve.measured:
+        return []
+    middle = 0.5 * (curve.knots[0] + curve.knots[-1])
+    return [(FOLLOWING, middle, curve.along_unit, f"{curve.signal.words}, which runs tell")]
 
 
 def _assumed(curve: Curve, table: bool) -> tuple[str, ...]:
