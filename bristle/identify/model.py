@@ -193,7 +193,7 @@ class Problem:
 
     def _moves(self, channel: str) -> bool:
         """Return whether all runs have an extra channel, and it varies in them."""
-        if not all(channel in run.extra for run in self.runs):
+        if not self.runs or not all(channel in run.extra for run in self.runs):
             return False
         values = np.concatenate([run.extra[channel].values for run in self.runs])
         return float(np.ptp(values)) > 0.0
