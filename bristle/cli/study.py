@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ._common import add_common_to_actions
 from ._consent import add_trust
 from ._extend import add_extend
-from ._files import channels_of, files_of, test_files
+from ._files import add_run_facts, channels_of, files_of, test_files
 
 if TYPE_CHECKING:
     from ..study.create import Created
@@ -120,16 +120,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 def _add_runs(parser: argparse.ArgumentParser) -> None:
     """Add what is known of whole runs, and how files hold them."""
-    for option, value, text in (
-        ("--level", "PATTERN", "the command's level in the names of files, {} in its place: "
-         "--level 'I{}A'"),
-        ("--label", "NAME=PATTERN", "what else names tell of a run: --label 'oil=batch{}'"),
-    ):  # fmt: skip
-        parser.add_argument(option, action="append", default=[], metavar=value, help=text)
-    parser.add_argument(
-        "--runs", type=Path, metavar="FILE",
-        help="a table with a row per run: file, role, current [A], temperature [degC], ...",
-    )  # fmt: skip
+    add_run_facts(parser)
     parser.add_argument(
         "--split", default="", metavar="HOW",
         help="files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'",
@@ -190,6 +181,7 @@ def _print_json(created: Created) -> None:
         "rig": settings.rig,
         "runs": [asdict(run) for run in settings.runs],
         "channels": [asdict(guess) for guess in created.guesses],
+        "extra": {n: {"column": s.column, "unit": s.unit} for n, s in created.extra.items()},
         "unused": list(created.unused),
         "notes": list(created.notes),
     }
@@ -209,6 +201,10 @@ def _print_new(created: Created) -> None:
         print(f"  {'':28}   {guess.reason}")
         if guess.doubt:
             print(f"  {'':28}   doubtful: {guess.doubt}")
+    extra = [f"  {name:28} {one.column}, in {one.unit}" for name, one in created.extra.items()]
+    if extra:
+        head = "Extra channels, on which an error may depend ([extra] in study.toml):"
+        print(head, *extra, sep="\n")
     if created.unused:
         print(f"Not used: {', '.join(created.unused)}.")
     for note in created.notes:
