@@ -34,7 +34,7 @@ from .knowledge import Known
 from .measured_force import of_one_force
 from .motions import Waveform
 from .outcome import Outcome, outcomes
-from .plan import Plan, Wish, errs, note_of_missing
+from .plan import Plan
 from .planned_test import Signals
 from .purposes import cost_of
 from .rig_limits import with_given
@@ -42,6 +42,7 @@ from .search import Goal
 from .shaking_limits import limits_of_shaking
 from .shaking_table import ShakingTable
 from .table_planner import DRAWS, TablePlanner
+from .wish import Wish, errs, note_of_missing
 
 Array = NDArray[np.float64]
 

@@ -31,7 +31,6 @@ from ..progress import tell
 from .basis import USUAL, ranges
 from .goal import Purposes
 from .knowledge import Question
-from .plan import Wish, parameters_of
 from .questions import (
     NONE,
     SizedRival,
@@ -42,6 +41,7 @@ from .questions import (
     sized_rival,
 )
 from .rig_limits import RESERVE, RigLimits
+from .wish import Wish, parameters_of
 
 
 @dataclass(frozen=True)

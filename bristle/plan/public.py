@@ -9,10 +9,12 @@ from typing import Any
 from ..errors import StudyError
 from ..findings import written
 from ..study.study import Study
+from .bench import plan_study
 from .building import plan_building
 from .new_rig import plan_new
-from .plan import Plan, Wish, plan_study
+from .plan import Plan
 from .rig_limits import SIZES, RigLimits, read_quantity, read_rig
+from .wish import Wish
 
 Names = str | Sequence[str] | bool | None
 
