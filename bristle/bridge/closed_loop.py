@@ -18,6 +18,7 @@ from ..data.open_effects import OpenEffect, left_open
 from ..draw.style import percent
 from ..errors import StudyError
 from ..findings import command
+from ..identify.run_labels import following
 from ..progress import tell
 from ..quantity import short_z
 from ..study.openings import count_opening, opened_text, openings, runs_for_test
@@ -194,6 +195,11 @@ def _predicted(
     effects: Sequence[OpenEffect],
 ) -> ClosedLoop:
     """Return the prediction of the present model and of that before the last step."""
+    if channels := dict.fromkeys(following(model.effects).values()):
+        raise StudyError(
+            f"{study.folder}: an effect of the model follows {', '.join(channels)}, which a "
+            "simulated building does not have. Leave that effect out of the model."
+        )
     before, step = _before(study)
     judged = history_steps(study.steps())
     rows: list[Predicted] = []
@@ -202,7 +208,7 @@ def _predicted(
         tell(f"simulating {trial.shaking.name}")
         now = figures_of(model, place, trial, draws, number, judged[-1].missed, effects)
         then = None
-        if before is not None:
+        if before is not None and not following(before.effects):
             drawn = draws if has_covariance(before) else 0
             then = figures_of(before, place, trial, drawn, number, judged[-2].missed)
         rows += now.rows(trial, then)

@@ -28,6 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "where no law was chosen; the model's law: keep it",
     )
     parser.add_argument(
+        "--limits", action="store_true",
+        help="fit the model again at the limit of every effect: exact where it is far from linear",
+    )  # fmt: skip
+    parser.add_argument(
         "--dry-run", action="store_true", help="show the verdict; do not change verdict.json"
     )
     add_trust(parser)
@@ -40,7 +44,9 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    found = diagnose_study(study, law=arguments.law, write=not arguments.dry_run)
+    found = diagnose_study(
+        study, law=arguments.law, profile=arguments.limits, write=not arguments.dry_run
+    )
     verdict = verdict_of(study, found)
     if arguments.json:
         print(json.dumps(verdict, indent=2, ensure_ascii=False))
@@ -160,9 +166,13 @@ def _then(verdict: Verdict, folder: Path) -> str:
 
 
 def _not_excited(verdict: Verdict) -> list[str]:
-    """Return the effects that these runs cannot show, and others may."""
+    """Return the effects that these runs cannot show, and others may.
+
+    What a parameter of another effect takes up is that effect.
+    """
     rows = [row for found in verdict["findings"] for row in found.get("limits", ())]
-    return sorted({row["effect"] for row in rows if row.get("why")})
+    hidden = [row for row in rows if row.get("why") and "." not in row["why"].partition(" ")[0]]
+    return sorted({row["effect"] for row in hidden})
 
 
 def _other_laws(verdict: Verdict, folder: Path) -> str:

@@ -181,6 +181,7 @@ def _print_json(created: Created) -> None:
         "rig": settings.rig,
         "runs": [asdict(run) for run in settings.runs],
         "channels": [asdict(guess) for guess in created.guesses],
+        "extra": {n: {"column": s.column, "unit": s.unit} for n, s in created.extra.items()},
         "unused": list(created.unused),
         "notes": list(created.notes),
     }
@@ -200,6 +201,10 @@ def _print_new(created: Created) -> None:
         print(f"  {'':28}   {guess.reason}")
         if guess.doubt:
             print(f"  {'':28}   doubtful: {guess.doubt}")
+    extra = [f"  {name:28} {one.column}, in {one.unit}" for name, one in created.extra.items()]
+    if extra:
+        head = "Extra channels, on which an error may depend ([extra] in study.toml):"
+        print(head, *extra, sep="\n")
     if created.unused:
         print(f"Not used: {', '.join(created.unused)}.")
     for note in created.notes:
