@@ -265,9 +265,11 @@ def _of_command(name: str, aligned: _Aligned) -> list[str]:
         return [f"the {name} was another one than planned for {_percent(wrong)} of the run"]
     out = []
     if abs(share - 1.0) > DIFFERS:
-        factor, unit = scale(channel_unit(name), float(np.max(planned)))
+        top = float(np.max(planned))
+        factor, unit = scale(channel_unit(name), top)
         how = f"was clipped at {plain(factor * reached)} {unit}, " if clipped else "reached "
-        out.append(f"the {name} {how}{_percent(share)} of what was planned")
+        told = _percent(reached / top if clipped and top > 0.0 else share)
+        out.append(f"the {name} {how}{told} of what was planned")
     if late and wrong > DIFFERS:
         way = "late" if late > 0 else "early"
         out.append(
