@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,9 @@ from .shaking_limits import limits_of_shaking
 from .shaking_table import ShakingTable
 from .table_planner import DRAWS, TablePlanner
 from .wish import Wish, errs, note_of_missing
+
+if TYPE_CHECKING:
+    from ..draw.style import Page
 
 Array = NDArray[np.float64]
 
@@ -111,6 +114,11 @@ class BuildingPlan(Plan):
         from .building_picture import building_files
 
         return building_files(self)
+
+    def _page(self, k: int) -> Page:
+        from .building_picture import draw_shaking
+
+        return draw_shaking(self.runs()[k], self.predicted[k], self.drive, self.level)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
