@@ -163,7 +163,13 @@ class Read:
     notes: tuple[str, ...]
 
     def beside(self, name: str, time: Array, values: Array, unit: str) -> Read:
-        """Return the same with one more channel, where it has values enough."""
+        """Return the same with one more channel, where it has values enough.
+
+        Parameters
+        ----------
+        name, unit : of the channel
+        time, values : (n,) s, and in that unit, NaN where a value is missing
+        """
         there = np.isfinite(values) & np.isfinite(time)
         try:
             _refuse_holes(time, there)
