@@ -13,7 +13,7 @@ from scipy.stats import t as student
 
 from ..data.model import StudyModel
 from ..data.model_draws import drawn_models
-from ..data.open_effects import OpenEffect
+from ..data.open_effects import OpenEffect, reach
 from ..identify.run_labels import values_of_labels
 from .closed_loop_result import MISSED, PARAMETERS, Predicted
 from .closed_loop_runs import Trial
@@ -73,7 +73,7 @@ class Figures:
         wide *= float(np.sqrt(1.0 + 1.0 / count))
         misses = 1.96 * self.missed * centre
         ends = {PARAMETERS: (wide, wide), MISSED: (misses, misses)}
-        return ends | {name: _reach(changes[key]) for name, changes in self.left.items()}
+        return ends | {name: reach(changes[key]) for name, changes in self.left.items()}
 
     def rows(self, trial: Trial, then: Figures | None) -> list[Predicted]:
         """Return a row per response and kind of figure."""
@@ -89,13 +89,6 @@ class Figures:
             parts = self.parts((name, kind)) if self.left else {}
             out.append(Predicted(run, name, kind, value, best, bands[0], before, bands[1], parts))
         return out
-
-
-def _reach(changes: Array) -> tuple[float, float]:
-    """Return how far an effect takes a figure down, and up, at 95 %, from changes (n,) by draws."""
-    ends = [changes[sign * changes > 0.0] for sign in (-1.0, 1.0)]
-    below, above = (1.96 * float(np.sqrt(np.mean(end**2))) if end.size else 0.0 for end in ends)
-    return below, above
 
 
 def figures_of(

@@ -69,7 +69,9 @@ class Predicted:
     @property
     def width(self) -> float:
         """The width of the band over the figure; 0 without a band."""
-        return (self.band[1] - self.band[0]) / self.predicted if self.band else 0.0
+        if self.band is None or self.predicted == 0.0:
+            return 0.0
+        return (self.band[1] - self.band[0]) / self.predicted
 
     def told(self) -> str:
         """Return the figure with its band, "12.1 mm, 95 % band 11.6 to 12.9 mm"."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..data.model import StudyModel
 from ..data.model_draws import drawn_models
 from ..data.open_effects import OpenEffect
-from ..errors import BristleError
+from ..errors import PhysicsError, RunError, ScenarioError
 from ..progress import tell
 from .closed_loop_runs import Trial
 from .closed_loop_sizes import Key, names_of, sizes_of
@@ -79,7 +79,7 @@ def _tried(
     """Return the figures of models, None for those that cannot be simulated."""
     try:
         return _figures(models[-1], models, place, trial)
-    except BristleError:
+    except (PhysicsError, RunError, ScenarioError):
         return [None] * len(models)
 
 

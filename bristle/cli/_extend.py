@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ._files import files_of
+from ._files import add_run_facts, files_of
 
 if TYPE_CHECKING:
     from ..plan.performed import Performed
@@ -25,6 +25,7 @@ def add_extend(parser: argparse.ArgumentParser) -> None:
         help="which of them are held out, by name; else the plan says it, or the names do, or "
         "every third is",
     )  # fmt: skip
+    add_run_facts(parser)
     parser.add_argument(
         "--plan", type=Path, metavar="PLAN",
         help="the plan that they were measured by: its roles, and what differs from it",
@@ -37,15 +38,17 @@ def _extend(arguments: argparse.Namespace) -> int:
     from ..plan.folder import read_plan
     from ..plan.performed import performed
     from ..study.extend import extend_study
+    from ..study.run_facts import RunChoices
     from ..study.study import Study
 
-    study, files = Study(arguments.folder), files_of(arguments.data, "")
+    study, table = Study(arguments.folder), arguments.runs
+    files = [file for file in files_of(arguments.data, "") if table is None or Path(file) != table]
     by_plan = None
     if arguments.plan is not None:
         by_plan = performed(study, files, read_plan(arguments.plan))
-    extended = extend_study(
-        study, files, roles=by_plan.roles if by_plan else None, holdout=arguments.holdout
-    )
+    choices = RunChoices(arguments.level, arguments.label, table)
+    roles = by_plan.roles if by_plan else None
+    extended = extend_study(study, files, roles=roles, holdout=arguments.holdout, choices=choices)
     print_added(extended, by_plan, as_json=arguments.json)
     return 0
 

@@ -18,6 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shown.set_defaults(act=_list)
     bench = commands.add_parser("bench", help="an MR damper on a test bench")
     _add_choices(bench)
+    bench.add_argument(
+        "--held", action="store_true",
+        help="hold the voltage in each run, at 2 or 6 V, as many laboratories do",
+    )  # fmt: skip
     bench.set_defaults(act=_bench)
     building = commands.add_parser("building", help="a base-isolated building on a shake table")
     _add_choices(building)
@@ -122,6 +126,7 @@ def _choice(arguments: argparse.Namespace):  # type: ignore[no-untyped-def]
         seed=arguments.seed,
         nothing=arguments.none,
         outside=arguments.outside,
+        held=getattr(arguments, "held", False),
     )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ._common import add_common_to_actions
 from ._consent import add_trust
 from ._extend import add_extend
-from ._files import channels_of, files_of, test_files
+from ._files import add_run_facts, channels_of, files_of, test_files
 
 if TYPE_CHECKING:
     from ..study.create import Created
@@ -120,16 +120,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 def _add_runs(parser: argparse.ArgumentParser) -> None:
     """Add what is known of whole runs, and how files hold them."""
-    for option, value, text in (
-        ("--level", "PATTERN", "the command's level in the names of files, {} in its place: "
-         "--level 'I{}A'"),
-        ("--label", "NAME=PATTERN", "what else names tell of a run: --label 'oil=batch{}'"),
-    ):  # fmt: skip
-        parser.add_argument(option, action="append", default=[], metavar=value, help=text)
-    parser.add_argument(
-        "--runs", type=Path, metavar="FILE",
-        help="a table with a row per run: file, role, current [A], temperature [degC], ...",
-    )  # fmt: skip
+    add_run_facts(parser)
     parser.add_argument(
         "--split", default="", metavar="HOW",
         help="files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'",

@@ -14,12 +14,17 @@ from pathlib import Path
 from statistics import NormalDist
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import StudyError
 from ..findings import command
 from ..physics.effect import EFFECTS, exclude
 from ..physics.forms import joined_form
 from ..units import convert
 from .study_model import StudyModel
+
+Array = NDArray[np.float64]
 
 POINT = 1.96
 """Standard deviations of a normal size at its limit: 95 % are smaller, whatever their sign."""
@@ -57,13 +62,13 @@ class OpenEffect:
         ----------
         count : how many
         """
-        normal = NormalDist()
-        shares = [(k + 0.5) / count for k in range(count)]
-        if not self.signed:
-            shares = [0.5 * (1.0 + share) for share in shares]
-        found = [normal.inv_cdf(share) for share in shares]
+        found = [self.part((k + 0.5) / count) for k in range(count)]
         power = sum(one**2 for one in found) / count
         return [one / (POINT * sqrt(power)) for one in found]
+
+    def part(self, share: float) -> float:
+        """Return the size over the limit below which a share of the sizes are, 0 < share < 1."""
+        return NormalDist().inv_cdf(share if self.signed else 0.5 * (1.0 + share)) / POINT
 
     def own(self, part: float) -> dict[str, float]:
         """Return the effect's parameters [SI] at a size over its limit, within their bounds.
@@ -106,6 +111,18 @@ class OpenEffect:
         return out.with_values(new, origin="assumed")
 
 
+def reach(changes: Array) -> tuple[float, float]:
+    """Return how far an effect takes a figure down, and up, at 95 %.
+
+    Parameters
+    ----------
+    changes : (n,) of the figure, by draws of the effect's size
+    """
+    ends = [changes[sign * changes > 0.0] for sign in (-1.0, 1.0)]
+    below, above = (POINT * float(np.sqrt(np.mean(end**2))) if end.size else 0.0 for end in ends)
+    return below, above
+
+
 def open_effects(
     verdict: Mapping[str, Any], model: StudyModel
 ) -> tuple[list[OpenEffect], list[str]]:
@@ -129,7 +146,7 @@ def open_effects(
             label = name if name not in found else f"{name} ({finding['site']})"
             found[label] = OpenEffect(
                 name, label, one["parameter"], float(one["limit95"]), one["side"] == "above",
-                _others(finding["site"], name, one["others"]), one.get("moved") or {},
+                _others(finding["site"], name, one["others"]), one["moved"],
             )  # fmt: skip
     return list(found.values()), [name for name in dict.fromkeys(unlimited) if name not in found]
 
@@ -165,6 +182,12 @@ def left_open(
         raise StudyError(
             f"{folder}: the verdict's law is {verdict['law']}, and the model's {model.law}. "
             f"Identify the one that is right, then:  {again}"
+        )
+    sized = [one for found in verdict["findings"] for one in found.get("limits") or []]
+    if any("moved" not in one for one in sized if not one.get("why")):
+        raise StudyError(
+            f"{folder}: an older version of bristle made the verdict, and it does not tell how its "
+            f"effects move the model's parameters. First:  {again}"
         )
     effects, unlimited = open_effects(verdict, model)
     if not effects:

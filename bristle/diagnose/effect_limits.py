@@ -73,8 +73,8 @@ class EffectLimit:
     which 9 of 10 verdicts would name the effect, None beyond the parameter's bounds. `coarse`: the
     steps of the integration tell no smaller size, and shares have no meaning. `others` are the
     values of the effect's other parameters for which all this holds, and `moved` says by how much
-    [SI] such an effect moves the model's own parameters in a fit. `why` says why the runs cannot
-    show the effect; the sizes are then None.
+    [SI] such an effect moves the model's own parameters in a fit. `profiled`: the model was fitted
+    again at the limit. `why` says why the runs cannot show the effect; the sizes are then None.
     """
 
     effect: str
@@ -89,6 +89,7 @@ class EffectLimit:
     others: tuple[tuple[str, float], ...] = ()
     why: str = ""
     moved: tuple[tuple[str, float], ...] = ()
+    profiled: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Return what verdict.json holds."""
@@ -99,6 +100,7 @@ class EffectLimit:
             "side": "above" if self.falls else "below", "limit95": self.largest,
             "share": self.share, "named_from": self.named, "named_share": self.named_share,
             "coarse": self.coarse, "others": dict(self.others), "moved": dict(self.moved),
+            "profiled": self.profiled,
         }  # fmt: skip
 
 
@@ -155,7 +157,9 @@ def _why_hidden(sized: Sized) -> str:
     if np.linalg.norm(change) > known.rule.silent * known.size and known.search.names:
         alike = np.abs(known.own.T @ change)
         return f"{known.search.names[int(np.argmax(alike))]} of the model takes it up"
-    still = steady(known.problem) and "V" in EFFECTS[sized.name].needs
+    problem = known.problem
+    held = all(steady(problem.of([run])) for run in problem.runs)
+    still = held and "V" in EFFECTS[sized.name].needs
     return "the command does not move" if still else "this motion does not excite it"
 
 

@@ -29,7 +29,8 @@ class Choice:
     """What an example is to be like.
 
     effects: what to hide, by name; drawn where empty. nothing: hide nothing. outside: hide what the
-    library does not have. noise: standard deviation on every channel as a share of its RMS [1].
+    library does not have. held: on a bench the voltage is held in each run, as many laboratories
+    do. noise: standard deviation on every channel as a share of its RMS [1].
     """
 
     effects: tuple[str, ...] = ()
@@ -38,6 +39,7 @@ class Choice:
     seed: int = 1
     nothing: bool = False
     outside: bool = False
+    held: bool = False
 
     def check(self) -> None:
         """Refuse what contradicts itself or cannot be.
@@ -70,7 +72,7 @@ def make_bench(folder: Path | str, choice: Choice) -> Study:
     draw, drawn, noise = streams(choice.seed)
     values, scales = draw_damper(law, draw), scales_of("bench", law)
     hidden, secret = _secret("bench", law, choice, scales, drawn)
-    plan = bench.plan(scales, draw)
+    plan = bench.plan(scales, draw, choice.held)
     damper, bare = Damper(law, values, secret), Damper(law, values)
     runs = [bench.perform(damper, motion, volts, scales) for _, motion, volts in plan]
     plain = [bench.perform(bare, motion, volts, scales) for _, motion, volts in plan]

@@ -130,6 +130,8 @@ class Command:
 
     def words(self, name: str, unit: str) -> str:
         """Return the command in words; its name and unit as the study has them."""
+        if self.high == self.low:
+            return f"{name} held at {self.high:.3g} {unit}"
         between = f"between {self.low:.3g} and {self.high:.3g} {unit}"
         return {
             "held": f"{name} held at {self.high:.3g} {unit}",

@@ -16,6 +16,9 @@ from .knowledge import Asked, Known
 from .purposes import seen, separated
 from .questions import SizedRival
 
+OUTCOMES = "outcomes.json"
+"""The file of a plan's folder with the table."""
+
 HEADER = ("question", "figure", "now", "with these tests")
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 
@@ -118,7 +118,10 @@ def performed(study: Study, files: Sequence[Path | str], plan: PlanFolder) -> Pe
             notes.append(f"{run.name} stands for no run of the plan")
         else:
             roles[Path(file).name] = planned.role
-            pairs.append(compared(run, planned, plan.motion))
+            # A level that stands in study.toml is in no file.
+            there = {plan.motion, *channels}
+            kept = {name: x for name, x in planned.signals.items() if name in there}
+            pairs.append(compared(run, replace(planned, signals=kept), plan.motion))
     missing = [one.name for one in plan.runs if one not in found]
     if missing:
         notes.append(f"planned, and not among the files: {', '.join(missing)}")

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..draw.style import BLUE, VERMILION, Page, look, png
 from ..physics.drive import DRIVES
+from .outcome import HEADER, OUTCOMES
 
 if TYPE_CHECKING:
     from .folder import PlannedRun
@@ -24,13 +26,17 @@ def plan_files(plan: Plan) -> dict[str, str | bytes]:
         f"{run.name}.png": png(draw_test(run, signals, plan.drive), 110)
         for run, signals in zip(plan.runs(), plan.signals, strict=True)
     }
-    return {**pictures, "plan.md": plan_text(plan)}
+    return {**pictures, "plan.md": plan_text(plan), OUTCOMES: outcomes_json(plan)}
+
+
+def outcomes_json(plan: Plan) -> str:
+    """Return the table of what the tests will show, as a report takes it."""
+    told = {"header": HEADER, "rows": [one.cells() for one in plan.outcomes]}
+    return json.dumps(told, indent=2, ensure_ascii=False) + "\n"
 
 
 def plan_text(plan: Plan) -> str:
     """Return the plan as a page of text."""
-    from .outcome import HEADER
-
     lines = [f"# Tests for {plan.study or 'a new rig'}", "", *_limits(plan), "", "## Runs", ""]
     lines += ["| run | for | what |", "|---|---|---|"]
     lines += [

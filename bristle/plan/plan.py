@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,14 @@ import numpy as np
 
 from ..diagnose.bench import BenchRuns
 from ..diagnose.opening import Opening
+from ..diagnose.rule import BENCH
 from ..errors import StudyError
+from ..findings import command, unknown
 from ..identify.model import Run
 from ..physics.drive import DRIVES
 from ..physics.effect import EFFECTS, plain_name
 from ..progress import tell
-from ..quantity import plain
+from ..quantity import plain, short_z
 from ..study.identification import as_model
 from ..study.study import Study
 from .folder import PlanFolder, PlannedRun, write_plan
@@ -29,6 +32,9 @@ from .purposes import cost_of
 from .questions import SizedRival, effects_beside, open_parts, rivals
 from .rig_limits import RigLimits, limits_of_runs, with_given
 from .search import Planner
+
+MANY = 10
+"""How many times as many tests as are planned are still told of."""
 
 GAINED = 0.1
 """Share by which a plan must lower its figures on average; below that nothing is left to gain."""
@@ -84,6 +90,8 @@ class Plan:
         The channel of the command, "" where there is none.
     gain : float
         By what factor the figures become smaller on average.
+    notes : tuple of str
+        What weakens the plan, in sentences.
     """
 
     study: str
@@ -93,6 +101,7 @@ class Plan:
     limits: RigLimits
     drive: str
     gain: float
+    notes: tuple[str, ...] = ()
 
     @property
     def worth(self) -> bool:
@@ -116,10 +125,12 @@ class Plan:
         """Return the plan as an engineer would say it."""
         if not self.worth:
             return [
+                *self.notes,
                 *self._left_open(),
                 "Nothing is left to gain: no test within these limits would show more.",
             ]
         return [
+            *self.notes,
             *(f"{run.name} ({run.role}): {run.about}." for run in self.runs()),
             *self._left_open(),
         ]
@@ -130,7 +141,9 @@ class Plan:
         for one in self.outcomes:
             if one.settled:
                 continue
-            apart = f"at best they differ by {plain(one.then, 2)} standard deviations."
+            apart = (
+                f"at best they differ by {plain(one.then, 2)} standard deviations{self._more(one)}."
+            )
             if not one.beyond:
                 out.append(f"{one.name}: not settled by these tests; --{one.purpose} it alone.")
             elif one.purpose == "separate":
@@ -140,6 +153,14 @@ class Plan:
                     f"{one.name}: no test within these limits shows it; the model takes it up."
                 )
         return out
+
+    def _more(self, one: Outcome) -> str:
+        """Return how many tests of this kind would tell rivals apart, "" where far too many."""
+        gained = one.then**2 - one.now**2
+        if one.purpose != "separate" or gained <= 0.0:
+            return ""
+        count = len(self.tests) * (BENCH.tells**2 - one.now**2) / gained
+        return f"; about {ceil(count)} such tests would" if count <= MANY * len(self.tests) else ""
 
     def write(self, folder: Path | str) -> Path:
         """Write the tests as files for a controller, a picture each; return the folder.
@@ -162,6 +183,7 @@ class Plan:
         """Return what json can hold."""
         return {
             "study": self.study, "gain": round(self.gain, 4), "worth": self.worth,
+            "notes": list(self.notes),
             "runs": [
                 {"name": run.name, "role": run.role, "about": run.about} for run in self.runs()
             ],
@@ -206,7 +228,22 @@ def plan_study(
         found.goal, rig, float(np.median([run.noise for run in runs])), _errors(runs[0]),
         1.0 / runs[0].dt, record, seed, runs[0].drive,
     )  # fmt: skip
-    return planned(study.name, found, planner, study.drive)
+    made = planned(study.name, found, planner, study.drive)
+    return replace(made, notes=_notes(study, opened))
+
+
+def _notes(study: Study, opened: Opening) -> tuple[str, ...]:
+    """Return what weakens a plan: an error that an effect would take away first."""
+    verdict, z = study.verdict() or {}, opened.before.z
+    if verdict.get("kind") == "effect" and verdict["effects"]:
+        named = [name for name in map(plain_name, verdict["effects"]) if name in EFFECTS]
+        missing = [name for name in named if name not in opened.before.effects]
+        if missing:
+            add = command("add", study.folder, *missing)
+            return (f"The model misses {', '.join(missing)}; a plan shows more after  {add} .",)
+    if z > opened.rule.clean:
+        return (f"The model errs by {short_z(z)} times the noise; the plan counts that as noise.",)
+    return ()
 
 
 def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:
@@ -290,8 +327,6 @@ def parameters_of(free: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
     StudyError
         If a name is that of none.
     """
-    from ..findings import unknown
-
     out: list[str] = []
     for name in names:
         own = [one for one in free if one == name or one.startswith(f"{name}.")]

@@ -35,7 +35,12 @@ MOST_EFFECTS = 4
 
 
 def diagnose_study(
-    study: Study, *, law: str | None = None, write: bool = True, say: Say = tell
+    study: Study,
+    *,
+    law: str | None = None,
+    profile: bool = False,
+    write: bool = True,
+    say: Say = tell,
 ) -> Diagnosis:
     """Return what the present model of a study is missing; write verdict.json.
 
@@ -44,6 +49,7 @@ def diagnose_study(
     study : the folder, opened
     law : "all" seeks the law together with its effects, the model's own keeps it; None seeks it
         where nobody chose one (`laws.law_or_all`)
+    profile : whether the model is fitted again at every limit of an effect
     write : whether to write verdict.json
     say : called with a few words at each stage
 
@@ -70,9 +76,10 @@ def diagnose_study(
     known = runs.train, runs.holdout, as_model(model), building_of(study, model)
     with telling(say) if say is not tell else nullcontext():
         if law == ALL:
-            found = diagnose_laws(*known, named=model.law, say=say)
+            found = diagnose_laws(*known, named=model.law, profile=profile, say=say)
         else:
-            found = diagnose_rig(*known, identified=_is_identified(model), say=say)
+            fitted = _is_identified(model)
+            found = diagnose_rig(*known, identified=fitted, profile=profile, say=say)
     found = replace(found, sensors=(*found.sensors, *_turned(study)))
     if write:
         study.write_verdict(verdict_of(study, found))

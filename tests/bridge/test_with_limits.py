@@ -134,6 +134,7 @@ def test_changes_to_either_side_widen_either_side() -> None:
     [
         (verdict(kind="effect", effects=("gas_spring",)), "names gas_spring, and its limits hold"),
         (verdict(), "the verdict has no limits"),
+        (verdict({k: v for k, v in SPRING.items() if k != "moved"}), "an older version"),
         (
             {**verdict(SPRING), "laws": [{}], "law": "lugre", "command": "linear"},
             "the verdict's law is lugre, and the model's bingham",

@@ -85,7 +85,7 @@ def test_a_command_that_came_late_is_told() -> None:
     assert late.startswith("plan_1: the voltage came 120 ms late, and was another one than planned")
     assert differences(measured(planned(), voltage=np.roll(volts, 5))) == []  # 10 ms: 0.8 %
     (other,) = differences(measured(planned(), voltage=volts[::-1]))
-    assert other == "plan_1: the voltage was another one than planned for 70 % of the run"
+    assert other == "plan_1: the voltage was another one than planned for 88 % of the run"
 
 
 def test_a_recording_that_ends_early_is_told() -> None:

@@ -175,6 +175,32 @@ def test_a_study_of_one_run_needs_one_held_out(tmp_path: Path) -> None:
     assert len(extend_study(study, [more], holdout=["day_2.csv"]).study.runs().holdout) == 1
 
 
+def test_a_level_in_the_name_of_a_file_is_that_of_the_new_run(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def held(name: str, seed: int) -> Path:
+        columns = bench_run(seed, SECONDS)
+        del columns["U [V]"]
+        return write(tmp_path / f"{name}.csv", columns)
+
+    files = [held("a_I1A", 1), held("b_I2A", 2)]
+    study = create_study(tmp_path / "held", files, law="bingham").study
+    more = held("c_I1p5A", 3)
+    assert main(["study", "extend", str(study.folder), str(more)]) == 0
+    assert Study(study.folder).settings.runs[2].levels == {"current": 1.5}
+    capsys.readouterr()
+    unknown = held("day_3", 4)
+    before = content(study.folder)
+    assert main(["study", "extend", str(study.folder), str(unknown)]) == 2
+    assert "no current, which other runs have" in capsys.readouterr().err
+    assert content(study.folder) == before
+    table = tmp_path / "log.csv"
+    table.write_text("file,current [A],role\nday_3.csv,0.5,holdout\n")
+    assert main(["study", "extend", str(study.folder), str(unknown), "--runs", str(table)]) == 0
+    added = Study(study.folder).settings.runs[3]
+    assert (added.levels, added.role) == ({"current": 0.5}, "holdout")
+
+
 def test_a_full_disk_leaves_the_study_as_it_was(
     rig: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
