@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -102,6 +102,7 @@ class Plan:
     drive: str
     gain: float
     notes: tuple[str, ...] = ()
+    rig: ClassVar[str] = "bench"
 
     @property
     def worth(self) -> bool:
@@ -137,22 +138,18 @@ class Plan:
 
     def _left_open(self) -> list[str]:
         """Return what the tests do not settle, and whether another one would."""
-        out = []
-        for one in self.outcomes:
-            if one.settled:
-                continue
-            apart = (
-                f"at best they differ by {plain(one.then, 2)} standard deviations{self._more(one)}."
-            )
-            if not one.beyond:
-                out.append(f"{one.name}: not settled by these tests; --{one.purpose} it alone.")
-            elif one.purpose == "separate":
-                out.append(f"{one.name}: no test within these limits tells them apart; {apart}")
-            else:
-                out.append(
-                    f"{one.name}: no test within these limits shows it; the model takes it up."
-                )
-        return out
+        return [f"{one.name}: {self._why(one)}" for one in self.outcomes if not one.settled]
+
+    def _why(self, one: Outcome) -> str:
+        """Return why the tests do not settle something."""
+        if not one.beyond:
+            return f"not settled by these tests; --{one.purpose} it alone."
+        if one.purpose != "separate":
+            return "no test within these limits shows it; the model takes it up."
+        return (
+            "no test within these limits tells them apart; at best they differ by "
+            f"{plain(one.then, 2)} standard deviations{self._more(one)}."
+        )
 
     def _more(self, one: Outcome) -> str:
         """Return how many tests of this kind would tell rivals apart, "" where far too many."""
@@ -170,14 +167,18 @@ class Plan:
         StudyError
             If the folder is there already or cannot be written.
         """
-        from .picture import plan_files
-
         path = Path(folder)
         write_plan(
-            PlanFolder("bench", self.study, self.limits.rate, tuple(self.runs())), path,
-            plan_files(self),
+            PlanFolder(self.rig, self.study, self.limits.rate, tuple(self.runs())), path,
+            self.files(),
         )  # fmt: skip
         return path
+
+    def files(self) -> dict[str, str | bytes]:
+        """Return the further files of the plan's folder by name."""
+        from .picture import plan_files
+
+        return plan_files(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
@@ -234,16 +235,34 @@ def plan_study(
 
 def _notes(study: Study, opened: Opening) -> tuple[str, ...]:
     """Return what weakens a plan: an error that an effect would take away first."""
-    verdict, z = study.verdict() or {}, opened.before.z
-    if verdict.get("kind") == "effect" and verdict["effects"]:
-        named = [name for name in map(plain_name, verdict["effects"]) if name in EFFECTS]
-        missing = [name for name in named if name not in opened.before.effects]
-        if missing:
-            add = command("add", study.folder, *missing)
-            return (f"The model misses {', '.join(missing)}; a plan shows more after  {add} .",)
-    if z > opened.rule.clean:
-        return (f"The model errs by {short_z(z)} times the noise; the plan counts that as noise.",)
-    return ()
+    missing = note_of_missing(study, [plain_name(name) for name in study.model().effects])
+    if not missing and opened.before.z > opened.rule.clean:
+        return (f"The model {errs(opened.before.z)}",)
+    return missing
+
+
+def note_of_missing(study: Study, there: Sequence[str]) -> tuple[str, ...]:
+    """Return what is said of effects that a verdict names and a model lacks, nothing of others.
+
+    Parameters
+    ----------
+    study : with its verdict
+    there : the effects of the model
+    """
+    verdict = study.verdict() or {}
+    if verdict.get("kind") != "effect":
+        return ()
+    named = [name for name in map(plain_name, verdict["effects"]) if name in EFFECTS]
+    missing = [name for name in named if name not in there]
+    if not missing:
+        return ()
+    add = command("add", study.folder, *missing)
+    return (f"The model misses {', '.join(missing)}; a plan shows more after  {add} .",)
+
+
+def errs(z: float) -> str:
+    """Return what is said of a model's error over noise."""
+    return f"errs by {short_z(z)} times the noise; the plan counts that as noise."
 
 
 def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:
