@@ -38,9 +38,10 @@ class DamperSlave(ComponentSlave):
         self.add_input("acceleration", "m/s2", text, over_step=HELD, optional=True)
         follows = ["displacement", "velocity", drive.name, "holding_force", "acceleration"]
         text = "force on the structure, positive against +x"
-        self.add_output("force", "N", text, depends=follows, nominal=10.0)
+        jumps = "holding_force" if LAWS[self.law].has("sign") else ""
+        self.add_output("force", "N", text, depends=follows, nominal=10.0, jumps_without=jumps)
         text = "integral of force times velocity, stored energy included"
-        self.add_output("dissipated_energy", "J", text)
+        self.add_output("dissipated_energy", "J", text, depends=follows)
         text = "displacement over stroke: beyond 1 the piston would hit its end"
         self.add_output("stroke_ratio", "1", text, depends=["displacement"])
         for name, parameter in LAWS[self.law].parameters.items():

@@ -16,10 +16,12 @@ import numpy as np
 
 from ..errors import RunError, ScenarioError
 from ..fmu.description import Description, Value
+from ..scenario.over_step import as_told
 from .loop import Memory, compile_loop
+from .operations import Node, Operation, Port, Read, Step, kind_of
 from .results import Array, Table
 from .rows import count_steps, make_columns, times
-from .schedule import Node, Operation, Port, Read, Step, find_loop, kind_of, make_schedule
+from .schedule import find_loop, make_schedule
 from .session import FATAL, STATUS, WARNING, Instance, Message, Unpacked
 
 if TYPE_CHECKING:
@@ -280,8 +282,9 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
     for c, component in enumerate(scenario.components):
         description = descriptions[component.name]
         substeps = round(scenario.step / component.step) if component.step else 1
-        outputs = {v.name: v for v in description.of("output") if v.kind != "String"}
-        inputs = {v.name: v for v in description.of("input")}
+        told = component.over_step
+        outputs = {v.name: as_told(v, told) for v in description.of("output") if v.kind != "String"}
+        inputs = {v.name: as_told(v, told) for v in description.of("input")}
         nodes.append(Node(component.name, inputs, outputs, sources[c], substeps))
     return nodes
 

@@ -7,6 +7,11 @@ schedule is worked out once, from the connections alone, and asks for no call th
 - Gauss-Seidel: each component in turn gets the inputs that are newer than those it has, steps,
   and is read. At the end of the step, inputs whose source came later are set wherever an output
   follows them, and these outputs are read for the row; what they feed directly follows.
+- Midpoint: as Gauss-Seidel, but an input that a component holds over its step has the middle of
+  the step there: half-way between the last value and the newest where the source has stepped
+  already, ahead of the newest by half its last change where it has not. Before outputs that follow
+  it are read it gets the value at the step's end. What a component interpolates or samples, and
+  what is discrete, gets the newest value.
 - Jacobi: all step, all are read, all inputs are set; outputs that follow an input are read again
   for the row and not passed on.
 
@@ -18,71 +23,25 @@ closes it: within a step each value of the loop is taken once. An output without
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ..fmu.description import Variable
-
-Port = tuple[int, str]
-"""A component's number in the order of the file, and the name of one of its variables."""
-
-FAULT = "fault"
-
-
-@dataclass(frozen=True)
-class Node:
-    """A component as the schedule sees it: outputs, and the source of each connected input."""
-
-    name: str
-    inputs: Mapping[str, Variable]
-    outputs: Mapping[str, Variable]
-    sources: Mapping[str, Port]
-    substeps: int = 1
-
-    def followed(self, output: str) -> tuple[str, ...]:
-        """Return the connected inputs that an output follows without a step."""
-        if kind_of(self.outputs[output]) == FAULT:  # changes where a step ends
-            return ()
-        named = self.outputs[output].dependencies
-        if named is None:
-            return tuple(self.sources)
-        return tuple(name for name in named if name in self.sources)
-
-
-@dataclass(frozen=True)
-class Step:
-    """Let a component step."""
-
-    component: int
-
-
-@dataclass(frozen=True)
-class Read:
-    """Read outputs of one component and kind in one call; they are neighbours in memory."""
-
-    component: int
-    kind: str
-    names: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Write:
-    """Set inputs of one component and kind in one call, each from the output that feeds it."""
-
-    component: int
-    kind: str
-    names: tuple[str, ...]
-
-
-Operation = Step | Read | Write
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """The operations of one macro step, and the order of each component's outputs in memory."""
-
-    operations: tuple[Operation, ...]
-    layout: tuple[Port, ...]
+from .operations import (
+    AHEAD,
+    END,
+    MIDDLE,
+    NEWEST,
+    Keep,
+    Node,
+    Operation,
+    Port,
+    Schedule,
+    Shift,
+    Step,
+    is_continuous,
+    reads,
+    writes,
+)
 
 
 @dataclass
@@ -93,21 +52,32 @@ class _Refresh:
     outputs: dict[Port, int] = field(default_factory=dict)
 
 
-def kind_of(variable: Variable) -> str:
-    """Return the kind of call that a variable needs: "Real", "Integer", "Boolean" or "fault".
-
-    `fault` has calls of its own, so that the fault codes of all components are neighbours.
-    """
-    if (variable.name, variable.causality, variable.kind) == (FAULT, "output", "Integer"):
-        return FAULT
-    return "Integer" if variable.kind == "Enumeration" else variable.kind
-
-
 def make_schedule(nodes: Sequence[Node], algorithm: str) -> Schedule:
-    """Return the schedule of a macro step for "gauss-seidel" or "jacobi"."""
+    """Return the schedule of a macro step for "gauss-seidel", "midpoint" or "jacobi"."""
     if algorithm == "jacobi":
         return _jacobi(nodes)
-    return _gauss_seidel(nodes)
+    return _one_after_another(nodes, held_inputs(nodes) if algorithm == "midpoint" else ())
+
+
+def held_inputs(nodes: Sequence[Node]) -> set[Port]:
+    """Return the inputs that midpoint gives the middle of the step: held, of signals that go on.
+
+    A continuous output that may jump, as dry friction does where the motion turns, is better off
+    with the newest values all round, which is Gauss-Seidel.
+    """
+    rough = {
+        (c, name)
+        for c, node in enumerate(nodes)
+        for output in node.outputs
+        if is_continuous(node.outputs[output]) and node.jumps(output)
+        for name in node.followed(output)
+    }
+    return {
+        (c, name)
+        for c, node in enumerate(nodes)
+        for name, (d, output) in node.sources.items()
+        if node.holds(name) and not nodes[d].jumps(output)
+    } - rough
 
 
 def find_loop(nodes: Sequence[Node]) -> list[Port]:
@@ -120,9 +90,19 @@ def find_loop(nodes: Sequence[Node]) -> list[Port]:
     return []
 
 
-def _gauss_seidel(nodes: Sequence[Node]) -> Schedule:
-    refresh = _gauss_seidel_refresh(nodes)
+def _one_after_another(nodes: Sequence[Node], held: Collection[Port]) -> Schedule:
+    """Return the schedule in which each component gets the newest values, and then steps.
+
+    Parameters
+    ----------
+    nodes : sequence of Node
+    held : inputs that get the middle of the step; none of them: Gauss-Seidel
+    """
+    graph = _graph(nodes)
+    refresh = _late(nodes, graph)
     early = _early(nodes, refresh)
+    kept = {nodes[c].sources[name] for c, name in held}
+    jumping = _jumping(nodes, graph, kept, early)
     # The last period is the steady one: only inputs older than their source are set.
     read: dict[Port, int] = defaultdict(int)
     written: dict[Port, int] = defaultdict(lambda: 1)
@@ -131,21 +111,95 @@ def _gauss_seidel(nodes: Sequence[Node]) -> Schedule:
     for _ in range(2):
         operations = []
         for c, node in enumerate(nodes):
-            due = [n for n, source in node.sources.items() if read[source] > written[c, n]]
+            due = [
+                name
+                for name, source in node.sources.items()
+                if (c, name) in held or read[source] > written[c, name]
+            ]
             clock += 1
             written.update({(c, name): clock for name in due})
-            operations += [*_writes(c, node, due), Step(c), *_reads(c, node, early[c])]
+            operations += _step(c, node, _before(c, node, due, held), kept)
+            again = [name for name in due if (c, name) in held]
+            operations += writes(c, node, _after(c, node, again, graph, early[c], refresh))
+            operations += reads(c, node, early[c])
             read.update({(c, name): clock for name in early[c]})
         for level in range(1, max(refresh.outputs.values(), default=0) + 1):
             for c, node in enumerate(nodes):
                 clock += 1
                 due = _at(refresh.inputs, c, level)
                 seen = _at(refresh.outputs, c, level)
+                moved = tuple(name for name in seen if (c, name) in jumping)
                 written.update({(c, name): clock for name in due})
-                operations += [*_writes(c, node, due), *_reads(c, node, seen)]
+                operations += writes(c, node, dict.fromkeys(due, NEWEST))
+                operations += [Shift(c, moved, "-=")] if moved else []
+                operations += reads(c, node, seen)
+                operations += [Shift(c, moved, "+=")] if moved else []
             read.update({port: clock for port, at in refresh.outputs.items() if at == level})
             clock += 1
     return Schedule(tuple(operations), _layout(nodes, refresh, early))
+
+
+def _step(c: int, node: Node, values: Mapping[str, str], kept: Collection[Port]) -> list[Operation]:
+    """Return what sets a component's inputs, keeps the outputs that it had, and lets it step."""
+    past = tuple(name for name in node.outputs if (c, name) in kept)
+    return [*writes(c, node, values), *([Keep(c, past)] if past else []), Step(c)]
+
+
+def _before(c: int, node: Node, due: Iterable[str], held: Collection[Port]) -> dict[str, str]:
+    """Return which value each input that is due has over the component's step."""
+    return {
+        name: (MIDDLE if node.sources[name][0] < c else AHEAD) if (c, name) in held else NEWEST
+        for name in due
+    }
+
+
+def _after(
+    c: int,
+    node: Node,
+    names: Iterable[str],
+    graph: Mapping[Port, Sequence[Port]],
+    early: Collection[str],
+    refresh: _Refresh,
+) -> dict[str, str]:
+    """Return which value held inputs get behind the step, for the outputs that follow them.
+
+    Where others wait for such an output it is now, from a source that has still to step as far as
+    that can be told; else it is when all have stepped, unless nothing else is set then.
+    """
+    values = {}
+    for name in names:
+        following = {output for _, output in graph[c, name]}
+        stepped = node.sources[name][0] < c
+        wanted = following.intersection(early)
+        if wanted or (stepped and following and (c, name) not in refresh.inputs):
+            values[name] = NEWEST if stepped else END
+    return values
+
+
+def _jumping(
+    nodes: Sequence[Node],
+    graph: Mapping[Port, Sequence[Port]],
+    kept: Collection[Port],
+    early: Sequence[Collection[str]],
+) -> set[Port]:
+    """Return the outputs whose change between two reads of a step is a jump, and no slope.
+
+    They follow a discrete signal, as a damper's force does the voltage of a controller that has
+    stepped after it.
+    """
+    queue = [
+        (c, name)
+        for c, node in enumerate(nodes)
+        for name, (d, output) in node.sources.items()
+        if d >= c and not is_continuous(nodes[d].outputs[output])
+    ]
+    reached: set[Port] = set()
+    while queue:
+        port = queue.pop()
+        if port not in reached:
+            reached.add(port)
+            queue += graph[port]
+    return {port for port in kept if port in reached and port[1] in early[port[0]]}
 
 
 def _jacobi(nodes: Sequence[Node]) -> Schedule:
@@ -159,17 +213,16 @@ def _jacobi(nodes: Sequence[Node]) -> Schedule:
     ]
     operations: list[Operation] = [Step(c) for c in range(len(nodes))]
     for c, node in enumerate(nodes):
-        operations += _reads(c, node, early[c])
+        operations += reads(c, node, early[c])
     for c, node in enumerate(nodes):
-        operations += _writes(c, node, node.sources)
+        operations += writes(c, node, dict.fromkeys(node.sources, NEWEST))
     for c, node in enumerate(nodes):
-        operations += _reads(c, node, _at(refresh.outputs, c, 1))
+        operations += reads(c, node, _at(refresh.outputs, c, 1))
     return Schedule(tuple(operations), _layout(nodes, refresh, early))
 
 
-def _gauss_seidel_refresh(nodes: Sequence[Node]) -> _Refresh:
+def _late(nodes: Sequence[Node], graph: Mapping[Port, Sequence[Port]]) -> _Refresh:
     """Return what follows the inputs whose source came later than their component's step."""
-    graph = _graph(nodes)
     seeds = [
         (c, name) for c, node in enumerate(nodes) for name, (d, _) in node.sources.items() if d >= c
     ]
@@ -257,20 +310,3 @@ def _path(graph: Mapping[Port, Sequence[Port]], start: Port, goal: Port) -> list
 
 def _at(levels: Mapping[Port, int], component: int, level: int) -> list[str]:
     return [name for (c, name), at in levels.items() if c == component and at == level]
-
-
-def _reads(component: int, node: Node, names: Iterable[str]) -> list[Operation]:
-    return [Read(component, *group) for group in _by_kind(node.outputs, names)]
-
-
-def _writes(component: int, node: Node, names: Iterable[str]) -> list[Operation]:
-    return [Write(component, *group) for group in _by_kind(node.inputs, names)]
-
-
-def _by_kind(
-    variables: Mapping[str, Variable], names: Iterable[str]
-) -> list[tuple[str, tuple[str, ...]]]:
-    groups: dict[str, list[str]] = defaultdict(list)
-    for name in names:
-        groups[kind_of(variables[name])].append(name)
-    return [(kind, tuple(group)) for kind, group in groups.items()]
