@@ -85,6 +85,7 @@ def advise(
     network = Network(parts, wires)
     _instances(network, findings)
     _order(run, network, findings)
+    _rollback(run, network, findings)
     _loops(network, findings)
     _designs(network, library, findings)
     for damper, drive in dampers_of(network):
@@ -112,8 +113,8 @@ def _instances(network: Network, findings: Findings) -> None:
 
 
 def _order(run: Run, network: Network, findings: Findings) -> None:
-    """With Gauss-Seidel the ground motion must have moved on before the structure steps."""
-    if run.algorithm != "gauss-seidel":
+    """Unless all step at once the ground motion must have moved on before the structure steps."""
+    if run.algorithm == "jacobi":
         return
     for structure in network.with_ports(_STRUCTURE_PORTS):
         ground = network.source(structure, "ground_acceleration")
@@ -123,6 +124,30 @@ def _order(run: Run, network: Network, findings: Findings) -> None:
                 f"[components.{ground[0].name}] comes after [components.{structure.name}], which "
                 "then gets the ground acceleration one step late; put it first, because components "
                 "step in the order of the file.",
+            )
+
+
+def _rollback(run: Run, network: Network, findings: Findings) -> None:
+    """What is to step again must go back first: each FMU of a loop needs its state in and out."""
+    if run.algorithm != "midpoint-iterated":
+        return
+    feeds = {name: {w.target for w in network.wires if w.source == name} for name in network.order}
+    for part in network.parts.values():
+        if part.file is None or part.description is None:
+            continue  # the built-in components can
+        reached, queue = set[str](), list(feeds[part.name])
+        while queue:
+            name = queue.pop()
+            if name not in reached:
+                reached.add(name)
+                queue += feeds[name]
+        able = part.description.capabilities.get("canGetAndSetFMUstate")
+        if part.name in reached and able not in ("true", "1"):
+            findings.error(
+                ("run", "algorithm"),
+                f"[run] algorithm: midpoint-iterated lets the components of a loop step twice, and "
+                f"[components.{part.name}] cannot go back: {part.file.name} declares no "
+                'canGetAndSetFMUstate. "midpoint" is right.',
             )
 
 

@@ -9,7 +9,7 @@ from ..findings import Findings, command, nearest
 from ..fmu.description import Description, Value, Variable
 from ..lines import KeyPath
 
-ALGORITHMS = ("gauss-seidel", "midpoint", "jacobi")
+ALGORITHMS = ("gauss-seidel", "midpoint", "midpoint-iterated", "jacobi")
 
 
 @dataclass

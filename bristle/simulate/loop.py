@@ -24,6 +24,8 @@ from .operations import (
     Operation,
     Port,
     Read,
+    Restore,
+    Save,
     Schedule,
     Shift,
     Step,
@@ -177,6 +179,8 @@ def compile_loop(
         if isinstance(operation, Step):
             substeps = memory.nodes[operation.component].substeps
             body += _step(number, instance, step, substeps, names)
+        elif isinstance(operation, Save | Restore):
+            body += _state(number, operation, instance, names)
         elif isinstance(operation, Keep | Shift):
             names["reals"] = memory.views["Real"]
             body += _keep(operation, memory)
@@ -227,6 +231,23 @@ def _transfer(
         lines = [line.replace("m[", f"m{number}[") for line in lines]
     call = f"f{number}(c{number}, v{number}, n{number}, p{number})"
     return [*lines, f"if s := {call}: fail(o{number}, s)"]
+
+
+def _state(
+    number: int, operation: Save | Restore, instance: Instance, names: dict[str, Any]
+) -> list[str]:
+    """Return the lines that get a component's state, or set it and free it: a get may allocate."""
+    component = ctypes.c_void_p.from_param(instance.component)
+    state = names.setdefault(f"state{operation.component}", ctypes.c_void_p())
+    calls = {"fmi2GetFMUstate": ctypes.byref(state)}
+    if isinstance(operation, Restore):
+        calls = {"fmi2SetFMUstate": state, "fmi2FreeFMUstate": ctypes.byref(state)}
+    lines = []
+    for i, (function, given) in enumerate(calls.items()):
+        names[f"f{number}_{i}"], names[f"c{number}"] = instance.function(function), component
+        names[f"p{number}_{i}"] = given
+        lines.append(f"if s := f{number}_{i}(c{number}, p{number}_{i}): fail(o{number}, s)")
+    return lines
 
 
 def _keep(operation: Keep | Shift, memory: Memory) -> list[str]:

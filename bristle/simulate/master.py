@@ -17,11 +17,12 @@ import numpy as np
 from ..errors import RunError, ScenarioError
 from ..fmu.description import Description, Value
 from ..scenario.over_step import as_told
+from .graph import find_loop
 from .loop import Memory, compile_loop
-from .operations import Node, Operation, Port, Read, Step, kind_of
+from .operations import Node, Operation, Port, Read, Restore, Save, Step, kind_of
 from .results import Array, Table
 from .rows import count_steps, make_columns, times
-from .schedule import find_loop, make_schedule
+from .schedule import make_schedule
 from .session import FATAL, STATUS, WARNING, Instance, Message, Unpacked
 
 if TYPE_CHECKING:
@@ -29,6 +30,13 @@ if TYPE_CHECKING:
 
 SETTLE = 100
 """Rounds in which the values at t = 0 must settle where outputs and inputs follow each other."""
+
+VERBS = {
+    Step: "doStep",
+    Read: "reading its outputs",
+    Save: "getting its state",
+    Restore: "setting its state",
+}
 
 FAULTS = {
     1: "an input is not finite",
@@ -233,7 +241,7 @@ class Master:
     def _explain(self, operation: Operation, status: int) -> NoReturn:
         instance = self._instances[operation.component]
         instance.poisoned |= status == FATAL
-        verb = {Step: "doStep", Read: "reading its outputs"}.get(type(operation), "setting inputs")
+        verb = VERBS.get(type(operation), "setting inputs")
         when = f"in the step from t = {self.time:.9g} s"
         answer = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
         text = f"{instance.name} {when}: {verb} answered {answer}"

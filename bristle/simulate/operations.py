@@ -104,7 +104,21 @@ class Shift:
     change: str  # "-=" or "+="
 
 
-Operation = Step | Read | Write | Keep | Shift
+@dataclass(frozen=True)
+class Save:
+    """Keep the whole state of a component."""
+
+    component: int
+
+
+@dataclass(frozen=True)
+class Restore:
+    """Take a component back to the state that was kept, and forget that."""
+
+    component: int
+
+
+Operation = Step | Read | Write | Keep | Shift | Save | Restore
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,19 @@ from collections.abc import Mapping
 import pytest
 
 from bristle.fmu.description import Variable
-from bristle.simulate.operations import Keep, Node, Read, Schedule, Shift, Step, Write
-from bristle.simulate.schedule import find_loop, make_schedule
+from bristle.simulate.graph import find_loop
+from bristle.simulate.operations import (
+    Keep,
+    Node,
+    Read,
+    Restore,
+    Save,
+    Schedule,
+    Shift,
+    Step,
+    Write,
+)
+from bristle.simulate.schedule import make_schedule
 
 
 def node(
@@ -50,8 +61,8 @@ def calls(schedule: Schedule) -> list[tuple[object, ...]]:
     verbs = {Read: "get", Write: "set", Keep: "keep", Shift: "shift"}
     found: list[tuple[object, ...]] = []
     for o in schedule.operations:
-        if isinstance(o, Step):
-            found.append(("step", o.component))
+        if isinstance(o, Step | Save | Restore):
+            found.append((type(o).__name__.lower(), o.component))
         elif isinstance(o, Write) and o.values:
             each = (f"{n}:{v}" for n, v in zip(o.names, o.values, strict=True))
             found.append(("set", o.component, " ".join(each)))
