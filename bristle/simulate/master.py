@@ -91,10 +91,10 @@ class Master:
         self.steps = count_steps(scenario.stop, scenario.step)
         self._stop = scenario.stop
         self._parameters = parameters
-        self._nodes = make_nodes(scenario, descriptions)
+        self.nodes = make_nodes(scenario, descriptions)
         self.columns = make_columns(scenario, descriptions)
-        schedule = make_schedule(self._nodes, scenario.algorithm)
-        self._memory = Memory(self._nodes, schedule)
+        schedule = make_schedule(self.nodes, scenario.algorithm)
+        self._memory = Memory(self.nodes, schedule)
         self._rows: list[bytes] = []
         self._blocks: list[dict[Port, Array]] = []
         self._collected = 0
@@ -141,7 +141,7 @@ class Master:
         RunError
             Also if an algebraic loop does not settle; the text names the loop.
         """
-        for node, instance in zip(self._nodes, self._instances, strict=True):
+        for node, instance in zip(self.nodes, self._instances, strict=True):
             instance.initialise(self._parameters.get(node.name, {}), self._stop)
         self._settle()
         for instance in self._instances:
@@ -208,24 +208,24 @@ class Master:
             outputs = {
                 (c, name): value
                 for c, instance in enumerate(self._instances)
-                for name, value in instance.get(self._nodes[c].outputs).items()
+                for name, value in instance.get(self.nodes[c].outputs).items()
             }
             wanted = {
                 (c, name): outputs[source]
-                for c, node in enumerate(self._nodes)
+                for c, node in enumerate(self.nodes)
                 for name, source in node.sources.items()
             }
             # Without a loop all is settled exactly after one round per component.
-            near = 1e-12 if turn > len(self._nodes) else 0.0
+            near = 1e-12 if turn > len(self.nodes) else 0.0
             changed = [p for p in wanted if p not in given or not _equal(wanted[p], given[p], near)]
             if not changed:
                 return outputs
             for c, instance in enumerate(self._instances):
                 instance.set({name: wanted[d, name] for d, name in changed if d == c})
             given = wanted
-        loop = find_loop(self._nodes)
+        loop = find_loop(self.nodes)
         if loop:
-            path = " -> ".join(f"{self._nodes[c].name}.{name}" for c, name in loop)
+            path = " -> ".join(f"{self.nodes[c].name}.{name}" for c, name in loop)
             raise RunError(
                 f"t = 0 s: the values of an algebraic loop do not settle: {path}.\n"
                 "  Leave out one of its connections, or add a component with memory."
@@ -245,13 +245,13 @@ class Master:
         when = f"in the step from t = {self.time:.9g} s"
         answer = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
         text = f"{instance.name} {when}: {verb} answered {answer}"
-        node = self._nodes[operation.component]
+        node = self.nodes[operation.component]
         if not instance.poisoned and any(kind_of(v) == "fault" for v in node.outputs.values()):
             text += self._code(instance.get(["fault"])["fault"])
         raise RunError(text + self._inputs(operation.component) + instance.said())
 
     def _explain_fault(self, when: str) -> NoReturn:
-        for c, node in enumerate(self._nodes):
+        for c, node in enumerate(self.nodes):
             for name, variable in node.outputs.items():
                 if kind_of(variable) == "fault" and (code := self._memory.value((c, name))):
                     text = f"{node.name} {when}{self._code(code)}{self._inputs(c)}"
@@ -264,14 +264,14 @@ class Master:
 
     def _inputs(self, component: int) -> str:
         """Return the inputs of a component with their values, those not finite first."""
-        node = self._nodes[component]
+        node = self.nodes[component]
         values = {name: self._memory.value(source) for name, source in node.sources.items()}
         names = sorted(values, key=lambda name: math.isfinite(values[name]))
         parts = [f"{name} = {values[name]:.9g}{_unit(node, name)}" for name in names]
         return ".\n  Inputs: " + ", ".join(parts) if parts else "."
 
     def _ports(self) -> list[Port]:
-        return [(c, name) for c, node in enumerate(self._nodes) for name in node.outputs]
+        return [(c, name) for c, node in enumerate(self.nodes) for name in node.outputs]
 
 
 def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> list[Node]:
