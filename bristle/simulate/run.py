@@ -179,7 +179,8 @@ def _add_error(scenario: Scenario, frame: Results, output: Output) -> None:
         if error.some:
             output.log(
                 f"coupling error of {name}, by {how}: {100 * error.along:.2g} % along the run, "
-                f"peak {100 * error.peak:.2g} %, RMS {100 * error.rms:.2g} %, order {error.order:.2g}"
+                f"peak {100 * error.peak:.2g} %, RMS {100 * error.rms:.2g} %, "
+                f"order {error.order:.2g}"
             )
         if not error.worth:
             output.warn(
