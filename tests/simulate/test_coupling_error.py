@@ -25,7 +25,7 @@ EXACT = np.sin(T)
 
 def off(error: float) -> np.ndarray:
     """Return a run with an error that grows with time."""
-    return EXACT + error * T * np.cos(T)
+    return EXACT * (1.0 + error * T)
 
 
 def rms(values: np.ndarray) -> float:
