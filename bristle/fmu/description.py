@@ -130,6 +130,7 @@ def describe(root: ElementTree.Element) -> Description:
         raise FmuError(f"variables defined twice: {', '.join(twice)}.")
     _add_dependencies(root, listed, variables)
     _mark_optional(root, variables)
+    _check_jumps(variables)
     return Description(
         name=root.get("modelName", ""),
         guid=root.get("guid", ""),
@@ -283,6 +284,15 @@ def _indexed(listed: list[Variable], text: str | None) -> Variable:
             f"ModelStructure names variable {text!r}; the variables are 1 to {len(listed)}."
         )
     return listed[number - 1]
+
+
+def _check_jumps(variables: dict[str, Variable]) -> None:
+    for variable in variables.values():
+        cure = variable.jumps_without
+        if cure is not None and (cure not in variables or variables[cure].causality != "input"):
+            raise FmuError(
+                f'"{variable.name}" may jump without "{cure}", but no input has that name.'
+            )
 
 
 def _mark_optional(root: ElementTree.Element, variables: dict[str, Variable]) -> None:

@@ -16,7 +16,7 @@ from ..fmu.description import Description, read_description
 from ..interrupt import Interrupt
 from ..scenario.scenario import Scenario, fmu_parameters, load_scenario
 from ..scenario.text import scenario_text
-from .coupling_error import as_data, estimate
+from .coupling_error import LEAST_ORDER, MOST_ORDER, as_data, estimate
 from .output import Output
 from .results import Table, to_frame
 from .rows import make_columns, times
@@ -183,9 +183,12 @@ def _add_error(scenario: Scenario, frame: Results, output: Output) -> None:
                 f"order {error.order:.2g}"
             )
         if not error.worth:
+            why = "it follows a controller whose output does not"
+            if not LEAST_ORDER <= error.order <= MOST_ORDER:
+                why = f"order {error.order:.2g}"
             output.warn(
                 f"{name}: the coupling error does not fall with the step as an algorithm's does "
-                f"(order {error.order:.2g}): the estimate is worth nothing"
+                f"({why}): the estimate is worth nothing"
             )
 
 

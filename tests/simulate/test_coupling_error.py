@@ -16,7 +16,13 @@ from bristle import load_results, run
 from bristle.cli import main
 from bristle.errors import RunError, ScenarioError
 from bristle.scenario.scenario import Scenario, load_scenario
-from bristle.simulate.coupling_error import against, extrapolated, find_step
+from bristle.simulate.coupling_error import (
+    against,
+    discrete_outputs,
+    estimate,
+    extrapolated,
+    find_step,
+)
 from bristle.simulate.run import run_quietly
 
 T = np.linspace(0.0, 3.0, 301)
@@ -91,6 +97,33 @@ def test_foreign_fmus_are_run_at_h_and_at_a_half_and_a_quarter(
     assert true / 1.3 <= found["along"] <= 1.3 * true
     assert found["order"] == pytest.approx(order, abs=0.2)
     assert found["worth"]
+
+
+def test_a_controller_that_does_not_settle_spoils_every_estimate_from_finer_steps() -> None:
+    scenario = load_scenario("el_centro_0p6g_clipped", {"run.stop": 0.02, "run.step": 0.002})
+    assert discrete_outputs(scenario) == [
+        f"controller.{name}" for name in ("voltage", "command_raw", "scheduling")
+    ]
+    quiet = run_quietly(scenario, "fmu")
+
+    def again(one: Scenario, engine: str) -> pd.DataFrame:
+        if engine == "compiled":
+            raise ScenarioError("foreign")
+        parts = round(one.steps / scenario.steps)
+        frame = quiet.loc[quiet.index.repeat(parts)].iloc[parts - 1 :].copy()
+        frame["damper.force"] += 0.1 * one.step  # of first order
+        if switches:
+            frame["controller.voltage"] += 8.0 * (parts % 4 == 2)
+        return frame
+
+    first = quiet.copy()
+    first["damper.force"] += 0.1 * scenario.step
+    for switches in (False, True):
+        how, found = estimate(scenario, first, again)
+        assert how == "h, h/2, h/4"
+        assert found["damper.force"].order == pytest.approx(1.0)
+        assert found["damper.force"].worth is not switches
+        assert found["structure.drift1"].worth  # no step changes it
 
 
 def test_our_own_components_are_held_against_the_coupled_engine(
