@@ -41,7 +41,8 @@ class DamperSlave(ComponentSlave):
         jumps = "holding_force" if LAWS[self.law].has("sign") else ""
         self.add_output("force", "N", text, depends=follows, nominal=10.0, jumps_without=jumps)
         text = "integral of force times velocity, stored energy included"
-        self.add_output("dissipated_energy", "J", text, depends=follows)
+        moved = [name for name in follows if name != drive.name]  # a jump counts from then on
+        self.add_output("dissipated_energy", "J", text, depends=moved)
         text = "displacement over stroke: beyond 1 the piston would hit its end"
         self.add_output("stroke_ratio", "1", text, depends=["displacement"])
         for name, parameter in LAWS[self.law].parameters.items():
