@@ -12,6 +12,7 @@ from typing import Any
 from bristle.resources import cache_folder
 
 from ._blind import work
+from ._blind.cases import ROOT, digest_of
 from ._rows import Row
 
 Answer = dict[str, Any]
@@ -24,6 +25,7 @@ def ask(
     answer: Callable[..., Answer],
     rows: Callable[[dict[str, Answer]], list[Row]],
     given: Sequence[str],
+    also: Sequence[str] = (),
 ) -> int:
     """Make what is missing of a benchmark's figures, print them; return 0.
 
@@ -34,13 +36,14 @@ def ask(
     answer : called with kind and number of a case; returns what is found
     rows : returns the figures of all answers
     given : options as typed
+    also : packages of bristle that the answers rest on, beside those of a diagnosis
     """
     parser = argparse.ArgumentParser(prog=f"python -m benchmarks {name}", description=text)
     for kind in kinds:
         parser.add_argument(f"--{kind}", type=int, default=0, metavar="CASES")
     chosen = parser.parse_args(given)
     jobs = ((kind, k) for kind in kinds for k in range(getattr(chosen, kind)))
-    for row in rows(Answers(name).complete(jobs, answer)):
+    for row in rows(Answers(name, also).complete(jobs, answer)):
         goal = f" (goal {row.goal})" if row.goal else ""
         print(f"{row.name}: {row.measured}{goal}")
     return 0
@@ -49,14 +52,16 @@ def ask(
 class Answers:
     """The record of one benchmark in the cache folder; answers of other code are not in it."""
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, name: str, also: Sequence[str] = ()) -> None:
+        self.name, self.also = name, also
 
     def path(self) -> Path:
         """Return the file of this code's answers."""
         folder = cache_folder() / self.name
         folder.mkdir(parents=True, exist_ok=True)
-        return folder / f"{work.digests()['diagnosis']}.jsonl"
+        files = [path for one in self.also for path in (ROOT / "bristle" / one).rglob("*.py")]
+        more = digest_of(files)[:12] if files else ""
+        return folder / f"{work.digests()['diagnosis']}{more}.jsonl"
 
     def kept(self) -> dict[str, Answer]:
         """Return the answers that are there, by key."""

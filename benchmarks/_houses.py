@@ -15,7 +15,7 @@ from bristle.example import tower
 from bristle.example.bench import Signals
 from bristle.example.damper import Damper
 from bristle.example.hidden import Scales
-from bristle.example.make import CENTRE
+from bristle.example.rigs import CENTRE
 from bristle.example.solve import ROUGH
 from bristle.physics.building import Building, from_data
 

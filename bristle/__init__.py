@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from .physics.effect import Effect as Effect
     from .physics.law import Law as Law
     from .physics.parameter import Parameter as Parameter
+    from .plan.plan import Plan as Plan
+    from .plan.public import plan as plan
     from .simulate.frame import Results as Results
     from .simulate.results import load_results as load_results
     from .simulate.run import run as run
@@ -51,6 +53,7 @@ _LAZY = {
     "Law": "physics.law",
     "Measurement": "data.measurement",
     "Parameter": "physics.parameter",
+    "Plan": "plan.plan",
     "Results": "simulate.frame",
     "Study": "study.study",
     "compare": "study.public",
@@ -59,6 +62,7 @@ _LAZY = {
     "ensemble": "batch.execute",
     "identify": "study.public",
     "load_results": "simulate.results",
+    "plan": "plan.public",
     "run": "simulate.run",
 }
 """The public names, and the modules that they are in."""
@@ -74,6 +78,7 @@ __all__ = [
     "Law",
     "Measurement",
     "Parameter",
+    "Plan",
     "Results",
     "Study",
     "__version__",
@@ -83,6 +88,7 @@ __all__ = [
     "ensemble",
     "identify",
     "load_results",
+    "plan",
     "run",
 ]
 

@@ -13,6 +13,7 @@ _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "m/s": ((0.0, 1e3, "mm/s"), (10.0, 1.0, "m/s")),
     "N": ((0.0, 1.0, "N"), (2e3, 1e-3, "kN"), (2e6, 1e-6, "MN")),
     "J": ((0.0, 1.0, "J"), (2e3, 1e-3, "kJ"), (2e6, 1e-6, "MJ")),
+    "Pa": ((0.0, 1.0, "Pa"), (2e3, 1e-3, "kPa"), (2e6, 1e-6, "MPa")),
 }
 
 # The same for a value that stands alone, and may be small.

@@ -93,6 +93,24 @@ _ALIASES = {"sec": "s", "ohm": "Ohm", "Ω": "Ohm", "°": "deg", "°C": "degC"}
 _CELSIUS = Unit("degC", 1.0, _dimension(K=1), 273.15)
 _LONGEST = 80  # characters
 _COMMON = ("m/s2", "m/s", "N/m", "N.s/m", "N.s/(m.V)", "rad/s", "degC")
+_USUAL = (
+    "m",
+    "s",
+    "m/s",
+    "m/s2",
+    "N",
+    "Pa",
+    "V",
+    "A",
+    "T",
+    "J",
+    "W",
+    "kg",
+    "Hz",
+    "N/m",
+    "N.s/m",
+    "Ohm",
+)
 _GRAM = re.compile(r"(?i)[a-zµ]?g|(milli|kilo)?gram(me)?s?")
 
 # Superscripts, signs and letters that look alike, each with the plain one that is meant: the
@@ -198,6 +216,23 @@ def conversion(source: str, target: str) -> tuple[float, float]:
         f'"{source}" [{_base_units(old)}] cannot become "{target}" [{_base_units(new)}]: '
         f"they differ in dimension.{note}"
     )
+
+
+def si_unit(text: str) -> str:
+    """Return the SI unit of the dimension that a unit has, as engineers spell it: `bar`, Pa.
+
+    degC and % stay what they are: so they are read.
+
+    Raises
+    ------
+    UnitError
+        If the unit is not known.
+    """
+    unit = parse(text)
+    if unit.offset or unit.factor == 1.0 or unit.name == "%":
+        return unit.name
+    usual = (name for name in _USUAL if parse(name).dimension == unit.dimension)
+    return next(usual, _base_units(unit))
 
 
 def _tokens(text: str, plain: str) -> list[re.Match[str]]:

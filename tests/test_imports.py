@@ -27,7 +27,7 @@ BASE = (
 )
 SIMULATE = ({"fmu"}, {"scenario", "conformance", "design"}, {"simulate"}, {"batch"})
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
-ROOF = ({"study"}, {"bridge"}, {"example"}, {"report"}, {"paper"}, {"cli"})
+ROOF = ({"study"}, {"bridge"}, {"plan"}, {"example"}, {"report"}, {"paper"}, {"cli"})
 STOREYS: tuple[tuple[tuple[set[str], ...], ...], ...] = ((BASE,), (SIMULATE, MEASURE), (ROOF,))
 PLAIN = ("physics", "control", "component", "units", "errors")
 """What imports the standard library alone."""

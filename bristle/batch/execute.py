@@ -15,7 +15,7 @@ from ..findings import written
 from ..progress import Progress
 from .file import read_ensemble
 from .plan import Outcome, Plan
-from .quantiles import Failure, failures, quantiles
+from .quantiles import Failure, failures, parts, quantiles
 from .table import NAME, RunsTable
 from .worker import prepare
 
@@ -60,6 +60,11 @@ class Ensemble:
     continued: int
     wall_time: float
 
+    @property
+    def parts(self) -> dict[str, dict[str, float]]:
+        """By output, which share of its variance is from what; empty without limits."""
+        return parts(self.plan, self.runs)
+
     def plot(self) -> Figure:
         """Return the figure: how each output is spread, and what moves it.
 
@@ -89,6 +94,7 @@ def ensemble(
     cluster: str | None = None,
     fresh: bool = False,
     retry: bool = False,
+    with_limits: bool = False,
     progress: bool = False,
 ) -> Ensemble:
     """Run an ensemble, or what is left of it, and return tables of runs and quantiles.
@@ -112,6 +118,9 @@ def ensemble(
         Start anew in a folder that holds runs.
     retry : bool
         Run again what failed.
+    with_limits : bool
+        Make each run once more with an effect that the verdict of the file's `[identified]` does
+        not exclude: quantiles have it, and `parts` tells the share of each.
     progress : bool
         Show a progress bar, on a terminal only.
 
@@ -140,7 +149,7 @@ def ensemble(
     """
     began = time.perf_counter()
     _refuse_types(file, runs=runs, workers=workers)
-    plan = read_ensemble(file, runs)
+    plan = read_ensemble(file, runs, with_limits=with_limits)
     if workers is not None and workers < 1:
         raise EnsembleError(f"--workers {workers}: 1 or more is right.")
     folder = None if out is None else Path(out)

@@ -21,6 +21,9 @@ seed = 1
 
 [outputs]                                      # peak, rms, max, min, mean, last
 "structure.floor2_acceleration_absolute" = ["peak", "rms"]
+
+[identified]                                   # the damper as a study has it: see `identified`
+model = "my_rig"
 """
 
 from __future__ import annotations
@@ -42,13 +45,25 @@ from ..scenario.text import scenario_text
 from ..simulate.rows import make_columns
 from . import buildings
 from .distributions import KINDS, Distribution, Value
+from .identified import Identified, read_identified, refuse_few
 from .plan import STATISTICS, Output, Plan, Varied
 
 SCHEMA = 1
 LARGEST = 4 * 1024**2
 """Largest ensemble file [bytes]."""
 MOST_RUNS = 10_000_000
-_KEYS = ("schema", "title", "scenario", "engine", "runs", "seed", "set", "vary", "outputs")
+_KEYS = (
+    "schema",
+    "title",
+    "scenario",
+    "engine",
+    "runs",
+    "seed",
+    "set",
+    "vary",
+    "outputs",
+    "identified",
+)
 _FILES = (*FILE_PARAMETERS, *MADE_FROM, "fmu")
 
 
@@ -80,8 +95,14 @@ def resolve_ensemble(name: str | Path) -> Path:
     )
 
 
-def read_ensemble(name: str | Path, runs: int | None = None) -> Plan:
+def read_ensemble(name: str | Path, runs: int | None = None, *, with_limits: bool = False) -> Plan:
     """Return the checked plan of an ensemble file; `runs` takes the place of the file's number.
+
+    Parameters
+    ----------
+    name : the file, or the name of a stock ensemble
+    runs : in place of the file's number
+    with_limits : whether effects that the verdict of its `[identified]` does not exclude are drawn
 
     Raises
     ------
@@ -91,7 +112,7 @@ def read_ensemble(name: str | Path, runs: int | None = None) -> Plan:
         If the base scenario is wrong.
     """
     path = resolve_ensemble(name)
-    return _Reader(path).plan(runs)
+    return _Reader(path).plan(runs, with_limits)
 
 
 class _Reader:
@@ -121,7 +142,7 @@ class _Reader:
         if self.wrong:
             raise EnsembleError("\n  ".join(dict.fromkeys(self.wrong)))
 
-    def plan(self, runs: int | None) -> Plan:
+    def plan(self, runs: int | None, with_limits: bool = False) -> Plan:
         if self.data.get("schema") != SCHEMA:
             found = written(self.data["schema"]) if "schema" in self.data else "missing"
             self.error(("schema",), f"schema is {found}; this version reads {SCHEMA}.")
@@ -140,11 +161,16 @@ class _Reader:
         if base is None:
             self.check()
         assert base is not None
+        identified = self._identified(base, with_limits)
+        if identified is not None:
+            fixed = {**identified.fixed, **fixed}
+            base = self._scenario(fixed) or base
         varied = tuple(
             one
             for name, table in self._table("vary").items()
             if (one := self._varied(name, table, base, str(engine))) is not None
         )
+        varied = self._all_varied(varied, identified)
         if not varied and not self.wrong:
             self.error(("vary",), "nothing varies: [vary] names what does, and within what.")
         outputs = self._outputs(base)
@@ -153,10 +179,41 @@ class _Reader:
         for file in _files_read(base, varied):
             content.update(file.read_bytes())
         title = str(self.data.get("title", "") or base.title)
-        return Plan(
+        plan = Plan(
             self.path, title, base.file, str(engine), runs or asked, seed, varied, outputs, fixed,
-            content.hexdigest()[:16],
+            content.hexdigest()[:16], identified,
         )  # fmt: skip
+        refuse_few(plan)
+        return plan
+
+    def _identified(self, base: Scenario, with_limits: bool) -> Identified | None:
+        """Return what `[identified]` says, None where there is none or it is wrong."""
+        if "identified" not in self.data:
+            if with_limits:
+                raise EnsembleError(
+                    f"{self.path}: --with-limits needs [identified], with the study whose verdict "
+                    "has the limits."
+                )
+            return None
+        try:
+            return read_identified(
+                self._table("identified"), self.path.parent, base, with_limits=with_limits
+            )
+        except EnsembleError as error:
+            self.error(("identified",), f"[identified]: {error}")
+            return None
+
+    def _all_varied(
+        self, varied: tuple[Varied, ...], identified: Identified | None
+    ) -> tuple[Varied, ...]:
+        """Return what varies, the parameters that are drawn together first."""
+        joint = identified.varied() if identified is not None else ()
+        for one in varied:
+            if any(one.name == other.name for other in joint):
+                self.error(
+                    ("vary", one.name), f'"{one.name}" is drawn by [identified]; one is right.'
+                )
+        return (*joint, *varied)
 
     def _whole(self, key: str, default: int, low: int, high: int) -> int:
         value = self.data.get(key, default)

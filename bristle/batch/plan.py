@@ -7,10 +7,13 @@ import json
 from dataclasses import asdict, dataclass, field
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from .distributions import Distribution, Value, share
+
+if TYPE_CHECKING:
+    from .identified import Identified
 
 STATISTICS = ("peak", "rms", "max", "min", "mean", "last")
 
@@ -60,6 +63,8 @@ class Plan:
     varied, outputs : tuple
     content : str
         Digest of the base scenario and of the files that it reads.
+    identified : Identified, optional
+        A component whose parameters are drawn together.
     """
 
     file: Path
@@ -72,6 +77,24 @@ class Plan:
     outputs: tuple[Output, ...]
     fixed: dict[str, Value] = field(default_factory=dict)
     content: str = ""
+    identified: Identified | None = None
+
+    @property
+    def left(self) -> bool:
+        """Whether each run is made twice, the second time with an effect that is left open."""
+        return self.identified is not None and bool(self.identified.left)
+
+    @property
+    def columns(self) -> list[str]:
+        """The names of the numbers that are kept of each run."""
+        own = [output.name for output in self.outputs]
+        return [*own, *(f"{name} with it" for name in own)] if self.left else own
+
+    def effect(self, run: int) -> tuple[str, float]:
+        """Return the effect that joins a run, and its size over the limit."""
+        assert self.identified is not None
+        effect, part = self.identified.open_at(self.seed, run)
+        return effect.label, part
 
     def values(self, run: int) -> dict[str, Value]:
         """Return what the varied names are in a run; it depends on seed, run and name alone."""
@@ -80,9 +103,11 @@ class Plan:
         for varied in reversed(cycled):
             turn, place = divmod(turn, len(varied.distribution.values))
             chosen[varied.name] = varied.distribution.values[place]
+        joint = self.identified.draw(self.seed, run) if self.identified is not None else {}
+        known = {**joint, **chosen}
         return {
-            varied.name: chosen[varied.name]
-            if varied.name in chosen
+            varied.name: known[varied.name]
+            if varied.name in known
             else varied.distribution.draw(share(self.seed, run, varied.name))
             for varied in self.varied
         }
@@ -107,6 +132,8 @@ class Plan:
             "varied": [asdict(v) for v in self.varied],
             "outputs": [o.name for o in self.outputs],
         }
+        if self.identified is not None:
+            decides["identified"] = asdict(self.identified)
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()[:16]
 
 

@@ -5,15 +5,23 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..data.open_effects import POINT, reach
 from .plan import Outcome, Plan
+from .table import EFFECT
 
 if TYPE_CHECKING:
     import pandas as pd
 
+Array = NDArray[np.float64]
+
+VARIES = "all that varies"
+"""What the ensemble draws, beside effects that are left open."""
 LEVELS = (0.05, 0.25, 0.5, 0.75, 0.95)
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?([eE][-+]?\d+)?")
 
@@ -30,7 +38,8 @@ class Failure:
 def quantiles(plan: Plan, frame: pd.DataFrame) -> pd.DataFrame:
     """Return one row per output: unit, quantiles of the runs that are done, their number.
 
-    Quantiles are linear between order statistics; without a run they are NaN.
+    Quantiles are linear between order statistics; without a run they are NaN. Effects that are
+    left open take those below the median down and those above it up.
     """
     import pandas as pd
 
@@ -39,10 +48,55 @@ def quantiles(plan: Plan, frame: pd.DataFrame) -> pd.DataFrame:
     for output in plan.outputs:
         values = done[output.name].to_numpy()
         found = np.quantile(values, LEVELS) if len(values) else np.full(len(LEVELS), np.nan)
+        if plan.left and len(values):
+            found = _widened(found, [*_reaches(plan, done, output.name).values()])
         rows.append([output.unit, *map(float, found), len(values), len(frame) - len(values)])
     titles = ["unit", *(f"{100 * level:g} %" for level in LEVELS), "done", "failed"]
     index = pd.Index([output.name for output in plan.outputs], name="output")
     return pd.DataFrame(rows, index=index, columns=titles)
+
+
+def parts(plan: Plan, frame: pd.DataFrame) -> dict[str, dict[str, float]]:
+    """Return by output which share of the variance is from what, the largest first.
+
+    "all that varies" is what the ensemble draws; the others are effects that are left open.
+    """
+    done = frame[frame["status"] == "done"]
+    found = {}
+    for output in plan.outputs if plan.left and len(done) > 1 else ():
+        ends = _reaches(plan, done, output.name)
+        power = {name: 0.5 * (low**2 + high**2) / POINT**2 for name, (low, high) in ends.items()}
+        power[VARIES] = float(np.var(done[output.name].to_numpy(), ddof=1))
+        whole = sum(power.values())
+        order = sorted((name for name in power if power[name] > 0.0), key=lambda n: -power[n])
+        found[output.name] = {name: power[name] / whole for name in order}
+    return found
+
+
+def unable(plan: Plan, frame: pd.DataFrame) -> list[str]:
+    """Return the effects with which not one run could be made."""
+    if not plan.left:
+        return []
+    done = frame[frame["status"] == "done"]
+    made = done[done[plan.columns[-1]].notna()]
+    tried, there = (list(dict.fromkeys(one[EFFECT[0]])) for one in (done, made))
+    return [name for name in tried if name not in there]
+
+
+def _reaches(plan: Plan, done: pd.DataFrame, output: str) -> dict[str, tuple[float, float]]:
+    """Return by effect how far it takes an output down, and up, at 95 %."""
+    changes = (done[f"{output} with it"] - done[output]).dropna()
+    names = done[EFFECT[0]][changes.index]
+    return {str(name): reach(changes[names == name].to_numpy()) for name in dict.fromkeys(names)}
+
+
+def _widened(found: Array, reaches: list[tuple[float, float]]) -> Array:
+    """Return quantiles at `LEVELS` with the reach of effects below and above the median."""
+    below, above = (np.sqrt(sum(ends[side] ** 2 for ends in reaches)) / POINT for side in (0, 1))
+    away = np.array([NormalDist().inv_cdf(level) for level in LEVELS])
+    middle = found[LEVELS.index(0.5)]
+    more = np.abs(away) * np.where(away < 0.0, below, above)
+    return np.asarray(middle + np.sign(away) * np.hypot(found - middle, more))
 
 
 def failures(outcomes: Iterable[Outcome]) -> list[Failure]:

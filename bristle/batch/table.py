@@ -23,6 +23,8 @@ NAME = "runs.csv"
 _KIND = "# bristle ensemble"
 _DIGEST = "# digest: "
 DONE, FAILED = "done", "failed"
+EFFECT = ("effect left open", "its size over the limit")
+"""Columns of the effect that joins a run the second time it is made."""
 
 
 class RunsTable:
@@ -96,9 +98,9 @@ class RunsTable:
         rows = [_row(self.plan, self.outcomes[run])[1:] for run in runs]
         index = pd.Index(runs, name="run")
         frame = pd.DataFrame(rows, index=index, columns=columns(self.plan)[1:])
-        for output in self.plan.outputs:
-            frame[output.name] = frame[output.name].astype("float64")
-        frame.attrs["units"] = {output.name: output.unit for output in self.plan.outputs}
+        for name in self.plan.columns:
+            frame[name] = frame[name].astype("float64")
+        frame.attrs["units"] = _units(self.plan)
         return frame
 
     def _rewrite(self) -> None:
@@ -124,13 +126,20 @@ class RunsTable:
 def columns(plan: Plan) -> list[str]:
     """Return the names of the table's columns."""
     varied = [one.name for one in plan.varied]
-    return ["run", "status", "reason", *varied, *(output.name for output in plan.outputs)]
+    return ["run", "status", "reason", *varied, *(EFFECT if plan.left else ()), *plan.columns]
+
+
+def _units(plan: Plan) -> dict[str, str]:
+    """Return the unit of each number that is kept."""
+    own = [output.unit for output in plan.outputs]
+    return dict(zip(plan.columns, 2 * own if plan.left else own, strict=True))
 
 
 def _row(plan: Plan, outcome: Outcome) -> list[Any]:
     status = FAILED if outcome.reason else DONE
-    numbers = outcome.numbers or (None,) * len(plan.outputs)
-    return [outcome.run, status, outcome.reason, *plan.values(outcome.run).values(), *numbers]
+    numbers = outcome.numbers or (None,) * len(plan.columns)
+    drawn = [*plan.values(outcome.run).values(), *(plan.effect(outcome.run) if plan.left else ())]
+    return [outcome.run, status, outcome.reason, *drawn, *numbers]
 
 
 def _line(plan: Plan, outcome: Outcome) -> bytes:
@@ -144,7 +153,7 @@ def _line(plan: Plan, outcome: Outcome) -> bytes:
 
 def _head(plan: Plan) -> bytes:
     names = columns(plan)
-    units = [""] * (len(names) - len(plan.outputs)) + [o.unit for o in plan.outputs]
+    units = [_units(plan).get(name, "") for name in names]
     titles = io.StringIO()
     csv.writer(titles, lineterminator="\n").writerow(
         [f"{name} [{unit}]" if unit else name for name, unit in zip(names, units, strict=True)]
@@ -178,7 +187,7 @@ def _read(plan: Plan, path: Path) -> dict[int, Outcome]:
     try:
         for row in rows:
             run, status, reason = int(row[0]), row[1], row[2]
-            numbers = row[len(row) - len(plan.outputs) :]
+            numbers = row[len(row) - len(plan.columns) :]
             if status == FAILED:
                 outcomes[run] = Outcome(run, reason=reason)
             else:

@@ -6,7 +6,7 @@ import tempfile
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
@@ -48,7 +48,9 @@ def run_one(plan: Plan, run: int) -> Outcome:
     """Return what became of run number `run`; a failure is an outcome as well."""
     try:
         with tempfile.TemporaryDirectory(prefix="bristle_") as scratch:
-            numbers = _numbers(plan, scenario_of(plan, plan.values(run), Path(scratch)))
+            values = plan.values(run)
+            numbers = _numbers(plan, scenario_of(plan, values, Path(scratch)))
+            more = _with_effect(plan, run, values, Path(scratch)) if plan.left else ()
     except BristleError as error:
         return Outcome(run, reason=_one_line(error))
     except Exception as error:  # whatever a user's effect or a foreign FMU raises, runs go on
@@ -56,7 +58,19 @@ def run_one(plan: Plan, run: int) -> Outcome:
     for output, number in zip(plan.outputs, numbers, strict=True):
         if not isfinite(number):
             return Outcome(run, reason=f"RunError: {output.name} is not finite.")
-    return Outcome(run, numbers)
+    return Outcome(run, (*numbers, *more))
+
+
+def _with_effect(
+    plan: Plan, run: int, values: Mapping[str, Value], scratch: Path
+) -> tuple[float, ...]:
+    """Return the numbers of a run with the effect that joins it; NaN where it cannot be run."""
+    assert plan.identified is not None
+    joined = {**values, **plan.identified.with_effect(values, plan.seed, run)}
+    try:
+        return _numbers(plan, scenario_of(plan, joined, scratch))
+    except BristleError:
+        return (nan,) * len(plan.outputs)
 
 
 def scenario_of(plan: Plan, values: Mapping[str, Value], scratch: Path) -> Scenario:
@@ -68,6 +82,7 @@ def scenario_of(plan: Plan, values: Mapping[str, Value], scratch: Path) -> Scena
         If a value is out of bounds or does not fit.
     """
     places = {varied.name: varied.place for varied in plan.varied}
+    places = dict.fromkeys(values, "parameter") | places
     overrides = plan.fixed | {k: v for k, v in values.items() if places[k] == "scenario"}
     scenario = _loaded(plan.scenario, tuple(overrides.items()))
     parameters: dict[str, dict[str, Any]] = {}

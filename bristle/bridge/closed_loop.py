@@ -13,9 +13,12 @@ import numpy as np
 
 from ..data.measurement import Measurement
 from ..data.model import StudyModel, read_model
+from ..data.model_draws import has_covariance
+from ..data.open_effects import OpenEffect, left_open
 from ..draw.style import percent
 from ..errors import StudyError
 from ..findings import command
+from ..identify.run_labels import following
 from ..progress import tell
 from ..quantity import short_z
 from ..study.openings import count_opening, opened_text, openings, runs_for_test
@@ -23,13 +26,15 @@ from ..study.rig import building_of
 from ..study.run_file import TEST
 from ..study.staircase import history_steps
 from ..study.study import Study
-from .closed_loop_figures import DRAWS, figures_of
+from .closed_loop_figures import DRAWS, FEWEST, figures_of
 from .closed_loop_result import ClosedLoop, Predicted
 from .closed_loop_runs import Trial, begins_in_motion, trial_of
 from .in_building import House
 
 
-def closed_loop(study: Study, *, role: str = "holdout", draws: int = DRAWS) -> ClosedLoop:
+def closed_loop(
+    study: Study, *, role: str = "holdout", draws: int = DRAWS, with_limits: bool = False
+) -> ClosedLoop:
     """Simulate a study's building with its model, and compare the responses with those measured.
 
     Parameters
@@ -40,6 +45,8 @@ def closed_loop(study: Study, *, role: str = "holdout", draws: int = DRAWS) -> C
         Whose ground motions; the study counts how often its test runs are opened.
     draws : int
         Draws of the parameters for the band; 0 for none.
+    with_limits : bool
+        Whether the band has what the limits of the study's verdict leave open, too.
 
     Raises
     ------
@@ -56,14 +63,15 @@ def closed_loop(study: Study, *, role: str = "holdout", draws: int = DRAWS) -> C
             f"{study.folder}: the damper was measured on a bench: --closed-loop needs a building, "
             f"as in  {command('compare', study.name, '--closed-loop', '--in', 'house.toml')}"
         )
-    _refuse_without_covariance(study, model, draws)
+    effects, more = _prepared(study, model, draws, with_limits)
     runs = study.runs()
     if role == TEST:
         runs = runs_for_test(study, runs)
     chosen = runs.train if role == "train" else runs.holdout
     trials, notes = _trials(study, chosen, split=role != TEST)
     house = House(building, study.folder / model.building if model.building else None)
-    found = _predicted(study, model, (house, False), trials, draws)
+    found = _predicted(study, model, (house, False), trials, draws, effects)
+    notes += more
     if role == TEST:
         count_opening(study)
         notes.append(opened_text(len(openings(study))))
@@ -71,7 +79,12 @@ def closed_loop(study: Study, *, role: str = "holdout", draws: int = DRAWS) -> C
 
 
 def closed_loop_in(
-    study: Study, house: House, trials: Sequence[Trial], *, draws: int = DRAWS
+    study: Study,
+    house: House,
+    trials: Sequence[Trial],
+    *,
+    draws: int = DRAWS,
+    with_limits: bool = False,
 ) -> ClosedLoop:
     """Predict the responses of a building with a damper that was identified on a bench.
 
@@ -85,6 +98,8 @@ def closed_loop_in(
         Its ground motions, with responses where there are some; see `bridge.closed_loop_input`.
     draws : int
         Draws of the parameters for the band; 0 for none.
+    with_limits : bool
+        Whether the band has what the limits of the study's verdict leave open, too.
 
     Raises
     ------
@@ -100,15 +115,15 @@ def closed_loop_in(
             "damper on a bench."
         )
     model = study.model()
-    _refuse_without_covariance(study, model, draws)
+    effects, more = _prepared(study, model, draws, with_limits)
     _refuse_other_command(study, trials)
-    found = _predicted(study, model, (house, True), trials, draws)
+    found = _predicted(study, model, (house, True), trials, draws, effects)
     most = max(
         (float(np.ptp(run["displacement"])) / 2.0 for run in study.runs().train
          if run.has("displacement")), default=float("inf"),
     )  # fmt: skip
     reached = max(found.strokes, default=0.0)
-    notes = list(found.notes)
+    notes = [*found.notes, *more]
     if reached > 1.2 * most:
         notes.append(
             f"the damper moves by {1e3 * reached:.3g} mm here, and by {1e3 * most:.3g} mm in the "
@@ -117,12 +132,20 @@ def closed_loop_in(
     return replace(found, notes=tuple(notes))
 
 
-def _refuse_without_covariance(study: Study, model: StudyModel, draws: int) -> None:
-    if draws and not _has_covariance(model):
+def _prepared(
+    study: Study, model: StudyModel, draws: int, with_limits: bool
+) -> tuple[list[OpenEffect], list[str]]:
+    """Return the effects that the band is to have, with notes; refuse what has no band."""
+    if draws and not has_covariance(model):
         raise StudyError(
             f"{study.folder / 'model.toml'}: no covariance of the parameters, which the 95 % band "
             f"needs. Identify the model again:  {command('identify', study.folder)}"
         )
+    if not with_limits:
+        return [], []
+    if draws < FEWEST:
+        raise StudyError(f"--with-limits widens a band, for which --draws {FEWEST} is the least.")
+    return left_open(study.verdict(), model, study.folder)
 
 
 def _refuse_other_command(study: Study, trials: Sequence[Trial]) -> None:
@@ -134,11 +157,6 @@ def _refuse_other_command(study: Study, trials: Sequence[Trial]) -> None:
                 f"{trial.shaking.name}: its command is a {given}, and the damper was identified "
                 f"with a {study.drive}. Measurements with a {study.drive} are right."
             )
-
-
-def _has_covariance(model: StudyModel) -> bool:
-    names = model.uncertain()
-    return len(names) == 1 or (len(names) > 1 and model.correlation is not None)
 
 
 def _trials(
@@ -169,23 +187,34 @@ def _trials(
 
 
 def _predicted(
-    study: Study, model: StudyModel, place: tuple[House, bool], trials: Sequence[Trial], draws: int
+    study: Study,
+    model: StudyModel,
+    place: tuple[House, bool],
+    trials: Sequence[Trial],
+    draws: int,
+    effects: Sequence[OpenEffect],
 ) -> ClosedLoop:
     """Return the prediction of the present model and of that before the last step."""
+    if channels := dict.fromkeys(following(model.effects).values()):
+        raise StudyError(
+            f"{study.folder}: an effect of the model follows {', '.join(channels)}, which a "
+            "simulated building does not have. Leave that effect out of the model."
+        )
     before, step = _before(study)
     judged = history_steps(study.steps())
     rows: list[Predicted] = []
-    strokes, failed = [], 0
+    strokes, failed, unable = [], 0, dict.fromkeys(one.label for one in effects)
     for number, trial in enumerate(trials):
         tell(f"simulating {trial.shaking.name}")
-        now = figures_of(model, place, trial, draws, number, judged[-1].missed)
+        now = figures_of(model, place, trial, draws, number, judged[-1].missed, effects)
         then = None
-        if before is not None:
-            drawn = draws if _has_covariance(before) else 0
+        if before is not None and not following(before.effects):
+            drawn = draws if has_covariance(before) else 0
             then = figures_of(before, place, trial, drawn, number, judged[-2].missed)
         rows += now.rows(trial, then)
         strokes.append(now.stroke)
         failed += now.failed
+        unable = {label: None for label in unable if label not in now.left}
     notes = [f"{failed} of the draws could not be simulated"] if failed else []
     last = judged[-1]
     if draws and last.missed and last.z is not None:
@@ -193,7 +222,10 @@ def _predicted(
             f"on held-out runs the error of the model is {short_z(last.z)} times the noise; what "
             f"it misses, {percent(last.missed)} of the force, widens the band"
         )
-    return ClosedLoop(tuple(rows), draws, step, tuple(notes), tuple(strokes))
+    if unable:
+        notes.append(f"with {', '.join(unable)} the building cannot be simulated: no band has it")
+    said = ClosedLoop(tuple(rows), draws, step, tuple(notes), tuple(strokes))
+    return replace(said, folder=str(study.folder))
 
 
 def _before(study: Study) -> tuple[StudyModel | None, str]:

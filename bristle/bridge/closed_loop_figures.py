@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -11,14 +12,17 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from ..data.model import StudyModel
+from ..data.model_draws import drawn_models
+from ..data.open_effects import OpenEffect, reach
 from ..identify.run_labels import values_of_labels
-from .closed_loop_result import KINDS, Predicted
+from .closed_loop_result import MISSED, PARAMETERS, Predicted
 from .closed_loop_runs import Trial
-from .draws import Columns, Simulator, drawn_models
+from .closed_loop_sizes import Key, names_of, size_of, sizes_of
+from .draws import Simulator
 from .in_building import House
+from .left_open import Left, changes_left_open
 
 Array = NDArray[np.float64]
-Key = tuple[str, str]  # a response, and "peak" or "rms"
 
 DRAWS = 20
 """Draws of the parameters for a band; with more of them it gets a little narrower."""
@@ -31,7 +35,7 @@ class Figures:
     """Peak and RMS by response, of the model as it is and of draws (draws,) of its errors.
 
     `missed` is the share of the force that the model misses beyond noise: it is taken to miss as
-    much of a response.
+    much of a response. `left` are the changes by effects that the runs do not exclude.
     """
 
     best: dict[Key, float]
@@ -39,18 +43,37 @@ class Figures:
     stroke: float
     failed: int
     missed: float = 0.0
+    left: Left = field(default_factory=dict)
 
     def band(self, key: Key) -> tuple[float, float] | None:
         """Return the 95 % band of what would be measured, None with too few draws."""
-        values = self.drawn.get(key, np.zeros(0))
-        count = len(values)
-        if count < FEWEST:
+        if len(self.drawn.get(key, ())) < FEWEST:
             return None
+        centre = float(np.mean(self.drawn[key]))
+        below, above = (
+            float(np.sqrt(sum(ends[side] ** 2 for ends in self._ends(key).values())))
+            for side in (0, 1)
+        )
+        return max(0.0, centre - below), centre + above
+
+    def parts(self, key: Key) -> dict[str, float]:
+        """Return which share of a band's variance is from what, the largest first; none without."""
+        if len(self.drawn.get(key, ())) < FEWEST:
+            return {}
+        power = {name: below**2 + above**2 for name, (below, above) in self._ends(key).items()}
+        whole = sum(power.values())
+        order = sorted((name for name in power if power[name] > 0.0), key=lambda n: -power[n])
+        return {name: power[name] / whole for name in order}
+
+    def _ends(self, key: Key) -> dict[str, tuple[float, float]]:
+        """Return by cause how far the band reaches below and above its centre."""
+        values = self.drawn[key]
+        count, centre = len(values), float(np.mean(values))
         wide = float(student.ppf(0.975, count - 1) * np.std(values, ddof=1))
         wide *= float(np.sqrt(1.0 + 1.0 / count))
-        centre = float(np.mean(values))
-        wide = float(np.hypot(wide, 1.96 * self.missed * centre))
-        return max(0.0, centre - wide), centre + wide
+        misses = 1.96 * self.missed * centre
+        ends = {PARAMETERS: (wide, wide), MISSED: (misses, misses)}
+        return ends | {name: reach(changes[key]) for name, changes in self.left.items()}
 
     def rows(self, trial: Trial, then: Figures | None) -> list[Predicted]:
         """Return a row per response and kind of figure."""
@@ -59,11 +82,12 @@ class Figures:
             measured = trial.measured.get(name)
             value = None
             if measured is not None:
-                value = _size(measured[0][trial.window], kind)
+                value = size_of(measured[0][trial.window], kind)
             bands = self.band((name, kind)), None if then is None else then.band((name, kind))
             before = None if then is None else then.best[name, kind]
             run = trial.shaking.name
-            out.append(Predicted(run, name, kind, value, best, bands[0], before, bands[1]))
+            parts = self.parts((name, kind)) if self.left else {}
+            out.append(Predicted(run, name, kind, value, best, bands[0], before, bands[1], parts))
         return out
 
 
@@ -74,6 +98,7 @@ def figures_of(
     draws: int,
     number: int,
     missed: float = 0.0,
+    effects: Sequence[OpenEffect] = (),
 ) -> Figures:
     """Simulate a run with a model, and with draws of the errors of model and channels.
 
@@ -85,6 +110,7 @@ def figures_of(
     draws : how many draws make a band; 0 for none
     number : of the run, which tells its draws from those of others
     missed : share of the force that the model misses beyond noise
+    effects : that the model's runs do not exclude, for a band that has them, too
 
     Raises
     ------
@@ -98,11 +124,11 @@ def figures_of(
         simulator = Simulator(model, house, bench, trial.shaking, Path(folder))
         scenario = simulator.scenario()
         columns = simulator.response(scenario)
-        names = _names(columns, trial)
+        names = names_of(columns, trial)
         sensors = np.random.default_rng([8, number])  # the same for the models before and after
         best = {
             key: float(np.mean(values))
-            for key, values in _sizes(columns, names, trial, sensors, DRAWS).items()
+            for key, values in sizes_of(columns, names, trial, sensors, DRAWS).items()
         }
         collected: dict[Key, list[float]] = {key: [] for key in best}
         failed = 0
@@ -111,58 +137,10 @@ def figures_of(
             if one is None:
                 failed += 1
                 continue
-            for key, values in _sizes(one, names, trial, generator, 1).items():
+            for key, values in sizes_of(one, names, trial, generator, 1).items():
                 collected[key] += values
+    left = changes_left_open(model, place, trial, effects, number) if effects else {}
     level = house.building.levels()[0]
     stroke = float(np.max(np.abs(columns[f"structure.{level}_displacement"])))
     drawn = {key: np.array(values) for key, values in collected.items()}
-    return Figures(best, drawn, stroke, failed, missed)
-
-
-def _names(columns: Columns, trial: Trial) -> dict[str, str]:
-    """Return the responses and the outputs that give them: those measured, else all but speeds."""
-    given = {name.removeprefix("structure."): name for name in columns if _shown(name)}
-    given["force"] = "damper.force"
-    if not trial.measured:
-        return given
-    every = given | {
-        name.removeprefix("structure."): name
-        for name in columns
-        if name.startswith("structure.") and name.endswith("_velocity")
-    }
-    return {name: every[name] for name in trial.measured if name in every}
-
-
-def _shown(name: str) -> bool:
-    of_structure = name.startswith("structure.")
-    what = ("_displacement", "_acceleration_absolute")
-    return of_structure and (name.endswith(what) or name.startswith("structure.drift"))
-
-
-def _sizes(
-    columns: Columns,
-    names: dict[str, str],
-    trial: Trial,
-    generator: np.random.Generator,
-    count: int,
-) -> dict[Key, list[float]]:
-    """Return peak and RMS by response as sensors would show them, for `count` draws of noise.
-
-    Noise adds to a peak: a model without it would seem to be too small.
-    """
-    found: dict[Key, list[float]] = {}
-    for name, port in names.items():
-        values = columns[port][trial.window]
-        noise = trial.measured.get(name, (None, 0.0))[1]
-        for _ in range(count if noise > 0.0 else 1):
-            shown = values + noise * generator.standard_normal(len(values)) if noise else values
-            for kind in KINDS:
-                found.setdefault((name, kind), []).append(_size(shown, kind))
-    return found
-
-
-def _size(values: Array, kind: str) -> float:
-    """Return the peak or the RMS of a response (n,)."""
-    if kind == "peak":
-        return float(np.max(np.abs(values)))
-    return float(np.sqrt(np.mean(values**2)))
+    return Figures(best, drawn, stroke, failed, missed, left)

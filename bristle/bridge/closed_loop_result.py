@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,16 @@ import numpy as np
 from ..compare.names import name_of
 from ..data.channels import channel_unit
 from ..draw.style import percent
+from ..findings import command
 from ..quantity import plain, scale
 
 Band = tuple[float, float]
 KINDS = {"peak": "Peak", "rms": "RMS"}
+PARAMETERS, MISSED = "the parameters", "what the model misses"
+CAUSES = (PARAMETERS, MISSED)
+"""Causes of a band beside effects that the runs do not exclude."""
+WORTH = 0.1
+"""Share of the variance of bands from which an effect is worth a test."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +30,8 @@ class Predicted:
     `kind` "peak" or "rms"; `measured` None where the response was not measured; `predicted` that of
     the model with its best values, the noise of the sensor added; `band` the 95 % band of what
     would be measured; `before`, `before_band` the same of the model before the last step; None
-    where there is none.
+    where there is none. `parts` is which share of the band's variance is from what, the largest
+    first, where effects that the runs do not exclude are part of it.
     """
 
     run: str
@@ -35,6 +42,7 @@ class Predicted:
     band: Band | None = None
     before: float | None = None
     before_band: Band | None = None
+    parts: dict[str, float] = field(default_factory=dict)
 
     @property
     def unit(self) -> str:
@@ -58,6 +66,20 @@ class Predicted:
             return None
         return self.band[0] <= self.measured <= self.band[1]
 
+    @property
+    def width(self) -> float:
+        """The width of the band over the figure; 0 without a band."""
+        if self.band is None or self.predicted == 0.0:
+            return 0.0
+        return (self.band[1] - self.band[0]) / self.predicted
+
+    def told(self) -> str:
+        """Return the figure with its band, "12.1 mm, 95 % band 11.6 to 12.9 mm"."""
+        factor, unit = scale(self.unit, self.predicted)
+        low, high = self.band or (self.predicted, self.predicted)
+        shown = [plain(factor * value) for value in (self.predicted, low, high)]
+        return f"{shown[0]} {unit}, 95 % band {shown[1]} to {shown[2]} {unit}"
+
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON has it."""
         return {
@@ -72,7 +94,8 @@ class ClosedLoop:
 
     `rows` per run, response and kind of figure; `draws` how many draws made the bands; `step` the
     last step of the history, "" where there is no model before it; `strokes` [m] how far the damper
-    moves in each run; `role` of the runs in the study, "" where they are of no study.
+    moves in each run; `role` of the runs in the study, "" where they are of no study; `folder` of
+    the study, for the next command.
     """
 
     rows: tuple[Predicted, ...]
@@ -81,6 +104,7 @@ class ClosedLoop:
     notes: tuple[str, ...] = ()
     strokes: tuple[float, ...] = ()
     role: str = ""
+    folder: str = "FOLDER"
 
     def sentences(self) -> tuple[str, ...]:
         """Return what an engineer would say: how wrong, within the band or not, and before."""
@@ -91,6 +115,7 @@ class ClosedLoop:
             return (
                 f"{given}, the model predicts these responses; nothing was measured to compare "
                 "them with.",
+                *self._limits(),
             )
         said = [f"{given}, the model predicts {_both(judged, before=False)}."]
         within = [row.inside for row in judged if row.inside is not None]
@@ -100,7 +125,35 @@ class ClosedLoop:
             )
         if self.step:
             said.append(f'Before the step "{self.step}" it predicted {_both(judged, before=True)}.')
-        return tuple(said)
+        return (*said, *self._limits())
+
+    def _limits(self) -> tuple[str, ...]:
+        """Return the sentences on a band with what limits leave open; none without."""
+        rows = [row for row in self.rows if row.parts and row.band is not None]
+        if not rows:
+            return ()
+        least = max((row for row in rows if row.kind == "peak"), key=lambda row: row.width)
+        first, share = next(iter(least.parts.items()))
+        open_effect = first not in CAUSES
+        said = (
+            f"Least known of the peaks is that of {name_of(least.response)} in {least.run}: "
+            f"{least.told()}; {percent(share, 0)} of the band's variance is "
+            f"{first}{', which the runs do not exclude' if open_effect else ''}."
+        )
+        total: dict[str, float] = {}
+        for row in rows:
+            for name, part in row.parts.items():
+                if name not in CAUSES:
+                    total[name] = total.get(name, 0.0) + part / len(rows)
+        most = max(total, key=lambda name: total[name], default="")
+        if not most or total[most] < WORTH:
+            return (said, "No effect that the runs do not exclude widens the bands by much.")
+        return (
+            said,
+            f"Over all figures {most} widens the bands most, by {percent(total[most], 0)} of the "
+            f"variance. A test that shows it would narrow them:  "
+            f"{command('plan', self.folder, '--see', most.partition(' ')[0])}",
+        )
 
     def tables(self) -> list[tuple[str, list[str], list[list[str]]]]:
         """Return title, header and rows of a table per run and kind of figure."""
@@ -154,13 +207,15 @@ def _both(rows: Sequence[Predicted], *, before: bool) -> str:
 
 def _table(rows: Sequence[Predicted], with_before: bool) -> tuple[list[str], list[list[str]]]:
     measured = any(row.measured is not None for row in rows)
+    parts = any(row.parts for row in rows)
     header = ["response", *(["measured"] if measured else []), "predicted", "95 % band"]
+    header += ["of it"] if parts else []
     header += ["error"] if measured else []
     header += (["before", "error before"] if measured else ["before"]) if with_before else []
-    return header, [_cells(row, measured, with_before) for row in rows]
+    return header, [_cells(row, measured, with_before, parts) for row in rows]
 
 
-def _cells(row: Predicted, measured: bool, with_before: bool) -> list[str]:
+def _cells(row: Predicted, measured: bool, with_before: bool, parts: bool) -> list[str]:
     size = max(row.predicted, row.measured or 0.0)
     factor, unit = scale(row.unit, size)
 
@@ -170,10 +225,16 @@ def _cells(row: Predicted, measured: bool, with_before: bool) -> list[str]:
     outside = " *" if row.inside is False else ""
     band = f"{text(row.band[0])} to {text(row.band[1])}{outside}" if row.band else "-"
     cells = [f"{name_of(row.response)} [{unit}]", *([text(row.measured)] if measured else [])]
-    cells += [text(row.predicted), band, *([_percent(row.error)] if measured else [])]
+    cells += [text(row.predicted), band, *([_of_it(row)] if parts else [])]
+    cells += [_percent(row.error)] if measured else []
     if with_before:
         cells += [text(row.before), *([_percent(row.error_before)] if measured else [])]
     return cells
+
+
+def _of_it(row: Predicted) -> str:
+    """Return the two largest parts of a band's variance."""
+    return ", ".join(f"{name} {percent(part, 0)}" for name, part in [*row.parts.items()][:2]) or "-"
 
 
 def _percent(error: float | None) -> str:

@@ -19,7 +19,6 @@ from ..physics.forms import split_form
 from ..physics.user import own_effects, own_laws
 from ..scenario.scenario import Scenario, load_scenario
 from ..simulate.coupled import simulate
-from ..units import convert
 from .in_building import House, Parameters, Shaking, loads, write_scenario, write_signals
 from .scenario_files import part_text
 
@@ -99,6 +98,22 @@ class Simulator:
                 yield None
         write_signals(self.folder, replace(shaking, drive=VOLTAGE))
 
+    def without_noise(
+        self, scenario: Scenario, models: list[StudyModel]
+    ) -> Iterator[dict[str, Array] | None]:
+        """Yield the responses of other values under the ground motion as it is; None for failures.
+
+        Parameters
+        ----------
+        scenario : what `scenario` has returned
+        models : the model with other values
+        """
+        for model in models:
+            try:
+                yield self.response(self._with_values(scenario, model))
+            except RunError:
+                yield None
+
     def _with_values(self, scenario: Scenario, model: StudyModel) -> Scenario:
         own = loads(model, self.house.building, self.bench)
         # A mass that is drawn as zero is in no load, and must not stay what it is in the scenario.
@@ -134,32 +149,3 @@ class Simulator:
         )
         limit = {VOLTAGE.limit: float(ceil(1.05 * most))} if most > VOLTAGE.largest else {}
         return part_text("damper", source, {**self._values(self.model), **limit, **moving})
-
-
-def drawn_models(model: StudyModel, count: int, generator: np.random.Generator) -> list[StudyModel]:
-    """Return the model with values drawn from the joint covariance of their errors.
-
-    Parameters
-    ----------
-    model : whose identified parameters have a covariance
-    count : how many draws
-    generator : draws
-    """
-    names, covariance = model.covariance()
-    flat = model.flat()
-    best = model.values()
-    own = [(flat[name], model.declared(name).unit) for name in names]
-    low, high = (
-        np.array([convert(getattr(value, end), value.unit, unit) for value, unit in own])
-        for end in ("low", "high")
-    )
-    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    # Parameters differ by many orders of magnitude: the root is taken of their correlation.
-    power, shapes = np.linalg.eigh(covariance / np.outer(scale, scale))
-    root = scale[:, None] * shapes * np.sqrt(np.maximum(power, 0.0))
-    centre = np.array([best[name] for name in names])
-    draws = centre + generator.standard_normal((count, len(names))) @ root.T
-    return [
-        model.with_values(dict(zip(names, np.clip(row, low, high).tolist(), strict=True)))
-        for row in draws
-    ]

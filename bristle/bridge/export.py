@@ -17,10 +17,11 @@ from ..data.model import StudyModel
 from ..errors import StudyError
 from ..fmu.build import build, plan
 from ..fmu.catalogue import component_of_law
+from ..fmu.damper import input_of
 from ..identify.fit import Problem, Run
 from ..identify.instruments import true_motion
 from ..identify.prepare import prepare
-from ..identify.run_labels import values_of_labels
+from ..identify.run_labels import following, values_of_labels
 from ..physics.building import paper_building, read_building
 from ..physics.drive import drive_named, state_for
 from ..physics.effect import EFFECTS
@@ -107,7 +108,8 @@ def _damper(
     starts: dict[str, float | bool] = {
         name: value
         for name, value in values.items()
-        if "." not in name or name.partition(".")[0] in effects
+        if ("." not in name or name.partition(".")[0] in effects)
+        and name not in following(model.effects)
     }
     starts |= {f"{effect}.on": True for effect in effects}
     starts |= _range(measurement, notes)
@@ -170,6 +172,9 @@ def _bench(
         rows["drive"] = (drive.name, drive.unit, run.V)
         wires[f"damper.{drive.name}"] = "drive.value"
     damper = model.at("damper", bench=True)
+    for name in dict.fromkeys(following(damper.effects).values()):
+        rows[name] = (name, run.extra[name].known_unit, run.extra[name].values)
+        wires[f"damper.{input_of(name, damper.base_law, drive)}"] = f"{name}.value"
     effects = [EFFECTS[name] for name in damper.effects]
     if any("a" in effect.needs for effect in effects):
         rows["acceleration"] = ("acceleration", "m/s2", run.a)
@@ -210,14 +215,15 @@ def _motion_file(run: Run, fine: int, path: Path) -> Path:
 
 
 def _start_values(damper: StudyModel, run: Run) -> dict[str, float]:
-    """Return the start values of states that begin with a signal of the run."""
+    """Return the start values of states that begin with a signal or the load of the run."""
     drive = drive_named(run.drive)
     first = {"x": run.x[0], "v": run.v[0], "a": run.a[0], "V": run.V[0]}
     states = dict(LAWS[damper.base_law].starts)
     for name in damper.effects:
         own = {state_for(s, drive): signal for s, signal in EFFECTS[name].starts.items()}
         states |= {f"{name}.{state}": signal for state, signal in own.items()}
-    return {f"{name}_0": float(first[s]) for name, s in states.items() if s in first}
+    begun = {f"{name}_0": float(first[s]) for name, s in states.items() if s in first}
+    return begun | Problem([run]).carrying(as_model(damper), run)
 
 
 def prediction(model: StudyModel, run: Run, bench: bool = True) -> Array:
@@ -246,6 +252,11 @@ def _structure(
     house = House(paper_building() if file is None else read_building(file), file)
     own = loads(model, house.building)
     notes += own.notes
+    if channels := dict.fromkeys(following(model.effects).values()):
+        notes.append(
+            f"{', '.join(channels)}: the damper's input keeps its mean in the scenario, for a "
+            "building under a ground motion does not give it. Connect it to a signal."
+        )
     head = (
         f"{study.name}: the building with the model's damper, ground of {measurement.name}",
         "# The model's damper in the study's building.",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..data.channels import PLAIN, meaning
+from ..data.extra import as_word
 from ..data.titles import title, unit_or_none
 from ..errors import FmuError, UnitError
 from ..findings import unknown
@@ -128,9 +129,9 @@ def _match(
     name, unit = variable.name, unit_of(variable)
     if name in given:
         return _as_given(variable, given[name], signals)
-    lower = {signal.lower(): signal for signal in signals}
+    words = {as_word(signal): signal for signal in signals}
     for candidate, reason in ((name, "its name"), (channel_of(variable), "what its name says")):
-        signal = lower.get(candidate.lower())
+        signal = words.get(as_word(candidate))
         if signal and _fits(unit, signals[signal]):
             return _port(variable, signal, reason)
     if not by_unit or unit in (None, "1"):

@@ -38,6 +38,11 @@ def add_closed_loop(parser: argparse.ArgumentParser) -> None:
         "--draws", type=int, metavar="N",
         help="draws of the parameters for the band; 0 for none; else 20",
     )  # fmt: skip
+    group.add_argument(
+        "--with-limits", action="store_true",
+        help="widen the band by the effects that the verdict's limits leave open, and tell which "
+        "part of it each is",
+    )  # fmt: skip
 
 
 def refuse_alone(arguments: argparse.Namespace) -> None:
@@ -53,6 +58,8 @@ def refuse_alone(arguments: argparse.Namespace) -> None:
     given = [name for name, own in names.items() if getattr(arguments, own) is not None]
     if given and not arguments.closed_loop:
         raise StudyError(f"--{given[0]} needs --closed-loop.")
+    if arguments.with_limits and not arguments.closed_loop:
+        raise StudyError("--with-limits needs --closed-loop.")
     alone = [name for name in given if name in _OF_HOUSE]
     if alone and arguments.house is None:
         raise StudyError(
@@ -76,10 +83,12 @@ def closed_loop_of(arguments: argparse.Namespace) -> ClosedLoop:
     study = Study(arguments.folder)
     draws = DRAWS if arguments.draws is None else arguments.draws
     if arguments.house is None:
-        return closed_loop(study, role=arguments.role, draws=draws)
+        return closed_loop(
+            study, role=arguments.role, draws=draws, with_limits=arguments.with_limits
+        )
     house = house_of(arguments.house)
     trials = trials_in(house, arguments.data, arguments.ground, arguments.level)
-    return closed_loop_in(study, house, trials, draws=draws)
+    return closed_loop_in(study, house, trials, draws=draws, with_limits=arguments.with_limits)
 
 
 def print_closed_loop(found: ClosedLoop) -> None:

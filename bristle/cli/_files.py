@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from fnmatch import fnmatchcase
 from glob import glob
 from pathlib import Path
@@ -9,6 +10,20 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..data.channels import ChannelSpec
+
+
+def add_run_facts(parser: argparse.ArgumentParser) -> None:
+    """Add what is known of whole runs beside their files."""
+    for option, value, text in (
+        ("--level", "PATTERN", "the command's level in the names of files, {} in its place: "
+         "--level 'I{}A'"),
+        ("--label", "NAME=PATTERN", "what else names tell of a run: --label 'oil=batch{}'"),
+    ):  # fmt: skip
+        parser.add_argument(option, action="append", default=[], metavar=value, help=text)
+    parser.add_argument(
+        "--runs", type=Path, metavar="FILE",
+        help="a table with a row per run: file, role, current [A], temperature [degC], ...",
+    )  # fmt: skip
 
 
 def test_files(patterns: list[str], files: list[str]) -> list[str]:
@@ -50,8 +65,14 @@ def _matches(pattern: str) -> list[str]:
     return [match for match in matches if Path(match).is_file()]
 
 
-def files_of(patterns: list[str]) -> list[str]:
-    """Return the files that patterns name, or that folders hold, each once, in order."""
+def files_of(patterns: list[str], option: str = "--data ") -> list[str]:
+    """Return the files that patterns name, or that folders hold, each once, in order.
+
+    Parameters
+    ----------
+    patterns : of the files
+    option : what stands before them on the command line, for messages
+    """
     from ..data.read import files_in
     from ..errors import StudyError
 
@@ -62,6 +83,6 @@ def files_of(patterns: list[str]) -> list[str]:
             continue
         files = _matches(pattern)
         if not files:
-            raise StudyError(f'--data "{pattern}": no file matches, seen from {Path.cwd()}.')
+            raise StudyError(f'{option}"{pattern}": no file matches, seen from {Path.cwd()}.')
         found += files
     return list(dict.fromkeys(found))

@@ -16,3 +16,15 @@ def print_tables(tables: Iterable[tuple[str, Sequence[str], Sequence[Sequence[st
                 *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)),
             ]
             print("  " + "  ".join(cells).rstrip())
+
+
+def aligned(table: Sequence[Sequence[str]], left: int = 2) -> list[str]:
+    """Return the lines of a table, its first columns to the left."""
+    wide = [max(len(cells[k]) for cells in table) for k in range(len(table[0]))]
+    return [
+        "  " + "  ".join(
+            cell.ljust(width) if k < left else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(cells, wide, strict=True))
+        )
+        for cells in table
+    ]  # fmt: skip

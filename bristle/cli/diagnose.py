@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..findings import command
 from ._consent import add_trust
+from ._table import aligned
 
 if TYPE_CHECKING:
     from ..diagnose.verdict_text import Verdict
@@ -27,6 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "where no law was chosen; the model's law: keep it",
     )
     parser.add_argument(
+        "--limits", action="store_true",
+        help="fit the model again at the limit of every effect: exact where it is far from linear",
+    )  # fmt: skip
+    parser.add_argument(
         "--dry-run", action="store_true", help="show the verdict; do not change verdict.json"
     )
     add_trust(parser)
@@ -39,7 +44,9 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    found = diagnose_study(study, law=arguments.law, write=not arguments.dry_run)
+    found = diagnose_study(
+        study, law=arguments.law, profile=arguments.limits, write=not arguments.dry_run
+    )
     verdict = verdict_of(study, found)
     if arguments.json:
         print(json.dumps(verdict, indent=2, ensure_ascii=False))
@@ -82,20 +89,8 @@ def law_lines(rows: Sequence[Verdict]) -> list[str]:
     """Return the table of laws as text, from its rows as verdict.json has them."""
     from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
 
-    lines = _aligned([list(HEADER), *law_table(rows)])
+    lines = aligned([list(HEADER), *law_table(rows)])
     return [*lines, *wrap(TABLE_NOTE, 98, initial_indent="  ", subsequent_indent="  ")]
-
-
-def _aligned(table: Sequence[Sequence[str]]) -> list[str]:
-    """Return the lines of a table, its first two columns to the left."""
-    wide = [max(len(cells[k]) for cells in table) for k in range(len(table[0]))]
-    return [
-        "  " + "  ".join(
-            cell.ljust(width) if k < 2 else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(cells, wide, strict=True))
-        )
-        for cells in table
-    ]  # fmt: skip
 
 
 def _trials(verdict: Verdict) -> list[str]:
@@ -129,7 +124,7 @@ def _limits(verdict: Verdict) -> list[str]:
     if not rows:
         return []
     notes = (f"  {note}" for note in LIMITS_NOTES)
-    return ["", *_aligned([list(LIMITS), *rows]), *notes]
+    return ["", *aligned([list(LIMITS), *rows]), *notes]
 
 
 def _next(verdict: Verdict, folder: Path) -> str:
@@ -146,9 +141,13 @@ def _next(verdict: Verdict, folder: Path) -> str:
 
 
 def _then(verdict: Verdict, folder: Path) -> str:
-    if verdict["kind"] in ("effect", "ambiguous"):
-        count = len(verdict["effects"]) if verdict["kind"] == "effect" else 1
-        return command("add", folder, *verdict["effects"][:count])
+    if verdict["kind"] == "ambiguous":
+        return (
+            f"{command('plan', folder)} , which writes a test that distinguishes them;  "
+            f"{command('add', folder, verdict['effects'][0])} , which takes the first."
+        )
+    if verdict["kind"] == "effect":
+        return command("add", folder, *verdict["effects"])
     if verdict["kind"] == "unknown":
         return (
             f"{_other_laws(verdict, folder)}"
@@ -157,7 +156,23 @@ def _then(verdict: Verdict, folder: Path) -> str:
             f"{command('compare', folder)} , which shows where the residual is;  "
             "bristle effects new NAME  starts your own effect."
         )
+    hidden = _not_excited(verdict)
+    if verdict["kind"] == "none" and hidden:
+        return (
+            f"{command('plan', folder, '--see', *hidden)} , which writes tests that show what "
+            f"these cannot;  {command('report', folder)}"
+        )
     return command("report", folder)
+
+
+def _not_excited(verdict: Verdict) -> list[str]:
+    """Return the effects that these runs cannot show, and others may.
+
+    What a parameter of another effect takes up is that effect.
+    """
+    rows = [row for found in verdict["findings"] for row in found.get("limits", ())]
+    hidden = [row for row in rows if row.get("why") and "." not in row["why"].partition(" ")[0]]
+    return sorted({row["effect"] for row in hidden})
 
 
 def _other_laws(verdict: Verdict, folder: Path) -> str:

@@ -33,6 +33,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--fresh", action="store_true", help="start again, replace earlier runs")
     parser.add_argument("--retry", action="store_true", help="repeat failed runs")
+    parser.add_argument(
+        "--with-limits", action="store_true",
+        help="widen the quantiles by the effects that the verdict of [identified] leaves open, and "
+        "tell which part of the variance each is",
+    )  # fmt: skip
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -54,6 +59,7 @@ def main(arguments: argparse.Namespace) -> int:
             cluster=arguments.cluster,
             fresh=arguments.fresh,
             retry=arguments.retry,
+            with_limits=arguments.with_limits,
             progress=True,
         )
     except EnsembleInterrupted as stopped:
@@ -108,6 +114,7 @@ def _answer(found: Ensemble, files: dict[str, Path]) -> dict[str, Any]:
         "continued": found.continued,
         "wall_time": round(found.wall_time, 3),
         "quantiles": outputs,
+        "parts": found.parts,
         "failures": [asdict(failure) for failure in found.failures],
         "files": {name: str(path.absolute()) for name, path in files.items()},
     }
@@ -132,9 +139,36 @@ def _print(found: Ensemble, files: dict[str, Path]) -> None:
     # In a pipe there is no width to fit.
     width = None if sys.stdout.isatty() else 140
     Console(highlight=False, markup=False, width=width).print(table)
+    for line in _limits(found):
+        print(line)
     for failure in found.failures:
         print(f"failed {failure.count} times, first in run {failure.run}: {failure.reason}")
     before = f", {found.continued} of them from before" if found.continued else ""
     print(f"{len(found.runs)} runs{before} in {found.wall_time:.1f} s")
     for path in files.values():
         print(f"  {path}")
+
+
+def _limits(found: Ensemble) -> list[str]:
+    """Return what of each output's variance is from effects that are left open; none without."""
+    from ..batch.quantiles import VARIES, unable
+    from ..draw.style import percent
+    from ..findings import command
+
+    plan = found.plan
+    if plan.identified is None or not plan.left:
+        return []
+    lines, total = ["Of the variance:"], dict[str, float]()
+    for output, parts in found.parts.items():
+        shown = ", ".join(f"{name} {percent(part, 0)}" for name, part in [*parts.items()][:3])
+        lines.append(f"  {output}: {shown}")
+        for name, part in parts.items():
+            total[name] = total.get(name, 0.0) + part
+    total.pop(VARIES, None)
+    if total:
+        most = max(total, key=lambda name: total[name]).partition(" ")[0]
+        see = command("plan", plan.identified.folder, "--see", most)
+        lines.append(f"{most} widens them most, which the runs do not exclude. To see it:  {see}")
+    if lost := unable(plan, found.runs):
+        lines.append(f"With {', '.join(lost)} no run could be made: the table is without it.")
+    return [*lines, *(f"{note[:1].upper()}{note[1:]}." for note in plan.identified.notes)]

@@ -18,6 +18,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     shown.set_defaults(act=_list)
     bench = commands.add_parser("bench", help="an MR damper on a test bench")
     _add_choices(bench)
+    bench.add_argument(
+        "--held", action="store_true",
+        help="hold the voltage in each run, at 2 or 6 V, as many laboratories do",
+    )  # fmt: skip
     bench.set_defaults(act=_bench)
     building = commands.add_parser("building", help="a base-isolated building on a shake table")
     _add_choices(building)
@@ -29,6 +33,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
     reveal.add_argument("--json", action="store_true", help="print the answer as JSON")
     reveal.set_defaults(act=_reveal)
+    performing = commands.add_parser("perform", help="let the true rig perform a plan")
+    performing.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
+    performing.add_argument("plan", type=Path, metavar="PLAN", help="the folder of the plan")
+    performing.add_argument(
+        "--as-runs", default="", metavar="NAME",
+        help="call the runs NAME_1, NAME_2 ...; else they have the names of the plan",
+    )  # fmt: skip
+    performing.add_argument(
+        "--insist", action="store_true", help="although the plan was made for another study"
+    )
+    performing.add_argument("--json", action="store_true", help="print the answer as JSON")
+    performing.set_defaults(act=_perform)
     add_common_to_actions(commands)
 
 
@@ -110,6 +126,7 @@ def _choice(arguments: argparse.Namespace):  # type: ignore[no-untyped-def]
         seed=arguments.seed,
         nothing=arguments.none,
         outside=arguments.outside,
+        held=getattr(arguments, "held", False),
     )
 
 
@@ -122,6 +139,17 @@ def _made(folder: Path) -> int:
     print(f"{folder}: a study of {len(runs) - held} runs for training and {held} held out.")
     print(f"The hidden answer is in {folder / FILE}.")
     print(f"Next:  bristle study auto {folder}")
+    return 0
+
+
+def _perform(arguments: argparse.Namespace) -> int:
+    from ..example.perform import perform_plan
+    from ._extend import print_added
+
+    extended = perform_plan(
+        arguments.folder, arguments.plan, name=arguments.as_runs, insist=arguments.insist
+    )
+    print_added(extended, as_json=arguments.json)
     return 0
 
 

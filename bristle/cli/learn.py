@@ -1,9 +1,9 @@
 """Learn what no known effect explains: a curve inside the model, as an effect of the study.
 
-A spline along displacement, speed, acceleration, the command or a memory of these acts as an added
-force, a factor of a part of the law, or a map of the command. In the isolation layer or a storey of
-a building it acts as an added force, friction or damping, or a factor of the stiffness. It is kept
-where it lowers the error on held-out runs beyond chance.
+A spline along displacement, speed, acceleration, the command, a memory of these or an extra
+channel acts as an added force, a factor of a part of the law, or a map of the command. In the
+isolation layer or a storey of a building it acts as an added force, friction or damping, or a
+factor of the stiffness. It is kept where it lowers the error on held-out runs beyond chance.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
         "--along", metavar="SIGNAL[,SIGNAL]", default="",
-        help="signals that the curve may depend on, such as displacement,speed; default all",
+        help="signals that the curve may depend on, such as displacement,speed, or an extra "
+        "channel of the study; default all",
     )  # fmt: skip
     parser.add_argument(
         "--as", dest="parts", metavar="PART[,PART]", default="",
@@ -56,7 +57,8 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    signals = {**{name: name for name in ALONG}, **_of_command(study.drive)}
+    signals = {name: name for name in (*ALONG, *study.settings.beside)}
+    signals |= _of_command(study.drive)
     found = learn_effect(
         study,
         parts=_listed(arguments.parts, {**PARTS, **PARTS_OF_LINE}, "--as"),

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 from ._common import add_common_to_actions
 from ._consent import add_trust
-from ._files import channels_of, files_of, test_files
+from ._extend import add_extend
+from ._files import add_run_facts, channels_of, files_of, test_files
 
 if TYPE_CHECKING:
     from ..study.create import Created
     from ..study.data_check import DataCheck
 
-HELP = "studies of measurements: new, check, auto"
+HELP = "studies of measurements: new, extend, check, auto"
 
 _OLD = "first-look"
 
@@ -24,6 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study`."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
     _add_new(commands.add_parser("new", help="make a study's folder from measurement files"))
+    add_extend(commands.add_parser("extend", help="add measured runs to a study"))
     _add_check(commands.add_parser("check", help="check the data, before any model"))
     # The name until 0.1; here for one release.
     _add_check(commands.add_parser(_OLD, description="The old name of `study check`."))
@@ -118,16 +120,7 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
 
 def _add_runs(parser: argparse.ArgumentParser) -> None:
     """Add what is known of whole runs, and how files hold them."""
-    for option, value, text in (
-        ("--level", "PATTERN", "the command's level in the names of files, {} in its place: "
-         "--level 'I{}A'"),
-        ("--label", "NAME=PATTERN", "what else names tell of a run: --label 'oil=batch{}'"),
-    ):  # fmt: skip
-        parser.add_argument(option, action="append", default=[], metavar=value, help=text)
-    parser.add_argument(
-        "--runs", type=Path, metavar="FILE",
-        help="a table with a row per run: file, role, current [A], temperature [degC], ...",
-    )  # fmt: skip
+    add_run_facts(parser)
     parser.add_argument(
         "--split", default="", metavar="HOW",
         help="files hold several runs: 'restart' of the time, 'rests', or 'column TITLE'",
@@ -188,6 +181,7 @@ def _print_json(created: Created) -> None:
         "rig": settings.rig,
         "runs": [asdict(run) for run in settings.runs],
         "channels": [asdict(guess) for guess in created.guesses],
+        "extra": {n: {"column": s.column, "unit": s.unit} for n, s in created.extra.items()},
         "unused": list(created.unused),
         "notes": list(created.notes),
     }
@@ -207,6 +201,10 @@ def _print_new(created: Created) -> None:
         print(f"  {'':28}   {guess.reason}")
         if guess.doubt:
             print(f"  {'':28}   doubtful: {guess.doubt}")
+    extra = [f"  {name:28} {one.column}, in {one.unit}" for name, one in created.extra.items()]
+    if extra:
+        head = "Extra channels, on which an error may depend ([extra] in study.toml):"
+        print(head, *extra, sep="\n")
     if created.unused:
         print(f"Not used: {', '.join(created.unused)}.")
     for note in created.notes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from ..physics.drive import DRIVES, VOLTAGE
+from ..quantity import scale
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
@@ -78,6 +80,21 @@ def coordinates_of(
     given = next((y for y in (x, v, a, V, force) if y is not None), np.zeros(0))
     found["time"] = np.arange(len(given), dtype=np.float64) * np.float64(dt)
     return found
+
+
+def shown(name: str, units: Mapping[str, str], size: float) -> tuple[float, str]:
+    """Return the factor from SI and the unit in which an engineer reads a coordinate.
+
+    Parameters
+    ----------
+    name : of the coordinate
+    units : those of extra channels, by name
+    size : how large its values are, in SI
+    """
+    if name in units:
+        factor, unit = scale(units[name], size)
+        return factor, {"1": "", "degC": "°C"}.get(unit, unit)
+    return SHOWN.get(name, (1.0, ""))
 
 
 def late_speed(v: Array, dt: float, over: float = RESTED) -> Array:

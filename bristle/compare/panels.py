@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, percent, short_z, zero_lines
 from ..quantity import tick
-from .coordinates import SHOWN
+from .coordinates import SHOWN, shown
 from .names import name_of
 
 if TYPE_CHECKING:
@@ -105,7 +105,8 @@ def draw_pattern(
     pattern : the coordinate with its bins
     after : a pattern whose means are taken off first; None for none
     """
-    factor, unit = SHOWN.get(pattern.coordinate, (1.0, ""))
+    units, size = comparison.predictions[0].units, float(np.max(np.abs(pattern.centre)))
+    factor, unit = shown(pattern.coordinate, units, size)
     x = np.concatenate([one.along()[pattern.coordinate] for one in comparison.predictions])
     y = np.concatenate([one.residual for one in comparison.predictions])
     sigma = np.concatenate([one.sigma[one.skip :] for one in comparison.predictions])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -30,7 +31,8 @@ class RunPrediction:
     not count, for the model's states begin somewhere, nor do those where `known` (n,) is False:
     they were not measured but filled in. `site` of a building is "damper", "layer", "storey1" ...,
     "" on a bench. `index` (n,) numbers the samples where some were left out, None where none were.
-    `drive` is the channel that commands the damper, `labels` what is known of the whole run.
+    `drive` is the channel that commands the damper, `labels` what is known of the whole run,
+    `units` those of the coordinates that are extra channels.
     """
 
     name: str
@@ -50,6 +52,7 @@ class RunPrediction:
     index: NDArray[np.int64] | None = None
     drive: str = VOLTAGE.name
     labels: Labels = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def time(self) -> Array:
@@ -102,6 +105,7 @@ def run_predictions(problem: Problem, model: Model, draws: int = 12) -> list[Run
                 coordinates_of_run(run), finer - predicted, skip=run.skip, known=run.measured,
                 index=run.keep if isinstance(run, StructureRun) else None,
                 drive=run.drive, labels=run.labels,
+                units={name: one.unit for name, one in run.extra.items()},
             )
         )  # fmt: skip
     return out
@@ -113,7 +117,8 @@ def coordinates_of_run(run: Run) -> dict[str, Array]:
         return {name: y[run.keep] for name, y in coordinates_of_run(run.whole).items()}
     found = coordinates_of(run.dt, run.x, run.v, run.a, run.V, run.force, run.drive)
     numbers = {name: y for name, y in run.labels.items() if not isinstance(y, str)}
-    return {**{name: np.full(len(run.x), y) for name, y in numbers.items()}, **found}
+    measured = {name: one.values for name, one in run.extra.items()}
+    return {**{name: np.full(len(run.x), y) for name, y in numbers.items()}, **measured, **found}
 
 
 def halved(run: Run) -> Run:
@@ -134,6 +139,10 @@ def halved(run: Run) -> Run:
         V=between(run.V, None, run.dt),
         force=between(run.force, None, run.dt),
         draws=np.zeros((0, 2 * len(x) - 1, 4)),
+        extra={
+            name: replace(one, values=between(one.values, None, run.dt))
+            for name, one in run.extra.items()
+        },
         measured=None,
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..data.labels import UNITS
 from ..physics.drive import DRIVES
 from ..quantity import plain, quantity, short_z
-from .coordinates import SHOWN
+from .coordinates import SHOWN, shown
 from .labels import label_sentence
 from .names import joined, name_of, site_name, site_names
 from .patterns import Finder, ResidualPattern
@@ -226,11 +226,11 @@ def _mirrored(
         return ""
     if pattern.high[b] >= 0.0 or pattern.low[c] <= 0.0:
         return ""
-    factor, shown = SHOWN[pattern.coordinate]
+    factor, unit = SHOWN[pattern.coordinate]
     edge = factor * 0.5 * float(pattern.low[c] - pattern.high[b])
     left, right = _largest(pattern.mean, a, b), _largest(pattern.mean, c, d)
     size = 0.5 * (abs(left) + abs(right))
-    where = f"beyond {plain(edge, 2)} {shown} to either side"
+    where = f"beyond {plain(edge, 2)} {unit} to either side"
     if left * right > 0.0:
         return f"{where} {_acts(pattern, right, 0.0, size, prediction)}"
     return f"{where} {_acts(pattern, right, 1.0, size, prediction)}"
@@ -245,7 +245,7 @@ def _one(pattern: ResidualPattern, begin: int, end: int, prediction: RunPredicti
     size = _largest(pattern.mean, begin, end)
     centre = float(pattern.centre[begin : end + 1].mean())
     acts = _acts(pattern, size, centre, abs(size), prediction)
-    return f"{_location(pattern, begin, end)} {acts}"
+    return f"{_location(pattern, begin, end, prediction.units)} {acts}"
 
 
 def _acts(
@@ -271,10 +271,10 @@ def _acts(
     return f"the force is {up_to} {'higher' if size > 0.0 else 'lower'} than the model's"
 
 
-def _location(pattern: ResidualPattern, begin: int, end: int) -> str:
+def _location(pattern: ResidualPattern, begin: int, end: int, units: Mapping[str, str]) -> str:
     """Return where along a coordinate a stretch of bins lies."""
     name = pattern.coordinate
-    factor, unit = SHOWN.get(name, (1.0, ""))
+    factor, unit = shown(name, units, float(np.max(np.abs(pattern.centre))))
     low, high = factor * float(pattern.low[begin]), factor * float(pattern.high[end])
     last = len(pattern.mean) - 1
     if name == "direction":

@@ -19,6 +19,7 @@ from ..units import conversion
 from .channels import DRIVE, ChannelSpec, channel_unit
 from .corrections import Correction, set_right
 from .decimate import decimated
+from .extra import Extra, found_in, read_extra
 from .guess import guess_channels, specs, too_few_rows
 from .labels import TEMPERATURE, Labels, mean_temperature
 from .noise import Noise, estimate_noise
@@ -38,7 +39,7 @@ class Known:
     `name` of the run, "" for that of its file; `levels` of a command that the file does not hold,
     by channel, in its unit; `labels` what else is known of the whole run; `rate` [Hz] to which
     faster samples are decimated, 0 for none; `mask` whether isolated spikes count as not measured;
-    `corrections` what is set right in its channels.
+    `corrections` what is set right in its channels; `extra` where its extra channels are.
     """
 
     name: str = ""
@@ -47,6 +48,7 @@ class Known:
     rate: float = 0.0
     mask: bool = False
     corrections: tuple[Correction, ...] = ()
+    extra: Mapping[str, ChannelSpec] = field(default_factory=dict)
 
 
 _ABSURD = 1e15  # in any SI unit; some recorders write 1e30 where a value is missing
@@ -74,6 +76,8 @@ class Measurement:
         What is known of the whole run, by name: a number or a word.
     spikes : tuple of Spike
         Isolated spikes in the file that this piece is from, as far as they are not masked.
+    extra : mapping of Extra
+        Channels besides those that bristle knows, by name.
 
     Examples
     --------
@@ -101,6 +105,7 @@ class Measurement:
     lost: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     labels: Labels = field(default_factory=dict)
     spikes: tuple[Spike, ...] = ()
+    extra: Mapping[str, Extra] = field(default_factory=dict)
 
     @property
     def step(self) -> float:
@@ -146,6 +151,7 @@ class Measurement:
             channels={key: values[start:stop] for key, values in self.channels.items()},
             measured=self.measured[start:stop],
             lost={key: flags[start:stop] for key, flags in self.lost.items()},
+            extra={key: one.of(slice(start, stop)) for key, one in self.extra.items()},
         )
 
     def digest(self) -> str:
@@ -218,6 +224,7 @@ def measurements_of(
         guesses = guess_channels(table)
         notes += [f"guessed: {guess}" for guess in guesses]
         channels = specs(table, guesses)
+        known = replace(known, extra=found_in(table, [g.column for g in guesses], channels))
     time = _time(table, channels.get("time"))
     units, values = {}, {}
     for channel, spec in channels.items():
@@ -237,8 +244,11 @@ def measurements_of(
         raise RecordError(f"{table.source}: no channel besides time is named. There is nothing.")
     spikes = spikes_of(time, values, mask=known.mask)
     notes += _masked(spikes) if known.mask else []
+    extra = read_extra(table, time, known.extra)
+    if warm is not None:
+        extra = extra.beside(TEMPERATURE, time, warm, channel_unit(TEMPERATURE))
     even = evenly(time, values, table.lines, table.source, table.place)
-    notes += even.notes + _what_is_missing([*values, *known.levels])
+    notes += [*extra.notes, *even.notes, *_what_is_missing([*values, *known.levels])]
     if known.corrections:
         even = _set_right(even, known.corrections)
         notes.append(f"corrected: {'; '.join(one.text for one in known.corrections)}")
@@ -258,7 +268,7 @@ def measurements_of(
             Measurement(
                 name, piece, parts, units, measured, noise, facts, even.sampling, table.source,
                 tuple(notes), labels=labels, spikes=() if known.mask else spikes,
-                lost=fewer.lost[number - 1],
+                lost=fewer.lost[number - 1], extra=extra.at(piece),
             )
         )  # fmt: skip
     return out

@@ -22,19 +22,22 @@ from .experiments import separating
 from .finding import Finding
 from .limits import detectable, untestable
 from .opening import Opening, of_layer
+from .profiled_limits import profiled
 from .remaining_residual import patterns_of, remaining_residual
 from .sites import joinable_at
 
 
-def detailed(found: Finding, opened: Opening) -> Finding:
+def detailed(found: Finding, opened: Opening, *, profile: bool = False) -> Finding:
     """Return a site's finding with limits, patterns, intervals and, where asked for, a next run.
 
     Parameters
     ----------
     found : what the site lacks
     opened : its runs and its model
+    profile : whether the model is fitted again at every limit, see `profiled_limits`
     """
-    found = _with_intervals(_with_patterns(_with_limits(found, opened), opened), opened)
+    found = _with_limits(found, opened, profile)
+    found = _with_intervals(_with_patterns(found, opened), opened)
     return _with_labels(found, opened)
 
 
@@ -55,7 +58,7 @@ def _known(runs: Sequence[Run]) -> list[Labels]:
     return with_levels(runs[0].drive, [run.V for run in runs], [run.labels for run in runs])
 
 
-def _with_limits(found: Finding, opened: Opening) -> Finding:
+def _with_limits(found: Finding, opened: Opening, profile: bool) -> Finding:
     """Return a finding with what the data could not show, and what would tell more."""
     problem, model, rule = opened.searched, opened.before.model, opened.rule
     expected = problem.expectation(model)
@@ -66,10 +69,10 @@ def _with_limits(found: Finding, opened: Opening) -> Finding:
         members = [t.model for t in found.trials if set(t.effects) & set(found.effects)]
         experiment = separating(members, opened.problem)
     found = replace(found, detectable=visible, untestable=tuple(hidden), experiment=experiment)
-    return replace(found, limits=_limits(found, opened))
+    return replace(found, limits=_limits(found, opened, profile))
 
 
-def _limits(found: Finding, opened: Opening) -> tuple[EffectLimit, ...]:
+def _limits(found: Finding, opened: Opening, profile: bool) -> tuple[EffectLimit, ...]:
     """Return how large each further effect may be beside the model that a finding names."""
     if found.kind == "insufficient" or found.after is None:
         return ()
@@ -82,7 +85,8 @@ def _limits(found: Finding, opened: Opening) -> tuple[EffectLimit, ...]:
         for name in _able(found, opened)
         if not any(name == one or exclude(name, one) for one in model.effects)
     ]
-    return effect_limits(known, able, found.untestable)
+    limits = effect_limits(known, able, found.untestable)
+    return profiled(known, limits) if profile else limits
 
 
 def _able(found: Finding, opened: Opening) -> list[str]:

@@ -63,6 +63,7 @@ def diagnose_rig(
     building: Building | None = None,
     *,
     identified: bool = False,
+    profile: bool = False,
     say: Progress = silent,
 ) -> Diagnosis:
     """Return what a rig's model is missing, and at which of its sites.
@@ -75,6 +76,7 @@ def diagnose_rig(
         known, stiffnesses and damping are fitted anew
     identified : whether the law was fitted on this bench before: it is then refined, not sought
         anew; in a building it always is
+    profile : whether the model is fitted again at every limit of an effect
     say : called with a few words at each stage
 
     Raises
@@ -88,7 +90,7 @@ def diagnose_rig(
         runs = BenchRuns(train, holdout, present, identified, say)
     else:
         runs = BuildingRuns(train, holdout, present, building, say)
-    findings = look_at_lines(runs, say)
+    findings = look_at_lines(runs, say, profile=profile)
     runs.correct(findings)
     opened = runs.open_damper()
     if isinstance(opened, Insufficient):
@@ -101,22 +103,28 @@ def diagnose_rig(
         say("intervals")
         # What an instrument explains contradicts nothing.
         settled = excused if excused is not found else contradicted(found, opened)
-        findings[DAMPER] = detailed(runs.beside_other_laws(settled, opened), opened)
+        findings[DAMPER] = detailed(
+            runs.beside_other_laws(settled, opened), opened, profile=profile
+        )
     return conclude(findings, runs.about())
 
 
-def look_at_lines(runs: BenchRuns | BuildingRuns, say: Progress = silent) -> dict[str, Finding]:
+def look_at_lines(
+    runs: BenchRuns | BuildingRuns, say: Progress = silent, *, profile: bool = False
+) -> dict[str, Finding]:
     """Return what the isolation layer and the storeys show, by site; nothing on a bench."""
     findings: dict[str, Finding] = {}
     for name, pair in runs.lines().items():
         say(f"{name}: effects of the structure")
-        findings[name] = _line(name, pair, runs.part(name))
+        findings[name] = _line(name, pair, runs.part(name), profile)
     return findings
 
 
-def _line(name: str, pair: tuple[StructureProblem, StructureProblem], present: Model) -> Finding:
+def _line(
+    name: str, pair: tuple[StructureProblem, StructureProblem], present: Model, profile: bool
+) -> Finding:
     """Return what a layer or storey shows, on its runs for training and held out."""
     found = look_at(name, *pair, present)
     assert found.before is not None
     opened = Opening(found.before, *pair, rule=SITE, scope=IN_BUILDING)
-    return detailed(contradicted(found, opened), opened)
+    return detailed(contradicted(found, opened), opened, profile=profile)

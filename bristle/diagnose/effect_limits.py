@@ -72,8 +72,9 @@ class EffectLimit:
     leaves once law and known effects are fitted again. `named` and `named_share` are those from
     which 9 of 10 verdicts would name the effect, None beyond the parameter's bounds. `coarse`: the
     steps of the integration tell no smaller size, and shares have no meaning. `others` are the
-    values of the effect's other parameters for which all this holds. `why` says why the runs cannot
-    show the effect; the sizes are then None.
+    values of the effect's other parameters for which all this holds, and `moved` says by how much
+    [SI] such an effect moves the model's own parameters in a fit. `profiled`: the model was fitted
+    again at the limit. `why` says why the runs cannot show the effect; the sizes are then None.
     """
 
     effect: str
@@ -87,6 +88,8 @@ class EffectLimit:
     coarse: bool = False
     others: tuple[tuple[str, float], ...] = ()
     why: str = ""
+    moved: tuple[tuple[str, float], ...] = ()
+    profiled: bool = False
 
     def as_dict(self) -> dict[str, Any]:
         """Return what verdict.json holds."""
@@ -96,7 +99,8 @@ class EffectLimit:
             "effect": self.effect, "parameter": self.parameter, "unit": self.unit,
             "side": "above" if self.falls else "below", "limit95": self.largest,
             "share": self.share, "named_from": self.named, "named_share": self.named_share,
-            "coarse": self.coarse, "others": dict(self.others),
+            "coarse": self.coarse, "others": dict(self.others), "moved": dict(self.moved),
+            "profiled": self.profiled,
         }  # fmt: skip
 
 
@@ -128,10 +132,11 @@ def limit_of(sized: Sized) -> EffectLimit:
     kept = float(np.linalg.norm(known.beyond(first)))
     if kept <= ABSORBED * float(np.linalg.norm(first)):
         return EffectLimit(sized.name, why=_why_hidden(sized))
-    least = _resolved(sized, LOOK / kept)
+    least = resolved(sized, LOOK / kept)
     size = _allowed(sized, least)
     coarse = size == least
-    share = float(np.linalg.norm(known.beyond(sized.change(size)))) / known.size
+    change = sized.change(size)
+    share = float(np.linalg.norm(known.beyond(change))) / known.size
     others = tuple(
         (name, sized.model.value(f"{sized.name}.{name}"))
         for name in effect.parameters
@@ -140,7 +145,8 @@ def limit_of(sized: Sized) -> EffectLimit:
     return EffectLimit(
         sized.name, sized.parameter, effect.parameters[sized.parameter].unit, sized.falls,
         sized.value(size), None if coarse else share,
-        *((None, None) if coarse else _named(sized, size)), coarse, others,
+        *((None, None) if coarse else _named(sized, size)), coarse, others, "",
+        known.moved(change),
     )  # fmt: skip
 
 
@@ -151,7 +157,9 @@ def _why_hidden(sized: Sized) -> str:
     if np.linalg.norm(change) > known.rule.silent * known.size and known.search.names:
         alike = np.abs(known.own.T @ change)
         return f"{known.search.names[int(np.argmax(alike))]} of the model takes it up"
-    still = steady(known.problem) and "V" in EFFECTS[sized.name].needs
+    problem = known.problem
+    held = all(steady(problem.of([run])) for run in problem.runs)
+    still = held and "V" in EFFECTS[sized.name].needs
     return "the command does not move" if still else "this motion does not excite it"
 
 
@@ -248,7 +256,7 @@ def _crossing(rising: Callable[[float], float], low: float, high: float) -> floa
     return high
 
 
-def _resolved(sized: Sized, size: float) -> float:
+def resolved(sized: Sized, size: float) -> float:
     """Return a size, raised to where the effect's change grows with it.
 
     Below that the steps of the integration decide: a lag of less than half a sample, a play that

@@ -23,6 +23,9 @@ from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
 
+TOLD = 1e-3
+"""Size of a direction, over the largest, in which the runs tell the model's parameters."""
+
 
 @dataclass(frozen=True)
 class Known:
@@ -59,13 +62,18 @@ class Known:
         return self.counts * self.search.residuals(self.search.start)
 
     @cached_property
+    def _scaled(self) -> tuple[Array, Array]:
+        """What the model's own parameters change (n, p), each column of length one; its length."""
+        if not self.search.names:
+            return np.zeros((len(self.plain), 0)), np.zeros(0)
+        columns: Array = self.counts[:, None] * self.search.sensitivities()
+        lengths = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        return columns / lengths, lengths
+
+    @property
     def own(self) -> Array:
         """What the model's own parameters change (n, p), each column of length one."""
-        if not self.search.names:
-            return np.zeros((len(self.plain), 0))
-        columns: Array = self.counts[:, None] * self.search.sensitivities()
-        columns /= np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
-        return columns
+        return self._scaled[0]
 
     @cached_property
     def basis(self) -> Array:
@@ -91,6 +99,19 @@ class Known:
         """Return what of a change (n,) the model's own parameters do not take up."""
         kept: Array = change - self.basis @ (self.basis.T @ change)
         return kept
+
+    def moved(self, change: Array) -> tuple[tuple[str, float], ...]:
+        """Return by how much [SI] a fit moves the model's own parameters to take up a change (n,).
+
+        Parameters
+        ----------
+        change : of the normalised residuals
+        """
+        search, (columns, lengths) = self.search, self._scaled
+        steps = np.linalg.lstsq(columns, -change, rcond=TOLD)[0] / lengths
+        theta = np.clip(search.start + steps, search.low, search.high)
+        there = search.at(theta)
+        return tuple((name, there.value(name) - self.model.value(name)) for name in search.names)
 
     def scatter(self, direction: Array) -> float:
         """Return the standard deviation of a direction's (n,) product with the residual."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..identify.fit import Model, Problem, Run
+from ..identify.run_labels import at_means
 from ..identify.search_context import Search
 from ..physics.drive import DRIVES, VOLTAGE, Drive
 from .rule import BENCH, DecisionRule
@@ -98,6 +99,7 @@ def separating(models: Sequence[Model], problem: Problem) -> Experiment:
     plans = []
     for plan in _plans(problem):
         run = _run(plan, dt, noise)
+        run = replace(run, extra=at_means([one.extra for one in problem.runs], len(run.x)))
         contrast = _contrast(rivals, run)
         far = contrast * float(np.sqrt(len(run.x)))
         plans.append(replace(plan, contrast=contrast, deviations=far))

@@ -42,6 +42,7 @@ def diagnose_laws(
     building: Building | None = None,
     *,
     named: str = "",
+    profile: bool = False,
     say: Progress = silent,
     rule: DecisionRule = BENCH,
 ) -> Diagnosis:
@@ -53,6 +54,7 @@ def diagnose_laws(
     present : the model as it is; laws have those of its effects that can join them
     building : the building that the damper is in, None for a test bench
     named : the present law with its variant, "" where nobody chose one
+    profile : whether the model is fitted again at every limit of an effect
     say : called with a few words at each stage
     rule : the numbers that decide
 
@@ -63,7 +65,7 @@ def diagnose_laws(
     """
     if building is not None:
         runs = BuildingRuns(train, holdout, present, building, say, free=True)
-        return _in_building(runs, tells_a_bend(train), named, say, rule)
+        return _in_building(runs, tells_a_bend(train), (named, profile), say, rule)
     data = bench_data(train, holdout, present, say)
     if isinstance(data, Insufficient):
         return Diagnosis("insufficient", (), data.reasons, sensors=data.faults, noise=data.noise)
@@ -72,7 +74,7 @@ def diagnose_laws(
     looks = Looks(lambda trial: opened_with(trial, data), say)
     sought = _sought(rows, looks, say, rule)
     finding = contradicted(sought.chosen.finding, sought.opened)
-    finding = detailed(finding, sought.opened)
+    finding = detailed(finding, sought.opened, profile=profile)
     driven = any(run.has(name) for run in (*train, *holdout) for name in DRIVE)
     about = About(sensors=sought.opened.faults, noise=data.noise, driven=driven)
     laws = sought.verdict(named, data.problem, present, rule)
@@ -80,15 +82,19 @@ def diagnose_laws(
 
 
 def _in_building(
-    runs: BuildingRuns, bends: bool, named: str, say: Progress, rule: DecisionRule
+    runs: BuildingRuns, bends: bool, wish: tuple[str, bool], say: Progress, rule: DecisionRule
 ) -> Diagnosis:
-    """Return the law of a building's damper and what it misses, beside what other sites miss."""
+    """Return the law of a building's damper and what it misses, beside what other sites miss.
+
+    `wish` is the present law by name, and whether limits are profiled.
+    """
+    named, profile = wish
     if runs.damper is None:
         raise RecordError(
             "no law of a damper can be sought: the runs have neither its force nor its command."
         )
     present = runs.part(DAMPER)
-    findings = look_at_lines(runs, say)
+    findings = look_at_lines(runs, say, profile=profile)
     if runs.damper[0].reconstructed:  # the building's numbers are asked for with a law at hand
         say("trying every law, with the building as its file has it")
         first = try_laws(*runs.damper, present, bends=bends)
@@ -102,7 +108,7 @@ def _in_building(
     found = sought.chosen.finding
     excused = runs.excused(found, findings)
     settled = excused if excused is not found else contradicted(found, sought.opened)
-    findings[DAMPER] = detailed(settled, sought.opened)
+    findings[DAMPER] = detailed(settled, sought.opened, profile=profile)
     laws = sought.verdict(named, problem, present, rule)
     return replace(conclude(findings, runs.about()), laws=laws)
 

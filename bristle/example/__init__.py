@@ -9,6 +9,10 @@ be found only from the measurements.
     excitation.py motions, ground motions and voltage programmes
     bench.py     a damper under prescribed motion
     tower.py     a base-isolated building on a shake table
+    rigs.py      the numbers of a rig, drawn from its seed
+    recorder.py  the instruments with their noise, and the files
     sealed.py    the answer, kept where nobody reads it by accident
     make.py      files, description and study
+    planned.py   motions and commands of a plan
+    perform.py   the true rig performs a plan
 """

@@ -21,6 +21,8 @@ PLAN = (
     ("holdout_2", "sine", "steps"),
 )
 """Runs: name, motion, voltage."""
+HELD = ("high", "low", "high", "low", "high")
+"""Voltages of the same runs where it is held in each."""
 
 
 def perform(damper: Damper, motion: Motion, volts: Programme, scales: Scales) -> Signals:
@@ -67,15 +69,20 @@ def perform(damper: Damper, motion: Motion, volts: Programme, scales: Scales) ->
     }
 
 
-def plan(scales: Scales, rng: np.random.Generator) -> list[tuple[str, Motion, Programme]]:
-    """Return the runs of an example: names, motions and voltages."""
+def plan(
+    scales: Scales, rng: np.random.Generator, held: bool = False
+) -> list[tuple[str, Motion, Programme]]:
+    """Return the runs of an example: names, motions and voltages, `held` in each or not."""
+    runs = [
+        (name, motion, HELD[k] if held else volts) for k, (name, motion, volts) in enumerate(PLAN)
+    ]
     return [
         (
             name,
             bench_motion(kind, SECONDS, scales.stroke, scales.speed * rng.uniform(0.8, 1.0), rng),
             programme(volts, SECONDS, rng),
         )
-        for name, kind, volts in PLAN
+        for name, kind, volts in runs
     ]
 
 

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 RATE = 500.0
 """Samples per second of every recorder."""
 V_MAX = 8.0  # V
+HELD = {"low": 2.0, "high": 6.0}  # V
 
 
 @dataclass(frozen=True)
@@ -87,7 +88,13 @@ def bench_motion(
 
 
 def programme(kind: str, seconds: float, rng: np.random.Generator) -> Programme:
-    """Return what the voltage does: "steps" between levels, or a "sine" between 0 and 5 V."""
+    """Return what the voltage does.
+
+    "steps" between levels, a "sine" between 0 and 5 V, or held: "low" or "high".
+    """
+    if kind in HELD:
+        level = HELD[kind]
+        return Programme(lambda _t: level)
     if kind == "sine":
         f = rng.uniform(0.5, 1.5)
         return Programme(lambda t: 2.5 * (1.0 + sin(2.0 * pi * f * t)))

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import tempfile
 from dataclasses import dataclass
-from math import sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..data.files import write_whole
 from ..errors import StudyError
@@ -19,24 +17,11 @@ from . import bench, tower
 from .bench import Signals
 from .damper import Damper, in_library_names
 from .hidden import UNITS, Hidden, Scales, Values, choose
+from .recorder import instruments, recorded, write_csv
+from .rigs import CENTRE, draw_damper, draw_frame, scales_of, streams, tower_of
 from .sealed import seal
 
-Array = NDArray[np.float64]
-
-CENTRE = {
-    "bingham": {"Y_0": 1.3, "Y_1": 0.83, "D_0": 100.0, "D_1": 20.0, "w_n": 0.02},
-    "lugre": {"Y_0": 1.3, "Y_1": 0.83, "D_0": 100.0, "D_1": 20.0, "w_n": 0.02, "l": 2e-3,
-              "c": 5.0},
-}  # fmt: skip
-"""Dampers of about 10 N: forces N, N/V; drags N s/m, N s/(m V); speed m/s; length m; N s/m."""
-FORCE, SPEED, STROKE = 10.0, 0.18, 0.02
-MASSES, STIFFNESSES = (1.97, 1.23, 1.23), (1057.0, 1366.0, 1366.0)
-SPREAD = 0.12
-"""Numbers of a rig lie up to this share off the table."""
 LARGEST_NOISE = 0.2
-LAYER = {"spring_5", "rub", "crack_drift", "stop_gap", "stop_k", "brace_gap", "brace_k"}
-"""What is hidden in the building, not in its damper."""
-SHOWN_IN = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
 
 
 @dataclass(frozen=True)
@@ -44,7 +29,8 @@ class Choice:
     """What an example is to be like.
 
     effects: what to hide, by name; drawn where empty. nothing: hide nothing. outside: hide what the
-    library does not have. noise: standard deviation on every channel as a share of its RMS [1].
+    library does not have. held: on a bench the voltage is held in each run, as many laboratories
+    do. noise: standard deviation on every channel as a share of its RMS [1].
     """
 
     effects: tuple[str, ...] = ()
@@ -53,6 +39,7 @@ class Choice:
     seed: int = 1
     nothing: bool = False
     outside: bool = False
+    held: bool = False
 
     def check(self) -> None:
         """Refuse what contradicts itself or cannot be.
@@ -82,10 +69,10 @@ def make_bench(folder: Path | str, choice: Choice) -> Study:
     """
     _check(Path(folder), choice)
     law = choice.law or "bingham"
-    draw, drawn, noise = _streams(choice.seed)
-    values, scales = _values(law, draw), Scales(FORCE, SPEED, STROKE, CENTRE[law]["w_n"])
+    draw, drawn, noise = streams(choice.seed)
+    values, scales = draw_damper(law, draw), scales_of("bench", law)
     hidden, secret = _secret("bench", law, choice, scales, drawn)
-    plan = bench.plan(scales, draw)
+    plan = bench.plan(scales, draw, choice.held)
     damper, bare = Damper(law, values, secret), Damper(law, values)
     runs = [bench.perform(damper, motion, volts, scales) for _, motion, volts in plan]
     plain = [bench.perform(bare, motion, volts, scales) for _, motion, volts in plan]
@@ -93,7 +80,9 @@ def make_bench(folder: Path | str, choice: Choice) -> Study:
         "values": _with_units(secret), "base": in_library_names(law, values),
         "share": bench.share(runs, plain),
     }  # fmt: skip
-    shown = _recorded(dict(zip([name for name, *_ in plan], runs, strict=True)), choice, noise)
+    shown = dict(zip([name for name, *_ in plan], runs, strict=True))
+    answer["instruments"] = instruments(shown, choice.noise)
+    shown = _with_noise(shown, answer, noise)
     return _written(Path(folder), shown, answer, DESCRIBED["bench"], "A damper on a bench")
 
 
@@ -115,24 +104,19 @@ def make_building(folder: Path | str, choice: Choice, *, load_cell: bool = True)
             "lugre is right."
         )
     law = "lugre"
-    draw, drawn, noise = _streams(choice.seed)
-    values = _values(law, draw)
-    frame = tower.frame(_spread(MASSES, draw), _spread(STIFFNESSES, draw))
-    # Storeys drift by about 3 mm where the base moves by half the stroke.
-    scales = Scales(FORCE, SPEED, STROKE, CENTRE[law]["w_n"], drift=5e-3)
-    hidden, secret = _secret("building", law, choice, scales, drawn)
-    layer = {name: value for name, value in secret.items() if name in LAYER}
-    inner = {name: value for name, value in secret.items() if name not in LAYER}
-    rig = tower.Tower(frame, Damper(law, values, inner), layer, scales)
-    plain = tower.Tower(frame, Damper(law, values), {}, scales)
+    draw, drawn, noise = streams(choice.seed)
+    values, frame = draw_damper(law, draw), draw_frame(draw)
+    hidden, secret = _secret("building", law, choice, scales_of("building", law), drawn)
+    rig, plain = (tower_of(frame, law, values, one) for one in (secret, {}))
     plan = tower.plan(plain, draw)
     runs = {name: rig.perform(ground, volts) for name, ground, volts in plan}
     if not load_cell:
         runs = {name: _without(run, "force") for name, run in runs.items()}
     answer = _answer("building", law, choice, hidden) | {
         "values": _with_units(secret), "base": in_library_names(law, values),
+        "instruments": instruments(runs, choice.noise),
     }  # fmt: skip
-    shown = _recorded(runs, choice, noise)
+    shown = _with_noise(runs, answer, noise)
     text = DESCRIBED["building"] if load_cell else DESCRIBED["building"].replace(CELL, NO_CELL)
     return _written(
         Path(folder), shown, answer, text, "A building on a shake table", _building_file(frame)
@@ -148,21 +132,6 @@ def _check(folder: Path, choice: Choice) -> None:
 
 def _without(run: Signals, channel: str) -> Signals:
     return {name: x for name, x in run.items() if name != channel}
-
-
-def _streams(seed: int) -> list[np.random.Generator]:
-    """Return what draws the rig and its runs, what is hidden, and the noise."""
-    return [np.random.default_rng(one) for one in np.random.SeedSequence(seed).spawn(3)]
-
-
-def _spread(centre: tuple[float, ...], rng: np.random.Generator) -> Array:
-    return np.array(centre) * (1.0 + rng.uniform(-SPREAD, SPREAD, len(centre)))
-
-
-def _values(law: str, rng: np.random.Generator) -> Values:
-    table = CENTRE[law]
-    spread = _spread(tuple(table.values()), rng)
-    return dict(zip(table, spread.tolist(), strict=True))
 
 
 def _secret(
@@ -194,41 +163,10 @@ def _with_units(values: Values) -> dict[str, tuple[float, str]]:
     return {name: (value, UNITS[name]) for name, value in values.items()}
 
 
-def _recorded(
-    runs: dict[str, Signals], choice: Choice, rng: np.random.Generator
+def _with_noise(
+    runs: dict[str, Signals], answer: dict[str, Any], rng: np.random.Generator
 ) -> dict[str, Signals]:
-    """Return the runs with white noise on every channel but the time."""
-    first = next(iter(runs.values()))
-    spread = {
-        name: choice.noise * sqrt(np.mean([np.mean(run[name] ** 2) for run in runs.values()]))
-        for name in first
-        if name != "time"
-    }
-    return {
-        name: run
-        | {key: run[key] + s * rng.standard_normal(run[key].size) for key, s in spread.items()}
-        for name, run in runs.items()
-    }
-
-
-def _unit(channel: str) -> str:
-    """Return the SI unit of a channel."""
-    plain = {"time": "s", "voltage": "V", "force": "N"}
-    kinds = {"displacement": "m", "velocity": "m/s", "acceleration": "m/s2", "absolute": "m/s2"}
-    return plain.get(channel) or kinds[channel.rsplit("_", 1)[-1]]
-
-
-def _write_csv(path: Path, run: Signals) -> None:
-    """Write one run as the recorder of a laboratory would: millimetres and newtons."""
-    titles, columns = [], []
-    for name, x in run.items():
-        factor, unit = SHOWN_IN.get(_unit(name), (1.0, _unit(name)))
-        titles.append(f"{name} [{unit}]")
-        columns.append(factor * x)
-    np.savetxt(
-        path, np.stack(columns, axis=1), fmt="%.6g", delimiter=",", header=",".join(titles),
-        comments="",
-    )  # fmt: skip
+    return {name: recorded(run, answer["instruments"], rng) for name, run in runs.items()}
 
 
 def _building_file(frame: tower.Frame) -> str:
@@ -249,7 +187,7 @@ def _written(
     with tempfile.TemporaryDirectory(prefix="bristle_example_") as name:
         place = Path(name)
         for run, signals in runs.items():
-            _write_csv(place / f"{run}.csv", signals)
+            write_csv(place / f"{run}.csv", signals)
         drawing = place / "building.toml"
         if building:
             drawing.write_text(building, encoding="utf-8")

@@ -26,7 +26,8 @@ def seal(folder: Path, answer: Mapping[str, Any]) -> None:
     answer : mapping
         `rig`, `law`, `noise`, `seed`, `hidden` (names), `about` (name to words), `values`
         (name to value in SI and unit), `base` (the law's values by the library's names, SI),
-        `share`, where it is known, [1].
+        `share`, where it is known, [1]; `instruments` (channel to the noise's standard deviation
+        in SI).
     """
     code = base64.b64encode(json.dumps(answer).encode()).decode()
     (folder / FILE).parent.mkdir(exist_ok=True)

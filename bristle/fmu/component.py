@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from ..physics.drive import VOLTAGE, declared_for, state_for, text_for, unit_for
-from ..physics.effect import Parameter, effects_of
+from ..physics.effect import Effect, Parameter, effects_of
 from .slave import STEPPING, Slave
 
 
@@ -20,13 +20,14 @@ class EffectSlave(Slave):
 
     def add_effects(self, site: str, law: str = "") -> None:
         """Declare `EFFECT.on`, `EFFECT.PARAMETER`, `EFFECT.STATE_0` for the effects of a site."""
-        own = self.baked.get("own", [])  # a user's, in this process; an FMU's are its library's
         self._called: dict[str, str] = {}
-        self._effects = tuple(e for e in effects_of(site, law) if not e.own or e.name in own)
+        self._effects = self.offered(site, law)
         for effect in self._effects:
             about = text_for(effect.first_line(), self.drive)
             self.add_parameter(effect.name + ".on", False, None, about)
             for name, parameter in effect.parameters.items():
+                if name in effect.channels:
+                    continue  # an input
                 self.add_physical(f"{effect.name}.{name}", declared_for(parameter, self.drive))
             for name, unit in effect.states.items():
                 called = state_for(name, self.drive)
@@ -35,6 +36,11 @@ class EffectSlave(Slave):
                 if called != name:
                     self._called[start] = f"{effect.name}.{name}_0"
                 self.add_parameter(start, 0.0, unit_for(unit, self.drive), text)
+
+    def offered(self, site: str, law: str = "") -> tuple[type[Effect], ...]:
+        """Return the effects that the component offers at a site."""
+        own = self.baked.get("own", [])  # a user's, in this process; an FMU's are its library's
+        return tuple(e for e in effects_of(site, law) if not e.own or e.name in own)
 
     def add_physical(self, name: str, parameter: Parameter) -> None:
         """Declare a parameter of a law or effect."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from ..component import HELD, damper
-from ..physics.drive import declared_for, drive_named, text_for, unit_for
+from ..physics import damper as laws
+from ..physics.drive import Drive, declared_for, drive_named, text_for, unit_for
 from ..physics.laws import LAWS
 from .component import ComponentSlave
 
@@ -15,6 +16,16 @@ _ABOUT = {
     "duty": "duty cycle of the amplifier",
     "field": "flux density in the gap",
 }
+
+
+def input_of(channel: str, law: str, drive: Drive) -> str:
+    """Return what the input for a measured channel is called.
+
+    As the channel, but where the damper of a law under a command has a parameter of that name.
+    """
+    own = LAWS[law]
+    taken = {*own.parameters, *(f"{state}_0" for state in own.states), drive.limit}
+    return f"measured_{channel}" if channel in taken else channel
 
 
 class DamperSlave(ComponentSlave):
@@ -37,6 +48,7 @@ class DamperSlave(ComponentSlave):
         text = "acceleration of the rod; else from differences of velocity"
         self.add_input("acceleration", "m/s2", text, over_step=HELD, optional=True)
         follows = ["displacement", "velocity", drive.name, "holding_force", "acceleration"]
+        follows += self._add_channels()
         text = "force on the structure, positive against +x"
         jumps = "holding_force" if LAWS[self.law].has("sign") else ""
         self.add_output("force", "N", text, depends=follows, nominal=10.0, jumps_without=jumps)
@@ -57,12 +69,38 @@ class DamperSlave(ComponentSlave):
             self.add_parameter(f"{name}_0", 0.0, unit_for(unit, drive), text)
         self.add_effects("damper", self.law)
 
+    def _add_channels(self) -> list[str]:
+        """Declare an input for each channel that effects follow; return their names."""
+        self.following: dict[str, list[str]] = {}
+        self._tracks: list[tuple[int, int]] = []
+        for effect in self.offered("damper", self.law):
+            for parameter, channel in effect.channels.items():
+                name = input_of(channel, self.law, self.drive)
+                if name not in self.following:
+                    known = effect.parameters[parameter]
+                    text = f"{channel.replace('_', ' ')}, which effects of the damper follow"
+                    self.add_input(
+                        name, known.unit, text, over_step=HELD, start=known.value, optional=True
+                    )
+                self.following.setdefault(name, []).append(f"{effect.name}.{parameter}")
+        return [*self.following]
+
     def setup(self) -> tuple[Any, list[float], int]:
         self._acceleration = self._index["acceleration"]
         measured = self._acceleration in self._set
         values = self.numbers()
         values["v_max"] = values[self.drive.limit]  # what the functions call any limit
+        self._tracks = [
+            (laws.SLOTS.parameters[parameter], self._index[name])
+            for name, parameters in self.following.items()
+            for parameter in parameters
+        ]
         return damper.setup(self.law, values, self.effects_on(), measured)
+
+    def _take_channels(self) -> None:
+        """Let parameters that follow a channel have its newest value."""
+        for slot, index in self._tracks:
+            self.constants.setup.p[slot] = self._values[index]
 
     def _bind(self) -> None:
         """Take the acceleration for measured from the moment on at which a host sets it."""
@@ -71,9 +109,11 @@ class DamperSlave(ComponentSlave):
     def advance(self, time: float, step: float) -> None:
         if (self._acceleration in self._set) is not self.constants.measured:
             self._bind()
+        self._take_channels()
         super().advance(time, step)
 
     def refresh(self) -> None:
         if (self._acceleration in self._set) is not self.constants.measured:
             self._bind()
+        self._take_channels()
         super().refresh()

@@ -249,6 +249,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def _add(self, variable: Any, value: Any, unit: str | None) -> int:
         name = variable.name
+        if name in self._index:
+            raise TypeError(f"{type(self).__name__}: {name!r} is declared twice.")
         index = len(self._values)
         self._values.append(value)
         self._index[name] = index

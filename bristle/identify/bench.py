@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from threading import Lock
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ law_step = damper.step_law
 
 
 _ONE_AT_A_TIME = Lock()
+_NO_TRACKS: Mapping[str, Array] = MappingProxyType({})
 
 
 def before_jump(V: Any, k: int) -> float:
@@ -40,15 +42,26 @@ def before_jump(V: Any, k: int) -> float:
     return V[k - 1] if abs(V[k] - V[k - 1]) > change else V[k]  # type: ignore[no-any-return]
 
 
-def force_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: Any) -> None:
+class Tracks(NamedTuple):
+    """Parameters that follow a channel: their `slots` (k,) in `p`, and `values` (k, n) in SI."""
+
+    slots: Any
+    values: Any
+
+
+def force_history(
+    setup: Setup, motion: Inputs, tracks: Tracks, z: Any, z1: Any, work: Any, out: Any
+) -> None:
     """Fill `out` (n,) with the force at each sample of a motion that is linear between them.
 
-    So is the voltage, but where it jumps: see `before_jump`.
+    So is the voltage, but where it jumps: see `before_jump`. A parameter that follows a channel has
+    its newest value over each step.
 
     Parameters
     ----------
     setup : the damper, its parameters in SI
     motion : x, v, a, V as (n,) [m, m/s, m/s2, V] and the step dt [s]
+    tracks : parameters that change over the run, set in `setup.p`
     z : (states,) at the begin, moved on in place
     z1 : room for as many states
     work : room for `damper.work_size()` floats
@@ -57,9 +70,13 @@ def force_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out:
     size = len(z)
     x, v, a, V, dt = motion.x, motion.v, motion.a, motion.V, motion.dt
     energy = 0.0
+    for i in range(len(tracks.slots)):
+        setup.p[tracks.slots[i]] = tracks.values[i, 0]
     now = Inputs(x[0], v[0], a[0], V[0], dt, 0.0, 0.0, False)
     out[0] = damper_evaluate(setup, now, z, work[0:size], work[size : 2 * size])[0]
     for k in range(1, len(x)):
+        for i in range(len(tracks.slots)):
+            setup.p[tracks.slots[i]] = tracks.values[i, k]
         V1 = before_jump(V, k)
         begin = Inputs(x[k - 1], v[k - 1], a[k - 1], V[k - 1], dt, energy, 0.0, False)
         now = Inputs(x[k], v[k], a[k], V1, dt, energy, 0.0, False)
@@ -72,7 +89,9 @@ def force_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out:
             z[i] = z1[i]
 
 
-def law_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: Any) -> None:
+def law_history(
+    setup: Setup, motion: Inputs, tracks: Tracks, z: Any, z1: Any, work: Any, out: Any
+) -> None:
     """Do what `force_history` does where no effect is on, without the code of any effect.
 
     A law knows the voltage of its own moment only, so a jump needs no care, but where its command
@@ -81,7 +100,7 @@ def law_history(setup: Setup, motion: Inputs, z: Any, z1: Any, work: Any, out: A
     Parameters
     ----------
     setup, motion, z, z1, out : as in `force_history`
-    work : not needed here
+    tracks, work : not needed here
     """
     law, p = setup.law, setup.p
     x, v, a, V, dt = motion.x, motion.v, motion.a, motion.V, motion.dt
@@ -145,8 +164,9 @@ class Bench:
         self._history = compiled_history(self._setup.active)
 
     def force(
-        self, x: Array, v: Array, a: Array, V: Array, dt: float, values: dict[str, float]
-    ) -> Array:
+        self, x: Array, v: Array, a: Array, V: Array, dt: float, values: dict[str, float],
+        tracks: Mapping[str, Array] = _NO_TRACKS,
+    ) -> Array:  # fmt: skip
         """Return the force (n,) [N] for a motion and a voltage.
 
         Parameters
@@ -156,6 +176,7 @@ class Bench:
         dt : sampling step [s]
         values : parameters by name in SI; missing ones take their defaults. The start values of
             states end in `_0`; those that start with a signal take its first value
+        tracks : (n,) in SI by name, of parameters of effects that change over the run
         """
         setup = self._setup._replace(p=np.array(damper.pack(self.law, values)))
         first = {"x": x[0], "v": v[0], "a": a[0], "V": V[0]}
@@ -170,7 +191,13 @@ class Bench:
         z = np.array(damper.start_states(self.law, {**initial, **values}))
         out = np.empty(len(x))
         motion = Inputs(x, v, a, V, dt, 0.0, 0.0, False)
-        self._history(setup, motion, z, np.zeros_like(z), np.zeros(damper.work_size()), out)
+        slots = [damper.SLOTS.parameters[name] for name in tracks]
+        changing = Tracks(
+            np.array(slots, dtype=np.int64),
+            np.array(list(tracks.values()), dtype=float).reshape(len(slots), len(x)),
+        )
+        work = np.zeros(damper.work_size())
+        self._history(setup, motion, changing, z, np.zeros_like(z), work, out)
         return out
 
 

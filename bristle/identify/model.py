@@ -1,5 +1,7 @@
 """Runs, models, and how a model predicts a run and what it cannot know of it."""
 
+# Longer than 300 lines: what a model is, and what it predicts of a run, stand together.
+
 from __future__ import annotations
 
 from collections.abc import Mapping
@@ -9,14 +11,16 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.extra import Extra
 from ..data.labels import Label
 from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import AT, EFFECTS, Effect, effects_of, plain_name
 from ..physics.laws import LAWS, Law
 from ..physics.parameter import CHOICES, Parameter
+from .begin import carrying_state, start_under_load
 from .bench import Bench
 from .instruments import earlier, pure_delay, shown_force, true_motion
-from .run_labels import told_by, values_of_labels
+from .run_labels import at_means, told_by, tracks_of, values_of_labels
 
 Array = NDArray[np.float64]
 
@@ -41,7 +45,9 @@ class Run:
     `x`, `v`, `a`, `V`, `force` (n,) in SI, evenly spaced by `dt` [s]; `noise` the force channel's
     standard deviation [N]; `draws` (d, n, 4) draws of the error of x, v, a, V; `measured` (n,)
     False where a sample was filled in, None if none was. `drive` is the channel that V holds, in
-    its own unit; `labels` what is known of the whole run, such as a temperature.
+    its own unit; `labels` what is known of the whole run, such as a temperature; `rest` how many
+    samples at its begin the damper rests under load, 0 where it does not; `extra` its channels
+    besides those that bristle knows.
     """
 
     name: str
@@ -57,13 +63,17 @@ class Run:
     measured: NDArray[np.bool_] | None = None
     drive: str = "voltage"
     labels: Mapping[str, Label] = field(default_factory=dict)
+    rest: int = 0
+    extra: Mapping[str, Extra] = field(default_factory=dict)
 
     def of(self, part: slice) -> Self:
         """Return the run with these of its samples; `dt` and `skip` stay what they were."""
+        rest = 0 if part.start else len(range(self.rest)[part])
         return replace(
-            self, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
+            self, rest=rest, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
             force=self.force[part], draws=self.draws[:, part],
             measured=None if self.measured is None else self.measured[part],
+            extra={name: one.of(part) for name, one in self.extra.items()},
         )  # fmt: skip
 
 
@@ -142,6 +152,17 @@ class Problem:
     def _made_of(self, runs: list[Run]) -> Problem:
         return Problem(runs)
 
+    def planned(self, runs: list[Run]) -> Problem:
+        """Return a problem for runs that were not measured yet: this rig's sizes are theirs.
+
+        So are the means of its extra channels.
+        """
+        own = [run.extra for run in self.runs]
+        made = self.of([replace(run, extra=at_means(own, len(run.x))) for run in runs])
+        self.size("N")
+        made._sizes, made._benches = self._sizes, self._benches
+        return made
+
     def with_free_zero(self) -> Problem:
         """Return the same runs with the force's zero fitted along with every model."""
         made = self.of(self.runs)
@@ -160,10 +181,22 @@ class Problem:
         ]
 
     def tells(self, effect: type[Effect]) -> bool:
-        """Return whether the runs have the labels that an effect takes, and differ in them."""
+        """Return whether the runs have what an effect takes of them, and differ in it.
+
+        Labels of whole runs, and channels besides those that bristle knows.
+        """
+        if not all(self._moves(channel) for channel in effect.channels.values()):
+            return False
         names = {*effect.labels.values(), *effect.label_means.values()}
         known = [self._numbers(name) for name in names]
         return all(len({*one}) > 1 and max(one) - min(one) >= effect.label_span for one in known)
+
+    def _moves(self, channel: str) -> bool:
+        """Return whether all runs have an extra channel, and it varies in them."""
+        if not self.runs or not all(channel in run.extra for run in self.runs):
+            return False
+        values = np.concatenate([run.extra[channel].values for run in self.runs])
+        return float(np.ptp(values)) > 0.0
 
     def _numbers(self, label: str) -> list[float]:
         """Return the numbers of a label, one per run; none where a run lacks it."""
@@ -200,6 +233,30 @@ class Problem:
 
     def predict(self, model: Model, run: Run, draw: int | None = None) -> Array:
         """Return the model's force (n,) [N] for a run, or for one draw of its motion."""
+        carrying = self.carrying(model, run)
+        if carrying:
+            model = replace(model, values={**model.values, **carrying})
+        return self._force(model, run, draw)
+
+    def carrying(self, model: Model, run: Run) -> dict[str, float]:
+        """Return the start value of the state that carries the load of a run at rest, by name.
+
+        Nothing where the run does not begin so, or no state of the model does.
+        """
+        if not run.rest:
+            return {}
+        part = run.of(slice(0, run.rest))
+        late = slice(run.rest // 2, None)  # a series element has settled by then
+
+        def settled(start: Mapping[str, float]) -> float:
+            begun = replace(model, values={**model.values, **start})
+            return float(np.mean(self._force(begun, part)[late]))
+
+        load, stroke = float(np.mean(part.force[late])), float(np.ptp(run.x))
+        return start_under_load(carrying_state(model.law, model.effects), load, stroke, settled)
+
+    def _force(self, model: Model, run: Run, draw: int | None = None) -> Array:
+        """Return the model's force (n,) [N] for a run, its states beginning as the model says."""
         x, v, a, V = run.x, run.v, run.a, run.V
         if draw is not None:
             e = run.draws[draw]
@@ -209,7 +266,8 @@ class Problem:
         late, values = pure_delay(model.effects, {**model.values, **own} if own else model.values)
         if late > 0.0:
             x, v, a, V = earlier((x, v, a, V), late, run.dt)
-        force = self.bench(model).force(x, v, a, V, run.dt, values)
+        tracks = tracks_of(model.effects, run.extra, run.name)
+        force = self.bench(model).force(x, v, a, V, run.dt, values, tracks)
         return shown_force(model.effects, values, force, run.dt)
 
     def expectation(self, model: Model, draws: int = 12) -> list[tuple[Array, Array, Array]]:

@@ -9,6 +9,7 @@ from ..data.derived import derived_velocity
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.drive import VOLTAGE
+from .begin import begin_of
 from .drive import smooth_drive
 from .fit import Run
 from .smooth import posterior_draws, smooth
@@ -17,27 +18,6 @@ Array = NDArray[np.float64]
 
 SHORTEST = 200
 """Fewest samples of a run that a fit makes sense of."""
-
-SETTLING = 25
-"""Samples at the begin of a run that are not judged."""
-
-RESTS = 2e-3
-"""Share of the stroke that a damper at rest moves by at most: noise."""
-
-STANDS = 0.2
-"""Time [s] for which it does: a motion that begins gently is faster."""
-
-LOADED = 0.2
-"""Share of its RMS that the force has at the begin of a rest under load."""
-
-MOST = 5
-"""What part of a run this may cost at most: one in so many samples."""
-
-FORGOTTEN = 0.5
-"""Path, as a share of the stroke, after which the damper forgets how such a run began."""
-
-COARSE = 0.05
-"""Step [s] in which the path is followed: noise would lengthen it sample by sample."""
 
 
 def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
@@ -79,28 +59,12 @@ def prepare(measurement: Measurement, draws: int = 24, seed: int = 0) -> Run:
     needed = ("force", drive, *(alone if len(alone) == 1 else ()))
     known = measurement.valid(*needed)
     force = measurement["force"]
+    begin = begin_of(motion.x, force, dt)
     return Run(
         measurement.name, dt, motion.x, motion.v, motion.a, V, force,
-        _noise_of_force(measurement), error, _begin(motion.x, force, dt),
-        None if known.all() else known, drive or VOLTAGE.name, measurement.labels,
+        _noise_of_force(measurement), error, begin.first, None if known.all() else known,
+        drive or VOLTAGE.name, measurement.labels, begin.rest, measurement.extra,
     )  # fmt: skip
-
-
-def _begin(x: Array, force: Array, dt: float) -> int:
-    """Return the first sample that is judged.
-
-    A run that begins in motion, or at rest under load, was cut out of a longer one: what elastic
-    parts hold is not known, until the motion has passed them.
-    """
-    span = float(np.ptp(x))
-    rms = float(np.sqrt(np.mean(force**2)))
-    rests = float(np.ptp(x[: max(SETTLING, round(STANDS / dt))])) <= RESTS * span
-    if rests and abs(float(np.mean(force[:SETTLING]))) <= LOADED * rms:
-        return SETTLING
-    every = max(1, round(COARSE / dt))
-    passed = np.cumsum(np.abs(np.diff(x[::every]))) > FORGOTTEN * span
-    first = every * (1 + int(np.argmax(passed))) if passed.any() else len(x)
-    return min(max(SETTLING, first), max(SETTLING, len(x) // MOST))
 
 
 def _seen(measurement: Measurement, channel: str) -> Array | None:

@@ -12,6 +12,7 @@ jump together; their noise is white and known.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from ..data.extra import Extra
 from ..data.labels import Labels
 from ..data.measurement import Measurement
 from ..errors import RecordError
@@ -45,7 +47,7 @@ class Response:
     standard deviations; `std` (levels, 3) what the smoother leaves uncertain of x, v and relative
     acceleration; `draws` (levels, d, n, 3) draws of that error; `V_left` the noise left on V;
     `drive` the channel that V holds, in its own unit, "" where none was measured; `labels` what is
-    known of the whole run.
+    known of the whole run; `extra` its channels besides those that bristle knows.
     """
 
     name: str
@@ -65,6 +67,7 @@ class Response:
     V_left: float
     drive: str = ""
     labels: Labels = field(default_factory=dict)
+    extra: Mapping[str, Extra] = field(default_factory=dict)
 
     @property
     def driven(self) -> bool:
@@ -227,7 +230,7 @@ def _response(
         a, m["ground_acceleration"], m["force"] if m.has("force") else None, V, noise_a,
         m.noise.get("force", 0.0), m.noise.get("ground_acceleration", 0.0), np.array(own),
         np.array([level["std"] for level in levels]),
-        np.array([error[:, :n] for error in errors]), left, drive, m.labels,
+        np.array([error[:, :n] for error in errors]), left, drive, m.labels, m.extra,
     )  # fmt: skip
 
 

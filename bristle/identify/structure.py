@@ -165,10 +165,13 @@ def structure_run(
 
 
 def _of(response: Response, run: StructureRun) -> StructureRun:
-    """Return a run with what is known of its measurement: its command and its labels."""
+    """Return a run with what is known of its measurement: command, labels, extra channels."""
     known: dict[str, Any] = {"drive": response.drive or VOLTAGE.name, "labels": response.labels}
-    whole = None if run.whole is None else replace(run.whole, **known)
-    return replace(run, whole=whole, **known)
+    whole = None if run.whole is None else replace(run.whole, extra=response.extra, **known)
+    extra = {
+        name: replace(one, values=one.values[run.keep]) for name, one in response.extra.items()
+    }
+    return replace(run, whole=whole, extra=extra, **known)
 
 
 def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
@@ -177,12 +180,7 @@ def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
     for run in problem.runs:
         assert isinstance(run, StructureRun)
         part = slice(run.skip, None, stride)
-        runs.append(
-            replace(
-                run, x=run.x[part], v=run.v[part], a=run.a[part], V=run.V[part],
-                force=run.force[part], draws=run.draws[:, part], skip=0, keep=run.keep[part],
-            )
-        )  # fmt: skip
+        runs.append(replace(run.of(part), skip=0, keep=run.keep[part]))
     return problem.of([*runs])
 
 

@@ -144,6 +144,10 @@ class Effect:
         the labels of `[[runs]]` in study.toml. The one is the run's own number, the other the mean
         of the training runs. No fit moves them, so `assumed` names them, too. The effect is tried
         where all runs have the labels and differ in them, by `label_span` at the least.
+    channels
+        Parameters of an effect of the damper that follow a channel measured beside motion, command
+        and force: {parameter: name in [extra] of study.toml}. No fit moves them, so `assumed` names
+        them, too. The effect is tried where all runs have the channel; an FMU has it as an input.
     contact
         Its `force` is dry friction, which carries what holds the motion (`q.halt`), or the push of
         a stop. In a structure it is found together with the motion, whatever its stiffness, and
@@ -243,6 +247,7 @@ class Effect:
     labels: ClassVar[dict[str, str]] = {}
     label_means: ClassVar[dict[str, str]] = {}
     label_span: ClassVar[float] = 0.0
+    channels: ClassVar[dict[str, str]] = {}
     contact: ClassVar[bool] = False
     shows: ClassVar[str] = "force"
     own: ClassVar[bool] = False

@@ -33,6 +33,7 @@ FIELDS = {
     **dict.fromkeys(("sites", "excludes", "start_ties", "mimics", "faults"), TEXTS),
     **dict.fromkeys(("contact", "passive", "zero_at_rest"), SWITCH),
     **dict.fromkeys(("states", "starts", "lookalikes", "labels", "label_means"), TEXT_BY_NAME),
+    "channels": TEXT_BY_NAME,
     **dict.fromkeys(("start_grid", "start_limits"), ANY_BY_NAME),
     "parameters": PARAMETERS,
     "tables": TABLES,
@@ -92,6 +93,16 @@ def check_search(effect: type[Effect], where: str) -> None:
     told = [name for name in (*effect.labels, *effect.label_means) if name not in effect.assumed]
     if told:
         raise PhysicsError(f"{where}: labels names {told}, which assumed must name as well.")
+    told = [n for n in effect.channels if n not in effect.assumed or n not in effect.parameters]
+    if told:
+        raise PhysicsError(
+            f"{where}: channels names {told}; parameters that assumed names as well are right."
+        )
+    if effect.channels and effect.sites != ("damper",):
+        raise PhysicsError(f"{where}: channels are what an effect of the damper alone may follow.")
+    wrong = [name for name in effect.channels.values() if not name.isidentifier()]
+    if wrong:
+        raise PhysicsError(f"{where}: channels names {wrong}; letters, digits and _ are right.")
     if effect.start_grid and effect.start_shares:
         raise PhysicsError(f"{where}: start_grid or start_shares is right, not both.")
     for name, limits in effect.start_limits.items():

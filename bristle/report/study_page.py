@@ -18,6 +18,7 @@ from ..study.run_file import TEST
 from ..study.staircase import HistoryStep, history_steps
 from .reproduce import commands
 from .study_curves import curves_section
+from .study_plan import plan_section
 from .study_tables import data_table, data_words, parameter_table, run_errors
 from .study_verdict import untold_section, verdict_section
 
@@ -138,6 +139,7 @@ def render(content: Content) -> str:
         _parameters(content),
         _data(content),
         untold_section(content.verdict),
+        plan_section(study),
         _reproduce(content),
     ]
     foot = (

@@ -256,6 +256,11 @@ def configured(component: Component, scenario: Scenario) -> Slave:
         slave.configure()
     except (ValueError, OSError, RuntimeError) as error:
         raise ScenarioError(f"{scenario.file} [components.{component.name}]: {error}") from error
+    if following := getattr(slave, "following", {}):
+        raise ScenarioError(
+            f"{scenario.file} [components.{component.name}]: an effect follows "
+            f"{', '.join(following)}, which is not compiled. Run it with the engine fmu."
+        )
     return slave
 
 

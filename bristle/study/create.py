@@ -15,10 +15,14 @@ from .study import Study
 
 @dataclass(frozen=True)
 class Created:
-    """A study that was made: what was guessed, what was left out, and what to know."""
+    """A study that was made: what was guessed, what was left out, and what to know.
+
+    `extra` are the channels besides those that bristle knows, by name.
+    """
 
     study: Study
     guesses: tuple[Guess, ...]
+    extra: Mapping[str, ChannelSpec]
     unused: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -67,4 +71,4 @@ def create_study(
         Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law,
         runs=runs,
     )  # fmt: skip
-    return Created(Study(folder), made.guesses, made.unused, made.notes)
+    return Created(Study(folder), made.guesses, made.extra, made.unused, made.notes)

@@ -6,7 +6,6 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date
-from itertools import product
 from keyword import iskeyword
 from pathlib import Path
 from typing import Any
@@ -14,9 +13,8 @@ from typing import Any
 from ..compare.names import site_name
 from ..diagnose.bench import BenchRuns
 from ..diagnose.equilibrium import BuildingRuns
-from ..diagnose.learned.along import ALONG
 from ..diagnose.learned.closed import ClosedForm, closed_forms, in_words, name_of
-from ..diagnose.learned.curve import Curve, may_change, parts_at
+from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.effect_file import effect_text
 from ..diagnose.learned.fit import Closed, LearnedCurve, close, learn
 from ..diagnose.learned.place import Place
@@ -28,6 +26,7 @@ from ..physics.effect import EFFECTS
 from ..progress import tell
 from ..quantity import plain, quantity
 from ..trust import remember_made
+from .curve_options import refuse_elsewhere
 from .curve_picture import curve_png
 from .identification import as_model
 from .rig import building_of
@@ -187,7 +186,7 @@ def learn_effect(
     if name in EFFECTS or (study.effects_folder / f"{name}.py").exists():
         raise StudyError(f'an effect is named "{name}" already. Another name is right.')
     site, opened = _opened(study, at)
-    refuse_elsewhere(parts, along, Place(site))
+    refuse_elsewhere(parts, along, Place(site), study.settings.beside)
     found = learn(opened, name, parts=parts, along=along)
     told = site if study.settings.has_building else ""
     if found.refused or found.curve is None:
@@ -199,31 +198,6 @@ def learn_effect(
         forms = (closed.form, *(one for one in forms if one is not closed.form))
     learned = LearnedEffect(found, forms, closed, site=told)
     return _written(study, learned, found.curve) if write else learned
-
-
-def refuse_elsewhere(parts: Sequence[str], along: Sequence[str], place: Place) -> None:
-    """Refuse parts and signals that curves do not have at a place.
-
-    Raises
-    ------
-    StudyError
-        Naming what there is.
-    """
-    there = parts_at(place)
-    signals = [one.name for one in ALONG.values() if place.offers(one.needs)]
-    for asked, known, option in ((parts, list(there), "--as"), (along, signals, "--along")):
-        wrong = [one for one in asked if one not in known and one not in there]
-        if wrong:
-            raise StudyError(
-                f"{option}: {site_name(place.name)} has no {', '.join(wrong)}; there are "
-                f"{', '.join(known)}."
-            )
-    pairs = product(parts or there, along or [*signals, *there])
-    if not any(may_change(*pair, place) for pair in pairs):
-        raise StudyError(
-            f"--as {','.join(parts)} --along {','.join(along)}: at {site_name(place.name)} no such "
-            "part is learned along such a signal. Leave one of the two options out."
-        )
 
 
 def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffect:

@@ -66,6 +66,10 @@ class DataCheck:
                         channel: [float(values.min()), float(values.max())]
                         for channel, values in run.channels.items()
                     },
+                    "extra": {
+                        name: [float(one.values.min()), float(one.values.max()), one.unit]
+                        for name, one in run.extra.items()
+                    },
                 }
                 for run, excitation in zip(self.runs, self.excitations, strict=True)
             ],
@@ -104,6 +108,21 @@ def _table(runs: tuple[Measurement, ...]) -> list[str]:
             f"{channel:28} {unit:6} {plain(factor * low, 4):>11} {plain(factor * high, 4):>11} "
             f"{plain(factor * noise, 2):>9} {share:>8} % {colour}"
         )
+    return lines + _extra_lines(runs)
+
+
+def _extra_lines(runs: tuple[Measurement, ...]) -> list[str]:
+    """Return one line per extra channel: unit and range over the runs that hold it."""
+    lines = []
+    for name in dict.fromkeys(name for run in runs for name in run.extra):
+        there = [run.extra[name] for run in runs if name in run.extra]
+        low = min(float(one.values.min()) for one in there)
+        high = max(float(one.values.max()) for one in there)
+        factor, unit = scale(there[0].unit, max(abs(low), abs(high)))
+        span = f"{plain(factor * low, 4):>11} {plain(factor * high, 4):>11}"
+        few = len(runs) - len(there)
+        lacking = f" (not in {few} run{'s' * (few > 1)})" if few else ""
+        lines.append(f"{name:28} {unit:6} {span} extra channel{lacking}")
     return lines
 
 

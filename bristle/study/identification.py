@@ -11,6 +11,7 @@ from ..data.checks.clipping import saturated_share
 from ..data.measurement import Measurement
 from ..data.model import StudyModel, new_model
 from ..errors import StudyError
+from ..identify.begin import under_load_text
 from ..identify.fit import Fit, Model
 from ..identify.residuals import robust_z
 from ..identify.rig import DAMPER, Rig
@@ -202,7 +203,21 @@ def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Iden
     rows = _table(at, task) if task.table else []
     task.show(4)
     notes += [*fits.notes(), *_by_site(models), *_weighing(rows, model, after), *rig.notes]
+    notes += _under_load(at)
     return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
+
+
+def _under_load(at: SiteModel) -> list[str]:
+    """Return the sentence that tells which runs begin under a load that the model carries."""
+    problems = (at.site.train, at.site.holdout)
+    loads = {
+        run.name: float(np.mean(run.force[: run.rest]))
+        for problem in problems
+        if problem is not None
+        for run in problem.runs
+        if problem.carrying(at.model, run)
+    }
+    return [under_load_text(loads)] if loads else []
 
 
 def _worst(models: SiteModels) -> SiteModel:

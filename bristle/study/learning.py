@@ -17,6 +17,7 @@ from ..errors import StudyError
 from ..findings import command, unknown
 from ..physics.laws import law_names
 from ..progress import tell, telling
+from .added_runs import unknown_to_model
 from .curves import LearnedEffect, learn_effect
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
@@ -34,7 +35,12 @@ MOST_EFFECTS = 4
 
 
 def diagnose_study(
-    study: Study, *, law: str | None = None, write: bool = True, say: Say = tell
+    study: Study,
+    *,
+    law: str | None = None,
+    profile: bool = False,
+    write: bool = True,
+    say: Say = tell,
 ) -> Diagnosis:
     """Return what the present model of a study is missing; write verdict.json.
 
@@ -43,6 +49,7 @@ def diagnose_study(
     study : the folder, opened
     law : "all" seeks the law together with its effects, the model's own keeps it; None seeks it
         where nobody chose one (`laws.law_or_all`)
+    profile : whether the model is fitted again at every limit of an effect
     write : whether to write verdict.json
     say : called with a few words at each stage
 
@@ -69,9 +76,10 @@ def diagnose_study(
     known = runs.train, runs.holdout, as_model(model), building_of(study, model)
     with telling(say) if say is not tell else nullcontext():
         if law == ALL:
-            found = diagnose_laws(*known, named=model.law, say=say)
+            found = diagnose_laws(*known, named=model.law, profile=profile, say=say)
         else:
-            found = diagnose_rig(*known, identified=_is_identified(model), say=say)
+            fitted = _is_identified(model)
+            found = diagnose_rig(*known, identified=fitted, profile=profile, say=say)
     found = replace(found, sensors=(*found.sensors, *_turned(study)))
     if write:
         study.write_verdict(verdict_of(study, found))
@@ -247,7 +255,8 @@ def complete(
     law = law_or_all(study, law)
     free = law == ALL
     other = None if law in (ALL, study.model().law) else law
-    if not free and (other or not _is_identified(study.model())):
+    stale = not _is_identified(study.model()) or bool(unknown_to_model(study))
+    if not free and (other or stale):
         say("identifying the model")
         stepped(identify_study(study, law=other, table=False).step)
     while True:

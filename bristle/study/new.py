@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..data.channels import DRIVE, ChannelSpec, channel_unit
 from ..data.decimate import FAST, RATE
+from ..data.extra import found_in
 from ..data.guess import Guess, guess_channels, left_out, too_few_rows
 from ..data.measurement import measurements_of
 from ..data.model import new_model
@@ -35,9 +36,13 @@ _CHOICE = re.compile(r"(?P<channel>\w+)=(?P<sign>-?)(?P<column>[^@]+?)(?:@(?P<un
 
 @dataclass(frozen=True)
 class Made:
-    """A study's folder that was made: what was guessed, what was left out, and what to know."""
+    """A study's folder that was made: what was guessed, what was left out, and what to know.
+
+    `extra` are the channels besides those that bristle knows, by name.
+    """
 
     guesses: tuple[Guess, ...]
+    extra: Mapping[str, ChannelSpec]
     unused: tuple[str, ...]
     notes: tuple[str, ...]
 
@@ -80,7 +85,9 @@ def make_folder(
         guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses
     } | {name: spec for name, spec in (channels or {}).items() if spec.step is not None}
     for table in tables:
-        _refuse_other_columns(table, guesses, first)
+        refuse_other_columns(table, guesses, first)
+    taken = [guess.column for guess in guesses]
+    extra = found_in(first, taken, specs)
     names = _names([Path(file) for file in files])
     about, notes = facts_of([Path(file) for file in files], choices, bool({*DRIVE} & {*specs}))
     found = _parts(names, tables, specs, choices.split)
@@ -93,7 +100,7 @@ def make_folder(
         specs, comments={guess.channel: _comment(guess) for guess in guesses},
         mask=choices.mask, split=choices.split, law=ALL if law is None and rig == "bench" else "",
         excluded=tuple(run for run in every if run.role == EXCLUDE),
-        rate=_rate([one for one in found if not is_test[one.file]], choices, notes),
+        rate=_rate([one for one in found if not is_test[one.file]], choices, notes), extra=extra,
     )  # fmt: skip
     _refuse_one_role(settings.runs)
     if settings.excluded:
@@ -102,10 +109,9 @@ def make_folder(
     notes += _twins(found, is_test)
     data = dict(zip(names, map(Path, files), strict=True))
     _write(folder, settings, data, building, law or DEFAULT)
-    unused = tuple(
-        text for text in left_out(first, guesses) if text not in {g.column for g in guesses}
-    )
-    return Made(tuple(guesses), unused, tuple(notes))
+    taken += [spec.column for spec in extra.values()]
+    unused = tuple(text for text in left_out(first, guesses) if text not in taken)
+    return Made(tuple(guesses), extra, unused, tuple(notes))
 
 
 @dataclass(frozen=True)
@@ -250,7 +256,20 @@ def _refuse_incomplete(
         )
 
 
-def _refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -> None:
+def refuse_other_columns(table: Table, guesses: Iterable[Guess], first: Table) -> None:
+    """Refuse a table that lacks columns of the first, or has them in other units.
+
+    Parameters
+    ----------
+    table : of a further run
+    guesses : the columns that are used
+    first : the table of the first run
+
+    Raises
+    ------
+    StudyError
+        Naming the column.
+    """
     there = {column.text: column for column in table.columns}
     for guess in guesses:
         if guess.column not in there:

@@ -227,6 +227,7 @@ def diagnose(
     holdout: Data | None = None,
     channels: Channels | None = None,
     building: str | Path | Building | None = None,
+    profile: bool = False,
     write: bool = True,
 ) -> Diagnosis:
     """Find the effects that a model misses, how sure that is, and what else it could be.
@@ -248,6 +249,9 @@ def diagnose(
         As in `bristle.identify`.
     building : path or Building, optional
         As in `bristle.identify`.
+    profile : bool
+        Whether the model is fitted again at the limit of every effect: exact where it is far from
+        linear, and slower.
     write : bool
         Of a study: whether verdict.json is written.
 
@@ -286,7 +290,8 @@ def diagnose(
     if isinstance(given, Study):
         _refuse_of_study(holdout=holdout, channels=channels, building=building)
         if (model is None or _is_all(model)) and not effects:
-            return diagnose_study(given, law=ALL if _is_all(model) else None, write=write)
+            law = ALL if _is_all(model) else None
+            return diagnose_study(given, law=law, profile=profile, write=write)
         raise StudyError(
             "diagnose uses the present model of a study: identify the other one first, with "
             "bristle.identify(study, ...)."
@@ -296,9 +301,11 @@ def diagnose(
     free = _is_all(model) or (model is None and not effects and house is None)
     runs = _runs(given, holdout, channels, house)
     if free:
-        return diagnose_laws(runs.train, runs.holdout, as_model(chosen), house)
+        return diagnose_laws(runs.train, runs.holdout, as_model(chosen), house, profile=profile)
     known = any(value.origin == "identified" for value in chosen.flat().values())
-    return diagnose_rig(runs.train, runs.holdout, as_model(chosen), house, identified=known)
+    return diagnose_rig(
+        runs.train, runs.holdout, as_model(chosen), house, identified=known, profile=profile
+    )
 
 
 def _is_all(model: Given | None) -> bool:

@@ -76,6 +76,7 @@ def _measured(
             f"piece = {run.piece} is none of them."
         )
     known = Known(
-        name_of_run(run), run.levels, run.labels, settings.rate, settings.mask, run.corrections
-    )
+        name_of_run(run), run.levels, run.labels, settings.rate, settings.mask, run.corrections,
+        settings.extra,
+    )  # fmt: skip
     return measurements_of(tables[max(run.piece, 1) - 1], settings.channels, known=known)

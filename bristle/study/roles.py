@@ -71,10 +71,26 @@ def roles_of(names: list[str], closed: list[bool]) -> tuple[list[RunFile], list[
     return [RunFile(f"data/{n}", role) for n, role in zip(names, every, strict=True)], notes
 
 
+def roles_added(names: list[str]) -> tuple[list[str], list[str]]:
+    """Return the roles of runs that are added to others, and the notes that tell why.
+
+    Parameters
+    ----------
+    names : of the files
+    """
+    found = [_role_in(name) for name in names]
+    if any(found):
+        roles, note = [role or "train" for role in found], "roles follow the names of the files"
+    elif len(names) == 1:
+        return ["train"], [f"{names[0]} is for training; --holdout '{names[0]}' holds it out"]
+    else:
+        roles, note = _every_third(names)
+    return roles, [f"{note}. {_held_out(names, roles)}"]
+
+
 def _seen_roles(names: list[str]) -> tuple[list[str], list[str]]:
     """Return roles and why: by the names of files, else every third is held out."""
-    words = [set(re.split(r"[^a-z]+", name.lower())) for name in names]
-    found = ["holdout" if w & _HOLDOUT else "train" if w & _TRAIN else "" for w in words]
+    found = [_role_in(name) for name in names]
     if len(names) == 1:
         return ["train"], [
             "there is one run: its last 30 % are held out, which is weaker than a separate run"
@@ -87,7 +103,25 @@ def _seen_roles(names: list[str]) -> tuple[list[str], list[str]]:
         roles = [role or "train" for role in found]
         note = "roles follow the names of the files"
     else:
-        roles = ["holdout" if k % 3 == 1 else "train" for k in range(len(names))]
-        note = "every third run is held out; change role in study.toml if another choice is better"
-    held_out = ", ".join(name for name, role in zip(names, roles, strict=True) if role == "holdout")
-    return roles, [f"{note}. Held out: {held_out}"]
+        roles, note = _every_third(names)
+    return roles, [f"{note}. {_held_out(names, roles)}"]
+
+
+def _role_in(name: str) -> str:
+    """Return the role that a file's name tells, "" where it tells none."""
+    words = set(re.split(r"[^a-z]+", name.lower()))
+    return "holdout" if words & _HOLDOUT else "train" if words & _TRAIN else ""
+
+
+def _every_third(names: list[str]) -> tuple[list[str], str]:
+    """Return roles of which every third is held out, and the note that says so."""
+    return (
+        ["holdout" if k % 3 == 1 else "train" for k in range(len(names))],
+        "every third run is held out; change role in study.toml if another choice is better",
+    )
+
+
+def _held_out(names: list[str], roles: list[str]) -> str:
+    """Return the words that tell which runs are held out."""
+    held_out = [name for name, role in zip(names, roles, strict=True) if role == "holdout"]
+    return f"Held out: {', '.join(held_out) or 'none'}"

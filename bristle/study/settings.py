@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..data.channels import DRIVE, PLAIN, ChannelSpec, channel_unit, is_channel
+from ..data.channels import DRIVE, ChannelSpec
 from ..data.corrections import Correction
 from ..data.files import Toml, write_whole
+from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
-from ..errors import RecordError, UnitError
-from ..findings import unknown, written
-from ..units import same_dimension
+from ..findings import written
+from .channel_file import channel_as_toml, is_right_channel, read_channel, read_extra
 from .run_file import (
     EXCLUDE,
     RunFile,
@@ -28,12 +28,10 @@ CUT_OFF = 18.0
 """Low-pass of measured and predicted force [Hz], as in Shirazi et al. (2012), section III-C."""
 _KEYS = (
     "schema", "title", "notes", "rig", "law", "cut_off", "rate", "mask", "split", "runs",
-    "channels",
+    "channels", "extra",
 )  # fmt: skip
 ALL = "all"
 """The word for all laws."""
-
-_CHANNEL_KEYS = ("column", "unit", "sign", "noise", "step")
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,8 @@ class Settings:
     runs that are sampled faster are decimated, 0 for none; `mask` whether isolated spikes count as
     not measured; `split` how files hold several runs, "" where they hold one (`data.pieces`);
     `law` "all" where the law is sought together with its effects, "" where the model's is kept;
-    `excluded` the runs that are left out, which are none of `runs`.
+    `excluded` the runs that are left out, which are none of `runs`; `extra` the channels besides
+    those that bristle knows.
     """
 
     title: str
@@ -59,12 +58,19 @@ class Settings:
     split: str = ""
     law: str = ""
     excluded: tuple[RunFile, ...] = ()
+    extra: dict[str, ChannelSpec] = field(default_factory=dict)
 
     @property
     def drive(self) -> str:
         """The channel that commands the damper, "" where none was measured."""
         there = {*self.channels, *(name for run in self.runs for name in run.levels)}
         return next((name for name in DRIVE if name in there), "")
+
+    @property
+    def beside(self) -> tuple[str, ...]:
+        """The channels that no fit needs, and on which an error may depend."""
+        warm = (TEMPERATURE,) if TEMPERATURE in self.channels else ()
+        return (*self.extra, *warm)
 
     @property
     def excluded_text(self) -> str:
@@ -117,16 +123,19 @@ def read_settings(path: Path) -> Settings:
     if listed and not runs:
         toml.error(("runs",), f'every run has role = "{EXCLUDE}": some for training are needed.')
     channels = {
-        name: _channel(toml, name, table)
+        name: read_channel(toml, name, table)
         for name, table in toml.table((), data, "channels").items()
-        if _is_right(toml, name, table)
+        if is_right_channel(toml, name, table)
+    }
+    extra = {
+        name: read_extra(toml, name, table) for name, table in toml.table((), data, "extra").items()
     }
     title, notes = toml.text((), data, "title", path.parent.name), toml.text((), data, "notes")
     check_levels(toml, runs, channels)
     toml.check()
     return Settings(
         title, rig, runs, channels, notes, CUT_OFF if cut_off is None else cut_off,
-        rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded,
+        rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded, extra=extra,
     )  # fmt: skip
 
 
@@ -157,14 +166,16 @@ def write_settings(path: Path, settings: Settings) -> None:
     for run in (*settings.runs, *settings.excluded):
         runs.append(run_as_toml(run))
     document.add("runs", runs)
-    channels = tomlkit.table(is_super_table=True)
-    for name, spec in settings.channels.items():
-        table = tomlkit.table()
-        for line in settings.comments.get(name, "").splitlines():
-            table.add(tomlkit.comment(line))
-        table.update(_as_toml(spec))
-        channels.add(name, table)
-    document.add("channels", channels)
+    for key, listed in (("channels", settings.channels), ("extra", settings.extra)):
+        channels = tomlkit.table(is_super_table=True)
+        for name, spec in listed.items():
+            table = tomlkit.table()
+            for line in settings.comments.get(name, "").splitlines():
+                table.add(tomlkit.comment(line))
+            table.update(channel_as_toml(spec))
+            channels.add(name, table)
+        if listed:
+            document.add(key, channels)
     write_whole(path, tomlkit.dumps(document))
 
 
@@ -204,6 +215,18 @@ def with_excluded(text: str, files: Sequence[tuple[str, int]]) -> str:
     return tomlkit.dumps(document)
 
 
+def with_runs(text: str, runs: Sequence[RunFile]) -> str:
+    """Return the text of a study.toml with more runs after its own, all else as it was."""
+    import tomlkit
+
+    document: Any = tomlkit.parse(text)
+    for run in runs:
+        table = run_as_toml(run)
+        table.add(tomlkit.nl())
+        document["runs"].append(table)
+    return tomlkit.dumps(document)
+
+
 def with_corrections(text: str, found: Mapping[tuple[str, int], Sequence[Correction]]) -> str:
     """Return the text of a study.toml with more corrections of runs, all else as it was.
 
@@ -222,49 +245,3 @@ def with_corrections(text: str, found: Mapping[tuple[str, int], Sequence[Correct
         known = [Correction(**one) for one in table.unwrap().get("correct", [])]
         table["correct"] = corrections_as_toml([*known, *corrections])
     return tomlkit.dumps(document)
-
-
-def _as_toml(spec: ChannelSpec) -> dict[str, Any]:
-    if spec.step is not None:
-        return {"step": spec.step}
-    found: dict[str, Any] = {"column": spec.column, "unit": spec.unit, "sign": spec.sign}
-    if spec.noise is not None:
-        found["noise"] = spec.noise
-    return found
-
-
-def _is_right(toml: Toml, name: str, table: Any) -> bool:
-    keys = ("channels", name)
-    if not is_channel(name):
-        toml.error(keys, unknown("channel", name, PLAIN))
-        return False
-    if not isinstance(table, dict):
-        toml.error(keys, f'is {written(table)}; a table with column = "..." is right.')
-        return False
-    return True
-
-
-def _channel(toml: Toml, name: str, table: Mapping[str, Any]) -> ChannelSpec:
-    keys = ("channels", name)
-    toml.known(keys, table, _CHANNEL_KEYS)
-    column, unit = toml.text(keys, table, "column"), toml.text(keys, table, "unit")
-    step = toml.number(keys, table, "step")
-    if step is not None and name != "time":
-        toml.error((*keys, "step"), "step belongs to [channels.time] alone.")
-    if not column and step is None:
-        toml.error(keys, 'column is missing: the title of the column, as in column = "F_kN".')
-    if unit:
-        try:
-            if not same_dimension(unit, channel_unit(name)):
-                right = channel_unit(name)
-                toml.error((*keys, "unit"), f'unit = "{unit}": {name} is in {right} or the like.')
-        except (UnitError, RecordError) as error:
-            toml.error((*keys, "unit"), str(error))
-    sign = table.get("sign", 1)
-    if sign not in (1, -1) or isinstance(sign, bool):
-        toml.error((*keys, "sign"), f"sign = {written(sign)}; 1 or -1 is right.")
-        sign = 1
-    noise = toml.number(keys, table, "noise")
-    if noise is not None and noise < 0.0:
-        toml.error((*keys, "noise"), f"noise = {noise}; a standard deviation is not negative.")
-    return ChannelSpec(column, unit, int(sign), noise, step)

@@ -23,6 +23,7 @@ from ..errors import StudyError
 from ..findings import command, written
 from ..physics.user import Loaded, waiting
 from ..trust import can_do_without, load
+from .added_runs import added_text
 from .history import History, Step
 from .new import make_folder
 from .reading import place_of_run, read_runs
@@ -187,6 +188,8 @@ class Study:
         idle = (*idle, *other)
         if self.settings.excluded:
             idle = (*idle, self.settings.excluded_text)
+        if added := added_text(self):
+            idle = (*idle, added)
         if sum(run.role != TEST for run in self.settings.runs) == 1:
             split = split_in_time([*train, *holdout])
             return replace(split, notes=(*split.notes, *idle))

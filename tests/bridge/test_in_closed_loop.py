@@ -21,10 +21,11 @@ from bristle.bridge.closed_loop_figures import Figures
 from bristle.bridge.closed_loop_input import house_of, trials_in
 from bristle.bridge.closed_loop_result import ClosedLoop, Predicted
 from bristle.bridge.closed_loop_runs import Trial
-from bristle.bridge.draws import Simulator, drawn_models
+from bristle.bridge.draws import Simulator
 from bristle.bridge.in_building import House, Shaking
 from bristle.cli import main
 from bristle.data.model import StudyModel, new_model
+from bristle.data.model_draws import drawn_models
 from bristle.errors import StudyError
 from bristle.physics.building import paper_building
 from bristle.physics.drive import drive_named

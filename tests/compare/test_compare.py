@@ -118,6 +118,28 @@ def test_white_noise_is_at_its_floor_in_every_band():
     assert power == pytest.approx(0.05**2, rel=0.1)
 
 
+def test_an_error_that_depends_on_an_extra_channel_is_told_in_its_unit():
+    def plant(along):
+        return 0.4 * (along["oil_pressure"] > 3e6)
+
+    found = []
+    for one in predictions_with(n=6000):
+        pressure = 3e6 + 1e6 * np.sin(0.9 * np.arange(6000) * DT)
+        along = {**one.coordinates, "oil_pressure": pressure}
+        error = plant(along)
+        found.append(
+            replace(
+                one, coordinates=along, measured=one.measured + error, units={"oil_pressure": "Pa"}
+            )
+        )
+    comparison = compare_predictions(found)
+    assert comparison.first.coordinate == "oil_pressure"
+    text = comparison.sentences[1]
+    assert text.startswith("The error depends mainly on oil pressure")
+    assert "above 3.1 MPa the force is up to 0.4 N higher than the model's" in text
+    comparison.plot()
+
+
 def test_a_tone_is_in_its_band():
     def tone(along):
         return 0.1 * np.sin(2.0 * np.pi * 3.0 * along["time"])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from bristle.diagnose.effect_limits import EffectLimit, effect_limits, limit_of
 from bristle.diagnose.effect_size import Known, Sized
 from bristle.diagnose.verdict_text import limit_rows
 from bristle.identify.fit import Model, intervals_of
+from bristle.identify.residuals import residuals
 from bristle.identify.search_context import refine
 from bristle.physics.effect import EFFECTS
 from tests.diagnose.test_limits import VALUES, problem_of, steady, steps
@@ -108,3 +111,17 @@ def test_the_table_has_units_as_people_write_them():
     ]  # fmt: skip
     assert len(table) == 8
     assert _limits({"findings": [{"site": "damper"}]}) == []
+
+
+def test_the_models_own_parameters_move_so_that_what_is_left_is_least(known):
+    sized = Sized("quadratic_damping", known)
+    limit = limit_of(sized)
+    moved = dict(limit.moved)
+    assert set(moved) == set(known.model.free())
+    joined = sized.with_value(limit.largest)
+    values = {**joined.values, **{n: joined.value(n) + by for n, by in moved.items()}}
+    change = residuals(known.problem, replace(joined, values=values), known.expected)
+    left = known.counts * change - known.plain
+    asked = known.beyond(sized.change(limit.largest / sized.one))
+    assert np.linalg.norm(left - asked) < 0.05 * np.linalg.norm(asked)
+    assert limit.as_dict()["moved"] == moved

@@ -12,10 +12,11 @@ import pytest
 
 from bristle.cli import main
 from bristle.errors import StudyError
-from bristle.example import bench, excitation, make, tower
+from bristle.example import bench, excitation, make, rigs, tower
 from bristle.example.damper import Damper, in_library_names
 from bristle.example.hidden import HIDDEN, UNITS, Scales, able, choose
-from bristle.example.make import CENTRE, Choice, make_bench, make_building
+from bristle.example.make import Choice, make_bench, make_building
+from bristle.example.rigs import CENTRE
 from bristle.example.sealed import FILE, seal, unseal
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
@@ -105,7 +106,7 @@ def test_a_gas_spring_adds_its_own_force_and_nothing_else() -> None:
 
 
 def a_tower(**hidden: float) -> tower.Tower:
-    frame = tower.frame(np.array(make.MASSES), np.array(make.STIFFNESSES))
+    frame = tower.frame(np.array(rigs.MASSES), np.array(rigs.STIFFNESSES))
     return tower.Tower(frame, Damper("lugre", CENTRE["lugre"]), hidden, SCALES)
 
 

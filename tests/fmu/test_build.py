@@ -23,6 +23,7 @@ from fresh import fresh
 
 from bristle.errors import BuildError, PhysicsError, RecordError
 from bristle.fmu import build as builder
+from bristle.fmu import catalogue
 from bristle.fmu.build import Plan, build, build_all, built_guid, ensure, plan
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -314,6 +315,35 @@ def test_an_effect_of_the_users_own_takes_part(write: Any, tmp_path: Path) -> No
     path = build(plan("BinghamDamper", effects=[write(OWN, "ripple.py")]), tmp_path)
     assert validate_fmu(str(path)) == []
     assert two_builds([str(path)], [{"ripple.on": True, "ripple.height": 3.0}], "force") == [3.0]
+
+
+FOLLOWING = OWN.replace(
+    '"largest force")}',
+    """"largest force"),
+        "signal": Parameter(2e5, "Pa", (0.0, 1e7), "pressure"),
+    }
+    assumed = ("signal",)
+    channels = {"signal": "pressure"}""",
+).replace("p.height * tanh((q.x + 1.0) / 0.01)", "p.height * 1e-5 * p.signal")
+
+
+def test_an_effect_that_follows_a_channel_has_it_as_an_input(write: Any, tmp_path: Path) -> None:
+    path = build(plan("BinghamDamper", effects=[write(FOLLOWING, "ripple.py")]), tmp_path)
+    assert validate_fmu(str(path)) == []
+    variables = {one.name: one for one in read_model_description(str(path)).modelVariables}
+    assert variables["pressure"].causality == "input"
+    assert variables["pressure"].unit == "Pa"
+    assert "ripple.signal" not in variables
+    on = {"ripple.on": True, "ripple.height": 3.0}
+    given = [on, {**on, "pressure": 5e5}, {"pressure": 5e5}]
+    assert two_builds([str(path)] * 3, given, "force") == pytest.approx([6.0, 15.0, 0.0])
+
+
+def test_an_input_is_not_called_as_a_parameter_of_the_law(write: Any) -> None:
+    file = write(FOLLOWING.replace('"pressure"}', '"f_c"}'), "ripple.py")
+    told = catalogue.describe("BinghamDamper", effects=[file]).variables
+    assert told["measured_f_c"].causality == "input"
+    assert told["f_c"].causality == "parameter"
 
 
 @pytest.mark.parametrize(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
 
 from bristle.data.measurement import measurements_of_frame
+from bristle.identify.begin import SETTLING, under_load_text
 from bristle.identify.model import Model, Problem, Run
-from bristle.identify.prepare import SETTLING, prepare
+from bristle.identify.prepare import prepare
 
 DT, NOISE = 0.002, 0.02
 MODEL = Model(
@@ -48,28 +51,77 @@ def stop_and_go():
     return 0.01 * (1.0 - np.cos(np.pi * turns))
 
 
+def left(run, model=MODEL):
+    """Return what a model does not predict (n,) [N] of a run."""
+    return run.force - Problem([run]).predict(model, run)
+
+
 @pytest.mark.parametrize("begin", [750, 1700])  # the rests after a stroke out and one back
 def test_a_run_cut_out_under_load_is_judged_once_the_bristles_have_slipped(begin):
     run = recorded(stop_and_go(), begin)
-    left = run.force - Problem([run]).predict(MODEL, run)
+    forgetful = left(replace(run, rest=0))
     assert run.skip > SETTLING
-    assert float(np.std(left[: run.skip])) > 20.0 * NOISE  # the bent bristles, which nobody knows
-    assert float(np.sqrt(np.mean(left[run.skip :] ** 2))) < 3.0 * NOISE
+    assert float(np.std(forgetful[: run.skip])) > 20.0 * NOISE  # the bent bristles
+    assert float(np.sqrt(np.mean(forgetful[run.skip :] ** 2))) < 3.0 * NOISE
+
+
+@pytest.mark.parametrize("begin", [750, 1700])
+def test_bristles_begin_with_the_load_under_which_a_run_begins(begin):
+    run = recorded(stop_and_go(), begin)
+    assert SETTLING <= run.rest <= run.skip
+    assert float(np.sqrt(np.mean(left(run) ** 2))) < 3.0 * NOISE  # from the first sample on
+    (deflection,) = Problem([run]).carrying(MODEL, run).values()
+    assert deflection * run.force[0] > 0.0
+
+
+def test_an_effect_in_the_place_of_the_sign_carries_the_load_of_a_law_without_states():
+    run = recorded(stop_and_go(), 750)
+    law = Model("bingham", ("presliding",), {"f_c": 12.0, "presliding.x_s": 2e-3})
+    start = Problem([run]).carrying(law, run)
+    rested = left(run, law)[5 : run.rest]
+    assert list(start) == ["presliding.direction_0"]
+    assert abs(float(np.mean(rested))) < 0.03 * abs(float(np.mean(run.force[: run.rest])))
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        Model("bingham", (), {"f_c": 12.0}),  # nothing in it carries a force at rest
+        replace(MODEL, values={**MODEL.values, "sigma_a": np.nan}),
+    ],
+)
+def test_a_model_that_carries_no_load_at_rest_begins_at_zero(model):
+    run = recorded(stop_and_go(), 750)
+    assert Problem([run]).carrying(model, run) == {}
+
+
+def test_a_part_of_a_run_rests_only_where_it_begins_with_it():
+    run = recorded(stop_and_go(), 750)
+    assert run.of(slice(100, None)).rest == 0
+    assert run.of(slice(None, None, 5)).rest == run.rest // 5
+    assert run.of(slice(0, 50)).rest == 50
+
+
+def test_runs_that_begin_under_load_are_told_with_it():
+    assert under_load_text({}) == ""
+    assert under_load_text({"run_2": -2.2846}).startswith("run_2 (-2.28 N) begins at rest")
+    assert under_load_text({"a": 1.0, "b": 2.0}).startswith("a (1 N), b (2 N) begin at rest")
 
 
 def test_a_run_cut_out_of_a_motion_is_judged_once_the_bristles_have_slipped():
     t = np.arange(5000) * DT
     run = recorded(0.01 * np.sin(2.0 * t), begin=800)  # it turns there: the force has lost its load
-    left = run.force - Problem([run]).predict(MODEL, run)
     assert run.skip > SETTLING
-    assert float(np.std(left[: run.skip])) > 20.0 * NOISE
-    assert float(np.sqrt(np.mean(left[run.skip :] ** 2))) < 2.0 * NOISE
+    assert run.rest == 0
+    assert float(np.std(left(run)[: run.skip])) > 20.0 * NOISE
+    assert float(np.sqrt(np.mean(left(run)[run.skip :] ** 2))) < 2.0 * NOISE
 
 
 def test_a_run_from_rest_without_load_is_judged_from_its_begin():
     t = np.arange(3000) * DT
     run = recorded(np.where(t > 1.0, 0.01 * np.sin(3.0 * (t - 1.0)), 0.0))
     assert run.skip == SETTLING
+    assert run.rest == 0
 
 
 def test_a_preload_costs_no_more_than_a_fifth_of_a_run():

@@ -730,6 +730,19 @@ def define(**data: Any) -> type[Effect]:
     [
         ({"site": "roof"}, r"site 'roof' is none of \('damper', 'structure', 'sensor'\)"),
         ({"name": "two words"}, "a name is one word"),
+        ({"channels": {"k": "pressure"}}, r"channels names \['k'\]; parameters that assumed names"),
+        (
+            {"channels": {"q": "pressure"}, "assumed": ("q",)},
+            r"channels names \['q'\]; parameters that assumed names",
+        ),
+        (
+            {"channels": {"k": "two words"}, "assumed": ("k",)},
+            r"channels names \['two words'\]; letters, digits and _",
+        ),
+        (
+            {"channels": {"k": "pressure"}, "assumed": ("k",), "site": "structure"},
+            "channels are what an effect of the damper alone may follow",
+        ),
         ({"needs": ("x", "colour")}, r"needs \['colour'\]; q offers \['x', 'v'"),
         ({"force": None}, r"defines no hook; there are \['voltage'"),
         ({"__doc__": ""}, "a first docstring line"),

@@ -106,6 +106,45 @@ def test_mistakes_are_told_with_their_line(folder: Path, old: str, new: str, tol
         read_settings(edit(folder, old, new))
 
 
+EXTRA = """
+[extra.oil_pressure]
+column = "p [bar]"
+unit = "bar"
+sign = -1
+"""
+
+
+def test_extra_channels_come_back_as_written(folder: Path) -> None:
+    text = (folder / "study.toml").read_text(encoding="utf-8")
+    (folder / "study.toml").write_text(text + EXTRA, encoding="utf-8")
+    settings = read_settings(folder / "study.toml")
+    assert settings.extra == {"oil_pressure": ChannelSpec("p [bar]", "bar", -1)}
+    write_settings(folder / "study.toml", settings)
+    assert read_settings(folder / "study.toml") == settings
+    assert "oil_pressure" not in settings.channels
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("oil_pressure", "force", 'cannot be called "force".*\\[channels.force\\] is its place'),
+        ("oil_pressure", "Oil", 'cannot be called "Oil": small letters'),
+        ('column = "p [bar]"\n', "", "line 24: column is missing"),
+        ('unit = "bar"\n', "", 'line 24: unit is missing: .*"1" for a plain number'),
+        ("sign = -1", "sign = 3", "line 27: sign = 3; 1 or -1"),
+        ("sign = -1", "noise = 0.1", 'there is no key "noise"'),
+        ('[extra.oil_pressure]\ncolumn = "p [bar]"\nunit = "bar"\nsign = -1', "extra = 3", "extra"),
+    ],
+)
+def test_mistakes_of_an_extra_channel_are_told(folder: Path, old: str, new: str, told: str) -> None:
+    path = folder / "study.toml"
+    text = path.read_text(encoding="utf-8")
+    assert old in EXTRA
+    path.write_text(text + EXTRA.replace(old, new), encoding="utf-8")
+    with pytest.raises(StudyError, match=told):
+        read_settings(path)
+
+
 def test_all_mistakes_at_once(folder: Path) -> None:
     edit(folder, "sign = -1", "sign = 2")
     edit(folder, 'rig = "bench"', 'rig = "car"')

@@ -6,16 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...quantity import plain
+from ...quantity import plain, quantity
 from ..channels import DRIVE
 from ..measurement import Measurement
-from ..noise import Noise, is_switched
+from ..noise import Noise, estimate_noise, is_switched
 from ..spikes import spikes_text
 from ..table import Array
 from .clipping import clipped_share
 from .finding import Finding, Level
 
 _MOTIONLESS = "Check the cable and the column: is it the right one?"
+_HELD = 2  # samples per value from which a channel is one that was logged more slowly
 _COLOURS = {
     "low-passed": "it fades towards half the sampling rate: this is its level below",
     "blue": "it grows towards high frequencies, as after a numerical derivative: an upper limit",
@@ -44,10 +45,32 @@ def check_channels(run: Measurement, velocity: Array | None) -> Iterator[Finding
         if channel not in DRIVE:
             yield from _clipped(run, channel, values, velocity)
         yield from _noise(run, channel, values)
+    yield from _extra(run)
     if "displacement" in run.channels and np.ptp(run["displacement"]) > 0.0:
         yield from _drift(run, run["displacement"], velocity)
     if "force" in run.channels and velocity is not None and np.ptp(velocity) > 0.0:
         yield from _force_offset(run, run["force"], velocity)
+
+
+def _extra(run: Measurement) -> Iterator[Finding]:
+    """Report extra channels that stand still or are cut off: they keep no run from use."""
+    for name, one in run.extra.items():
+        if np.ptp(one.values) == 0.0:
+            text = f"{name} is {quantity(float(one.values[0]), one.unit, 6)} throughout."
+            do = "" if one.values[0] else _MOTIONLESS
+            yield Finding("still", "note", text, do, run.name, name)
+            continue
+        changes = np.flatnonzero(np.diff(one.values))
+        if np.median(np.diff(changes, prepend=-1)) >= _HELD:
+            continue  # a slow logger repeats its last value
+        share, level, stretches = clipped_share(one.values, estimate_noise(one.values).quantum)
+        if share and not is_switched(one.values):
+            text = (
+                f"{name} stays at exactly {quantity(level, one.unit, 6)} in {stretches} stretches, "
+                f"{plain(100.0 * share, 2)} % of the samples: it is cut off."
+            )
+            do = "An error beyond that value shows no dependence on it."
+            yield Finding("clipping", "warning", text, do, run.name, name, share)
 
 
 def _spikes(run: Measurement) -> Iterator[Finding]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -73,6 +73,7 @@ class Along:
     `starts` as in `Effect`. `value` is the source of the curve's value where it is not that of one
     signal, `formula` what the signal then is. `named` says whether a formula may take the place of
     a curve along it; `contains` the signal whose curves are special cases of those along it.
+    `measured` says whether it is a channel of the runs, which the model does not know.
     """
 
     name: str
@@ -89,6 +90,7 @@ class Along:
     formula: str = ""
     named: bool = True
     contains: str = ""
+    measured: bool = False
 
     def memories(
         self, dt: float, length: float, stroke: float, top: float
@@ -230,3 +232,29 @@ ALONG = {
         _fading("recent_voltage", "V", "recent command", "q.V", "V", "V"),
     )
 }  # fmt: skip
+
+FOLLOWING = "signal"
+"""The parameter of a learned effect that follows a measured channel."""
+
+
+def measured_signal(name: str, unit: str) -> Along:
+    """Return a channel beside those that bristle knows as a signal.
+
+    Parameters
+    ----------
+    name : of the channel
+    unit : its own, "1" where bristle does not know it
+    """
+
+    def history(run: Run, _: dict[str, float]) -> Array:
+        return run.extra[name].values
+
+    words = name.replace("_", " ")
+    return Along(name, unit, words, (), f"p.{FOLLOWING}", history, measured=True)
+
+
+def measured_signals(runs: Sequence[Run]) -> list[Along]:
+    """Return the channels that all runs hold beside those that bristle knows, as signals."""
+    known = runs[0].extra
+    shared = [name for name in known if all(name in run.extra for run in runs)]
+    return [measured_signal(name, known[name].known_unit) for name in shared]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...quantity import plain, quantity
+from ...quantity import plain, quantity, scale
 from ...units import canonical
 from .curve import Curve, Formula
 from .rule import LEARN, LearnRule
@@ -220,7 +220,8 @@ def _fitted(form: Form, curve: Curve, y: Array, weight: Array, size: float) -> C
     span, step = float(np.max(np.abs(s))), float(np.min(np.diff(s)))
     for d in form.scales(span, step) if form.scales else [1.0]:
         A = np.hstack([form.at(s, float(d)), s[:, None][:, :beside]])
-        found = np.linalg.lstsq(A * weight[:, None], y * weight, rcond=1e-12)[0]
+        size_of = np.maximum(np.max(np.abs(A), axis=0), 1e-300)  # a cube of 1e6 Pa dwarfs the 1
+        found = np.linalg.lstsq(A / size_of * weight[:, None], y * weight, rcond=1e-12)[0] / size_of
         at = A @ found
         left = float(np.sqrt(np.sum((weight * (y - at)) ** 2) / np.sum(weight**2))) / size
         if best is None or left < best.left:
@@ -248,6 +249,9 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
     if found.name == "constant":
         return f"a constant, {quantity(found.values[0], unit)}"
     m, d, scaled = found.values[1], found.values[2], found.form.scales is not None
+    if curve.measured:  # per kPa or MPa, not per Pa
+        factor, along = scale(along, max(map(abs, curve.knots)))
+        m, d = m / factor, d if found.name == "power" else factor * d
     rate = unit if along == "1" else canonical(f"{unit}/({along})")
     if found.name == "line":
         physical = _PHYSICAL.get((curve.part, curve.along))
@@ -258,7 +262,7 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
         if unit == "1":
             return f"a line of slope {plain(m)}" + ("" if along == "1" else f" per {along}")
         return f"a line, {plain(m)} {rate}"
-    scale = {
+    over = {
         "ripple": f", pitch {quantity(d, along)}",
         "power": f" with exponent {plain(d, 2)}",
         **{
@@ -269,8 +273,8 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
     height = np.hypot(m, found.values[3]) if len(found.values) > 3 else abs(m)
     article = "an" if found.name[0] in "aeiou" else "a"
     tall = f", height {quantity(float(height), unit)}"
-    tall = tall if scale and found.name not in ("power", *_GAPS) else ""
-    return f"{article} {found.name}{scale}{tall}"
+    tall = tall if over and found.name not in ("power", *_GAPS) else ""
+    return f"{article} {found.name}{over}{tall}"
 
 
 _PHYSICAL = {

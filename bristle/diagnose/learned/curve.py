@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ...identify.rig import DAMPER
 from ...physics.drive import VOLTAGE, drive_named, unit_for
 from ...quantity import quantity
-from .along import ALONG, Along
+from .along import ALONG, Along, measured_signal
 from .place import AT_DAMPER, Place
 from .ring import RING, SIGNAL
 from .slip import SLIP, force_source, signal_of
@@ -162,7 +162,8 @@ class Curve:
     the largest command of the runs; `drive` names what the command is, whose unit takes the place
     of volts. Elastic-slip elements have their travels as knots, and their forces as values; a
     resonance has one value, its share, and frequency and damping ratio as memory. `at` is the site
-    of the rig where it acts.
+    of the rig where it acts. `measured` is the unit of its signal where that is a channel beside
+    those that bristle knows, else "".
     """
 
     part: str
@@ -175,6 +176,7 @@ class Curve:
     top: float = 1.0
     drive: str = VOLTAGE.name
     at: str = DAMPER
+    measured: str = ""
 
     @property
     def place(self) -> Place:
@@ -201,6 +203,8 @@ class Curve:
         """The signal that it depends on."""
         if self.part == RING:
             return SIGNAL
+        if self.measured:
+            return measured_signal(self.along, self.measured)
         along = ALONG[self.along] if self.along in ALONG else signal_of(self.knots)
         return signal_at(along, self.place)
 

@@ -9,7 +9,7 @@ import math
 from collections.abc import Sequence
 
 from ...physics.drive import drive_named, unit_for
-from .along import GIVEN, MEMORIES
+from .along import FOLLOWING, GIVEN, MEMORIES
 from .curve import BOUND, Curve, Formula, bounds_of
 from .slip import SLIP
 
@@ -36,7 +36,8 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     formula : what stands for the table, None for the table itself
     """
     body = _hooks(curve, formula)
-    parameters: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
+    memory: list[Declared] = [(n, value, *MEMORIES[n]) for n, value in curve.memory]
+    parameters = [*memory, *_followed(curve)]
     only = [*_only_value(curve), *_only_storey(curve)]
     kept = formula.positive if formula else ()
     table = formula is None and not curve.of.parameter
@@ -55,7 +56,7 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
         f'    expect = "an error that depends on {curve.of.cause or curve.signal.words}"',
         "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
     ]
-    held = _assumed(curve) if not formula else ()
+    held = _assumed(curve, table)
     if held:
         lines.append(f"    assumed = {held!r}  # no fit moves them".replace("'", '"'))
     if parameters or only:
@@ -70,10 +71,24 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
     return "\n".join([*lines, "", *body]) + "\n"
 
 
-def _assumed(curve: Curve) -> tuple[str, ...]:
-    """Return the parameters that stay: knots at the law's own constant, where the way turns."""
+def _followed(curve: Curve) -> list[Declared]:
+    """Return the parameter that follows a measured channel; none where the curve follows none."""
+    if not curve.measured:
+        return []
+    middle = 0.5 * (curve.knots[0] + curve.knots[-1])
+    return [(FOLLOWING, middle, curve.along_unit, f"{curve.signal.words}, which runs tell")]
+
+
+def _assumed(curve: Curve, table: bool) -> tuple[str, ...]:
+    """Return the parameters that stay: what a channel tells, and in a table some more.
+
+    These are knots at the law's own constant, and where the way turns.
+    """
+    follows = (FOLLOWING,) if curve.measured else ()
+    if not table:
+        return follows
     held = tuple(f"curve[{k + 1}]" for k in curve.held)
-    return (*held, *(name for name, _ in curve.memory if name in GIVEN))
+    return (*held, *(name for name, _ in curve.memory if name in GIVEN), *follows)
 
 
 def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
@@ -187,6 +202,7 @@ def _fields(curve: Curve) -> list[str]:
     """Return the lines of the class data that follow from part and signal."""
     along, part, drive = curve.signal, curve.of, drive_named(curve.drive)
     given: dict[str, object] = {
+        "channels": {FOLLOWING: curve.along} if curve.measured else {},
         "needs": tuple(dict.fromkeys((*along.needs, *part.needs, *_numbered(curve)))),
         "states": {name: unit_for(unit, drive) for name, unit in along.states},
         "starts": dict(along.starts),

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from .along import ALONG, GIVEN, Along
+from .along import ALONG, GIVEN, Along, measured_signals
 from .curve import Curve, may_change
 from .modes import best_mode
 from .normal import Hats, Normal, hats_at
@@ -139,7 +139,8 @@ def signals(
     step = residual.runs[0].dt
     length = min(len(run.x) for run in residual.runs) * step
     top = max(float(np.max(run.x)) for run in residual.runs)
-    offered = (one for one in ALONG.values() if residual.place.offers(one.needs))
+    offered = [one for one in ALONG.values() if residual.place.offers(one.needs)]
+    offered += measured_signals(residual.runs) if not residual.place.is_line else []
     for along in (one for one in offered if not names or one.name in names):
         for memory in along.memories(step, length, _stroke(residual), top):
             yield along, memory, _values(residual, along, memory)
@@ -181,7 +182,8 @@ def _promise(
     """Return the best curve of a part along a signal, None where it has too little to go by."""
     (along, memory), (knots, hats) = signal, spline
     residual = known.residual
-    kind = Curve(part, along.name, tuple(memory.items()), (), (), at=residual.at)
+    unit = along.unit if along.measured else ""
+    kind = Curve(part, along.name, tuple(memory.items()), (), (), at=residual.at, measured=unit)
     held = _held(kind, knots, values)
     free = [k for k in range(len(knots)) if k not in held]
     normal = known.with_curve(residual.parts[part], hats, free)

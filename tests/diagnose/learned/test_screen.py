@@ -7,15 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bristle.data.extra import Extra
 from bristle.diagnose.learned.along import rebuilt
+from bristle.diagnose.learned.effect_file import effect_text
 from bristle.diagnose.learned.normal import Normal, hats_at
 from bristle.diagnose.learned.promise import distinct
 from bristle.diagnose.learned.residual import residual_of
 from bristle.diagnose.learned.rule import LEARN
 from bristle.diagnose.learned.screen import knots_of, promises
 from bristle.diagnose.learned.slip import SLIP, slips
+from bristle.errors import RecordError
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, fit
+from bristle.identify.run_labels import tracks_of
+from bristle.physics.effect import EFFECTS
+from bristle.physics.user import defined
 
 STEP = 0.002  # s
 T = STEP * np.arange(3000)
@@ -44,6 +50,38 @@ def first_of(hidden):
     problem = runs(hidden)
     base = fit(problem, Model("bingham", (), VALUES), with_std=False).model
     return promises(residual_of(problem, base))
+
+
+def test_a_channel_besides_those_that_are_known_is_a_signal_as_well():
+    pressure = 2e6 + 1e6 * np.sin(5.3 * T)
+    hidden = 1.5 * np.tanh((pressure - 2e6) / 1e6)
+    plain = runs(lambda x, v, V, F: F + hidden)
+    extra = {
+        "oil_pressure": Extra(pressure, "Pa"),
+        "gauge": Extra(np.cos(3.0 * T), "counts"),
+        "still": Extra(np.ones(len(T)), "K"),
+    }
+    problem = Problem([replace(run, extra=extra) for run in plain.runs])
+    base = fit(problem, Model("bingham", (), VALUES), with_std=False).model
+    best = promises(residual_of(problem, base))[0]
+    assert (best.curve.part, best.curve.along) == ("force", "oil_pressure")
+    assert best.curve.measured == "Pa"
+    assert best.curve.words() == "an added force along oil pressure"
+    assert best.loss < 2.0
+    only = promises(residual_of(problem, base), along=["gauge"])
+    assert {one.curve.along for one in only} <= {"gauge"}
+    text = effect_text("learned_1", best.curve, "a trial")
+    assert 'channels = {"signal": "oil_pressure"}' in text
+    assert "interpolate(p.signal, KNOTS, p.curve)" in text
+    with defined({"learned_1": text}):
+        effect = EFFECTS["learned_1"]
+        assert effect.assumed == ("signal",)
+        assert problem.tells(effect)
+        assert not plain.tells(effect)
+        with pytest.raises(RecordError, match="learned_1 follows the channel oil_pressure, which"):
+            tracks_of(["learned_1"], {}, "run_3")
+        with pytest.raises(RecordError, match=r"oil_pressure is in K, and .* it in Pa"):
+            tracks_of(["learned_1"], {"oil_pressure": Extra(pressure, "K")}, "run_3")
 
 
 def run_of(x):

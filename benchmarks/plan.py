@@ -1,0 +1,266 @@
+"""What planned tests show against ordinary campaigns of the same length, on the same rig.
+
+    python -m benchmarks plan --campaign 6 --settled 10 --learn 4
+
+makes what is missing of these figures, and prints them; without a number it prints what is there.
+
+campaign   rigs with nothing hidden: the size from which effects are named, and the intervals of the
+           law's parameters, on the paper's chirp, seven random runs, sines at three amplitudes and
+           four levels; and on plans from the data sheet, one for each of four effects, one for all
+           of them, one for the parameters
+settled    rigs with a hidden effect whose sines leave a verdict open: the verdict after one plan
+learn      rigs with an unknown effect: a curve learned from random runs, and from a plan
+
+Limits of the rig are checked on the true rig: stroke, speed, acceleration, with 10 % reserve.
+"""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from collections.abc import Sequence
+from math import inf
+from pathlib import Path
+
+import numpy as np
+
+import bristle
+from bristle.diagnose.bench import BenchRuns
+from bristle.diagnose.candidates import joinable
+from bristle.diagnose.effect_limits import limit_of
+from bristle.diagnose.effect_size import Known, Sized
+from bristle.diagnose.opening import Opening
+from bristle.example.make import Choice
+from bristle.example.perform import perform_plan
+from bristle.identify.fit import intervals_of
+from bristle.identify.model import Model
+from bristle.physics.effect import EFFECTS
+from bristle.plan.folder import PlannedRun
+from bristle.study.curves import learn_effect
+from bristle.study.learning import add_effects, diagnose_study
+
+from ._answers import Answer, Answers, ask
+from ._campaigns import LIMITS, ORDINARY, SHEET, TrueRig, few_sines
+from ._rows import Row
+
+SEED = 5000
+LAWS = ("bingham", "lugre")
+HIDDEN = (
+    "gas_spring", "coil_lag", "stribeck", "asymmetry", "fluid_inertia", "flattening",
+    "mount_compliance", "saturation", "quadratic_damping", "temperature",
+)  # fmt: skip
+"""Effects that examples hide."""
+SEEN = (
+    "gas_spring", "coil_lag", "stribeck", "asymmetry", "fluid_inertia", "delay", "flattening",
+    "saturation", "quadratic_damping", "temperature", "duffing", "remanence",
+)  # fmt: skip
+"""Effects that a plan is made for, whose size the steps of the integration do not bound."""
+
+OF_EACH = 4
+"""Effects in a case."""
+
+ALSO = ("plan", "example")
+
+
+def run() -> list[Row]:
+    """Return the rows of what has been made so far."""
+    return rows(Answers("plan", ALSO).kept())
+
+
+def main(given: list[str]) -> int:
+    """Make what is missing of the figures, print them."""
+    return ask("plan", __doc__, tuple(KINDS), _answered, rows, given, ALSO)
+
+
+def _answered(kind: str, number: int) -> Answer:
+    with tempfile.TemporaryDirectory(prefix="bristle_plan_") as folder:
+        return KINDS[kind](number, Path(folder))
+
+
+def _campaign(number: int, folder: Path) -> Answer:
+    """Return sizes and deviations by campaign, and what the planned tests use of the limits."""
+    law = LAWS[number % 2]
+    rig = TrueRig(folder / "rig", Choice(law=law, nothing=True, seed=SEED + number))
+    sheet = folder / "rig.toml"
+    sheet.write_text(SHEET.format(law=law), encoding="utf-8")
+    first = OF_EACH * (number // len(LAWS))
+    named = [SEEN[k % len(SEEN)] for k in range(first, first + OF_EACH)]
+    plans = {
+        **{name: bristle.plan(sheet, see=name).runs() for name in named},
+        "all": bristle.plan(sheet, see=True).runs(),
+        "sharpen": bristle.plan(sheet, sharpen=True).runs(),
+    }
+    campaigns = {**{name: make(number) for name, make in ORDINARY.items()}, **plans}
+    shown = {name: _shown(rig, runs) for name, runs in campaigns.items()}
+    used = [_used(rig, runs) for runs in plans.values()]
+    return {"law": law, "named": named, "shown": shown, "used": used}
+
+
+def _shown(rig: TrueRig, runs: Sequence[PlannedRun]) -> Answer:
+    """Return from what size each effect is named, and the deviations of the law's parameters."""
+    opened = BenchRuns(*rig.measured(runs), Model(rig.law), False, lambda _: None).open_damper()
+    if not isinstance(opened, Opening):
+        raise RuntimeError(json.dumps(opened.reasons))
+    model, problem = opened.before.model, opened.problem
+    deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
+    known = Known(problem, model, problem.expectation(model), deciding)
+    sizes = {}
+    for name in joinable(model):
+        if EFFECTS[name].amount:
+            sized = Sized(name, known)
+            named = limit_of(sized).named
+            sizes[name] = None if not named else 1.0 / named if sized.falls else named
+    found = intervals_of(problem, model)
+    std = {name: s / max(abs(found.model.value(name)), 1e-300) for name, s in found.std.items()}
+    return {"sizes": sizes, "std": std}
+
+
+def _used(rig: TrueRig, runs: Sequence[PlannedRun]) -> list[float]:
+    """Return the largest share of stroke, speed and acceleration that the true rig moves by."""
+    shares = []
+    for run in runs:
+        one = rig.ideal(run)
+        a = np.gradient(one["velocity"], one["time"])
+        limits = (LIMITS.stroke, LIMITS.speed, LIMITS.acceleration)
+        shares += [
+            float(np.max(np.abs(values))) / limit
+            for values, limit in zip((one["displacement"], one["velocity"], a), limits, strict=True)
+        ]
+    return shares
+
+
+def _settled(number: int, folder: Path) -> Answer:
+    """Return the verdicts before and after one plan, where the first one leaves something open."""
+    hidden = HIDDEN[number % len(HIDDEN)]
+    choice = Choice((hidden,), LAWS[(number // len(HIDDEN)) % 2], seed=SEED + 100 + number)
+    rig = TrueRig(folder / "rig", choice)
+    runs = few_sines(number)
+    study = rig.study(runs, folder / "sines")
+    bristle.identify(study)
+    first = diagnose_study(study, law=rig.law)
+    out: Answer = {"hidden": hidden, "before": [first.kind, list(first.effects)]}
+    if first.kind == "effect" and hidden in first.effects:
+        return out
+    plan = bristle.plan(
+        study, see=hidden if first.kind == "none" else None, stroke=LIMITS.stroke,
+        speed=LIMITS.speed, acceleration=LIMITS.acceleration, command=LIMITS.command,
+    )  # fmt: skip
+    if not plan.worth:
+        return {**out, "beyond": True}
+    perform_plan(study.folder, plan.write(folder / "plan"), insist=True)
+    study = bristle.Study(study.folder)
+    bristle.identify(study)
+    after = diagnose_study(study, law=rig.law)
+    return {**out, "after": [after.kind, list(after.effects)]}
+
+
+def _learn(number: int, folder: Path) -> Answer:
+    """Return z on a third campaign of curves learned from random runs and from a plan."""
+    rig = TrueRig(folder / "rig", Choice(law=LAWS[number % 2], outside=True, seed=SEED + number))
+    sheet = folder / "rig.toml"
+    sheet.write_text(SHEET.format(law=rig.law), encoding="utf-8")
+    campaigns = {
+        "random": ORDINARY["random"](number),
+        "plan": bristle.plan(sheet, learn=True, sharpen=True).runs(),
+    }
+    third = [*ORDINARY["chirp"](number + 50)[:2], *ORDINARY["random"](number + 50)[:2]]
+    out: Answer = {"hidden": rig.answer["hidden"]}
+    for name, runs in campaigns.items():
+        study = rig.study(runs, folder / name)
+        bristle.identify(study)
+        found = learn_effect(study)
+        if found.file is not None:
+            study = bristle.Study(study.folder, trust=True)
+            add_effects(study, [found.name])
+        judged = bristle.compare(
+            {run.name: one for run, one in zip(third, rig.performed(third), strict=True)},
+            study.model(),
+        )
+        out[name] = {"learned": found.file is not None, "z": judged.z}
+    return out
+
+
+KINDS = {"campaign": _campaign, "settled": _settled, "learn": _learn}
+
+
+def rows(done: dict[str, Answer]) -> list[Row]:
+    """Return the rows of what has answers."""
+    by_kind: dict[str, list[Answer]] = {kind: [] for kind in KINDS}
+    for key, answer in done.items():
+        by_kind[json.loads(key)[0]].append(answer)
+    return [
+        *_campaign_rows(by_kind["campaign"]), *_settled_rows(by_kind["settled"]),
+        *_learn_rows(by_kind["learn"]),
+    ]  # fmt: skip
+
+
+def _campaign_rows(answers: Sequence[Answer]) -> list[Row]:
+    if not answers:
+        return []
+    own: dict[str, list[float]] = {}
+    whole: dict[str, list[float]] = {}
+    against: dict[str, list[float]] = {"chirp": [], "random": []}
+    for answer in answers:
+        shown = answer["shown"]
+        for name in shown["all"]["sizes"]:
+            others = [shown[one]["sizes"].get(name) for one in ORDINARY]
+            best = min((size for size in others if size), default=None)
+            for plan, found in ((name, own), ("all", whole)):
+                planned = shown.get(plan, {"sizes": {}})["sizes"].get(name)
+                if plan in shown and best:
+                    found.setdefault(name, []).append(planned / best if planned else inf)
+        for name, ratios in against.items():
+            std, other = shown["sharpen"]["std"], shown[name]["std"]
+            ratios += [std[p] / other[p] for p in std if other.get(p)]
+    out = [
+        _ratios("sizes named, a plan for the effect / best ordinary campaign", own, 0.5),
+        _ratios("sizes named, one plan for all effects / best ordinary campaign", whole, None),
+    ]
+    for name, goal in (("chirp", 0.5), ("random", 0.7)):
+        ratio = float(np.median(against[name]))
+        out.append(
+            Row(f"intervals of the law, plan / {name}", f"{ratio:.2f}", f"<= {goal}", ratio / goal)
+        )
+    used = max(share for answer in answers for shares in answer["used"] for share in shares)
+    out.append(Row("largest share of a limit that is used", f"{used:.3f}", "<= 0.9", used / 0.9))
+    return out
+
+
+def _ratios(name: str, found: dict[str, list[float]], goal: float | None) -> Row:
+    """Return the row of ratios by effect: the median over effects of their medians."""
+    medians = {one: float(np.median(ratios)) for one, ratios in found.items()}
+    middle = float(np.median(list(medians.values())))
+    each = ", ".join(f"{one} {ratio:.2f}" for one, ratio in sorted(medians.items()))
+    return Row(
+        name, f"{middle:.2f}", f"<= {goal}" if goal else "", middle / goal if goal else None, each
+    )
+
+
+def _settled_rows(answers: Sequence[Answer]) -> list[Row]:
+    asked = [one for one in answers if "after" in one or "beyond" in one]
+    if not asked:
+        return []
+    right = [
+        one for one in asked if "after" in one
+        and one["after"][0] == "effect" and one["hidden"] in one["after"][1]
+    ]  # fmt: skip
+    beyond = sum("beyond" in one for one in asked)
+    share = len(right) / len(asked)
+    return [
+        Row(
+            "settled by one plan", f"{len(right)} of {len(asked)}, {beyond} told as beyond any",
+            ">= 85 %", 0.85 / max(share, 1e-3),
+        )
+    ]  # fmt: skip
+
+
+def _learn_rows(answers: Sequence[Answer]) -> list[Row]:
+    if not answers:
+        return []
+    lower = sum(one["plan"]["z"] < one["random"]["z"] for one in answers)
+    return [
+        Row(
+            "learned from a plan: lower z on a third campaign", f"{lower} of {len(answers)}",
+            ">= 75 %", 0.75 * len(answers) / max(lower, 1e-3),
+        )
+    ]  # fmt: skip

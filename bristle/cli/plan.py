@@ -1,0 +1,132 @@
+"""Write the next tests of a rig: motions and commands for its controller, and what they will show.
+
+Each test is a CSV file that begins and ends at rest, with a picture. Half of them are to fit to,
+half to judge by. Without a purpose, they settle what the verdict leaves open: rivals where it is
+ambiguous, a part without a form where it is unknown, or else all effects and parameters.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..findings import command
+from ._consent import add_trust
+
+if TYPE_CHECKING:
+    from ..plan.plan import Plan
+
+HELP = "the next tests of a rig: what to measure, as files for its controller"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle plan`."""
+    parser.add_argument("folder", type=Path, metavar="FOLDER", nargs="?", help="the study")
+    parser.add_argument(
+        "--new", type=Path, metavar="FILE",
+        help="a rig.toml with [damper] and [limits]: plan before the first measurement",
+    )  # fmt: skip
+    parser.add_argument(
+        "--separate", nargs="+", metavar="NAME",
+        help="tell rivals apart: effects, laws, or none for the model as it is",
+    )  # fmt: skip
+    parser.add_argument(
+        "--see", nargs="*", metavar="EFFECT", help="make effects visible; all if none is named"
+    )
+    parser.add_argument(
+        "--sharpen", nargs="*", metavar="PARAMETER",
+        help="know parameters better, or those of an effect; all if none is named",
+    )  # fmt: skip
+    parser.add_argument(
+        "--learn", nargs="*", metavar="COORDINATE",
+        help="cover coordinates on which an unknown part may depend; the usual if none is named",
+    )  # fmt: skip
+    parser.add_argument("--rig", type=Path, metavar="FILE", help="a rig.toml with [limits]")
+    for name, text in LIMITS.items():
+        parser.add_argument(f"--{name}", metavar="QUANTITY", help=text)
+    parser.add_argument("--runs", type=int, metavar="N", help="how many tests; 4 by default")
+    parser.add_argument("--seed", type=int, default=1, help="draws the tests that are looked at")
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="FOLDER",
+        help="where the files go; by default plan, plan_2 ... in the study",
+    )  # fmt: skip
+    parser.add_argument("--dry-run", action="store_true", help="show the plan; write no files")
+    add_trust(parser)
+    parser.add_argument("--json", action="store_true", help="print the plan as JSON")
+
+
+LIMITS = {
+    "stroke": 'motion to either side, such as "20 mm"; by default what the runs have done',
+    "speed": 'such as "200 mm/s"; by default what the runs have done',
+    "acceleration": 'such as "10 m/s2"; by default what the runs have done',
+    "force": 'of the actuator, such as "2 kN"',
+    "heat": 'energy that the damper may take up in a test, such as "200 J"',
+    "duration": 'of a test, such as "20 s"; 12 s by default',
+    "rate": 'samples per second of the controller, such as "500 Hz"',
+}
+"""Limits that are options: quantities with their unit."""
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Plan, write the files, print the tests and what they will show."""
+    from ..errors import StudyError
+    from ..plan.public import plan
+
+    if (arguments.folder is None) == (arguments.new is None):
+        raise StudyError("name a study, or a rig.toml with --new; one of the two.")
+    given: dict[str, Any] = {
+        name: getattr(arguments, name)
+        for name in (*LIMITS, "runs")
+        if getattr(arguments, name) is not None
+    }
+    found = plan(
+        arguments.new or arguments.folder,
+        separate=arguments.separate,
+        see=_asked(arguments.see),
+        sharpen=_asked(arguments.sharpen),
+        learn=_asked(arguments.learn),
+        rig=arguments.rig,
+        seed=arguments.seed,
+        **given,
+    )
+    folder = None
+    if found.worth and not arguments.dry_run:
+        folder = found.write(arguments.output or _free(arguments.folder or Path()))
+    if arguments.json:
+        place = {"folder": str(folder)} if folder else {}
+        print(json.dumps({**found.as_dict(), **place}, indent=2, ensure_ascii=False))
+    else:
+        print(text(found, arguments.folder, folder))
+    return 0
+
+
+def _asked(names: list[str] | None) -> list[str] | bool | None:
+    return names or (None if names is None else True)
+
+
+def _free(folder: Path) -> Path:
+    """Return the first folder of `plan`, `plan_2` ... that is not there."""
+    number = 1
+    while (found := folder / ("plan" if number == 1 else f"plan_{number}")).exists():
+        number += 1
+    return found
+
+
+def text(found: Plan, study: Path | None, folder: Path | None) -> str:
+    """Return a plan as text, with the next command."""
+    from ..plan.outcome import HEADER
+    from ._table import aligned
+
+    lines = [*found.sentences(), ""]
+    lines += aligned([list(HEADER), *(one.cells() for one in found.outcomes)])
+    if folder is not None:
+        lines += ["", f"Files:  {folder}"]
+        if study is not None:
+            then = command("study", "extend", study, "MEASURED.csv", "--plan", folder)
+            lines += [f"Next, once they are measured:  {then}"]
+        else:
+            then = command("study", "new", "my_rig", "--data", "MEASURED.csv")
+            lines += [f"Next, once they are measured:  {then}"]
+    return "\n".join(lines)

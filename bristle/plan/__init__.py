@@ -1,0 +1,1 @@
+"""The next tests of a rig: the folder that holds them."""

@@ -1,0 +1,151 @@
+"""What tests will show beside what the runs at hand show: a row for each thing in question."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+from typing import Any
+
+from ..diagnose.effect_limits import ONE_SIDED, TWO_SIDED
+from ..diagnose.rule import BENCH
+from ..identify.model import parameter
+from ..quantity import plain, quantity
+from .goal import Purposes
+from .knowledge import Asked, Known
+from .purposes import seen, separated
+from .questions import SizedRival
+
+OUTCOMES = "outcomes.json"
+"""The file of a plan's folder with the table."""
+
+HEADER = ("question", "figure", "now", "with these tests")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What tests will show of one thing.
+
+    `purpose` one of `purposes.PURPOSES`; `name` of effect, rivals, parameter or coordinate;
+    `what` the quantity is, in `unit`; `now` from the runs at hand, `then` with the tests too;
+    infinite where no run shows it. `settled` whether a verdict will be able to tell; `beyond`
+    whether no test that was looked at would.
+    """
+
+    purpose: str
+    name: str
+    what: str
+    unit: str
+    now: float
+    then: float
+    settled: bool = True
+    beyond: bool = False
+
+    def cells(self) -> list[str]:
+        """Return the row of a table."""
+        return [self.name, self.what, self._shown(self.now), self._shown(self.then)]
+
+    def _shown(self, value: float) -> str:
+        if not isfinite(value):
+            return "not visible"
+        if self.purpose == "separate":
+            return f"{plain(value, 2)} std"
+        if self.purpose == "sharpen" and self.unit == "%":
+            return f"{plain(100.0 * value, 2)} %"
+        return quantity(value, self.unit, 2, fine=True)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold: None where a number is not finite."""
+        return {
+            "purpose": self.purpose, "name": self.name, "what": self.what, "unit": self.unit,
+            "now": self.now if isfinite(self.now) else None,
+            "then": self.then if isfinite(self.then) else None, "settled": self.settled,
+            "beyond": self.beyond,
+        }  # fmt: skip
+
+
+def outcomes(
+    purposes: Purposes, asked: Sequence[Asked], now: Sequence[Known], then: Sequence[Known]
+) -> list[Outcome]:
+    """Return what tests will show.
+
+    Parameters
+    ----------
+    purposes : of the plan
+    asked : its questions
+    now, then : what the runs at hand say of them, and what these and the tests would say
+    """
+    out = _separated(now[1:], then[1:]) if purposes.rivals else []
+    out += _seen(purposes.effects, now[0], then[0])
+    out += _sharpened(purposes, asked[0], now[0], then[0])
+    return out + _learned(purposes, now[0], then[0])
+
+
+def _separated(now: Sequence[Known], then: Sequence[Known]) -> list[Outcome]:
+    before = {one.name: BENCH.tells / one.value if one.value else inf for one in separated(now)}
+    after = {one.name: BENCH.tells / one.value if one.value else inf for one in separated(then)}
+    return [
+        Outcome(
+            "separate", name, f"distance; a verdict needs {BENCH.tells:g}", "std", before[name],
+            after[name], after[name] >= BENCH.tells,
+        )
+        for name in after
+    ]  # fmt: skip
+
+
+def _seen(effects: Sequence[SizedRival], now: Known, then: Known) -> list[Outcome]:
+    """Return from what size each effect is named, largest gain first, and how large it may be."""
+    before = {one.name: one.value for one in seen(now)}
+    after = {one.name: one.value for one in seen(then)}
+    near = [known.distances() for known in (now, then)]
+    out = []
+    for one in effects:
+        sized, name = one.sized, one.sized.name
+        unit = parameter(sized.model.law, sized.key).unit
+        apart = one.size * (TWO_SIDED if sized.signed else ONE_SIDED)
+        seen_now = one.limit is not None and not one.limit.why and isfinite(before[name])
+        visible = (seen_now, isfinite(after[name]))
+        limits = [
+            sized.value(max(apart / found[name], one.least)) if shown else inf
+            for found, shown in zip(near, visible, strict=True)
+        ]
+        found = max(one.size * after[name], one.least)
+        text = f"{sized.parameter}, limit at 95 %"
+        if visible[1] and not sized.ended(found):
+            side = "above" if not sized.falls else "below"
+            text += f"; named {side} {quantity(sized.value(found), unit, 2, fine=True)}"
+        out.append(Outcome("see", name, text, unit, limits[0], limits[1], visible[1]))
+    return out
+
+
+def _sharpened(purposes: Purposes, asked: Asked, now: Known, then: Known) -> list[Outcome]:
+    before, after = now.deviations(), then.deviations()
+    out = []
+    for name in purposes.parameters:
+        size, as_share = asked.spread(name)
+        unit = parameter(purposes.model.law, name).unit
+        value = abs(purposes.model.value(name))
+        share = 1.0 if as_share else size / value if value else 0.0
+        factor, unit = (share, "%") if share else (size, unit)
+        out.append(
+            Outcome(
+                "sharpen", name, "standard deviation", unit, factor * before[name],
+                factor * after[name],
+            )
+        )  # fmt: skip
+    return out
+
+
+def _learned(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
+    if purposes.parts is None:
+        return []
+    before, after = now.of_bases(), then.of_bases()
+    out = []
+    for name in after:
+        first, second = (float((one[name] ** 2).mean() ** 0.5) for one in (before, after))
+        out.append(
+            Outcome(
+                "learn", f"along {name}", "uncertainty of a curve, over noise", "1", first, second
+            )
+        )
+    return out

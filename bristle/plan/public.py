@@ -1,0 +1,122 @@
+"""`bristle.plan`: the next tests of a rig, from Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import StudyError
+from ..findings import written
+from ..study.study import Study
+from .new_rig import plan_new
+from .plan import Plan, Wish, plan_study
+from .rig_limits import SIZES, RigLimits, read_quantity, read_rig
+
+Names = str | Sequence[str] | bool | None
+
+
+def plan(
+    study: Study | str | Path,
+    *,
+    separate: Names = None,
+    see: Names = None,
+    sharpen: Names = None,
+    learn: Names = None,
+    rig: str | Path | None = None,
+    seed: int = 1,
+    **limits: Any,
+) -> Plan:
+    """Return the next tests of a rig: motions and commands that show what is not known yet.
+
+    Without a purpose they settle what the verdict leaves open: rivals where it is ambiguous,
+    a part without a form where it is unknown, or else all effects and parameters.
+
+    Parameters
+    ----------
+    study : Study or path
+        A study of a damper on a bench; or a rig.toml with `[damper]` and `[limits]`, before the
+        first measurement.
+    separate : str or sequence of str, optional
+        Rivals to tell apart: effects, laws, or "none" for the model as it is.
+    see : str, sequence of str or True, optional
+        Effects to make visible; True for all that can be.
+    sharpen : str, sequence of str or True, optional
+        Parameters to know better, or effects whose parameters these are; True for all.
+    learn : str, sequence of str or True, optional
+        Coordinates on which an unknown part may depend; True for the usual ones.
+    rig : path, optional
+        A rig.toml with the limits of the rig; what it does not say is what the runs have done.
+    seed : int
+        Draws the tests that are looked at.
+    **limits
+        Limits in place of those, by the names of rig.toml: numbers in SI or texts with a unit, such
+        as `stroke="20 mm"`, `runs=6`.
+
+    Returns
+    -------
+    Plan
+        Its tests, what they will show, and `write(folder)` for the files.
+
+    Raises
+    ------
+    StudyError
+        If the limits allow no test, or a purpose names what there is not.
+    RecordError
+        If a file cannot be read.
+
+    Examples
+    --------
+    >>> import bristle, pathlib, tempfile
+    >>> sheet = pathlib.Path(tempfile.mkdtemp()) / "rig.toml"
+    >>> _ = sheet.write_text('''schema = 1
+    ... [damper]
+    ... law = "bingham"
+    ... max_force = "2 kN"
+    ... [limits]
+    ... stroke = "20 mm"
+    ... speed = "250 mm/s"
+    ... command = ["0 V", "5 V"]
+    ... rate = "100 Hz"
+    ... duration = "5 s"
+    ... ''')
+    >>> tests = bristle.plan(sheet, see="coil_lag", runs=2)
+    >>> [run.role for run in tests.runs()]
+    ['train', 'holdout']
+    """
+    wish = Wish(*(_names(one) for one in (separate, see, sharpen, learn)))
+    given = {name: _limit(name, value) for name, value in limits.items()}
+    if isinstance(study, str | Path) and Path(study).is_file():
+        if rig is not None:
+            raise StudyError(f"{study} is a rig.toml itself; rig = {written(rig)} is one too many.")
+        return plan_new(Path(study), wish, limits=given, seed=seed)
+    opened = study if isinstance(study, Study) else Study(study)
+    of_file = read_rig(Path(rig), opened.drive) if rig is not None else {}
+    return plan_study(opened, wish, limits={**of_file, **given}, seed=seed)
+
+
+def _names(names: Names) -> tuple[str, ...] | None:
+    """Return names as a tuple: None for none, empty for all."""
+    if names is None or names is False:
+        return None
+    if names is True:
+        return ()
+    return (names,) if isinstance(names, str) else tuple(names)
+
+
+def _limit(name: str, value: Any) -> Any:
+    """Return a limit in SI.
+
+    Raises
+    ------
+    StudyError
+        If there is no such limit.
+    """
+    from dataclasses import fields
+
+    from ..findings import unknown
+
+    known = [one.name for one in fields(RigLimits)]
+    if name not in known:
+        raise StudyError(unknown("limit", name, known))
+    return read_quantity(value, SIZES[name], name) if name in SIZES else value

@@ -1,0 +1,290 @@
+"""The search for tests: many candidates, the best ones picked one by one, each then improved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from os import cpu_count
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from ..errors import StudyError
+from ..identify.model import Run
+from ..progress import Count, tell
+from .knowledge import Asked, Known
+from .motions import Command, Waveform
+from .planned_test import Signals, Test
+from .rig_limits import RESERVE, RigLimits
+
+Array = NDArray[np.float64]
+
+CANDIDATES = 256
+"""Tests that are looked at before the best ones are picked."""
+
+IMPROVED = 40
+"""Evaluations in which a picked test is improved."""
+
+LEAST = 0.04
+"""Smallest motion that is planned, over the stroke."""
+
+SMALLER = 0.8
+"""Factor on a motion that asks too much of force or heat."""
+
+TRIES = 6
+"""How often a motion is made smaller until it is given up."""
+
+DWELLS = (0.25, 3.0)
+"""Shortest and longest time [s] of a level of the command."""
+
+TWIN_SIZE, TWIN_PITCH = 0.93, 1.07
+"""Size and frequencies of the second run of a test, over those of the first: no mere repeat."""
+
+SECOND = 1000
+"""Distance between the seeds of the two."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A test as it would be seen: what it prescribes, its normal equations per question."""
+
+    test: Test
+    signals: Signals
+    normals: tuple[Array, ...]
+    samples: int
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What a plan is to reach.
+
+    `asked` the questions, over and over where parameters are drawn, the `count` first ones with the
+    fitted ones; `known` what the runs at hand say of them; `cost` what is to become small, of what
+    runs would say.
+    """
+
+    asked: tuple[Asked, ...]
+    known: tuple[Known, ...]
+    count: int
+    cost: Callable[[Sequence[Known]], float]
+
+    def with_tests(self, tests: Sequence[Seen]) -> list[Known]:
+        """Return what the runs at hand and tests would say of each question."""
+        samples = sum(one.samples for one in tests)
+        held_out = sum(one.samples for one in tests[1::2])
+        return [
+            known.with_runs(sum((one.normals[k] for one in tests), np.zeros(1)), samples, held_out)
+            for k, known in enumerate(self.known)
+        ]
+
+    def value(self, tests: Sequence[Seen]) -> float:
+        """Return the cost of the runs at hand with tests."""
+        return self.cost(self.with_tests(tests))
+
+
+@dataclass(frozen=True)
+class Planner:
+    """Finds the tests of a rig that serve a goal best.
+
+    Parameters
+    ----------
+    goal : Goal
+    limits : RigLimits
+    noise : float
+        Standard deviation of the measured force [N].
+    errors : Array
+        (d, n, 4) draws of the error of x, v, a and the command, as the rig's instruments leave it.
+    rate : float
+        Samples per second at which tests are judged.
+    record : Waveform or None
+        A motion that was recorded, offered along with the others.
+    seed : int
+    drive : str
+        The channel of the command.
+    """
+
+    goal: Goal
+    limits: RigLimits
+    noise: float
+    errors: Array
+    rate: float
+    record: Waveform | None = None
+    seed: int = 1
+    drive: str = "voltage"
+    _seen: dict[Test, Seen | None] = field(default_factory=dict, repr=False)
+
+    def plan(self) -> list[Seen]:
+        """Return the tests, in pairs: one to fit to, and one of its kind to judge by.
+
+        Raises
+        ------
+        StudyError
+            If the limits of force or heat allow none of them.
+        """
+        tests = self._candidates()
+        count = Count("test", len(tests))
+
+        def look(test: Test) -> Seen | None:
+            found = self.see(test)
+            count.done(test.motion.kind)
+            return found
+
+        with ThreadPoolExecutor(cpu_count()) as pool:
+            found = [one for one in pool.map(look, tests) if one is not None]
+        if not found:
+            raise StudyError(
+                "no test stays within the limits: even small motions ask for more force or put "
+                "more heat into the damper than the rig allows. More force, more heat or a smaller "
+                "command is needed."
+            )
+        picked: list[Seen] = []
+        for number in range(-(-self.limits.runs // 2)):
+            best = min(found, key=lambda one: self.goal.value([*picked, *self._both(one)]))
+            if len(found) > 1:
+                found.remove(best)  # the next test shall be another one
+            tell(f"improving test {number + 1}")
+            best = self._improved(best, picked)
+            picked += self._both(best, exact=True)
+        return picked[: self.limits.runs]
+
+    def _both(self, one: Seen, exact: bool = False) -> list[Seen]:
+        """Return a test and the second one of its kind, which until it matters is like it."""
+        if self.limits.runs == 1:
+            return [one]
+        twin = self.see(self.twin(one.test)) if exact else one
+        return [one, twin or one]
+
+    def looked_at(self) -> list[Seen]:
+        """Return the tests that were looked at and keep the limits."""
+        return [one for one in self._seen.values() if one is not None]
+
+    def see(self, test: Test) -> Seen | None:
+        """Return a test as it would be seen, with less motion where that keeps force and heat.
+
+        None where no motion does.
+        """
+        if test not in self._seen:
+            self._seen[test] = self._look(test)
+        return self._seen[test]
+
+    def _look(self, test: Test) -> Seen | None:
+        for _ in range(TRIES):
+            signals = test.signals(self.limits, self.rate)
+            if float(np.max(np.abs(signals.x))) < LEAST * self.limits.stroke:
+                return None
+            run = self._run(signals)
+            if self._keeps(run):
+                break
+            test = test.smaller(SMALLER)
+        else:
+            return None
+        normals = tuple(asked.of([run]) for asked in self.goal.asked)
+        return Seen(test, signals, normals, len(run.x) - run.skip)
+
+    def _run(self, signals: Signals) -> Run:
+        count = len(signals.x)
+        turns = -(-count // self.errors.shape[1])
+        draws = np.tile(self.errors, (1, turns, 1))[:, :count]
+        nothing = np.zeros(count)
+        return Run(
+            "plan", signals.dt, signals.x, signals.v, signals.a, signals.V, nothing, self.noise,
+            draws, drive=self.drive,
+        )  # fmt: skip
+
+    def _keeps(self, run: Run) -> bool:
+        """Return whether a run keeps the limits of force and heat, by every model in question."""
+        if np.isinf(self.limits.force) and np.isinf(self.limits.heat):
+            return True
+        for asked in self.goal.asked[: self.goal.count]:
+            force = asked.problem.planned([run]).predict(asked.question.model, run)
+            if np.max(np.abs(force)) > RESERVE * self.limits.force:
+                return False
+            if float(np.sum(np.abs(force * run.v))) * run.dt > RESERVE * self.limits.heat:
+                return False
+        return True
+
+    def twin(self, test: Test) -> Test:
+        """Return the second test of a kind: other phases and levels, nearly the same motion."""
+        motion, command = test.motion, test.command
+        low, high = self.limits.usable_band
+        moved = replace(
+            motion, seed=motion.seed + SECOND, low=min(motion.low * TWIN_PITCH, high),
+            high=max(low, min(motion.high / TWIN_PITCH, high)),
+        )  # fmt: skip
+        if moved.low > moved.high:
+            moved = replace(moved, low=motion.low, high=motion.high)
+        other = replace(command, seed=command.seed + SECOND, period=command.period * TWIN_PITCH)
+        return replace(test, motion=moved, command=other, share=test.share * TWIN_SIZE)
+
+    def _candidates(self) -> list[Test]:
+        """Return tests spread evenly over all that the rig can do (scrambled Sobol points)."""
+        points = qmc.Sobol(8, seed=self.seed).random(CANDIDATES)
+        return [self._test(row) for row in points]
+
+    def _test(self, row: Array) -> Test:
+        """Return the test of a point (8,) between 0 and 1."""
+        limits = self.limits
+        kinds = [*limits.motions, *(["record"] if self.record else [])]
+        kind = kinds[min(int(row[0] * len(kinds)), len(kinds) - 1)]
+        seed = self.seed + int(1e4 * row[1])
+        low, high = self.limits.usable_band
+        if kind == "record" and self.record is not None:
+            motion = self.record
+        elif kind in ("sine", "triangle"):
+            motion = Waveform(kind, low, low * (high / low) ** float(row[2]))
+        else:
+            top = low * (high / low) ** (0.3 + 0.7 * float(row[2]))
+            motion = Waveform(kind, low, top, seed)
+        share = LEAST ** ((1.0 - float(row[3])) ** 2)
+        return Test(motion, self._command(row[4:], seed), share, limits.duration)
+
+    def _command(self, row: Array, seed: int) -> Command:
+        low, high = self.limits.command
+        if high <= low:
+            return Command("held", low, high)
+        kind = self.limits.commands[
+            min(int(row[0] * len(self.limits.commands)), len(self.limits.commands) - 1)
+        ]
+        bottom = low + (high - low) * max(0.0, 0.8 * float(row[1]) - 0.4)
+        top = bottom + (high - bottom) * (0.3 + 0.7 * float(row[2]))
+        period = DWELLS[0] * (DWELLS[1] / DWELLS[0]) ** float(row[3])
+        if kind == "held":
+            top = low + (high - low) * float(row[2])
+        bottom, top = self.limits.nearest(bottom), self.limits.nearest(top)
+        return Command(kind, bottom, top, period, seed)
+
+    def _improved(self, best: Seen, picked: Sequence[Seen]) -> Seen:
+        """Return a test after a search about it for size, frequencies, levels and dwell."""
+        known = {best.test: best}
+
+        def cost(point: Array) -> float:
+            one = self.see(self._moved(best.test, point))
+            if one is None:
+                return 1e3
+            known[one.test] = one
+            return self.goal.value([*picked, *self._both(one)])
+
+        start = np.zeros(5)
+        simplex = np.vstack([start, 0.4 * np.eye(5)])
+        options = {"maxfev": IMPROVED, "initial_simplex": simplex}
+        minimize(cost, start, method="Nelder-Mead", options=options)
+        return min(known.values(), key=lambda one: self.goal.value([*picked, *self._both(one)]))
+
+    def _moved(self, test: Test, point: Array) -> Test:
+        """Return a test with its numbers moved by a point (5,) of logarithms and shares."""
+        low, high = self.limits.usable_band
+        motion, command = test.motion, test.command
+        if motion.kind != "record":
+            bottom = float(np.clip(motion.low * np.exp(point[0]), low, high))
+            top = float(np.clip(motion.high * np.exp(point[1]), bottom, high))
+            motion = replace(motion, low=bottom, high=top)
+        share = float(np.clip(test.share * np.exp(point[2]), LEAST, 1.0))
+        period = float(np.clip(command.period * np.exp(point[3]), *DWELLS))
+        least, most = self.limits.command
+        level = command.high + 0.5 * float(point[4]) * (most - least)
+        top_level = self.limits.nearest(float(np.clip(level, command.low, most)))
+        changed = replace(command, period=period, high=top_level)
+        return replace(test, motion=motion, command=changed, share=share)

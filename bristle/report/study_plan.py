@@ -1,0 +1,60 @@
+"""The newest plan of a study in its report: the next tests, and what they will show."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ..draw import html
+from ..errors import BristleError
+from ..plan.folder import FILE, PlanFolder, read_plan
+from ..plan.outcome import OUTCOMES
+
+if TYPE_CHECKING:
+    from ..study.study import Study
+
+
+def plan_section(study: Study) -> str:
+    """Return the section of the newest plan in a study's folder, "" where there is none."""
+    folders = sorted(study.folder.glob(f"plan*/{FILE}"), key=lambda file: file.stat().st_mtime)
+    if not folders:
+        return ""
+    folder = folders[-1].parent
+    try:
+        plan = read_plan(folder)
+        told = json.loads((folder / OUTCOMES).read_text(encoding="utf-8"))
+        header, rows = told["header"], told["rows"]
+    except (BristleError, OSError, ValueError, KeyError, TypeError) as error:
+        return html.section("Next tests", html.paragraphs(f"{folder.name} cannot be read: {error}"))
+    performed = _performed(study, plan)
+    lead = (
+        f"The tests of {folder.name} are measured: their runs are in this study."
+        if performed
+        else f"{folder.name} holds tests for the rig's controller, one file each."
+    )
+    runs = [
+        [run.name, "fitting" if run.role == "train" else "judging", run.about] for run in plan.runs
+    ]
+    return html.section(
+        "Planned tests" if performed else "Next tests",
+        html.paragraphs(lead, kind="lead"),
+        html.table(["run", "for", "what"], runs),
+        html.table(header, rows, numbers=(2, 3)),
+        *(() if performed else _pictures(folder, plan)),
+    )
+
+
+def _performed(study: Study, plan: PlanFolder) -> bool:
+    """Return whether the runs of a plan are in a study."""
+    there = {Path(run.file).stem for run in study.settings.runs}
+    return all(run.name in there for run in plan.runs)
+
+
+def _pictures(folder: Path, plan: PlanFolder) -> list[str]:
+    found = []
+    for run in plan.runs:
+        file = folder / f"{run.name}.png"
+        if file.is_file():
+            found.append(html.figure(file.read_bytes(), run.about, f"{run.name}: {run.about}."))
+    return found

@@ -1,0 +1,86 @@
+"""Runs that were added to a study: which ones, and whether its model knows them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+from ..data.files import other_schema, read_json, write_json
+from ..data.measurement import stem_of
+from ..errors import StudyError
+from ..findings import command
+
+if TYPE_CHECKING:
+    from .study import Study
+
+FILE = "added_runs.json"
+"""Where a study notes it."""
+
+
+@dataclass(frozen=True)
+class Addition:
+    """Runs that were added at once: when (UTC), the step of the model then, files of the runs."""
+
+    date: str
+    step: int
+    files: tuple[str, ...]
+
+
+def additions(study: Study) -> tuple[Addition, ...]:
+    """Return which runs were added, the first time first.
+
+    Raises
+    ------
+    StudyError
+        If the file that says so is damaged.
+    """
+    path = study.folder / FILE
+    if not path.is_file():
+        return ()
+    data = read_json(path)
+    if data.get("schema") != 1:
+        raise StudyError(f"{path}: {other_schema(data.get('schema'))}")
+    try:
+        return tuple(
+            Addition(str(one["date"]), int(one["step"]), tuple(map(str, one["files"])))
+            for one in data["additions"]
+        )
+    except (KeyError, TypeError, ValueError):
+        raise StudyError(
+            f"{path}: it lists runs that were added, and is damaged. Remove it."
+        ) from None
+
+
+def note_addition(study: Study, files: Sequence[str]) -> None:
+    """Write down that runs are added now, to the present model; the caller holds the lock."""
+    numbers = study.history.numbers()
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    made = Addition(now, numbers[-1] if numbers else 0, tuple(files))
+    every = [asdict(one) for one in (*additions(study), made)]
+    write_json(study.folder / FILE, {"schema": 1, "additions": every})
+
+
+def unknown_to_model(study: Study) -> list[str]:
+    """Return the files of the runs that were added since the present model was identified.
+
+    None before the first identification.
+    """
+    numbers = study.history.numbers()
+    last = numbers[-1] if numbers else 0
+    there = {run.file for run in study.settings.runs}
+    found = [file for one in additions(study) if one.step == last > 0 for file in one.files]
+    return [file for file in dict.fromkeys(found) if file in there]
+
+
+def added_text(study: Study) -> str:
+    """Return the sentence that tells which runs the present model does not know, "" for none."""
+    names = [stem_of(file) for file in unknown_to_model(study)]
+    if not names:
+        return ""
+    what = "run was" if len(names) == 1 else "runs were"
+    return (
+        f"{len(names)} {what} added after the present model was identified: {', '.join(names)}. "
+        f"Identify it again:  {command('identify', study.folder)}"
+    )

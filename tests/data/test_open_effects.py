@@ -1,0 +1,102 @@
+"""What limits leave open: sizes whose 95 % point is the limit, and models with such an effect."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bristle.data.model import new_model
+from bristle.data.model_draws import has_covariance, joint_errors
+from bristle.data.open_effects import OpenEffect, open_effects
+
+SPRING = {
+    "effect": "gas_spring", "parameter": "k", "unit": "N/m", "side": "below", "limit95": 40.0,
+    "others": {}, "moved": {"c_0": -3.0, "f_c": -9.0, "gone": 1.0},
+}  # fmt: skip
+LAG = {**SPRING, "effect": "coil_lag", "why": "the command does not move"}
+CORE = {
+    **SPRING, "effect": "saturation", "parameter": "V_s", "side": "above", "limit95": 20.0,
+    "others": {"shape": 2.0}, "moved": {},
+}  # fmt: skip
+
+
+def verdict(*limits: dict[str, object], site: str = "damper") -> dict[str, object]:
+    return {"findings": [{"site": site, "limits": list(limits)}]}
+
+
+def spring() -> OpenEffect:
+    return open_effects(verdict(SPRING), new_model("bingham"))[0][0]
+
+
+def test_nineteen_of_twenty_sizes_are_below_the_limit() -> None:
+    parts = np.array(spring().parts(2000))
+    assert not spring().signed
+    assert np.mean(parts < 1.0) == pytest.approx(0.95, abs=1e-3)
+    assert parts.min() > 0.0
+    ratio = OpenEffect("asymmetry", "asymmetry", "ratio", 0.1, False, {}, {})
+    parts = np.array(ratio.parts(2000))
+    assert ratio.signed
+    assert np.mean(np.abs(parts) < 1.0) == pytest.approx(0.95, abs=1e-3)
+    assert np.mean(parts) == pytest.approx(0.0, abs=1e-9)
+    for few in (spring().parts(4), ratio.parts(4)):
+        assert np.sqrt(np.mean(np.square(few))) == pytest.approx(1.0 / 1.96)
+
+
+def test_the_effect_joins_and_the_models_own_parameters_move_along() -> None:
+    model = new_model("bingham").with_values({"c_0": 60.0, "f_c": 2.0})
+    joined = spring().joined(model, 0.5)
+    values = joined.values()
+    assert values["gas_spring.k"] == 20.0
+    assert values["c_0"] == 58.5
+    assert values["f_c"] == 0.0  # its bound
+    assert {values[f"gas_spring.{name}"] for name in ("preload", "k_2", "k_3")} == {0.0}
+    assert "gas_spring" not in model.effects
+
+
+def test_a_parameter_that_is_not_free_does_not_move() -> None:
+    model = new_model("bingham").with_values({"c_0": 60.0})
+    fixed = {"c_0": replace(model.parameters["c_0"], free=False)}
+    held = replace(model, parameters={**model.parameters, **fixed})
+    assert spring().joined(held, 1.0).values()["c_0"] == 60.0
+
+
+def test_an_effect_that_vanishes_as_its_parameter_grows() -> None:
+    (core,), _ = open_effects(verdict(CORE), new_model("bingham"))
+    assert (core.falls, core.signed) == (True, False)
+    assert core.own(0.5)["V_s"] == 40.0
+    assert core.own(2.0)["V_s"] == 10.0
+    assert core.own(2.0)["shape"] == 2.0
+    assert core.own(0.0)["V_s"] > 1e3  # none of it
+
+
+def test_what_has_no_limit_or_is_in_the_model_is_not_open() -> None:
+    model = new_model("bingham", ("gas_spring",))
+    found, unlimited = open_effects(verdict(SPRING, LAG, CORE), model)
+    assert [one.name for one in found] == ["saturation"]
+    assert unlimited == ["coil_lag"]
+    assert open_effects({}, model) == ([], [])
+
+
+def test_a_storeys_limit_is_of_that_storey() -> None:
+    soft = {
+        **SPRING, "effect": "storey_softening", "parameter": "d_half", "side": "above",
+        "limit95": 0.02, "others": {"shape": 2.0}, "moved": {},
+    }  # fmt: skip
+    both = {"findings": [{"site": f"storey{k}", "limits": [soft]} for k in (1, 2)]}
+    found, _ = open_effects(both, new_model("lugre"))
+    assert [one.label for one in found] == ["storey_softening", "storey_softening (storey2)"]
+    assert [one.own(1.0)["which"] for one in found] == [1.0, 2.0]
+
+
+def test_joint_errors_are_those_of_the_covariance() -> None:
+    model = new_model("bingham").with_values({"f_c": 2.0, "c_0": 60.0}, {"f_c": 0.2, "c_0": 3.0})
+    assert not has_covariance(model)  # whether they go together is not known
+    covariance = np.array([[0.04, -0.5], [-0.5, 9.0]])
+    model = model.with_covariance(["f_c", "c_0"], covariance)
+    assert has_covariance(model)
+    errors = joint_errors(model)
+    np.testing.assert_allclose(errors.root @ errors.root.T, covariance)
+    assert errors.values(np.zeros(2)) == {"f_c": 2.0, "c_0": 60.0}
+    assert errors.values(np.array([1e9, 1e9]))["f_c"] in (0.0, errors.high[0])

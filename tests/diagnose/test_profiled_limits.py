@@ -1,0 +1,77 @@
+"""A limit by the profile of the likelihood is that of a fit at every size."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bristle.diagnose.effect_limits import EffectLimit, limit_of
+from bristle.diagnose.effect_size import Known, Sized
+from bristle.diagnose.profiled_limits import profiled
+from bristle.identify.model import Model, Problem, Run
+from bristle.identify.search_context import refine
+
+TRUE = Model("bingham", values={"f_c": 5.0, "c_0": 20.0, "v_n": 100.0}, fixed=("f_v", "c_v", "v_n"))
+
+
+@pytest.fixture(scope="module")
+def known() -> Known:
+    rng = np.random.default_rng(3)
+    runs = []
+    for k, f in enumerate((1.0, 2.3)):
+        t = np.arange(1500) * 0.004
+        x = 0.01 * np.sin(2.0 * np.pi * f * t) * (0.4 + 0.6 * np.sin(0.9 * t) ** 2)
+        v = np.gradient(x, t)
+        one = Run(
+            f"run_{k}", 0.004, x, v, np.gradient(v, t), np.zeros_like(t), np.zeros_like(t), 0.2,
+            np.zeros((2, len(t), 4)),
+        )  # fmt: skip
+        force = Problem([one]).predict(TRUE, one) + 0.2 * rng.standard_normal(len(t))
+        runs.append(Run(**{**one.__dict__, "force": force}))
+    problem = Problem(runs)
+    model = refine(TRUE, problem)
+    return Known(problem, model, problem.expectation(model), 1500)
+
+
+def test_where_all_is_linear_the_profile_agrees(known: Known) -> None:
+    limit = limit_of(Sized("gas_spring", known))
+    (found,) = profiled(known, [limit])
+    assert found.profiled
+    assert not limit.profiled
+    assert found.largest == pytest.approx(limit.largest, rel=0.15)
+
+
+def test_a_limit_that_is_wrong_is_moved_to_where_it_belongs(known: Known) -> None:
+    limit = limit_of(Sized("gas_spring", known))
+    assert limit.largest is not None
+    assert limit.share is not None
+    wrong = EffectLimit(
+        "gas_spring", "k", "N/m", largest=3.0 * limit.largest, share=3.0 * limit.share
+    )
+    (found,) = profiled(known, [wrong])
+    assert found.largest == pytest.approx(limit.largest, rel=0.15)
+    assert found.share == pytest.approx(limit.share, rel=0.15)
+
+
+def test_what_has_no_size_stays_as_it_is(known: Known) -> None:
+    hidden = EffectLimit("coil_lag", why="the command does not move")
+    coarse = EffectLimit("backlash", "gap", "m", largest=1e-6, coarse=True)
+    assert profiled(known, [hidden, coarse]) == (hidden, coarse)
+
+
+def test_the_command_asks_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from bristle.cli import main
+    from bristle.study import learning
+
+    asked: dict[str, object] = {}
+
+    def stop(*_given: object, **options: object) -> None:
+        asked.update(options)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(learning, "diagnose_study", stop)
+    monkeypatch.setattr("bristle.study.study.Study", lambda folder: folder)
+    assert main(["diagnose", str(tmp_path), "--limits"]) == 130
+    assert asked["profile"] is True

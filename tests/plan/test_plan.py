@@ -1,0 +1,202 @@
+"""A plan shows more than the runs at hand, keeps its limits, and says what it cannot settle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bristle
+from bristle.errors import StudyError
+from bristle.example.make import Choice, make_bench
+from bristle.identify.model import Model, Problem, Run
+from bristle.plan.folder import read_plan
+from bristle.plan.knowledge import Asked, Known, Question, Rival
+from bristle.plan.plan import Wish, default_wish
+from bristle.plan.purposes import Figure, cost_of
+
+SHEET = """schema = 1
+[damper]
+law = "bingham"
+max_force = "2 kN"
+[limits]
+stroke = "20 mm"
+speed = "250 mm/s"
+command = ["0 V", "5 V"]
+rate = "100 Hz"
+duration = "5 s"
+runs = 2
+"""
+
+
+@pytest.fixture(scope="module")
+def sheet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("sheet") / "rig.toml"
+    file.write_text(SHEET)
+    return file
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> bristle.Study:
+    folder = tmp_path_factory.mktemp("rigs") / "rig"
+    make_bench(folder, Choice(nothing=True, law="bingham", seed=4))
+    study = bristle.Study(folder)
+    bristle.identify(study)
+    return study
+
+
+def a_run(x_of: float = 0.01, noise: float = 0.1) -> Run:
+    t = np.arange(1000) * 0.005
+    x = x_of * np.sin(6.0 * t)
+    v, a = 6.0 * x_of * np.cos(6.0 * t), -36.0 * x
+    force = 10.0 * np.sign(v)
+    draws = np.zeros((2, len(t), 4))
+    return Run("run", 0.005, x, v, a, np.zeros_like(t), force, noise, draws)
+
+
+# At 0 V, with a viscous part that does not fall: f_c sign(v) + c_0 v.
+PLAIN = Model(
+    "bingham", values={"f_c": 5.0, "c_0": 20.0, "v_n": 100.0}, fixed=("f_v", "c_v", "v_n")
+)
+
+
+def test_deviations_and_distances_are_those_of_least_squares() -> None:
+    run = a_run()
+    more = Model("bingham", values={**PLAIN.values, "c_0": 23.0}, fixed=PLAIN.fixed)
+    question = Question(PLAIN, (Rival("thicker", more, PLAIN),))
+    asked = Asked(question, Problem([run]))
+    known = Known(question, asked.of([run]), len(run.x))
+    J = np.stack([np.sign(run.v), run.v], axis=1)[run.skip :] / run.noise
+    exact = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+    for name, std in zip(("f_c", "c_0"), exact, strict=True):
+        assert known.deviations()[name] * asked.spread(name)[0] == pytest.approx(std, rel=0.01)
+    # A dashpot of its own takes the thicker oil up whole; the model as it is does not.
+    assert known.raw()["thicker"] == pytest.approx(3.0 * np.linalg.norm(J[:, 1]), rel=1e-3)
+    assert known.distances()["thicker"] < 0.02 * known.raw()["thicker"]
+
+
+def test_runs_add_up_and_never_tell_less() -> None:
+    runs = [a_run(0.01), a_run(0.004)]
+    asked = Asked(Question(PLAIN), Problem(runs))
+    both = asked.of(runs)
+    assert both == pytest.approx(asked.of(runs[:1]) + asked.of(runs[1:]))
+    one = Known(asked.question, asked.of(runs[:1]), 1000)
+    more = one.with_runs(asked.of(runs[1:]), 1000, 0)
+    assert all(more.deviations()[name] < one.deviations()[name] for name in ("f_c", "c_0"))
+
+
+def test_a_figure_costs_nothing_below_what_is_enough() -> None:
+    assert Figure("see", "gas_spring", 0.1, 0.2).cost == 0.0
+    assert cost_of([Figure("see", "a", 0.4, 0.2), Figure("sharpen", "b", 0.2, 0.2)]) > 0.0
+
+
+def test_a_plan_of_a_new_rig_keeps_its_limits_and_sees_what_it_is_for(sheet: Path) -> None:
+    found = bristle.plan(sheet, see="coil_lag")
+    (seen,) = [one for one in found.outcomes if one.purpose == "see"]
+    assert seen.name == "coil_lag"
+    assert 0.0 < seen.then < 0.02  # s; nothing measured tells before
+    assert not np.isfinite(seen.now)
+    # A coil that lags shows where its command changes.
+    assert all(np.ptp(one.V) > 1.0 for one in found.signals)
+    for one in found.signals:
+        assert np.max(np.abs(one.x)) <= 0.9 * 20e-3 * (1.0 + 1e-9)
+        assert np.max(np.abs(one.v)) <= 0.9 * 0.25 * (1.0 + 1e-9)
+
+
+def test_force_and_heat_are_kept_by_the_model_or_the_plan_is_refused(sheet: Path) -> None:
+    found = bristle.plan(sheet, sharpen=True, heat="200 J", force="1.5 kN")
+    for run, one in zip(found.runs(), found.signals, strict=True):
+        assert run.signals["voltage"].max() < 0.75 * 5.0  # at 5 V the data sheet has 2 kN
+        assert np.sum(np.abs(one.v)) * one.dt < 0.5  # m of travel: 200 J at 400 N
+    with pytest.raises(StudyError, match="no test stays within the limits"):
+        bristle.plan(sheet, sharpen=True, force="1 N")
+
+
+def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
+    rig: bristle.Study, tmp_path: Path
+) -> None:
+    found = bristle.plan(rig, sharpen=["f_v"], runs=2, duration="6 s")
+    (row,) = found.outcomes
+    assert row.name == "f_v"
+    assert row.then < 0.9 * row.now
+    assert found.worth
+    folder = found.write(tmp_path / "plan")
+    read = read_plan(folder)
+    assert [run.role for run in read.runs] == ["train", "holdout"]
+    assert read.study == rig.name
+    for name in ("plan.md", "plan_1.png", "plan_2.csv"):
+        assert (folder / name).is_file()
+    assert "f_v" in (folder / "plan.md").read_text()
+    with pytest.raises(StudyError):
+        found.write(tmp_path / "plan")
+
+
+def test_the_same_seed_gives_the_same_plan(sheet: Path) -> None:
+    first, again = (bristle.plan(sheet, sharpen="f_c", seed=5).runs() for _ in range(2))
+    assert [run.about for run in first] == [run.about for run in again]
+
+
+def test_rivals_that_no_test_tells_apart_are_said_to_be_so(rig: bristle.Study) -> None:
+    found = bristle.plan(rig, separate=["gas_spring", "duffing"], runs=1, duration="3 s")
+    assert not found.worth  # on this rig neither has a size
+    assert "no test within these limits tells them apart" in found.sentences()[0]
+    assert "Nothing is left to gain" in found.sentences()[-1]
+
+
+def test_parts_without_a_form_are_covered_along_their_coordinates(sheet: Path) -> None:
+    found = bristle.plan(sheet, learn=["displacement"])
+    (row,) = found.outcomes
+    assert row.name == "along displacement"
+    assert row.then < 0.5 * row.now
+    assert max(np.max(np.abs(one.x)) for one in found.signals) > 0.7 * 0.9 * 20e-3
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"see": "gas_sprin"}, "gas_spring"), ({"separate": "gas_spring"}, "two or more"),
+        ({"sharpen": "nothing"}, "parameter"), ({"learn": "colour"}, "displacement"),
+        ({"stroke": "3 kg"}, "stroke"), ({"strok": 1.0}, "stroke"), ({"runs": 0}, "1 or more"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_planned_is_refused(
+    sheet: Path, wrong: dict[str, object], told: str
+) -> None:
+    with pytest.raises(StudyError, match=told):
+        bristle.plan(sheet, **wrong)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ('max_force = "2 kN"', 'max_force = "2 mm"', "max_force"),
+        ('max_force = "2 kN"\n', "", "max_force is missing"),
+        ('stroke = "20 mm"\n', "", "lacks stroke"), ("bingham", "bengham", "bingham"),
+        ('max_force = "2 kN"', 'max_force = "-2 kN"', "more than 0"),
+    ],
+)  # fmt: skip
+def test_a_data_sheet_with_mistakes_is_refused(
+    tmp_path: Path, old: str, new: str, told: str
+) -> None:
+    file = tmp_path / "rig.toml"
+    file.write_text(SHEET.replace(old, new))
+    with pytest.raises(StudyError, match=told):
+        bristle.plan(file)
+
+
+@pytest.mark.parametrize(
+    ("verdict", "wish"),
+    [
+        ({"kind": "ambiguous", "effects": ["gas_spring", "duffing"]},
+         Wish(separate=("gas_spring", "duffing"))),
+        ({"kind": "unknown", "effects": []}, Wish(sharpen=(), learn=())),
+        ({"kind": "none", "effects": []}, Wish(see=(), sharpen=())),
+        (None, Wish(see=(), sharpen=())),
+    ],
+)  # fmt: skip
+def test_without_a_purpose_the_verdict_says_what_for(
+    rig: bristle.Study, monkeypatch: pytest.MonkeyPatch, verdict: object, wish: Wish
+) -> None:
+    monkeypatch.setattr(type(rig), "verdict", lambda _self: verdict)
+    assert default_wish(rig) == wish
