@@ -1,5 +1,7 @@
 """What an FMU says of itself: its variables with units, starts and dependencies."""
 
+# Longer than 300 lines: what can be wrong with a description is told attribute by attribute.
+
 from __future__ import annotations
 
 import math

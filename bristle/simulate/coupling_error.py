@@ -56,6 +56,17 @@ class CouplingError:
         """Whether there is an error beyond rounding."""
         return self.along > ROUNDING
 
+    def __str__(self) -> str:
+        shares = (f"{100 * share:.2g} %" for share in (self.along, self.peak, self.rms))
+        return "{} along the run, peak {}, RMS {}, order {:.2g}".format(*shares, self.order)
+
+    def doubt(self) -> str:
+        """Return why the estimate is worth nothing, where it is."""
+        if LEAST_ORDER <= self.order <= MOST_ORDER:
+            return "the coupling error follows a controller whose output does not settle"
+        said = "the coupling error does not fall with the step as an algorithm's does"
+        return f"{said} (order {self.order:.2g})"
+
 
 def estimate(
     scenario: Scenario, frame: pd.DataFrame, again: Callable[[Scenario, str], pd.DataFrame]

@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, NoReturn, Self
 
 import numpy as np
 
-from ..errors import RunError, ScenarioError
+from ..errors import RunError
 from ..fmu.description import Description, Value
-from ..scenario.over_step import as_told
 from .graph import find_loop
 from .loop import Memory, compile_loop
+from .nodes import make_nodes
 from .operations import Node, Operation, Port, Read, Restore, Save, Step, kind_of
 from .results import Array, Table
 from .rows import count_steps, make_columns, times
@@ -272,29 +272,6 @@ class Master:
 
     def _ports(self) -> list[Port]:
         return [(c, name) for c, node in enumerate(self.nodes) for name in node.outputs]
-
-
-def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> list[Node]:
-    """Return the components as the schedule sees them, in the order of the file."""
-    numbers = {component.name: c for c, component in enumerate(scenario.components)}
-    sources: list[dict[str, Port]] = [{} for _ in scenario.components]
-    for connection in scenario.connections:
-        if descriptions[connection.target].variables[connection.input].kind == "String":
-            raise ScenarioError(
-                f'{scenario.file}: "{connection.target}.{connection.input}" is a text; texts are '
-                "set in parameters, only numbers and Booleans are passed on."
-            )
-        port = numbers[connection.source], connection.output
-        sources[numbers[connection.target]][connection.input] = port
-    nodes = []
-    for c, component in enumerate(scenario.components):
-        description = descriptions[component.name]
-        substeps = round(scenario.step / component.step) if component.step else 1
-        told = component.over_step
-        outputs = {v.name: as_told(v, told) for v in description.of("output") if v.kind != "String"}
-        inputs = {v.name: as_told(v, told) for v in description.of("input")}
-        nodes.append(Node(component.name, inputs, outputs, sources[c], substeps))
-    return nodes
 
 
 def _equal(one: Value, other: Value, near: float) -> bool:

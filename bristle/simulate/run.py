@@ -1,5 +1,7 @@
 """Run a scenario: from a file to a pandas frame with units, and to files that survive a crash."""
 
+# Longer than 300 lines: whatever ends a run, and how, the rows before are kept in one class.
+
 from __future__ import annotations
 
 import os
@@ -16,7 +18,7 @@ from ..fmu.description import Description, read_description
 from ..interrupt import Interrupt
 from ..scenario.scenario import Scenario, fmu_parameters, load_scenario
 from ..scenario.text import scenario_text
-from .coupling_error import LEAST_ORDER, MOST_ORDER, as_data, estimate
+from .coupling_error import as_data, estimate
 from .output import Output
 from .results import Table, to_frame
 from .rows import make_columns, times
@@ -171,25 +173,19 @@ def execute(
 
 
 def _add_error(scenario: Scenario, frame: Results, output: Output) -> None:
-    """Estimate the coupling error of a run, keep it with the results and warn of what is no use."""
-    how, found = estimate(scenario, frame, run_quietly)
+    """Estimate the coupling error of a run, keep it with the results and tell it."""
+    try:
+        how, found = estimate(scenario, frame, run_quietly)
+    except RunError as error:  # the run itself is whole
+        output.warn(f"the coupling error cannot be estimated: {error}")
+        return
     frame.attrs["coupling_error"] = as_data(found)
     frame.attrs["coupling_error_by"] = how
-    for name, error in found.items():
-        if error.some:
-            output.log(
-                f"coupling error of {name}, by {how}: {100 * error.along:.2g} % along the run, "
-                f"peak {100 * error.peak:.2g} %, RMS {100 * error.rms:.2g} %, "
-                f"order {error.order:.2g}"
-            )
-        if not error.worth:
-            why = "it follows a controller whose output does not"
-            if not LEAST_ORDER <= error.order <= MOST_ORDER:
-                why = f"order {error.order:.2g}"
-            output.warn(
-                f"{name}: the coupling error does not fall with the step as an algorithm's does "
-                f"({why}): the estimate is worth nothing"
-            )
+    for name, one in found.items():
+        if one.some:
+            output.log(f"coupling error of {name}, by {how}: {one}")
+        if not one.worth:
+            output.warn(f"{name}: {one.doubt()}: the estimate is worth nothing")
 
 
 def run_quietly(scenario: Scenario, engine: str) -> Results:
