@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
+<<<<<<< HEAD
 from typing import TYPE_CHECKING, Any, ClassVar
+=======
+from typing import Any
+>>>>>>> planb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,26 +21,21 @@ from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.opening import Opening, median_noise
 from ..errors import StudyError
 from ..identify.rig import DAMPER
-from ..physics.drive import DRIVES
 from ..physics.effect import plain_name
 from ..progress import tell
-from ..quantity import plain, quantity
 from ..study.identification import as_model
 from ..study.rig import building_of
 from ..study.study import Study
-from .added_sensors import Added, added_sensors, place_of
+from .added_sensors import added_sensors
+from .building_plan import ONE_FORCE, BuildingPlan
 from .building_sites import SiteWish, default_wishes, purposes_at
-from .folder import PlannedRun
 from .goal import Measured, Stated, stated
 from .ground import records_at_hand, scalable
 from .knowledge import Known
 from .measured_force import of_one_force
-from .motions import Waveform
 from .outcome import Outcome, outcomes
-from .plan import Plan
-from .planned_test import Signals
 from .purposes import cost_of
-from .rig_limits import with_given
+from .rig_limits import RigLimits, with_given
 from .search import Goal
 from .shaking_limits import limits_of_shaking
 from .shaking_table import ShakingTable
@@ -53,13 +51,17 @@ CANDIDATES, IMPROVED = 64, 10
 """Tests that are looked at, and evaluations in which a picked one is improved: each is a run of the
 building, simulated and smoothed."""
 
-ONE_FORCE = "distance, if they have exactly the forms of the model"
-"""The figure of rivals that add up to one force while the damper's is not measured."""
+MANY = 12_000
+"""Samples of a test from which on half as many are looked at."""
+
+SAME_RATE = 1e-3
+"""Share by which a given rate may differ from that of the runs."""
 
 TIE = 0.01
 """Weight of how well parameters are known, where purposes leave a choice."""
 
 
+<<<<<<< HEAD
 @dataclass(frozen=True)
 class BuildingPlan(Plan):
     """The next tests of a building.
@@ -134,6 +136,8 @@ def _words(motion: Waveform, signals: Signals) -> str:
     return f"{motion.name} times {plain(factor, 2)}, {peak}"
 
 
+=======
+>>>>>>> planb
 def plan_building(
     study: Study,
     wish: Wish | None = None,
@@ -164,39 +168,49 @@ def plan_building(
     model, runs = study.model(), study.runs()
     building = building_of(study, model)
     assert building is not None
-    house = House(building, study.folder / model.building if model.building else None)
     measured = [*runs.train, *runs.holdout]
+    motions = records_at_hand(measured, records, Path.cwd())
+    house = House(building, study.folder / model.building if model.building else None)
     found = BuildingRuns(runs.train, runs.holdout, as_model(model), building, tell)
     sites = _opened(study, found)
-    own = limits_of_shaking(measured, sites, house)
-    rig = with_given(own, limits or {})
-    if rig.rate != own.rate:
-        raise StudyError(
-            f"rate = {rig.rate:g} Hz: the runs of {study.name} have {own.rate:g} samples per "
-            "second, and so have planned ones."
-        )
-    waveforms = [
-        scalable(one, rig.rate, rig.duration, rig.usable_band[0])
-        for one in records_at_hand(measured, records, Path.cwd())
-    ]
+    rig = _within(limits_of_shaking(measured, sites, house), limits or {})
     given = wish is not None and not wish.nothing
     wishes = [SiteWish(wish)] if given and wish else default_wishes(study.verdict() or {})
     purposes = purposes_at(sites, wishes, rig, study.drive)
     stand = {site: _stated(one, sites[site], seed) for site, one in purposes.items()}
     tell("looking at ground motions")
-    with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bristle_plan_")))
+    with tempfile.TemporaryDirectory(prefix="bristle_plan_") as folder:
         table = ShakingTable(
-            model, house, runs.train[0], median_noise(measured), rig.command[1], folder
+            model, house, runs.train[0], median_noise(measured), rig.command[1], Path(folder)
         )
         planner = TablePlanner(
-            _joint(stand), rig, 0.0, np.zeros((0, 0, 4)), rig.rate, None, seed, study.drive,
-            CANDIDATES, IMPROVED, table=table, show=lambda few: found.planned(few, DRAWS),
+            _joint(stand), rig, 0.0, np.zeros((0, 0, 4)), rig.rate, seed=seed, drive=study.drive,
+            candidates=CANDIDATES // (1 if rig.rate * rig.duration < MANY else 2),
+            improved=IMPROVED, table=table, show=lambda few: found.planned(few, DRAWS),
             places=tuple(site for site, one in stand.items() for _ in one.goal.asked),
-            records=tuple(waveforms),
+            records=tuple(
+                scalable(one, rig.rate, rig.duration, rig.usable_band[0]) for one in motions
+            ),
         )  # fmt: skip
         made = _planned(study, stand, planner)
     return replace(made, notes=_notes(study, sites))
+
+
+def _within(done: RigLimits, given: Mapping[str, Any]) -> RigLimits:
+    """Return what table and building have done, with what is given in its place.
+
+    Raises
+    ------
+    StudyError
+        If they allow no test, or ask for another rate than that of the runs.
+    """
+    rig = with_given(done, given)
+    if abs(rig.rate / done.rate - 1.0) > SAME_RATE:
+        raise StudyError(
+            f"rate = {rig.rate:g} Hz: the runs of this study have {done.rate:g} samples per "
+            "second, and so have planned ones."
+        )
+    return replace(rig, rate=done.rate)
 
 
 def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:
