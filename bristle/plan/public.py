@@ -56,8 +56,8 @@ def plan(
     seed : int
         Draws the tests that are looked at.
     limits : float, str or sequence
-        Limits as keywords, in place of those, by the names of rig.toml: numbers in SI or texts with a unit, such
-        as `stroke="20 mm"`, `runs=6`.
+        Limits as keywords, in place of those, by the names of rig.toml: numbers in SI or texts with
+        a unit, such as `stroke="20 mm"`, `runs=6`.
 
     Returns
     -------
