@@ -20,6 +20,9 @@ from .basis import Basis
 
 Array = NDArray[np.float64]
 
+SPREAD = 0.3
+"""Standard deviation at most, over its size, of a parameter that is drawn."""
+
 DRAWS = 4
 """Draws of the motion's error from which the noise on a planned run is taken."""
 
@@ -111,7 +114,7 @@ class Asked:
         generator : draws
         """
         p = len(self.names)
-        covariance = np.linalg.inv(known.normal[:p, :p] + np.eye(p))
+        covariance = np.linalg.inv(known.normal[:p, :p] + np.eye(p) / SPREAD**2)
         step = generator.multivariate_normal(np.zeros(p), covariance, method="eigh")
         theta = np.clip(self._scaled.start + step, self._scaled.low, self._scaled.high)
         moved = {n: v for n, v in self._scaled.at(theta).values.items() if n in self.names}
