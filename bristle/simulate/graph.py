@@ -125,6 +125,7 @@ def lay_out(
 
 
 def at_level(levels: Mapping[Port, int], component: int, level: int) -> list[str]:
+    """Return the ports of one component at one level, by name."""
     return [name for (c, name), at in levels.items() if c == component and at == level]
 
 
