@@ -3,6 +3,8 @@
 Each test is a CSV file that begins and ends at rest, with a picture. Half of them are to fit to,
 half to judge by. Without a purpose, they settle what the verdict leaves open: rivals where it is
 ambiguous, a part without a form where it is unknown, or else all effects and parameters.
+
+On a building the tests are ground motions and commands, and sensors are named that would show more.
 """
 
 from __future__ import annotations

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,34 +17,26 @@ from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.opening import Opening, median_noise
 from ..errors import StudyError
 from ..identify.rig import DAMPER
-from ..physics.drive import DRIVES
 from ..physics.effect import plain_name
 from ..progress import tell
-from ..quantity import plain, quantity
 from ..study.identification import as_model
 from ..study.rig import building_of
 from ..study.study import Study
-from .added_sensors import Added, added_sensors, place_of
+from .added_sensors import added_sensors
+from .building_plan import ONE_FORCE, BuildingPlan
 from .building_sites import SiteWish, default_wishes, purposes_at
-from .folder import PlannedRun
 from .goal import Measured, Stated, stated
 from .ground import records_at_hand, scalable
 from .knowledge import Known
 from .measured_force import of_one_force
-from .motions import Waveform
 from .outcome import Outcome, outcomes
-from .plan import Plan
-from .planned_test import Signals
 from .purposes import cost_of
-from .rig_limits import with_given
+from .rig_limits import RigLimits, with_given
 from .search import Goal
 from .shaking_limits import limits_of_shaking
 from .shaking_table import ShakingTable
 from .table_planner import DRAWS, TablePlanner
 from .wish import Wish, errs, note_of_missing
-
-if TYPE_CHECKING:
-    from ..draw.style import Page
 
 Array = NDArray[np.float64]
 
@@ -53,85 +44,14 @@ CANDIDATES, IMPROVED = 64, 10
 """Tests that are looked at, and evaluations in which a picked one is improved: each is a run of the
 building, simulated and smoothed."""
 
-ONE_FORCE = "distance, if they have exactly the forms of the model"
-"""The figure of rivals that add up to one force while the damper's is not measured."""
+MANY = 12_000
+"""Samples of a test from which on half as many are looked at."""
+
+SAME_RATE = 1e-3
+"""Share by which a given rate may differ from that of the runs."""
 
 TIE = 0.01
 """Weight of how well parameters are known, where purposes leave a choice."""
-
-
-@dataclass(frozen=True)
-class BuildingPlan(Plan):
-    """The next tests of a building.
-
-    Attributes
-    ----------
-    predicted : tuple of (n,) arrays
-        The displacement of the first level [m] in each test, simulated with the study's model.
-    sensors : tuple of Added
-        What sensors that the study lacks would show besides, the most useful one first.
-    level : str
-        The first level.
-    """
-
-    predicted: tuple[Array, ...] = field(default=(), repr=False)
-    sensors: tuple[Added, ...] = ()
-    level: str = "base"
-    rig: ClassVar[str] = "structure"
-
-    def runs(self) -> list[PlannedRun]:
-        """Return the runs as a plan's folder holds them."""
-        drive = DRIVES.get(self.drive)
-        out = []
-        for k, (test, one) in enumerate(zip(self.tests, self.signals, strict=True)):
-            channels = {"ground_acceleration": one.a}
-            about = _words(test.motion, one)
-            if drive is not None:
-                channels[drive.name] = one.V
-                about += f", {test.command.words(drive.name, drive.unit)}"
-            moved = quantity(float(np.max(np.abs(self.predicted[k]))), "m")
-            about += f"; {place_of(self.level)} moves by {moved}"
-            role = "holdout" if k % 2 else "train"
-            out.append(PlannedRun(f"plan_{k + 1}", role, about, one.time, channels))
-        return out
-
-    def sentences(self) -> list[str]:
-        """Return the plan as an engineer would say it."""
-        return [*super().sentences(), *(one.sentence() for one in self.sensors)]
-
-    @property
-    def worth(self) -> bool:
-        """Whether the tests would show what the runs at hand do not, with a sensor if need be."""
-        return super().worth or any(one.settles for one in self.sensors)
-
-    def _why(self, one: Outcome) -> str:
-        if one.what == ONE_FORCE:
-            return "they add up to one force while the damper's is not measured; no motion helps."
-        return super()._why(one)
-
-    def files(self) -> dict[str, str | bytes]:
-        """Return the further files of the plan's folder by name."""
-        from .building_picture import building_files
-
-        return building_files(self)
-
-    def _page(self, k: int) -> Page:
-        from .building_picture import draw_shaking
-
-        return draw_shaking(self.runs()[k], self.predicted[k], self.drive, self.level)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return what json can hold."""
-        return {**super().as_dict(), "sensors": [one.as_dict() for one in self.sensors]}
-
-
-def _words(motion: Waveform, signals: Signals) -> str:
-    """Return a ground motion in words, a recorded one with its scale."""
-    peak = quantity(float(np.max(np.abs(signals.a))), "m/s2")
-    if motion.kind != "record":
-        return motion.words(peak)
-    factor = float(np.max(np.abs(signals.x)) / np.max(np.abs(motion.record)))
-    return f"{motion.name} times {plain(factor, 2)}, {peak}"
 
 
 def plan_building(
@@ -164,39 +84,49 @@ def plan_building(
     model, runs = study.model(), study.runs()
     building = building_of(study, model)
     assert building is not None
-    house = House(building, study.folder / model.building if model.building else None)
     measured = [*runs.train, *runs.holdout]
+    motions = records_at_hand(measured, records, Path.cwd())
+    house = House(building, study.folder / model.building if model.building else None)
     found = BuildingRuns(runs.train, runs.holdout, as_model(model), building, tell)
     sites = _opened(study, found)
-    own = limits_of_shaking(measured, sites, house)
-    rig = with_given(own, limits or {})
-    if rig.rate != own.rate:
-        raise StudyError(
-            f"rate = {rig.rate:g} Hz: the runs of {study.name} have {own.rate:g} samples per "
-            "second, and so have planned ones."
-        )
-    waveforms = [
-        scalable(one, rig.rate, rig.duration, rig.usable_band[0])
-        for one in records_at_hand(measured, records, Path.cwd())
-    ]
+    rig = _within(limits_of_shaking(measured, sites, house), limits or {})
     given = wish is not None and not wish.nothing
     wishes = [SiteWish(wish)] if given and wish else default_wishes(study.verdict() or {})
     purposes = purposes_at(sites, wishes, rig, study.drive)
     stand = {site: _stated(one, sites[site], seed) for site, one in purposes.items()}
     tell("looking at ground motions")
-    with ExitStack() as stack:
-        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="bristle_plan_")))
+    with tempfile.TemporaryDirectory(prefix="bristle_plan_") as folder:
         table = ShakingTable(
-            model, house, runs.train[0], median_noise(measured), rig.command[1], folder
+            model, house, runs.train[0], median_noise(measured), rig.command[1], Path(folder)
         )
         planner = TablePlanner(
-            _joint(stand), rig, 0.0, np.zeros((0, 0, 4)), rig.rate, None, seed, study.drive,
-            CANDIDATES, IMPROVED, table=table, show=lambda few: found.planned(few, DRAWS),
+            _joint(stand), rig, 0.0, np.zeros((0, 0, 4)), rig.rate, seed=seed, drive=study.drive,
+            candidates=CANDIDATES // (1 if rig.rate * rig.duration < MANY else 2),
+            improved=IMPROVED, table=table, show=lambda few: found.planned(few, DRAWS),
             places=tuple(site for site, one in stand.items() for _ in one.goal.asked),
-            records=tuple(waveforms),
+            records=tuple(
+                scalable(one, rig.rate, rig.duration, rig.usable_band[0]) for one in motions
+            ),
         )  # fmt: skip
         made = _planned(study, stand, planner)
     return replace(made, notes=_notes(study, sites))
+
+
+def _within(done: RigLimits, given: Mapping[str, Any]) -> RigLimits:
+    """Return what table and building have done, with what is given in its place.
+
+    Raises
+    ------
+    StudyError
+        If they allow no test, or ask for another rate than that of the runs.
+    """
+    rig = with_given(done, given)
+    if abs(rig.rate / done.rate - 1.0) > SAME_RATE:
+        raise StudyError(
+            f"rate = {rig.rate:g} Hz: the runs of this study have {done.rate:g} samples per "
+            "second, and so have planned ones."
+        )
+    return replace(rig, rate=done.rate)
 
 
 def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:

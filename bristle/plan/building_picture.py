@@ -15,7 +15,7 @@ from .outcome import OUTCOMES
 from .picture import SHOWN, outcomes_json, plan_text
 
 if TYPE_CHECKING:
-    from .building import BuildingPlan
+    from .building_plan import BuildingPlan
     from .folder import PlannedRun
 
 Array = NDArray[np.float64]
