@@ -1,4 +1,4 @@
-"""A plan of a building: ground motions with their commands, and the sensors that would show more."""
+"""A plan of a building: ground motions with commands, and the sensors that would show more."""
 
 from __future__ import annotations
 
