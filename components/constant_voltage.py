@@ -8,6 +8,8 @@ from bristle.physics.signals import CONSTANT
 class ConstantVoltage(SourceSlave):
     """Constant voltage for a damper, the simplest of all controllers."""
 
+    changes = "discrete"
+
     def declare(self):
         self.add_parameter("level", 4.0, "V", "the voltage", (-1e3, 1e3))
         self.add_output("voltage", "V", "voltage for the damper")

@@ -213,11 +213,15 @@ def _model_of(table: Mapping[str, Any], beside: Path) -> tuple[Path, StudyModel]
 
 
 def _fixed(model: StudyModel, places: Places) -> dict[str, Value]:
-    """Return all values of a model, and the switches of its effects, by a scenario's names."""
+    """Return all values of a model, and the switches of its effects, by a scenario's names.
+
+    Not what follows a channel of the runs: the damper has it as an input.
+    """
     values = model.values()
     found: dict[str, Value] = {places.of(name): values[name] for name in model.parameters}
     for effect, own in model.effects.items():
-        found |= places.of_effect(effect, {f"{effect}.{n}": values[f"{effect}.{n}"] for n in own})
+        given = [f"{effect}.{n}" for n in own if n not in EFFECTS[effect].channels]
+        found |= places.of_effect(effect, {name: values[name] for name in given})
     return found
 
 

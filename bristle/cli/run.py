@@ -42,6 +42,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--format", choices=("csv", "parquet"), default="csv", help="of the results"
     )
+    parser.add_argument(
+        "--coupling-error",
+        action="store_true",
+        help="estimate the error that the step causes, output by output, by runs besides",
+    )
+    parser.add_argument(
+        "--tolerance",
+        metavar="SHARE",
+        help="find the step at which this error stays below a share of the peaks, e.g. 0.2%%",
+    )
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -57,11 +67,16 @@ def main(arguments: argparse.Namespace) -> int:
 
     overrides = parse_overrides(arguments.overrides)
     file = resolve_scenario(arguments.file)
+    if arguments.tolerance is not None:
+        overrides["run.step"] = _step_for(arguments, file, overrides)
     folder = Path(arguments.out or Path("results", run_name(file, overrides)))
     output = Output(folder, arguments.format, lambda line: print(line, file=sys.stderr, flush=True))
     code, trouble = 0, ""
     try:
-        frame = execute(file, overrides, arguments.engine, output, True, end_process=True)
+        frame = execute(
+            file, overrides, arguments.engine, output, True, end_process=True,
+            coupling_error=arguments.coupling_error or arguments.tolerance is not None,
+        )  # fmt: skip
     except (IncompleteRunError, RunInterrupted) as error:
         if arguments.debug and isinstance(error, IncompleteRunError):
             raise
@@ -86,6 +101,39 @@ def main(arguments: argparse.Namespace) -> int:
     return code
 
 
+def _step_for(
+    arguments: argparse.Namespace, file: Path, overrides: dict[str, bool | int | float | str]
+) -> float:
+    """Return the step [s] that keeps the tolerance, and say it."""
+    from ..errors import not_usable
+    from ..scenario.scenario import load_scenario
+    from ..simulate.coupling_error import find_step
+    from ..simulate.run import run_quietly
+
+    if arguments.engine != "fmu":
+        raise not_usable('--tolerance: engine "compiled" makes no coupling error; "fmu" does.')
+    tolerance = _share(arguments.tolerance)
+    scenario = find_step(load_scenario(file, overrides), tolerance, run_quietly)
+    said = f"a step of {1e3 * scenario.step:.6g} ms keeps the coupling error below"
+    print(f"{said} {100 * tolerance:.3g} %", file=sys.stderr)
+    return scenario.step
+
+
+def _share(text: str) -> float:
+    """Return a share [1] from a text such as "0.2%" or "0.002"."""
+    from math import isfinite
+
+    from ..errors import not_usable
+
+    try:
+        value = float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
+    except ValueError:
+        value = 0.0
+    if not (isfinite(value) and 0.0 < value < 1.0):
+        raise not_usable(f"--tolerance {text!r}: a share above 0 and below 1, as 0.2% or 0.002.")
+    return value
+
+
 def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> None:
     import json
     from dataclasses import asdict
@@ -98,6 +146,11 @@ def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> 
         "rows": len(frame),
         "window": [float(frame.index[0]), float(frame.index[-1])],
         "wall_time": frame.attrs["made"]["wall_time"],
+        "energy_residual": frame.attrs["made"].get("energy_residual", {}),
+        "coupling_error": {
+            name: {key: None if value != value else value for key, value in error.items()}
+            for name, error in frame.attrs.get("coupling_error", {}).items()
+        },
         "outputs": [
             {key: None if value != value else value for key, value in asdict(summary).items()}
             for summary in summarise(frame, everything=True)  # JSON has no NaN
@@ -127,6 +180,38 @@ def _print_plain(frame: pd.DataFrame, written: dict[str, Path]) -> None:
             row.name, plain(row.peak, 5), plain(row.time_of_peak, 4), plain(row.rms, 5), unit
         )
     Console(highlight=False).print(table)
+    _print_errors(frame)
     print(f"{len(frame)} rows in {made['wall_time']:.2f} s")
     for path in written.values():
         print(f"  {path}")
+
+
+def _print_errors(frame: pd.DataFrame) -> None:
+    """Print the coupling error where it was estimated, else the energy that the coupling makes."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from ..simulate.summary import judged_by
+
+    found = frame.attrs.get("coupling_error")
+    if found is None:
+        for name, share in frame.attrs["made"].get("energy_residual", {}).items():
+            print(f"energy made by the coupling: {100 * share:.2g} % of that through {name}")
+        return
+    step = 1e3 * frame.attrs["made"]["step"]
+    heading = f"Coupling error at {step:g} ms, by {frame.attrs['coupling_error_by']}, in %"
+    shown = [name for name in judged_by(frame) if found[name]["along"] > 0.0]
+    if not shown:
+        print(f"{heading}: none, for nothing here depends on the step.")
+        return
+    table = Table(title=heading, title_justify="left", box=None, pad_edge=False)
+    table.add_column("output", overflow="fold")
+    for column in ("along run", "of peak", "of RMS", "order"):
+        table.add_column(column, justify="right")
+    for name in shown:
+        error = found[name]
+        shares = (plain(100.0 * error[key], 2) for key in ("along", "peak", "rms"))
+        order = f"{error['order']:.1f}" + ("" if error["worth"] else ", no use")
+        table.add_row(name, *shares, order)
+    Console(highlight=False).print(table)
+    print("The other outputs do not depend on the step.")

@@ -20,9 +20,14 @@ DISPLACEMENT, VELOCITY, VOLTAGE, HOLDING_FORCE, ACCELERATION = range(5)
 FORCE, DISSIPATED_ENERGY, STROKE_RATIO, FRICTION = range(4)
 """Outputs; friction, the part of the force that is, is hidden."""
 
-REMEMBERED = 5
-ENERGY, FORCE_AT_END, ACCELERATION_AT_END, VOLTAGE_AT_END, LAST_STEP = range(-REMEMBERED, 0)
-"""What the state holds behind the states of law and effects: counted from its end."""
+REMEMBERED = 8
+ENERGY, ENERGY_SHOWN, ENERGY_AT_BEGIN = range(-REMEMBERED, -5)
+VELOCITY_AT_END, FORCE_AT_END, ACCELERATION_AT_END, VOLTAGE_AT_END, LAST_STEP = range(-5, 0)
+"""What the state holds behind the states of law and effects: counted from its end.
+
+`ENERGY` is that of the step, which effects know; `ENERGY_SHOWN` that at the motion shown since;
+`ENERGY_AT_BEGIN` has what the begin of the step adds to it already.
+"""
 
 SATURATED = 1
 """The voltage left its limits."""
@@ -109,7 +114,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     inputs : (5,) displacement [m], velocity [m/s], voltage [V], holding force [N],
         acceleration [m/s2]
     c : Constants
-    state : (`SLOTS.z_size` + 5,) the states of law and effects as given; the last five are filled
+    state : (`SLOTS.z_size` + 8,) the states of law and effects as given; the last eight are filled
     outputs : (4,) force [N], dissipated energy [J], stroke ratio [1], friction [N], filled
     work : room to work, of the size that `setup` returns
 
@@ -118,7 +123,8 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     int
         0 or `SATURATED`.
     """
-    state[ENERGY], state[LAST_STEP] = 0.0, inf
+    state[ENERGY] = state[ENERGY_SHOWN] = state[ENERGY_AT_BEGIN] = 0.0
+    state[LAST_STEP] = inf
     state[ACCELERATION_AT_END] = inputs[ACCELERATION] if c.measured else 0.0
     code = output(time, inputs, c, state, outputs, work)
     remember(inputs, c, state, outputs)
@@ -126,16 +132,16 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
 
 
 def remember(inputs: Row, c: Constants, state: Row, outputs: Row) -> None:
-    """Take the present voltage and force for those from which the next step begins.
+    """Take the present motion, voltage and force for those from which the next step begins.
 
     Parameters
     ----------
     inputs : (5,) as in `start`
     c : Constants
-    state : as in `start`, its last five filled
+    state : as in `start`, its last entries filled
     outputs : (4,) as in `start`, those at these inputs
     """
-    state[FORCE_AT_END] = outputs[FORCE]
+    state[VELOCITY_AT_END], state[FORCE_AT_END] = inputs[VELOCITY], outputs[FORCE]
     state[VOLTAGE_AT_END] = limited(inputs[VOLTAGE], 0.0, c.v_max)
     if c.measured:
         state[ACCELERATION_AT_END] = inputs[ACCELERATION]
@@ -172,7 +178,7 @@ def step(
     V0 = limited(before[VOLTAGE], 0.0, c.v_max) if c.linear else V1
     a0 = state[ACCELERATION_AT_END]
     a1 = now[ACCELERATION] if c.measured else (v1 - v0) / dt
-    force0, energy = state[FORCE_AT_END], state[ENERGY]
+    force0, energy = state[FORCE_AT_END], state[ENERGY_SHOWN]
     if state[VOLTAGE_AT_END] != V0:
         force0 = present_force(before, V0, a0, c, state, work)[0]
     sticks = c.moving_mass > 0.0
@@ -183,8 +189,11 @@ def step(
         force, friction = law_step(c.setup, begin, end, state, new_state, work)
     else:
         force, friction = hold_law(c.setup.law, c.setup.p, end, state, new_state)
-    energy += 0.5 * dt * (force0 * v0 + force * v1)
-    new_state[ENERGY], new_state[FORCE_AT_END] = energy, force
+    energy += 0.5 * dt * force0 * state[VELOCITY_AT_END]
+    new_state[ENERGY_AT_BEGIN] = energy
+    energy += 0.5 * dt * force * v1
+    new_state[ENERGY] = new_state[ENERGY_SHOWN] = energy
+    new_state[VELOCITY_AT_END], new_state[FORCE_AT_END] = v1, force
     new_state[ACCELERATION_AT_END], new_state[VOLTAGE_AT_END] = a1, V1
     new_state[LAST_STEP] = dt
     outputs[FORCE], outputs[FRICTION] = force, friction
@@ -197,12 +206,15 @@ def step(
 def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
     """Let the force follow motion and voltage, the states held.
 
+    The step's energy ends at the motion shown: a master may have given the middle of the step for
+    it, and gives its end now. A voltage that has jumped since counts from the next step on.
+
     Parameters
     ----------
     time : s, not used
     inputs : (5,) as in `start`
     c : Constants
-    state : as in `start`, kept
+    state : as in `start`, kept but for energy, velocity and force at the end
     outputs : (4,) as in `start`, filled
     work : room to work, of the size that `setup` returns
 
@@ -213,7 +225,12 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     """
     V = limited(inputs[VOLTAGE], 0.0, c.v_max)
     a = inputs[ACCELERATION] if c.measured else state[ACCELERATION_AT_END]
-    outputs[FORCE], outputs[FRICTION] = present_force(inputs, V, a, c, state, work)
-    outputs[DISSIPATED_ENERGY] = state[ENERGY]
+    force, friction = present_force(inputs, V, a, c, state, work)
+    dt, v = state[LAST_STEP], inputs[VELOCITY]
+    if state[VOLTAGE_AT_END] == V and isfinite(dt):
+        state[ENERGY_SHOWN] = state[ENERGY_AT_BEGIN] + 0.5 * dt * force * v
+        state[VELOCITY_AT_END], state[FORCE_AT_END] = v, force
+    outputs[FORCE], outputs[FRICTION] = force, friction
+    outputs[DISSIPATED_ENERGY] = state[ENERGY_SHOWN]
     outputs[STROKE_RATIO] = abs(inputs[DISPLACEMENT]) / c.stroke
     return SATURATED if inputs[VOLTAGE] != V else 0

@@ -308,6 +308,7 @@ def describe(
             dependencies=slave._depends.get(key),
             optional=key in slave._optional,
             over_step=slave._over_step.get(key),
+            jumps_without=slave._jumps.get(key),
         )
     return Description(
         name=name,

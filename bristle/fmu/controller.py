@@ -41,6 +41,8 @@ _LONG = (
 class SampledSlave(ComponentSlave):
     """A component that samples `MEASURED` at t = 0, h, 2h ... and holds its outputs in between."""
 
+    changes = "discrete"
+
     def configure(self) -> None:
         super().configure()
         self._new_state = self.state  # no step is made twice

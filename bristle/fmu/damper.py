@@ -50,9 +50,11 @@ class DamperSlave(ComponentSlave):
         follows = ["displacement", "velocity", drive.name, "holding_force", "acceleration"]
         follows += self._add_channels()
         text = "force on the structure, positive against +x"
-        self.add_output("force", "N", text, depends=follows, nominal=10.0)
+        jumps = "holding_force" if LAWS[self.law].has("sign") else ""
+        self.add_output("force", "N", text, depends=follows, nominal=10.0, jumps_without=jumps)
         text = "integral of force times velocity, stored energy included"
-        self.add_output("dissipated_energy", "J", text)
+        moved = [name for name in follows if name != drive.name]  # a jump counts from then on
+        self.add_output("dissipated_energy", "J", text, depends=moved)
         text = "displacement over stroke: beyond 1 the piston would hit its end"
         self.add_output("stroke_ratio", "1", text, depends=["displacement"])
         for name, parameter in LAWS[self.law].parameters.items():

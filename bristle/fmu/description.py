@@ -1,5 +1,7 @@
 """What an FMU says of itself: its variables with units, starts and dependencies."""
 
+# Longer than 300 lines: what can be wrong with a description is told attribute by attribute.
+
 from __future__ import annotations
 
 import math
@@ -20,7 +22,7 @@ from .archive import (
     open_archive,
     read_member,
 )
-from .model_description import OVER_STEP_TAG, TOOL
+from .model_description import JUMPS_TAG, OVER_STEP_TAG, TOOL
 
 __all__ = ["Description", "Value", "Variable", "extract", "read_description"]
 
@@ -38,6 +40,7 @@ class Variable:
     FMU gives none ("1" for a dimensionless real that says so). `dependencies` are the names of
     the inputs that the output follows directly, None where the FMU does not say. `over_step` is how
     an input is taken over a step, one of `component.OVER_STEP`, None where the FMU does not say.
+    `jumps_without` names the input without which an output may jump, None where the FMU names none.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Variable:
     dependencies: tuple[str, ...] | None = None
     optional: bool = False
     over_step: str | None = None
+    jumps_without: str | None = None
 
 
 @dataclass(frozen=True)
@@ -128,6 +132,7 @@ def describe(root: ElementTree.Element) -> Description:
         raise FmuError(f"variables defined twice: {', '.join(twice)}.")
     _add_dependencies(root, listed, variables)
     _mark_optional(root, variables)
+    _check_jumps(variables)
     return Description(
         name=root.get("modelName", ""),
         guid=root.get("guid", ""),
@@ -202,17 +207,24 @@ def _variable(
         nominal=_number(name, "nominal", own.get("nominal")),
         description=element.get("description", ""),
         over_step=_over_step(name, element),
+        jumps_without=_annotation(element, JUMPS_TAG),
     )
 
 
 def _over_step(name: str, element: ElementTree.Element) -> str | None:
+    text = _annotation(element, OVER_STEP_TAG)
+    if text is not None and text not in OVER_STEP:
+        known = ", ".join(OVER_STEP)
+        said = f"the annotation {OVER_STEP_TAG} is {text!r}, none of {known}."
+        raise FmuError(f'variable "{name}": {said}')
+    return text
+
+
+def _annotation(element: ElementTree.Element, tag: str) -> str | None:
+    """Return the text of one of bristle's annotations of a variable."""
     for tool in element.iterfind("Annotations/Tool"):
-        text = tool.findtext(OVER_STEP_TAG)
+        text = tool.findtext(tag)
         if tool.get("name") == TOOL and text is not None:
-            if text not in OVER_STEP:
-                known = ", ".join(OVER_STEP)
-                said = f"the annotation {OVER_STEP_TAG} is {text!r}, none of {known}."
-                raise FmuError(f'variable "{name}": {said}')
             return text
     return None
 
@@ -274,6 +286,15 @@ def _indexed(listed: list[Variable], text: str | None) -> Variable:
             f"ModelStructure names variable {text!r}; the variables are 1 to {len(listed)}."
         )
     return listed[number - 1]
+
+
+def _check_jumps(variables: dict[str, Variable]) -> None:
+    for variable in variables.values():
+        cure = variable.jumps_without
+        if cure is not None and (cure not in variables or variables[cure].causality != "input"):
+            raise FmuError(
+                f'"{variable.name}" may jump without "{cure}", but no input has that name.'
+            )
 
 
 def _mark_optional(root: ElementTree.Element, variables: dict[str, Variable]) -> None:

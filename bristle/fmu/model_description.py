@@ -18,6 +18,9 @@ TOOL = "bristle"
 OVER_STEP_TAG = "overStep"
 """Annotation of an input: how it is taken over a step."""
 
+JUMPS_TAG = "jumpsWithout"
+"""Annotation of an output that may jump while an input is not connected: the name of that input."""
+
 
 def complete(root: Element, slave: Any) -> None:
     """Add to a description what a component declares beyond pythonfmu's variables, in place."""
@@ -28,8 +31,9 @@ def complete(root: Element, slave: Any) -> None:
     for node in variables:
         name = node.attrib["name"]
         add_attributes(node[0], slave._units.get(name), slave._bounds.get(name, (None,) * 3))
-        if name in slave._over_step:
-            annotate(SubElement(node, "Annotations"), {OVER_STEP_TAG: slave._over_step[name]})
+        for tag, texts in ((OVER_STEP_TAG, slave._over_step), (JUMPS_TAG, slave._jumps)):
+            if name in texts:
+                annotate(SubElement(node, "Annotations"), {tag: texts[name]})
     if slave._optional:
         annotations = Element("VendorAnnotations")
         annotate(annotations, {"optional": " ".join(slave._optional)})

@@ -16,7 +16,7 @@ from collections.abc import Iterable
 from math import isfinite
 from operator import itemgetter
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
 from pythonfmu import (
@@ -80,6 +80,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     guid: Any
     fault: int
+    changes: ClassVar[str] = "continuous"
+    """How Real outputs change: "continuous", or "discrete" where they stand between instants."""
 
     def __init__(self, baked: dict[str, Any] | None = None, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -90,6 +92,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._depends: dict[str, tuple[str, ...]] = {}
         self._optional: list[str] = []
         self._over_step: dict[str, str] = {}
+        self._jumps: dict[str, str] = {}
         self._inputs: list[int] = []
         self._outputs: list[int] = []
         self._parameters: set[int] = set()
@@ -186,6 +189,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         depends: Iterable[str] = (),
         bounds: tuple[float | None, float | None] = (None, None),
         nominal: float | None = None,
+        jumps_without: str = "",
     ) -> None:
         """Declare an output: Real, or Integer without a unit.
 
@@ -196,6 +200,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         depends : names of the inputs that it follows as soon as they are set
         bounds : lowest and highest value in its unit, None: no bound
         nominal : usual size in its unit, None: not said
+        jumps_without : an input; while that is not connected the output may jump from one time to
+            the next, and cannot be told ahead
         """
         common = {
             "causality": Fmi2Causality.output,
@@ -205,7 +211,9 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         if unit is None:
             variable = Integer(name, variability=Fmi2Variability.discrete, **common)
         else:
-            variable = Real(name, variability=Fmi2Variability.continuous, **common)
+            variable = Real(name, variability=Fmi2Variability[self.changes], **common)
+        if jumps_without:
+            self._jumps[name] = jumps_without
         self._depends[name] = tuple(depends)
         self._bounds[name] = (bounds[0], bounds[1], nominal)
         index = self._add(variable, 0 if unit is None else 0.0, unit)

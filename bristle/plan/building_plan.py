@@ -1,9 +1,9 @@
-"""A plan of a building: ground motions with commands, and the sensors that would show more."""
+"""A plan of a building: ground motions with commands, and sensors that would show more."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from .motions import Waveform
 from .outcome import Outcome
 from .plan import Plan
 from .planned_test import Signals
+
+if TYPE_CHECKING:
+    from ..draw.style import Page
 
 Array = NDArray[np.float64]
 
@@ -77,6 +80,11 @@ class BuildingPlan(Plan):
         from .building_picture import building_files
 
         return building_files(self)
+
+    def _page(self, k: int) -> Page:
+        from .building_picture import draw_shaking
+
+        return draw_shaking(self.runs()[k], self.predicted[k], self.drive, self.level)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""

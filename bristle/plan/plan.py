@@ -5,15 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from ..diagnose.rule import BENCH
+from ..errors import StudyError
 from ..physics.drive import DRIVES
 from ..quantity import plain
 from .folder import PlanFolder, PlannedRun, write_plan
 from .outcome import Outcome
 from .planned_test import Signals, Test
 from .rig_limits import RigLimits
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..draw.style import Page
 
 MANY = 10
 """How many times as many tests as are planned are still told of."""
@@ -44,6 +50,26 @@ class Plan:
         By what factor the figures become smaller on average.
     notes : tuple of str
         What weakens the plan, in sentences.
+
+    Examples
+    --------
+    >>> import bristle, pathlib, tempfile
+    >>> sheet = pathlib.Path(tempfile.mkdtemp()) / "rig.toml"
+    >>> _ = sheet.write_text('''schema = 1
+    ... [damper]
+    ... law = "bingham"
+    ... max_force = "2 kN"
+    ... [limits]
+    ... stroke = "20 mm"
+    ... speed = "250 mm/s"
+    ... command = ["0 V", "5 V"]
+    ... rate = "100 Hz"
+    ... duration = "5 s"
+    ... ''')
+    >>> tests = bristle.plan(sheet, sharpen="f_v", runs=2)
+    >>> tests.worth, [one.name for one in tests.outcomes]
+    (True, ['f_v'])
+    >>> figure = tests.plot(2)  # the second test; tests.write("plan") writes all as files
     """
 
     study: str
@@ -131,6 +157,28 @@ class Plan:
         from .picture import plan_files
 
         return plan_files(self)
+
+    def plot(self, number: int = 1) -> Figure:
+        """Return the figure of a test, the first one being number 1: motion and command.
+
+        Raises
+        ------
+        StudyError
+            If there is no such test.
+        """
+        if not 1 <= number <= len(self.tests):
+            raise StudyError(f"test {number}: there are 1 to {len(self.tests)}.")
+        return self._page(number - 1).figure
+
+    def _page(self, k: int) -> Page:
+        from .picture import draw_test
+
+        return draw_test(self.runs()[k], self.signals[k], self.drive)
+
+    def _repr_html_(self) -> str:
+        from .notebook import plan_html
+
+        return plan_html(self)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""

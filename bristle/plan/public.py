@@ -55,9 +55,9 @@ def plan(
         Of a building: further ground motions that may be scaled, by name or as files.
     seed : int
         Draws the tests that are looked at.
-    **limits
-        Limits in place of those, by the names of rig.toml: numbers in SI or texts with a unit, such
-        as `stroke="20 mm"`, `runs=6`.
+    limits : float, str or sequence
+        Limits as keywords, in place of those, by the names of rig.toml: numbers in SI or texts with
+        a unit, such as `stroke="20 mm"`, `runs=6`.
 
     Returns
     -------

@@ -7,7 +7,6 @@ somebody else's making gets the same advice.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import sqrt
 
 from ..errors import BristleError, PhysicsError
 from ..findings import Findings
@@ -17,6 +16,7 @@ from ..physics.laws import LAWS, laws_of
 from .connections import Wire
 from .library import Library
 from .parts import Part, Run
+from .stability import longest_step
 
 _DAMPER_PORTS = frozenset(("displacement", "velocity", "force"))  # and that of its command
 _STRUCTURE_PORTS = frozenset(("ground_acceleration", "damper_force"))
@@ -85,6 +85,7 @@ def advise(
     network = Network(parts, wires)
     _instances(network, findings)
     _order(run, network, findings)
+    _rollback(run, network, findings)
     _loops(network, findings)
     _designs(network, library, findings)
     for damper, drive in dampers_of(network):
@@ -112,8 +113,8 @@ def _instances(network: Network, findings: Findings) -> None:
 
 
 def _order(run: Run, network: Network, findings: Findings) -> None:
-    """With Gauss-Seidel the ground motion must have moved on before the structure steps."""
-    if run.algorithm != "gauss-seidel":
+    """Unless all step at once the ground motion must have moved on before the structure steps."""
+    if run.algorithm == "jacobi":
         return
     for structure in network.with_ports(_STRUCTURE_PORTS):
         ground = network.source(structure, "ground_acceleration")
@@ -123,6 +124,30 @@ def _order(run: Run, network: Network, findings: Findings) -> None:
                 f"[components.{ground[0].name}] comes after [components.{structure.name}], which "
                 "then gets the ground acceleration one step late; put it first, because components "
                 "step in the order of the file.",
+            )
+
+
+def _rollback(run: Run, network: Network, findings: Findings) -> None:
+    """What is to step again must go back first: each FMU of a loop needs its state in and out."""
+    if run.algorithm != "midpoint-iterated":
+        return
+    feeds = {name: {w.target for w in network.wires if w.source == name} for name in network.order}
+    for part in network.parts.values():
+        if part.file is None or part.description is None:
+            continue  # the built-in components can
+        reached, queue = set[str](), list(feeds[part.name])
+        while queue:
+            name = queue.pop()
+            if name not in reached:
+                reached.add(name)
+                queue += feeds[name]
+        able = part.description.capabilities.get("canGetAndSetFMUstate")
+        if part.name in reached and able not in ("true", "1"):
+            findings.error(
+                ("run", "algorithm"),
+                f"[run] algorithm: midpoint-iterated lets the components of a loop step twice, and "
+                f"[components.{part.name}] cannot go back: {part.file.name} declares no "
+                'canGetAndSetFMUstate. "midpoint" is right.',
             )
 
 
@@ -258,27 +283,6 @@ def slopes(damper: Part, level: float) -> tuple[float, float]:
     return 0.0, 0.0
 
 
-def longest_step(algorithm: str, mass: float, c: float, k: float) -> float:
-    """Return the step [s] from which the coupling of a mass with a damper is unstable.
-
-    For m v' = -f, f = k z + c v, z' = v, with f held over a step. Jacobi, where f uses the velocity
-    of one step before, has the characteristic equation (s - 1)^2 s + q s + g (s - 1) = 0,
-    Gauss-Seidel (s - 1)(s - 1 + g) + q s = 0, with g = c h/m and q = k h^2/m. Jury's criterion
-    (Jury 1964, Theory and Application of the z-Transform Method) gives q < g (1 - g) and
-    2 g + q < 4. The exact step of the structure leaves its own stiffness out of this.
-
-    Parameters
-    ----------
-    algorithm : str
-        "jacobi" or "gauss-seidel".
-    mass, c, k : float
-        kg; N.s/m, above 0; N/m.
-    """
-    if algorithm == "jacobi":
-        return mass * c / (c * c + k * mass)
-    return 4.0 * mass / (c + sqrt(c * c + 4.0 * k * mass))
-
-
 def _coupling(
     run: Run, structure: Part, network: Network, library: Library, findings: Findings
 ) -> None:
@@ -303,7 +307,9 @@ def _coupling(
         c, k = c + each[0], k + each[1]
     if run.step is None or c <= 0.0:
         return
-    limit = longest_step(run.algorithm, mass, c, k)
+    rough = any(_jumps(damper, network) for damper, _ in dampers)
+    algorithm = "gauss-seidel" if rough and run.algorithm != "jacobi" else run.algorithm
+    limit = longest_step(algorithm, mass, c, k)
     if run.step >= limit:
         findings.warning(
             ("run", "step"),
@@ -312,6 +318,14 @@ def _coupling(
             f"{structure.name} becomes unstable ({mass:.4g} kg, {c:.4g} N.s/m, {k:.4g} N/m); a "
             f"shorter step{' or gauss-seidel' if run.algorithm == 'jacobi' else ''} is right.",
         )
+
+
+def _jumps(damper: Part, network: Network) -> bool:
+    """Return whether a damper's force may jump: midpoint then leaves it at the newest values."""
+    force = damper.variables["force"]
+    return force.jumps_without is not None and (
+        (damper.name, force.jumps_without) not in network.feeding
+    )
 
 
 def _mass_terms(damper: Part, mass: float, findings: Findings) -> None:

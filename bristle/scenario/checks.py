@@ -15,6 +15,7 @@ from ..lines import KeyPath
 from .document import COMPONENT_KEYS, LAW_KEYS, MADE_FROM, Document, flatten
 from .laws import choose_law
 from .library import Library
+from .over_step import choose_over_step
 from .parameters import check_parameter, check_together
 from .parts import ALGORITHMS, Part, Run, existing_file
 
@@ -99,7 +100,8 @@ def check_run(document: Document, findings: Findings) -> Run:
     else:
         findings.error(
             ("run", "algorithm"),
-            f'[run] algorithm is {written(algorithm)}; "gauss-seidel" or "jacobi" is right.',
+            f"[run] algorithm is {written(algorithm)}; one of these in quotes is right: "
+            f"{', '.join(ALGORITHMS)}.",
         )
     return run
 
@@ -219,6 +221,7 @@ def _check_component(
         _choose_fmu(part, settings, folder, library, findings)
     elif choose_law(part, settings, folder, library, findings):
         _describe(part, (*part.path, "law"), settings, library, findings)
+    choose_over_step(part, settings, findings)
     for key in settings:
         if key in COMPONENT_KEYS:
             continue

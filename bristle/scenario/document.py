@@ -18,7 +18,9 @@ MAX_BYTES = 1_000_000
 
 LAW_KEYS = ("law", "command", "command_knots")
 """Those that say which law a damper has, and how the command enters it."""
-COMPONENT_KEYS = ("fmu", *LAW_KEYS, "building", "controller", "effects", "step", "parameters")
+COMPONENT_KEYS = (
+    *("fmu", *LAW_KEYS, "building", "controller", "effects", "step", "over_step", "parameters"),
+)
 MADE_FROM = ("building", "controller")
 """Those of them that name a file which a component is made from."""
 FILE_PARAMETERS = ("record", "file")
@@ -160,6 +162,8 @@ def _target(data: Mapping[str, Any], name: str) -> tuple[str, ...] | str:
         return f'a dotted name is right, as in "{first}.step".'
     if first in ("run", "connections"):
         return first, rest
+    if rest.startswith("over_step."):
+        return "components", first, "over_step", rest.removeprefix("over_step.")
     if rest in COMPONENT_KEYS[:-1]:
         return "components", first, rest
     return "components", first, "parameters", rest.removeprefix("parameters.")

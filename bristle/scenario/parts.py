@@ -9,7 +9,7 @@ from ..findings import Findings, command, nearest
 from ..fmu.description import Description, Value, Variable
 from ..lines import KeyPath
 
-ALGORITHMS = ("gauss-seidel", "jacobi")
+ALGORITHMS = ("gauss-seidel", "midpoint", "midpoint-iterated", "jacobi")
 
 
 @dataclass
@@ -55,6 +55,7 @@ class Part:
     description: Description | None = None
     parameters: dict[str, Value] = field(default_factory=dict)
     places: dict[str, KeyPath] = field(default_factory=dict)
+    over_step: dict[str, str] = field(default_factory=dict)
 
     @property
     def variables(self) -> dict[str, Variable]:

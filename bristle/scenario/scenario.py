@@ -6,7 +6,7 @@ Every mistake of a file is found at once, with its line and what would be right.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from .. import resources
@@ -52,7 +52,8 @@ class Component:
     controller, None for the one that it carries; `effects` the files of a user's own effects that a
     built-in one carries besides the library's; `parameters` the values that the scenario sets,
     inputs that are held constant included; `step` its own step [s], None for the run's; `law` that
-    of a damper where the scenario names it.
+    of a damper where the scenario names it; `over_step` what the scenario says of a foreign FMU's
+    ports (see `over_step.choose_over_step`).
     """
 
     name: str
@@ -65,6 +66,7 @@ class Component:
     effects: tuple[Path, ...] = ()
     controller: Path | None = None
     law: DamperLaw | None = None
+    over_step: dict[str, str] = field(default_factory=dict)
 
     def made_of(self) -> str:
         """Return what the catalogue makes it from; a law of a user's own is registered then."""
@@ -93,7 +95,7 @@ class Scenario:
 
     `title` is the file's unless overrides changed what runs (see `naming.changed_title`).
 
-    `algorithm` is "gauss-seidel" (components step in their order) or "jacobi". `findings` are the
+    `algorithm` is one of `parts.ALGORITHMS`; components step in their order. `findings` are the
     warnings and notes of its check.
     """
 
@@ -210,6 +212,7 @@ def _read(
             part.effects,
             part.controller,
             part.law,
+            part.over_step,
         )
         for part in parts.values()
         if (description := part.description) is not None

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from ..component import OVER_STEP
 from ..fmu.description import Description, Variable
 from ..physics.forms import FORMS
 from .checks import SCHEMA
@@ -42,7 +43,7 @@ def build_schema(library: Library | None = None) -> dict[str, Any]:
             "run": _run(),
             "components": {
                 "type": "object",
-                "description": "with gauss-seidel they step in this order",
+                "description": "they step in this order, but for jacobi",
                 "minProperties": 1,
                 "additionalProperties": _component(names),
             },
@@ -120,6 +121,12 @@ def _component(names: list[str]) -> dict[str, Any]:
                 "description": "controller file of bristle design, for a designed controller",
             },
             "step": {**_TIME, "description": "the run's step divided by a whole number [s]"},
+            "over_step": {
+                "type": "object",
+                "description": "how a foreign FMU takes its inputs over a step; an output that "
+                "stands between instants is sampled",
+                "additionalProperties": {"enum": list(OVER_STEP)},
+            },
             "parameters": {"type": "object"},
         },
         "allOf": [*each, only],

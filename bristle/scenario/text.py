@@ -58,6 +58,9 @@ def _component(component: Component, folder: Path) -> list[str]:
         lines.append(f"controller = {_value(component.controller.absolute().as_posix())}")
     if component.step is not None:
         lines.append(f"step = {_value(component.step)}")
+    if component.over_step:
+        told = [f"{_key(name)} = {_value(word)}" for name, word in component.over_step.items()]
+        lines.append(f"over_step = {{ {', '.join(told)} }}")
     if component.parameters:
         values = dict(component.parameters)
         for name in FILE_PARAMETERS:

@@ -13,12 +13,37 @@ from typing import Any
 
 import numpy as np
 
+from .operations import (
+    AHEAD,
+    END,
+    FAULT,
+    MIDDLE,
+    NEWEST,
+    Keep,
+    Node,
+    Operation,
+    Port,
+    Read,
+    Restore,
+    Save,
+    Schedule,
+    Shift,
+    Step,
+    Write,
+    kind_of,
+)
 from .results import Array
-from .schedule import FAULT, Node, Operation, Port, Read, Schedule, Step, Write, kind_of
 from .session import Instance
 
 _SIZE = {"Real": 8, "Integer": 4, "Boolean": 4, FAULT: 4}
 _FUNCTION = {"Real": "Real", "Integer": "Integer", "Boolean": "Boolean", FAULT: "Integer"}
+_VALUE = {
+    NEWEST: "m[{now}]",
+    MIDDLE: "0.5 * (m[{now}] + m[{past}])",
+    AHEAD: "1.5 * m[{now}] - 0.5 * m[{past}]",
+    END: "2.0 * m[{now}] - m[{past}]",
+}
+"""What an input is given, of doubles in memory."""
 _DTYPE = {"Real": "<f8", "Integer": "<i4", "Boolean": "<i4", FAULT: "<i4"}
 
 
@@ -26,6 +51,7 @@ class Memory:
     """Where every output of every component lies, and room for inputs to be gathered.
 
     The first `row_size` bytes are the row: Reals, then Integers and Booleans, then all `fault`.
+    `past` says where Reals of a step before are kept.
     """
 
     def __init__(self, nodes: Sequence[Node], schedule: Schedule) -> None:
@@ -40,8 +66,13 @@ class Memory:
             if kind == "Boolean":
                 self.faults = size
         self.row_size = size
-        self._gathered = -(-size // 8) * 8
-        total = self._gathered + sum(8 * len(node.sources) for node in nodes)
+        kept = [port for port in self.offsets if port in _kept(schedule)]
+        start = -(-size // 8) * 8
+        self.past = {port: start + 8 * i for i, port in enumerate(kept)}
+        self._gathered = start + 8 * len(kept)
+        total = self._gathered + 8 * sum(
+            len(o.names) for o in schedule.operations if isinstance(o, Write)
+        )
         self._buffer = bytearray(total)
         self._address = ctypes.addressof((ctypes.c_char * total).from_buffer(self._buffer))
         view = memoryview(self._buffer)
@@ -49,10 +80,10 @@ class Memory:
         self.views: dict[str, memoryview[Any]] = {"Real": view[: total // 8 * 8].cast("d")}
         self.views["Integer"] = self.views["Boolean"] = view[: total // 4 * 4].cast("i")
 
-    def place(self, operation: Read | Write) -> tuple[tuple[str, ...], int, list[tuple[int, int]]]:
-        """Return the order of the names in a call, its offset, and the bytes to gather before.
+    def place(self, operation: Read | Write) -> tuple[tuple[str, ...], int, list[str]]:
+        """Return the order of the names in a call, its offset, and the lines that gather before.
 
-        The copies are (to, from) in units of the kind's size.
+        In these lines m is the view of the kind of values.
         """
         node, size = self.nodes[operation.component], _SIZE[operation.kind]
         if isinstance(operation, Read):
@@ -64,14 +95,25 @@ class Memory:
         )
         names = tuple(name for _, name in places)
         offsets = [offset for offset, _ in places]
-        if all(offset == offsets[0] + i * size for i, offset in enumerate(offsets)):
+        plain = isinstance(operation, Read) or not operation.values
+        if plain and all(offset == offsets[0] + i * size for i, offset in enumerate(offsets)):
             return names, offsets[0], []
         if isinstance(operation, Read):
             raise AssertionError(f"outputs of one call are not neighbours: {names}")
+        values = dict(zip(operation.names, operation.values or [NEWEST] * len(names), strict=True))
         start = self._gathered
         self._gathered += 8 * len(names)
-        copies = [((start + i * size) // size, offset // size) for i, offset in enumerate(offsets)]
-        return names, start, copies
+        lines = []
+        for i, (name, offset) in enumerate(zip(names, offsets, strict=True)):
+            past = self.past.get(node.sources[name], 0)
+            value = _VALUE[values[name]].format(now=offset // size, past=past // size)
+            lines.append(f"m[{start // size + i}] = {value}")
+        return names, start, lines
+
+    def kept(self, operation: Keep | Shift) -> list[tuple[int, int]]:
+        """Return where outputs lie and where they are kept, as numbers of doubles."""
+        ports = [(operation.component, name) for name in operation.names]
+        return [(self.offsets[port] // 8, self.past[port] // 8) for port in ports]
 
     def address(self, offset: int) -> int:
         """Return the address of an offset."""
@@ -89,6 +131,8 @@ class Memory:
         for port, value in values.items():
             kind = kind_of(self.nodes[port[0]].outputs[port[1]])
             self.views[_FUNCTION[kind]][self.offsets[port] // _SIZE[kind]] = value
+        for port, offset in self.past.items():
+            self.views["Real"][offset // 8] = self.value(port)
 
     def columns(self, rows: Sequence[bytes]) -> dict[Port, Array]:
         """Return kept rows as one array per output, all of them views of one block."""
@@ -135,6 +179,11 @@ def compile_loop(
         if isinstance(operation, Step):
             substeps = memory.nodes[operation.component].substeps
             body += _step(number, instance, step, substeps, names)
+        elif isinstance(operation, Save | Restore):
+            body += _state(number, operation, instance, names)
+        elif isinstance(operation, Keep | Shift):
+            names["reals"] = memory.views["Real"]
+            body += _keep(operation, memory)
         else:
             body += _transfer(number, operation, instance, memory, names)
     body += ["row = take()", "keep(row)"]
@@ -166,7 +215,7 @@ def _step(
 def _transfer(
     number: int, operation: Read | Write, instance: Instance, memory: Memory, names: dict[str, Any]
 ) -> list[str]:
-    order, offset, copies = memory.place(operation)
+    order, offset, lines = memory.place(operation)
     variables = instance.description.variables
     references = (ctypes.c_uint * len(order))(*(variables[name].reference for name in order))
     names[f"r{number}"] = references  # kept: its address is used below
@@ -177,9 +226,40 @@ def _transfer(
     names[f"v{number}"] = ctypes.c_void_p.from_param(ctypes.addressof(references))
     names[f"n{number}"] = ctypes.c_size_t.from_param(len(order))
     names[f"p{number}"] = ctypes.c_void_p.from_param(memory.address(offset))
-    lines = []
-    if copies:
+    if lines:
         names[f"m{number}"] = memory.views[kind]
-        lines = [f"m{number}[{to}] = m{number}[{source}]" for to, source in copies]
+        lines = [line.replace("m[", f"m{number}[") for line in lines]
     call = f"f{number}(c{number}, v{number}, n{number}, p{number})"
     return [*lines, f"if s := {call}: fail(o{number}, s)"]
+
+
+def _state(
+    number: int, operation: Save | Restore, instance: Instance, names: dict[str, Any]
+) -> list[str]:
+    """Return the lines that get a component's state, or set it and free it: a get may allocate."""
+    component = ctypes.c_void_p.from_param(instance.component)
+    state = names.setdefault(f"state{operation.component}", ctypes.c_void_p())
+    calls = {"fmi2GetFMUstate": ctypes.byref(state)}
+    if isinstance(operation, Restore):
+        calls = {"fmi2SetFMUstate": state, "fmi2FreeFMUstate": ctypes.byref(state)}
+    lines = []
+    for i, (function, given) in enumerate(calls.items()):
+        names[f"f{number}_{i}"], names[f"c{number}"] = instance.function(function), component
+        names[f"p{number}_{i}"] = given
+        lines.append(f"if s := f{number}_{i}(c{number}, p{number}_{i}): fail(o{number}, s)")
+    return lines
+
+
+def _keep(operation: Keep | Shift, memory: Memory) -> list[str]:
+    assign = operation.change if isinstance(operation, Shift) else "="
+    return [f"reals[{past}] {assign} reals[{now}]" for now, past in memory.kept(operation)]
+
+
+def _kept(schedule: Schedule) -> set[Port]:
+    """Return the outputs of which a step before is kept."""
+    return {
+        (operation.component, name)
+        for operation in schedule.operations
+        if isinstance(operation, Keep)
+        for name in operation.names
+    }

@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING, NoReturn, Self
 
 import numpy as np
 
-from ..errors import RunError, ScenarioError
+from ..errors import RunError
 from ..fmu.description import Description, Value
+from .graph import find_loop
 from .loop import Memory, compile_loop
+from .nodes import make_nodes
+from .operations import Node, Operation, Port, Read, Restore, Save, Step, kind_of
 from .results import Array, Table
 from .rows import count_steps, make_columns, times
-from .schedule import Node, Operation, Port, Read, Step, find_loop, kind_of, make_schedule
+from .schedule import make_schedule
 from .session import FATAL, STATUS, WARNING, Instance, Message, Unpacked
 
 if TYPE_CHECKING:
@@ -27,6 +30,13 @@ if TYPE_CHECKING:
 
 SETTLE = 100
 """Rounds in which the values at t = 0 must settle where outputs and inputs follow each other."""
+
+VERBS = {
+    Step: "doStep",
+    Read: "reading its outputs",
+    Save: "getting its state",
+    Restore: "setting its state",
+}
 
 FAULTS = {
     1: "an input is not finite",
@@ -81,10 +91,10 @@ class Master:
         self.steps = count_steps(scenario.stop, scenario.step)
         self._stop = scenario.stop
         self._parameters = parameters
-        self._nodes = make_nodes(scenario, descriptions)
+        self.nodes = make_nodes(scenario, descriptions)
         self.columns = make_columns(scenario, descriptions)
-        schedule = make_schedule(self._nodes, scenario.algorithm)
-        self._memory = Memory(self._nodes, schedule)
+        schedule = make_schedule(self.nodes, scenario.algorithm)
+        self._memory = Memory(self.nodes, schedule)
         self._rows: list[bytes] = []
         self._blocks: list[dict[Port, Array]] = []
         self._collected = 0
@@ -131,7 +141,7 @@ class Master:
         RunError
             Also if an algebraic loop does not settle; the text names the loop.
         """
-        for node, instance in zip(self._nodes, self._instances, strict=True):
+        for node, instance in zip(self.nodes, self._instances, strict=True):
             instance.initialise(self._parameters.get(node.name, {}), self._stop)
         self._settle()
         for instance in self._instances:
@@ -198,24 +208,24 @@ class Master:
             outputs = {
                 (c, name): value
                 for c, instance in enumerate(self._instances)
-                for name, value in instance.get(self._nodes[c].outputs).items()
+                for name, value in instance.get(self.nodes[c].outputs).items()
             }
             wanted = {
                 (c, name): outputs[source]
-                for c, node in enumerate(self._nodes)
+                for c, node in enumerate(self.nodes)
                 for name, source in node.sources.items()
             }
             # Without a loop all is settled exactly after one round per component.
-            near = 1e-12 if turn > len(self._nodes) else 0.0
+            near = 1e-12 if turn > len(self.nodes) else 0.0
             changed = [p for p in wanted if p not in given or not _equal(wanted[p], given[p], near)]
             if not changed:
                 return outputs
             for c, instance in enumerate(self._instances):
                 instance.set({name: wanted[d, name] for d, name in changed if d == c})
             given = wanted
-        loop = find_loop(self._nodes)
+        loop = find_loop(self.nodes)
         if loop:
-            path = " -> ".join(f"{self._nodes[c].name}.{name}" for c, name in loop)
+            path = " -> ".join(f"{self.nodes[c].name}.{name}" for c, name in loop)
             raise RunError(
                 f"t = 0 s: the values of an algebraic loop do not settle: {path}.\n"
                 "  Leave out one of its connections, or add a component with memory."
@@ -231,17 +241,17 @@ class Master:
     def _explain(self, operation: Operation, status: int) -> NoReturn:
         instance = self._instances[operation.component]
         instance.poisoned |= status == FATAL
-        verb = {Step: "doStep", Read: "reading its outputs"}.get(type(operation), "setting inputs")
+        verb = VERBS.get(type(operation), "setting inputs")
         when = f"in the step from t = {self.time:.9g} s"
         answer = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
         text = f"{instance.name} {when}: {verb} answered {answer}"
-        node = self._nodes[operation.component]
+        node = self.nodes[operation.component]
         if not instance.poisoned and any(kind_of(v) == "fault" for v in node.outputs.values()):
             text += self._code(instance.get(["fault"])["fault"])
         raise RunError(text + self._inputs(operation.component) + instance.said())
 
     def _explain_fault(self, when: str) -> NoReturn:
-        for c, node in enumerate(self._nodes):
+        for c, node in enumerate(self.nodes):
             for name, variable in node.outputs.items():
                 if kind_of(variable) == "fault" and (code := self._memory.value((c, name))):
                     text = f"{node.name} {when}{self._code(code)}{self._inputs(c)}"
@@ -254,36 +264,14 @@ class Master:
 
     def _inputs(self, component: int) -> str:
         """Return the inputs of a component with their values, those not finite first."""
-        node = self._nodes[component]
+        node = self.nodes[component]
         values = {name: self._memory.value(source) for name, source in node.sources.items()}
         names = sorted(values, key=lambda name: math.isfinite(values[name]))
         parts = [f"{name} = {values[name]:.9g}{_unit(node, name)}" for name in names]
         return ".\n  Inputs: " + ", ".join(parts) if parts else "."
 
     def _ports(self) -> list[Port]:
-        return [(c, name) for c, node in enumerate(self._nodes) for name in node.outputs]
-
-
-def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> list[Node]:
-    """Return the components as the schedule sees them, in the order of the file."""
-    numbers = {component.name: c for c, component in enumerate(scenario.components)}
-    sources: list[dict[str, Port]] = [{} for _ in scenario.components]
-    for connection in scenario.connections:
-        if descriptions[connection.target].variables[connection.input].kind == "String":
-            raise ScenarioError(
-                f'{scenario.file}: "{connection.target}.{connection.input}" is a text; texts are '
-                "set in parameters, only numbers and Booleans are passed on."
-            )
-        port = numbers[connection.source], connection.output
-        sources[numbers[connection.target]][connection.input] = port
-    nodes = []
-    for c, component in enumerate(scenario.components):
-        description = descriptions[component.name]
-        substeps = round(scenario.step / component.step) if component.step else 1
-        outputs = {v.name: v for v in description.of("output") if v.kind != "String"}
-        inputs = {v.name: v for v in description.of("input")}
-        nodes.append(Node(component.name, inputs, outputs, sources[c], substeps))
-    return nodes
+        return [(c, name) for c, node in enumerate(self.nodes) for name in node.outputs]
 
 
 def _equal(one: Value, other: Value, near: float) -> bool:

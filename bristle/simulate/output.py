@@ -85,7 +85,10 @@ class Output:
     def finish(self, frame: pd.DataFrame) -> None:
         """Mark the file as complete or incomplete; a Parquet file is written now."""
         if self._writer:
-            self._writer.finish(frame.attrs["complete"], frame.attrs["made"]["wall_time"])
+            made = frame.attrs["made"]
+            self._writer.finish(
+                frame.attrs["complete"], made["wall_time"], made.get("energy_residual")
+            )
         elif self.folder is not None:
             write_parquet(frame, self.folder / "results.parquet")
         if self.failed:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 import os
 import re
 from collections.abc import Mapping
@@ -111,7 +112,7 @@ class CsvWriter:
     def __init__(self, path: Path, table: Table, made: Mapping[str, Any]) -> None:
         self.path = path
         head = _head(table.columns, made)
-        self._place = len(head.split(_status(False), 1)[0].encode())
+        self._place = len(f"{_KIND}\n".encode())
         new = path.with_name(path.name + ".new")
         try:
             try:
@@ -140,11 +141,19 @@ class CsvWriter:
             raise cannot_write(self.path, error, self.rows) from error
         self.rows += len(table.time)
 
-    def finish(self, complete: bool, wall_time: float) -> None:
-        """Write into the head whether the run is complete, and its wall time [s]."""
+    def finish(
+        self, complete: bool, wall_time: float, residuals: Mapping[str, float | None] | None = None
+    ) -> None:
+        """Write into the head whether the run is complete, its wall time [s], energy residuals.
+
+        Parameters
+        ----------
+        complete, wall_time : bool, float [s]
+        residuals : share [1] per power bond, of the bonds that `made` named
+        """
         try:
             self._file.seek(self._place)
-            self._file.write(_status(complete, wall_time).encode())
+            self._file.write(_status(complete, wall_time, residuals or {}).encode())
         except OSError as error:
             raise cannot_write(self.path, error, self.rows) from error
 
@@ -154,7 +163,8 @@ def write_csv(frame: pd.DataFrame, path: Path) -> None:
     made = frame.attrs["made"]
     writer = CsvWriter(path, from_frame(frame), made)
     try:
-        writer.finish(frame.attrs["complete"], made.get("wall_time", 0.0))
+        residuals = made.get("energy_residual")
+        writer.finish(frame.attrs["complete"], made.get("wall_time", 0.0), residuals)
     finally:
         writer.close()
 
@@ -243,15 +253,27 @@ def cannot_write(path: Path, error: OSError, rows: int) -> RunError:
     return RunError(f"{path}: cannot be written on: {reason}; {rows} rows are in it.")
 
 
-def _status(complete: bool, wall_time: float = 0.0) -> str:
-    """Return two lines of the head whose length is always the same."""
-    return (
-        f"# status: {'complete' if complete else 'incomplete':10}\n# wall_time: {wall_time:12.3f}\n"
-    )
+def _status(complete: bool, wall_time: float, residuals: Mapping[str, float | None]) -> str:
+    """Return the lines of the head that are written twice, always of the same length."""
+    lines = [
+        f"# status: {'complete' if complete else 'incomplete':10}",
+        f"# wall_time: {wall_time:12.3f}",
+    ]
+    if residuals:
+        each = [f"{json.dumps(name)}: {_fixed(value)}" for name, value in residuals.items()]
+        lines.append(f"# energy_residual: {{{', '.join(each)}}}")
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _fixed(value: float | None) -> str:
+    """Return a number of JSON, always of the same length; null for what is not finite."""
+    known = value is not None and math.isfinite(value)
+    return f"{value:24.16e}" if known else f"{'null':>24}"
 
 
 def _head(columns: tuple[Column, ...], made: Mapping[str, Any]) -> str:
-    known = {k: v for k, v in made.items() if k not in ("wall_time", "scenario")}
+    twice = ("wall_time", "energy_residual")
+    known = {k: v for k, v in made.items() if k not in (*twice, "scenario")}
     for key, kinds in (("integers", ("Integer", "Enumeration")), ("booleans", ("Boolean",))):
         known[key] = [column.name for column in columns if column.kind in kinds]
     lines = [f"# {key}: {json.dumps(value, ensure_ascii=False)}\n" for key, value in known.items()]
@@ -260,7 +282,8 @@ def _head(columns: tuple[Column, ...], made: Mapping[str, Any]) -> str:
     csv.writer(titles, lineterminator="\n").writerow(
         ["time [s]", *(column.header for column in columns)]
     )
-    return f"{_KIND}\n{_status(False)}{''.join(lines)}{_SCENARIO}\n{scenario}{titles.getvalue()}"
+    status = _status(False, 0.0, dict.fromkeys(made.get("energy_residual", {})))
+    return f"{_KIND}\n{status}{''.join(lines)}{_SCENARIO}\n{scenario}{titles.getvalue()}"
 
 
 def _lines(table: Table) -> bytes:

@@ -1,5 +1,7 @@
 """Run a scenario: from a file to a pandas frame with units, and to files that survive a crash."""
 
+# Longer than 300 lines: whatever ends a run, and how, the rows before are kept in one class.
+
 from __future__ import annotations
 
 import os
@@ -16,6 +18,7 @@ from ..fmu.description import Description, read_description
 from ..interrupt import Interrupt
 from ..scenario.scenario import Scenario, fmu_parameters, load_scenario
 from ..scenario.text import scenario_text
+from .coupling_error import as_data, estimate
 from .output import Output
 from .results import Table, to_frame
 from .rows import make_columns, times
@@ -56,6 +59,7 @@ def run(
     out: str | Path | None = None,
     format: str = "csv",
     progress: bool = False,
+    coupling_error: bool = False,
 ) -> Results:
     """Run a scenario and return every output at every step.
 
@@ -73,13 +77,18 @@ def run(
         "csv" grows with the run; "parquet" is written whole at the end.
     progress : bool
         Show a progress bar, on a terminal only.
+    coupling_error : bool
+        Estimate the error that the exchange of values at steps causes, by runs besides: one at half
+        the step and one of the coupled engine, or those at a half and a quarter of the step.
 
     Returns
     -------
     Results
         A pandas frame: columns "damper.force", index "time" [s], row k at t_k, t = 0 included.
         `attrs["units"]` maps columns to units, `attrs["made"]` says how the results were made,
-        `attrs["complete"]` is True. `plot()` returns its figure; a notebook shows it.
+        `attrs["complete"]` is True. `attrs["coupling_error"]` maps outputs to the error `along` the
+        run, of `peak` and `rms` as shares, the `order` seen and whether that is `worth` anything.
+        `plot()` returns its figure; a notebook shows it.
 
     Raises
     ------
@@ -99,7 +108,8 @@ def run(
     (5.9, 'N')
     """
     _refuse_types(scenario, overrides, out)
-    return execute(scenario, overrides, engine, Output(_folder(out), format), progress)
+    output = Output(_folder(out), format)
+    return execute(scenario, overrides, engine, output, progress, coupling_error=coupling_error)
 
 
 def _refuse_types(scenario: object, overrides: object, out: object) -> None:
@@ -125,6 +135,7 @@ def execute(
     output: Output,
     progress: bool,
     end_process: bool = False,
+    coupling_error: bool = False,
 ) -> Results:
     """Run a scenario as `run` does, into an output that is closed afterwards.
 
@@ -136,6 +147,8 @@ def execute(
         What takes results and log.
     end_process : bool
         Whether a component that hangs after Ctrl-C costs the process, not the results.
+    coupling_error : bool
+        Whether to estimate the coupling error as well.
     """
     try:
         if engine not in ENGINES:
@@ -148,10 +161,50 @@ def execute(
             output.show(line)
         job = _Job(scenario, dict(overrides or {}), engine, output)
         if engine == "compiled":
+            if coupling_error:
+                raise not_usable('engine "compiled" makes no coupling error; "fmu" does.')
             return job.solve()
-        return job.step(progress, end_process)
+        frame = job.step(progress, end_process)
+        if coupling_error:
+            _add_error(scenario, frame, output)
+        return frame
     finally:
         output.close()
+
+
+def _add_error(scenario: Scenario, frame: Results, output: Output) -> None:
+    """Estimate the coupling error of a run, keep it with the results and tell it."""
+    try:
+        how, found = estimate(scenario, frame, run_quietly)
+    except RunError as error:  # the run itself is whole
+        output.warn(f"the coupling error cannot be estimated: {error}")
+        return
+    frame.attrs["coupling_error"] = as_data(found)
+    frame.attrs["coupling_error_by"] = how
+    for name, one in found.items():
+        if one.some:
+            output.log(f"coupling error of {name}, by {how}: {one}")
+        if not one.worth:
+            output.warn(f"{name}: {one.doubt()}: the estimate is worth nothing")
+
+
+def run_quietly(scenario: Scenario, engine: str) -> Results:
+    """Run a scenario for its numbers alone: nothing is written, and what it warns of is known.
+
+    Parameters
+    ----------
+    scenario : Scenario
+    engine : str
+        As in `run`.
+    """
+    return execute(scenario, None, engine, _Silent(None), progress=False)
+
+
+class _Silent(Output):
+    """An output that takes nothing."""
+
+    def warn(self, line: str) -> None:
+        """Keep quiet."""
 
 
 class _Job:
@@ -199,9 +252,13 @@ class _Job:
         folder = self.scenario.file.parent
         parameters = {c.name: fmu_parameters(c, folder) for c in self.scenario.components}
         from .master import Master
+        from .power import bond_names, energy_residuals
 
         with Master(self.scenario, paths, descriptions, parameters, self._listen) as master:
             self._master = master
+            self.made["energy_residual"] = dict.fromkeys(
+                bond_names(master.nodes, self.scenario.algorithm)
+            )
             hang = self._end_process if end_process else None
             stopped: RunError | None = None
             with Interrupt(hang) as interrupt:
@@ -212,6 +269,9 @@ class _Job:
                         raise
                     stopped = error
             table = master.table()
+            self.made["energy_residual"] = energy_residuals(
+                master.nodes, self.scenario.algorithm, self.scenario.step, table
+            )
             return self._end(table, stopped, interrupt.asked and master.rows <= master.steps)
 
     def _go(self, master: Master, interrupt: Interrupt, progress: bool) -> None:

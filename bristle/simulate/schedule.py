@@ -7,6 +7,13 @@ schedule is worked out once, from the connections alone, and asks for no call th
 - Gauss-Seidel: each component in turn gets the inputs that are newer than those it has, steps,
   and is read. At the end of the step, inputs whose source came later are set wherever an output
   follows them, and these outputs are read for the row; what they feed directly follows.
+- Midpoint: as Gauss-Seidel, but an input that a component holds over its step has the middle of
+  the step there: half-way between the last value and the newest where the source has stepped
+  already, ahead of the newest by half its last change where it has not. Before outputs that follow
+  it are read it gets the value at the step's end. What a component interpolates or samples, and
+  what is discrete, gets the newest value.
+- Midpoint, iterated: the components of a loop then go back to the begin of the step and make it
+  again, with the middle between the values at its begin and those found at its end.
 - Jacobi: all step, all are read, all inputs are set; outputs that follow an input are read again
   for the row and not passed on.
 
@@ -17,139 +24,55 @@ closes it: within a step each value of the loop is taken once. An output without
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Sequence
 
-from ..fmu.description import Variable
-
-Port = tuple[int, str]
-"""A component's number in the order of the file, and the name of one of its variables."""
-
-FAULT = "fault"
-
-
-@dataclass(frozen=True)
-class Node:
-    """A component as the schedule sees it: outputs, and the source of each connected input."""
-
-    name: str
-    inputs: Mapping[str, Variable]
-    outputs: Mapping[str, Variable]
-    sources: Mapping[str, Port]
-    substeps: int = 1
-
-    def followed(self, output: str) -> tuple[str, ...]:
-        """Return the connected inputs that an output follows without a step."""
-        if kind_of(self.outputs[output]) == FAULT:  # changes where a step ends
-            return ()
-        named = self.outputs[output].dependencies
-        if named is None:
-            return tuple(self.sources)
-        return tuple(name for name in named if name in self.sources)
-
-
-@dataclass(frozen=True)
-class Step:
-    """Let a component step."""
-
-    component: int
-
-
-@dataclass(frozen=True)
-class Read:
-    """Read outputs of one component and kind in one call; they are neighbours in memory."""
-
-    component: int
-    kind: str
-    names: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Write:
-    """Set inputs of one component and kind in one call, each from the output that feeds it."""
-
-    component: int
-    kind: str
-    names: tuple[str, ...]
-
-
-Operation = Step | Read | Write
-
-
-@dataclass(frozen=True)
-class Schedule:
-    """The operations of one macro step, and the order of each component's outputs in memory."""
-
-    operations: tuple[Operation, ...]
-    layout: tuple[Port, ...]
-
-
-@dataclass
-class _Refresh:
-    """What is set and read once more at the end of a step; the level gives the order."""
-
-    inputs: dict[Port, int] = field(default_factory=dict)
-    outputs: dict[Port, int] = field(default_factory=dict)
-
-
-def kind_of(variable: Variable) -> str:
-    """Return the kind of call that a variable needs: "Real", "Integer", "Boolean" or "fault".
-
-    `fault` has calls of its own, so that the fault codes of all components are neighbours.
-    """
-    if (variable.name, variable.causality, variable.kind) == (FAULT, "output", "Integer"):
-        return FAULT
-    return "Integer" if variable.kind == "Enumeration" else variable.kind
+from .graph import Refresh, at_level, lay_out
+from .operations import (
+    NEWEST,
+    Node,
+    Operation,
+    Port,
+    Schedule,
+    Step,
+    is_continuous,
+    reads,
+    writes,
+)
+from .sequence import in_sequence
 
 
 def make_schedule(nodes: Sequence[Node], algorithm: str) -> Schedule:
-    """Return the schedule of a macro step for "gauss-seidel" or "jacobi"."""
+    """Return the schedule of a macro step for one of `scenario.parts.ALGORITHMS`."""
     if algorithm == "jacobi":
         return _jacobi(nodes)
-    return _gauss_seidel(nodes)
+    if algorithm == "gauss-seidel":
+        return in_sequence(nodes, ())
+    return in_sequence(nodes, held_inputs(nodes), iterated=algorithm == "midpoint-iterated")
 
 
-def find_loop(nodes: Sequence[Node]) -> list[Port]:
-    """Return the ports of one algebraic loop that the FMUs declare, or an empty list."""
-    graph = _graph(nodes, only_declared=True)
-    for start in graph:
-        path = _path(graph, start, start)
-        if path:
-            return path
-    return []
+def held_inputs(nodes: Sequence[Node]) -> set[Port]:
+    """Return the inputs that midpoint gives the middle of the step: held, of signals that go on.
 
-
-def _gauss_seidel(nodes: Sequence[Node]) -> Schedule:
-    refresh = _gauss_seidel_refresh(nodes)
-    early = _early(nodes, refresh)
-    # The last period is the steady one: only inputs older than their source are set.
-    read: dict[Port, int] = defaultdict(int)
-    written: dict[Port, int] = defaultdict(lambda: 1)
-    clock = 1
-    operations: list[Operation] = []
-    for _ in range(2):
-        operations = []
-        for c, node in enumerate(nodes):
-            due = [n for n, source in node.sources.items() if read[source] > written[c, n]]
-            clock += 1
-            written.update({(c, name): clock for name in due})
-            operations += [*_writes(c, node, due), Step(c), *_reads(c, node, early[c])]
-            read.update({(c, name): clock for name in early[c]})
-        for level in range(1, max(refresh.outputs.values(), default=0) + 1):
-            for c, node in enumerate(nodes):
-                clock += 1
-                due = _at(refresh.inputs, c, level)
-                seen = _at(refresh.outputs, c, level)
-                written.update({(c, name): clock for name in due})
-                operations += [*_writes(c, node, due), *_reads(c, node, seen)]
-            read.update({port: clock for port, at in refresh.outputs.items() if at == level})
-            clock += 1
-    return Schedule(tuple(operations), _layout(nodes, refresh, early))
+    A continuous output that may jump, as dry friction does where the motion turns, is better off
+    with the newest values all round, which is Gauss-Seidel.
+    """
+    rough = {
+        (c, name)
+        for c, node in enumerate(nodes)
+        for output in node.outputs
+        if is_continuous(node.outputs[output]) and node.jumps(output)
+        for name in node.followed(output)
+    }
+    return {
+        (c, name)
+        for c, node in enumerate(nodes)
+        for name, (d, output) in node.sources.items()
+        if node.holds(name) and not nodes[d].jumps(output)
+    } - rough
 
 
 def _jacobi(nodes: Sequence[Node]) -> Schedule:
-    refresh = _Refresh(
+    refresh = Refresh(
         outputs={(c, o): 1 for c, n in enumerate(nodes) for o in n.outputs if n.followed(o)}
     )
     passed_on = {source for node in nodes for source in node.sources.values()}
@@ -159,118 +82,9 @@ def _jacobi(nodes: Sequence[Node]) -> Schedule:
     ]
     operations: list[Operation] = [Step(c) for c in range(len(nodes))]
     for c, node in enumerate(nodes):
-        operations += _reads(c, node, early[c])
+        operations += reads(c, node, early[c])
     for c, node in enumerate(nodes):
-        operations += _writes(c, node, node.sources)
+        operations += writes(c, node, dict.fromkeys(node.sources, NEWEST))
     for c, node in enumerate(nodes):
-        operations += _reads(c, node, _at(refresh.outputs, c, 1))
-    return Schedule(tuple(operations), _layout(nodes, refresh, early))
-
-
-def _gauss_seidel_refresh(nodes: Sequence[Node]) -> _Refresh:
-    """Return what follows the inputs whose source came later than their component's step."""
-    graph = _graph(nodes)
-    seeds = [
-        (c, name) for c, node in enumerate(nodes) for name, (d, _) in node.sources.items() if d >= c
-    ]
-    refresh = _Refresh()
-    queue = [(port, 1) for port in seeds]
-    while queue:
-        port, level = queue.pop()
-        if refresh.inputs.get(port, 0) >= level or not graph[port]:
-            continue  # nothing follows this input: it is set before the next step
-        refresh.inputs[port] = level
-        for output in graph[port]:
-            if refresh.outputs.get(output, 0) < level:
-                refresh.outputs[output] = level
-            queue += [
-                (target, level + 1) for target in graph[output] if not _path(graph, target, output)
-            ]
-    return refresh
-
-
-def _early(nodes: Sequence[Node], refresh: _Refresh) -> list[list[str]]:
-    """Return what is read directly after each step: all that is final, or that is needed next."""
-    needed = {
-        source for c, node in enumerate(nodes) for source in node.sources.values() if source[0] < c
-    }
-    early = []
-    for c, node in enumerate(nodes):
-        levels = {level for (d, _), level in refresh.outputs.items() if d == c}
-        # With several levels the outputs of one call would not all be neighbours: read all.
-        early.append(
-            [
-                name
-                for name in node.outputs
-                if len(levels) > 1 or (c, name) not in refresh.outputs or (c, name) in needed
-            ]
-        )
-    return early
-
-
-def _layout(
-    nodes: Sequence[Node], refresh: _Refresh, early: Sequence[Iterable[str]]
-) -> tuple[Port, ...]:
-    """Return all outputs in an order that makes those of each call neighbours."""
-    ports = [
-        (refresh.outputs.get((c, name), 0), name not in set(early[c]), place, (c, name))
-        for c, node in enumerate(nodes)
-        for place, name in enumerate(node.outputs)
-    ]
-    ports.sort(key=lambda entry: (entry[3][0], *entry[:3]))
-    return tuple(entry[3] for entry in ports)
-
-
-def _graph(nodes: Sequence[Node], only_declared: bool = False) -> dict[Port, list[Port]]:
-    """Return which port follows which at once: inputs to outputs, outputs to inputs."""
-    graph: dict[Port, list[Port]] = {}
-    for c, node in enumerate(nodes):
-        graph |= {(c, name): [] for name in (*node.inputs, *node.outputs)}
-    for c, node in enumerate(nodes):
-        for name, source in node.sources.items():
-            graph[source].append((c, name))
-        for output, variable in node.outputs.items():
-            if only_declared and variable.dependencies is None:
-                continue
-            for name in node.followed(output):
-                graph[c, name].append((c, output))
-    return graph
-
-
-def _path(graph: Mapping[Port, Sequence[Port]], start: Port, goal: Port) -> list[Port]:
-    """Return a path from `start` to `goal` with at least one edge, or an empty list."""
-    before: dict[Port, Port] = {}
-    queue = [start]
-    while queue:
-        port = queue.pop()
-        for after in graph[port]:
-            if after not in before:
-                before[after] = port
-                queue.append(after)
-    if goal not in before:
-        return []
-    path = [goal, before[goal]]
-    while path[-1] != start:
-        path.append(before[path[-1]])
-    return path[::-1]
-
-
-def _at(levels: Mapping[Port, int], component: int, level: int) -> list[str]:
-    return [name for (c, name), at in levels.items() if c == component and at == level]
-
-
-def _reads(component: int, node: Node, names: Iterable[str]) -> list[Operation]:
-    return [Read(component, *group) for group in _by_kind(node.outputs, names)]
-
-
-def _writes(component: int, node: Node, names: Iterable[str]) -> list[Operation]:
-    return [Write(component, *group) for group in _by_kind(node.inputs, names)]
-
-
-def _by_kind(
-    variables: Mapping[str, Variable], names: Iterable[str]
-) -> list[tuple[str, tuple[str, ...]]]:
-    groups: dict[str, list[str]] = defaultdict(list)
-    for name in names:
-        groups[kind_of(variables[name])].append(name)
-    return [(kind, tuple(group)) for kind, group in groups.items()]
+        operations += reads(c, node, at_level(refresh.outputs, c, 1))
+    return Schedule(tuple(operations), lay_out(nodes, refresh, early))

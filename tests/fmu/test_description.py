@@ -40,7 +40,9 @@ XML = """<?xml version="1.0" encoding="UTF-8"?>
     <ScalarVariable name="flag" valueReference="0" causality="input" variability="discrete">
       <Boolean start="true"/></ScalarVariable>
     <ScalarVariable name="force" valueReference="1" causality="output">
-      <Real declaredType="Force" max="8"/></ScalarVariable>
+      <Real declaredType="Force" max="8"/>
+      <Annotations><Tool name="bristle"><jumpsWithout>x</jumpsWithout></Tool></Annotations>
+    </ScalarVariable>
     <ScalarVariable name="count" valueReference="0" causality="output" variability="discrete">
       <Integer/></ScalarVariable>
     <ScalarVariable name="quiet" valueReference="9" causality="output"><Real/></ScalarVariable>
@@ -126,6 +128,13 @@ def test_dependencies_name_inputs_only_and_silence_is_none(write: Write) -> None
 def test_how_an_input_is_taken_comes_from_our_annotation_only(write: Write) -> None:
     variables = read_description(write()).variables
     assert {name: v.over_step for name, v in variables.items() if v.over_step} == {"x": "linear"}
+
+
+def test_an_output_that_jumps_names_the_input_that_cures_it(write: Write) -> None:
+    variables = read_description(write()).variables
+    assert {n: v.jumps_without for n, v in variables.items() if v.jumps_without} == {"force": "x"}
+    with pytest.raises(FmuError, match='"force" may jump without "count", but no input has'):
+        read_description(write((">x</jumps", ">count</jumps")))
 
 
 def test_optional_inputs_come_from_our_annotation_only(write: Write) -> None:
@@ -366,6 +375,8 @@ def test_built_fmu_says_what_the_catalogue_says(name: str) -> None:
         assert variable.dependencies == other.dependencies
         assert variable.optional == other.optional
         assert variable.over_step == other.over_step
+        assert variable.jumps_without == other.jumps_without
+        assert variable.variability == other.variability
 
 
 @pytest.mark.parametrize("name", catalogue.component_names())
@@ -377,6 +388,24 @@ def test_every_input_says_how_it_is_taken_over_a_step(name: str) -> None:
     elif found:
         assert found.pop("ground_acceleration", "linear") == "linear"
         assert set(found.values()) == {"held"}
+
+
+@pytest.mark.parametrize("name", catalogue.component_names())
+def test_outputs_that_stand_between_samples_are_discrete(name: str) -> None:
+    described = catalogue.describe(name)
+    found = {v.variability for v in described.of("output") if v.kind == "Real"}
+    stands = "sample_period" in described.variables or name == "ConstantVoltage"
+    assert found == {"discrete" if stands else "continuous"}
+
+
+def test_dry_friction_jumps_unless_it_knows_what_holds_the_mass() -> None:
+    found = {
+        name: catalogue.describe(name).variables["force"].jumps_without
+        for name in catalogue.component_names()
+        if name.endswith("Damper")
+    }
+    assert found.pop("BinghamDamper") == "holding_force"
+    assert set(found.values()) == {None}
 
 
 def test_a_component_cannot_leave_it_open() -> None:

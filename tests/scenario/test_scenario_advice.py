@@ -3,8 +3,8 @@
 import pytest
 from fake_library import BASE_MASS, FAKE, VALID
 
-from bristle.scenario.advice import longest_step
 from bristle.scenario.scenario import check_scenario, load_scenario
+from bristle.scenario.stability import longest_step
 from bristle.simulate.run import run
 
 GROUND = VALID[VALID.index("[components.ground]") : VALID.index("[components.structure]")]
@@ -70,6 +70,38 @@ def grows(algorithm, step, mass, c, k):
     return False
 
 
+def midpoint_grows(order, step, mass, c, k):
+    """Return the same of midpoint, for either order of the two, or with one rollback."""
+    v = before = 1e-6
+    z = force = last = 0.0
+    for _ in range(100_000):
+        if order == "structure first":
+            new = v - step / mass * (1.5 * force - 0.5 * last)
+            z += 0.5 * step * (v + new)
+        elif order == "damper first":
+            z += step * (1.5 * v - 0.5 * before)
+            new = v - 0.5 * step / mass * (force + k * z + c * (2.0 * v - before))
+        else:
+            tried = v - step / mass * (1.5 * force - 0.5 * last)
+            guess = k * (z + 0.5 * step * (v + tried)) + c * tried
+            new = v - 0.5 * step / mass * (force + guess)
+            z += 0.5 * step * (v + new)
+        v, before = new, v
+        force, last = k * z + c * v, force
+        if abs(v) > 1e-3:
+            return True
+    return False
+
+
+@pytest.mark.parametrize("order", ["structure first", "damper first", "rollback"])
+@pytest.mark.parametrize(("c", "k"), [(185.0, 2310.0), (265.0, 3970.0), (260.0, 0.0), (10.0, 1e4)])
+def test_midpoint_is_stable_up_to_its_longest_step_in_either_order(order, c, k):
+    algorithm = "midpoint-iterated" if order == "rollback" else "midpoint"
+    limit = longest_step(algorithm, BASE_MASS, c, k)
+    assert not midpoint_grows(order, 0.99 * limit, BASE_MASS, c, k)
+    assert midpoint_grows(order, 1.01 * limit, BASE_MASS, c, k)
+
+
 @pytest.mark.parametrize("algorithm", ["jacobi", "gauss-seidel"])
 @pytest.mark.parametrize(("c", "k"), [(185.0, 2310.0), (265.0, 3970.0), (260.0, 0.0), (100.0, 1e4)])
 def test_the_longest_step_is_where_the_coupled_motion_begins_to_grow(algorithm, c, k):
@@ -89,7 +121,7 @@ def test_the_longest_step_is_where_the_coupled_motion_begins_to_grow(algorithm, 
         ({**BINGHAM, "structure.attached_mass": 2.0}, 100.0 + 20.0 * 4.0, 0.0),
     ],
 )
-@pytest.mark.parametrize("algorithm", ["jacobi", "gauss-seidel"])
+@pytest.mark.parametrize("algorithm", ["jacobi", "gauss-seidel", "midpoint"])
 def test_a_step_beyond_stability_is_a_warning_with_the_limit(told, overrides, c, k, algorithm):
     mass = BASE_MASS + overrides.get("structure.attached_mass", 0.0)
     limit = longest_step(algorithm, mass, c, k)
@@ -101,7 +133,10 @@ def test_a_step_beyond_stability_is_a_warning_with_the_limit(told, overrides, c,
     assert ("or gauss-seidel" in warning) == (algorithm == "jacobi")
 
 
-@pytest.mark.parametrize(("algorithm", "limit"), [("jacobi", 6.69e-3), ("gauss-seidel", 13.5e-3)])
+@pytest.mark.parametrize(
+    ("algorithm", "limit"),
+    [("jacobi", 6.69e-3), ("gauss-seidel", 13.5e-3), ("midpoint", 7.43e-3)],
+)
 def test_the_fmus_themselves_become_unstable_where_the_warning_says(algorithm, limit, tmp_path):
     """The stock pulse at 8 V: below the limit the base comes to rest, above it never does."""
 
@@ -115,8 +150,10 @@ def test_the_fmus_themselves_become_unstable_where_the_warning_says(algorithm, l
         {"voltage.level": 8.0, "run.algorithm": algorithm, "run.step": 0.02},
     )
     assert f"above about {1e3 * limit:.3g} ms" in findings[0].text
-    assert speed_at_the_end(0.95 * limit) < 3e-4
-    assert speed_at_the_end(1.05 * limit) > 1e-3
+    below, above = speed_at_the_end(0.95 * limit), speed_at_the_end(1.05 * limit)
+    assert below < 3e-4
+    assert above > 4e-4
+    assert above > 4.0 * below
 
 
 def test_an_unknown_voltage_counts_as_the_highest(levels):

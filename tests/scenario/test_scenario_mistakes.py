@@ -75,8 +75,9 @@ MISTAKES = [
     ("algorithm", '"gauss-seidel"', '"gauss_seidel"', "algorithm",
      ['no algorithm "gauss_seidel"', 'Did you mean "gauss-seidel"?']),
     ("algorithm unlike any", '"gauss-seidel"', '"euler"', "algorithm",
-     ["There are: gauss-seidel, jacobi."]),
-    ("algorithm a number", '"gauss-seidel"', "1", "algorithm", ['"gauss-seidel" or "jacobi"']),
+     ["There are: gauss-seidel, midpoint, midpoint-iterated, jacobi."]),
+    ("algorithm a number", '"gauss-seidel"', "1", "algorithm",
+     ["in quotes", "gauss-seidel, midpoint, midpoint-iterated, jacobi"]),
     # components
     ("components no table", VALID[VALID.index("[components.ground]"):], "[[components]]\n",
      "components", ["is a list, not a table"]),

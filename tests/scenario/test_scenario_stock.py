@@ -37,7 +37,7 @@ def test_the_paper_s_passive_case():
     assert scenario.component("voltage").parameters == {"level": 4.0}
     assert scenario.component("damper").parameters == {}
     assert (scenario.stop, scenario.step) == (35.0, 0.002)
-    assert scenario.algorithm == "gauss-seidel"
+    assert scenario.algorithm == "midpoint"
 
 
 @pytest.mark.parametrize(("name", "intensity"), EL_CENTRO.items())

@@ -7,7 +7,19 @@ from collections.abc import Mapping
 import pytest
 
 from bristle.fmu.description import Variable
-from bristle.simulate.schedule import Node, Read, Schedule, Step, Write, find_loop, make_schedule
+from bristle.simulate.graph import find_loop
+from bristle.simulate.operations import (
+    Keep,
+    Node,
+    Read,
+    Restore,
+    Save,
+    Schedule,
+    Shift,
+    Step,
+    Write,
+)
+from bristle.simulate.schedule import make_schedule
 
 
 def node(
@@ -46,12 +58,17 @@ LOOP = [GROUND, STRUCTURE, VOLTAGE, DAMPER]
 
 def calls(schedule: Schedule) -> list[tuple[object, ...]]:
     """Return the operations in short: (kind, component, names)."""
-    return [
-        ("step", o.component)
-        if isinstance(o, Step)
-        else ("get" if isinstance(o, Read) else "set", o.component, " ".join(o.names))
-        for o in schedule.operations
-    ]
+    verbs = {Read: "get", Write: "set", Keep: "keep", Shift: "shift"}
+    found: list[tuple[object, ...]] = []
+    for o in schedule.operations:
+        if isinstance(o, Step | Save | Restore):
+            found.append((type(o).__name__.lower(), o.component))
+        elif isinstance(o, Write) and o.values:
+            each = (f"{n}:{v}" for n, v in zip(o.names, o.values, strict=True))
+            found.append(("set", o.component, " ".join(each)))
+        else:
+            found.append((verbs[type(o)], o.component, " ".join(o.names)))
+    return found
 
 
 def test_gauss_seidel_of_structure_and_damper() -> None:

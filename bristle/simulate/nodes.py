@@ -1,0 +1,37 @@
+"""The components of a scenario as the schedule sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from ..errors import ScenarioError
+from ..fmu.description import Description
+from ..scenario.over_step import as_told
+from .operations import Node, Port
+
+if TYPE_CHECKING:
+    from ..scenario.scenario import Scenario
+
+
+def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> list[Node]:
+    """Return the components as the schedule sees them, in the order of the file."""
+    numbers = {component.name: c for c, component in enumerate(scenario.components)}
+    sources: list[dict[str, Port]] = [{} for _ in scenario.components]
+    for connection in scenario.connections:
+        if descriptions[connection.target].variables[connection.input].kind == "String":
+            raise ScenarioError(
+                f'{scenario.file}: "{connection.target}.{connection.input}" is a text; texts are '
+                "set in parameters, only numbers and Booleans are passed on."
+            )
+        port = numbers[connection.source], connection.output
+        sources[numbers[connection.target]][connection.input] = port
+    nodes = []
+    for c, component in enumerate(scenario.components):
+        description = descriptions[component.name]
+        substeps = round(scenario.step / component.step) if component.step else 1
+        told = component.over_step
+        outputs = {v.name: as_told(v, told) for v in description.of("output") if v.kind != "String"}
+        inputs = {v.name: as_told(v, told) for v in description.of("input")}
+        nodes.append(Node(component.name, inputs, outputs, sources[c], substeps))
+    return nodes

@@ -1,0 +1,178 @@
+"""Components that step one after another: Gauss-Seidel, midpoint, midpoint with one rollback."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+from .graph import at_level, find_late, lay_out, loop_members, read_early, signal_graph
+from .operations import (
+    AHEAD,
+    END,
+    MIDDLE,
+    NEWEST,
+    Keep,
+    Node,
+    Operation,
+    Port,
+    Restore,
+    Save,
+    Schedule,
+    Shift,
+    Step,
+    is_continuous,
+    reads,
+    writes,
+)
+
+
+def in_sequence(nodes: Sequence[Node], held: Collection[Port], iterated: bool = False) -> Schedule:
+    """Return the schedule in which each component gets the newest values, and then steps.
+
+    Parameters
+    ----------
+    nodes : sequence of Node
+    held : inputs that get the middle of the step; none of them: Gauss-Seidel
+    iterated : whether the components of a loop go back once and step again, now that the values
+        at the end of the step are known
+    """
+    plan = _Plan(nodes, held, iterated)
+    for _ in range(2):  # the last period is the steady one
+        plan.macro_step()
+    return Schedule(tuple(plan.operations), lay_out(nodes, plan.refresh, plan.early))
+
+
+class _Plan:
+    """The operations of a macro step while they are worked out."""
+
+    def __init__(self, nodes: Sequence[Node], held: Collection[Port], iterated: bool) -> None:
+        self.nodes, self.held = nodes, held
+        inside, behind = loop_members(nodes) if iterated else ([], [])
+        self.again, self.behind = inside, behind
+        self.graph = signal_graph(nodes)
+        self.refresh = find_late(nodes, self.graph)
+        fed_back = {source for c in inside for source in nodes[c].sources.values()}
+        self.early = read_early(nodes, self.refresh, fed_back)
+        self.kept = {nodes[c].sources[name] for c, name in held}
+        self.jumping = self._jumping()
+        self.operations: list[Operation] = []
+        # When each output was read and each input written: only inputs that are older are set.
+        self._read: dict[Port, int] = defaultdict(int)
+        self._written: dict[Port, int] = defaultdict(lambda: 1)
+        self._clock = 1
+
+    def macro_step(self) -> None:
+        """Work out a macro step that follows on those before."""
+        self.operations = []
+        for c in self.again:
+            late = [n for n in self._older(c) if self.nodes[c].sources[n][0] >= c]
+            self._write(c, dict.fromkeys(late, NEWEST))
+            self.operations.append(Save(c))
+        for c in range(len(self.nodes)):
+            if c not in self.behind:
+                self._step(c)
+        if self.again:
+            self.operations += [Restore(c) for c in self.again]
+            for c in self.again:
+                self._step_again(c)
+            for c in self.behind:
+                self._step(c)
+        self._refresh()
+
+    def _older(self, c: int) -> list[str]:
+        """Return the inputs with the newest value whose source is newer than they are."""
+        return [
+            name
+            for name, source in self.nodes[c].sources.items()
+            if (c, name) not in self.held and self._read[source] > self._written[c, name]
+        ]
+
+    def _held(self, c: int) -> list[str]:
+        return [name for name in self.nodes[c].sources if (c, name) in self.held]
+
+    def _write(self, c: int, values: Mapping[str, str]) -> None:
+        self._clock += 1
+        self._written.update({(c, name): self._clock for name in values})
+        self.operations += writes(c, self.nodes[c], values)
+
+    def _read_outputs(self, c: int, names: Iterable[str]) -> None:
+        self.operations += reads(c, self.nodes[c], names)
+
+    def _step(self, c: int) -> None:
+        node = self.nodes[c]
+        stepped = {name: self._has_stepped(node.sources[name][0], c) for name in self._held(c)}
+        values = {name: MIDDLE if stepped[name] else AHEAD for name in stepped}
+        values.update(dict.fromkeys(self._older(c), NEWEST))
+        self._write(c, {name: values[name] for name in node.sources if name in values})
+        past = tuple(name for name in node.outputs if (c, name) in self.kept)
+        self.operations += [Keep(c, past)] if past else []
+        self.operations.append(Step(c))
+        self._show(c, stepped)
+
+    def _has_stepped(self, source: int, c: int) -> bool:
+        """Return whether a source steps before a component; those behind a loop come last."""
+        return source < c or (c in self.behind and source not in self.behind)
+
+    def _step_again(self, c: int) -> None:
+        """Step from the restored state: the ends of all inputs are known, if only nearly."""
+        node = self.nodes[c]
+        before = [n for n, (d, _) in node.sources.items() if d < c and (c, n) not in self.held]
+        values = dict.fromkeys(self._held(c), MIDDLE)
+        self._write(c, {**dict.fromkeys(before, NEWEST), **values})
+        self.operations.append(Step(c))
+        self._show(c, dict.fromkeys(values, True))
+
+    def _show(self, c: int, known: Mapping[str, bool]) -> None:
+        """Give held inputs the end of the step for the outputs that follow them, and read these.
+
+        Where others wait for such an output it is now, from a source that has still to step as far
+        as that can be told; else it is when all have stepped, unless nothing else is set then.
+
+        Parameters
+        ----------
+        c : the component
+        known : held inputs, and whether their value at the end is known
+        """
+        values = {}
+        for name in known:
+            following = {output for _, output in self.graph[c, name]}
+            wanted = following.intersection(self.early[c])
+            if wanted or (known[name] and following and (c, name) not in self.refresh.inputs):
+                values[name] = NEWEST if known[name] else END
+        self.operations += writes(c, self.nodes[c], values)
+        self._read_outputs(c, self.early[c])
+        self._read.update({(c, name): self._clock for name in self.early[c]})
+
+    def _refresh(self) -> None:
+        """Set what came too late, and read what follows it, link by link."""
+        for level in range(1, max(self.refresh.outputs.values(), default=0) + 1):
+            for c in range(len(self.nodes)):
+                seen = at_level(self.refresh.outputs, c, level)
+                moved = tuple(name for name in seen if (c, name) in self.jumping)
+                self._write(c, dict.fromkeys(at_level(self.refresh.inputs, c, level), NEWEST))
+                self.operations += [Shift(c, moved, "-=")] if moved else []
+                self._read_outputs(c, seen)
+                self.operations += [Shift(c, moved, "+=")] if moved else []
+            changed = [port for port, at in self.refresh.outputs.items() if at == level]
+            self._read.update(dict.fromkeys(changed, self._clock))
+            self._clock += 1
+
+    def _jumping(self) -> set[Port]:
+        """Return the outputs whose change between two reads of a step is a jump, and no slope.
+
+        They follow a discrete signal, as a damper's force does the voltage of a controller that has
+        stepped after it.
+        """
+        queue = [
+            (c, name)
+            for c, node in enumerate(self.nodes)
+            for name, (d, output) in node.sources.items()
+            if d >= c and not is_continuous(self.nodes[d].outputs[output])
+        ]
+        reached: set[Port] = set()
+        while queue:
+            port = queue.pop()
+            if port not in reached:
+                reached.add(port)
+                queue += self.graph[port]
+        return {port for port in self.kept if port in reached and port[1] in self.early[port[0]]}

@@ -1,0 +1,234 @@
+"""The coupling error that a run states, against what it is; the step for a tolerance; energy."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from toys import Maker
+
+from bristle import load_results, run
+from bristle.cli import main
+from bristle.errors import RunError, ScenarioError
+from bristle.scenario.scenario import Scenario, load_scenario
+from bristle.simulate.coupling_error import (
+    against,
+    discrete_outputs,
+    estimate,
+    extrapolated,
+    find_step,
+)
+from bristle.simulate.run import run_quietly
+
+T = np.linspace(0.0, 3.0, 301)
+EXACT = np.sin(T)
+
+
+def off(error: float) -> np.ndarray:
+    """Return a run with an error that grows with time."""
+    return EXACT * (1.0 + error * T)
+
+
+def rms(values: np.ndarray) -> float:
+    """Return the root of the mean square."""
+    return float(np.sqrt(np.mean(values**2)))
+
+
+@pytest.mark.parametrize(("order", "h"), [(1, 0.02), (2, 0.02), (2, 1e-5)])
+def test_an_error_that_falls_regularly_is_told_to_a_percent(order: int, h: float) -> None:
+    one, half, quarter = (off(h / 2 ** (order * k)) for k in range(3))
+    true = float(np.abs(one - EXACT).max())
+    for found in (extrapolated(one, half, quarter), against(one, half, EXACT)):
+        assert found.worth
+        assert found.order == pytest.approx(order, abs=0.02)
+        assert found.along == pytest.approx(true, rel=0.02)
+        assert found.peak == pytest.approx(np.abs(one).max() / EXACT.max() - 1.0, rel=0.4, abs=1e-6)
+        assert found.rms == pytest.approx(rms(one) / rms(EXACT) - 1.0, rel=0.4, abs=1e-6)
+
+
+def test_an_error_that_does_not_fall_is_worth_nothing() -> None:
+    jumps = [np.sign(EXACT - 0.5 + shift) for shift in (0.02, -0.02, 0.015)]
+    assert not extrapolated(*jumps).worth
+    assert not against(*jumps).worth
+    growing = extrapolated(off(0.01), off(0.02), off(0.05))
+    assert not growing.worth
+    assert growing.order < 0.0
+
+
+def test_what_no_step_changes_has_no_error() -> None:
+    for same in (EXACT, np.zeros(5), np.full(5, 8.0)):
+        found = extrapolated(same, same, same)
+        assert (found.along, found.peak, found.rms, found.worth) == (0.0, 0.0, 0.0, True)
+        assert math.isnan(found.order)
+        assert not found.some
+
+
+def oscillator(scenario_of: Maker, algorithm: str) -> Path:
+    """Return x1' = x2 + 1, x2' = -x1 of foreign FMUs: there is no engine but theirs."""
+    return scenario_of(
+        {"one": "Integrator", "two": "Integrator", "minus": "Gain"},
+        {"one.u": "two.y", "two.u": "minus.y", "minus.u": "one.y"},
+        parameters={
+            "one": {"gain": 0.0},
+            "two": {"gain": 0.0},
+            "minus": {"gain": -1.0, "offset": 1.0},
+        },
+        step=0.025,
+        steps={"two": 0.0125},
+        stop=3.0,
+        algorithm=algorithm,
+    )
+
+
+@pytest.mark.parametrize(("algorithm", "order"), [("midpoint", 2), ("gauss-seidel", 1)])
+def test_foreign_fmus_are_run_at_h_and_at_a_half_and_a_quarter(
+    scenario_of: Maker, algorithm: str, order: int
+) -> None:
+    frame = run(oscillator(scenario_of, algorithm), coupling_error=True)
+    assert frame.attrs["coupling_error_by"] == "h, h/2, h/4"
+    found = frame.attrs["coupling_error"]["one.x"]
+    exact = 1.0 - np.cos(frame.index.to_numpy())
+    true = float(np.abs(frame["one.x"] - exact).max() / exact.max())
+    assert true / 1.3 <= found["along"] <= 1.3 * true
+    assert found["order"] == pytest.approx(order, abs=0.2)
+    assert found["worth"]
+
+
+def test_a_controller_that_does_not_settle_spoils_every_estimate_from_finer_steps() -> None:
+    scenario = load_scenario("el_centro_0p6g_clipped", {"run.stop": 0.02, "run.step": 0.002})
+    assert discrete_outputs(scenario) == [
+        f"controller.{name}" for name in ("voltage", "command_raw", "scheduling")
+    ]
+    quiet = run_quietly(scenario, "fmu")
+
+    def again(one: Scenario, engine: str) -> pd.DataFrame:
+        if engine == "compiled":
+            raise ScenarioError("foreign")
+        parts = round(one.steps / scenario.steps)
+        frame = quiet.loc[quiet.index.repeat(parts)].iloc[parts - 1 :].copy()
+        frame["damper.force"] += 0.1 * one.step  # of first order
+        if switching:
+            frame["controller.voltage"] += 8.0 * (parts % 4 == 2)
+        return frame
+
+    first = quiet.copy()
+    first["damper.force"] += 0.1 * scenario.step
+    for switching in (False, True):
+        how, found = estimate(scenario, first, again)
+        assert how == "h, h/2, h/4"
+        assert found["damper.force"].order == pytest.approx(1.0)
+        assert found["damper.force"].worth is not switching
+        assert found["structure.drift1"].worth  # no step changes it
+    first.loc[0.01:, "controller.voltage"] = 8.0  # in all three runs: they agree, perhaps wrongly
+    quiet.loc[0.01:, "controller.voltage"] = 8.0
+    switching = False
+    _, found = estimate(scenario, first, again)
+    assert found["controller.voltage"].along == 0.0
+    assert "switches" in found["damper.force"].doubt()
+    assert not found["damper.force"].worth
+
+
+def test_our_own_components_are_held_against_the_coupled_engine(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    short = {"run.stop": 0.5}
+    with caplog.at_level(logging.WARNING, "bristle"):
+        frame = run("half_sine_pulse", short, coupling_error=True, out=tmp_path)
+    assert frame.attrs["coupling_error_by"] == "coupled engine"
+    exact = run("half_sine_pulse", short, engine="compiled")
+    for name in ("structure.base_displacement", "damper.force", "damper.dissipated_energy"):
+        error = frame.attrs["coupling_error"][name]
+        true = float((frame[name] - exact[name]).abs().max() / exact[name].abs().max())
+        assert error["along"] == pytest.approx(true)
+        assert 1.5 < error["order"] < 2.5
+    assert frame.attrs["coupling_error"]["voltage.voltage"]["along"] == 0.0
+    assert "coupling error of damper.force, by coupled engine" in (tmp_path / "log").read_text()
+    assert not caplog.records
+
+
+def test_friction_that_jumps_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    sliding = {"damper.fmu": "BinghamDamper", "run.stop": 1.0}
+    with caplog.at_level(logging.WARNING, "bristle"):
+        frame = run("half_sine_pulse", sliding, coupling_error=True)
+    assert not frame.attrs["coupling_error"]["damper.force"]["worth"]
+    assert any("damper.force" in r.message and "worth nothing" in r.message for r in caplog.records)
+
+
+def test_a_tolerance_finds_the_largest_step_that_keeps_it(scenario_of: Maker) -> None:
+    scenario = load_scenario(oscillator(scenario_of, "midpoint"))
+    steps = {t: find_step(scenario, t, run_quietly).step for t in (3e-3, 3e-4, 3e-5)}
+    assert steps[3e-5] < steps[3e-4] <= 0.025
+    for tolerance, step in steps.items():
+        finest = load_scenario(scenario.file, {"run.step": step, "two.step": step / 2})
+        frame = run(finest)
+        exact = 1.0 - np.cos(frame.index.to_numpy())
+        assert np.abs(frame["one.x"] - exact).max() / 2.0 <= 1.1 * tolerance
+
+
+def test_a_tolerance_that_nothing_keeps_is_refused(scenario_of: Maker) -> None:
+    scenario = load_scenario(oscillator(scenario_of, "midpoint"))
+    quiet = run_quietly(scenario, "fmu")
+    noise = np.random.default_rng(1)
+
+    def noisy(one: Scenario, engine: str) -> pd.DataFrame:
+        rows = round(one.steps / scenario.steps)
+        frame = quiet.loc[quiet.index.repeat(rows)].iloc[rows - 1 :]
+        if engine == "compiled":
+            raise ScenarioError("foreign")
+        return frame + noise.normal(size=frame.shape)
+
+    with pytest.raises(RunError, match="falls with the step"):
+        find_step(scenario, 1e-3, noisy)
+
+
+@pytest.mark.parametrize("text", ["", "abc", "-1%", "0", "150%", "nan"])
+def test_a_tolerance_that_is_no_share_is_refused(
+    text: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["run", "half_sine_pulse", f"--tolerance={text}"]) == 2
+    assert "as 0.2% or 0.002" in capsys.readouterr().err
+
+
+def test_the_command_line_prints_the_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [
+        "run",
+        "half_sine_pulse",
+        "--set",
+        "run.stop=0.5",
+        "--no-figure",
+        "--out",
+        str(tmp_path),
+    ]
+    assert main([*given, "--coupling-error"]) == 0
+    shown = capsys.readouterr().out
+    assert "Coupling error at 2 ms, by coupled engine, in %" in shown
+    assert "order" in shown
+    assert main([*given, "--tolerance", "0.2%", "--json"]) == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert answer["coupling_error"]["damper.force"]["along"] <= 0.002
+    assert main([*given, "--tolerance", "0.2%", "--engine", "compiled"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "low", "high"),
+    [("gauss-seidel", 1.7, 2.3), ("jacobi", 1.7, 2.3), ("midpoint", 3.3, 4.7)],
+)
+def test_the_energy_that_the_coupling_makes_is_in_every_results_file(
+    tmp_path: Path, algorithm: str, low: float, high: float
+) -> None:
+    def residual(step: float) -> float:
+        given = {"run.step": step, "run.stop": 1.0, "run.algorithm": algorithm}
+        frame = run("half_sine_pulse", given, out=tmp_path)
+        found = frame.attrs["made"]["energy_residual"]
+        assert load_results(tmp_path).attrs["made"]["energy_residual"] == found
+        assert list(found) == ["damper.force"]
+        return float(found["damper.force"])
+
+    assert low < residual(0.002) / residual(0.001) < high
