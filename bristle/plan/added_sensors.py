@@ -26,9 +26,6 @@ from .shaking_table import FORCE, Columns, ShakingTable
 HELPS, SOME = 1.5, 1.15
 """Factors from which on a sensor is said to help, and from which on the best one is named."""
 
-DRAWS = 4
-"""Draws of the smoother's error."""
-
 Sites = dict[str, StructureProblem]
 Show = Callable[[list[Measurement]], Sites]
 Key = tuple[str, str, str]  # site, purpose, name of the figure
@@ -146,7 +143,7 @@ def _values(stand: Mapping[str, Stated], sites: Sequence[Sites]) -> dict[Key, fl
             for k, found in enumerate(sites):
                 runs = found[site].runs
                 count = sum(len(run.x) - run.skip for run in runs)
-                now = now.with_runs(asked.of(runs, DRAWS), count, count * (k % 2))
+                now = now.with_runs(asked.of(runs), count, count * (k % 2))
             known.append(now)
         out |= {(site, f.purpose, f.name): f.value for f in one.purposes.figures(known)}
     return out

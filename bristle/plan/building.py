@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..bridge.in_building import House
 from ..compare.names import site_name
@@ -27,7 +26,7 @@ from .building_plan import ONE_FORCE, BuildingPlan
 from .building_sites import SiteWish, default_wishes, purposes_at
 from .goal import Measured, Stated, stated
 from .ground import records_at_hand, scalable
-from .knowledge import Known
+from .knowledge import DRAWS, Known
 from .measured_force import of_one_force
 from .outcome import Outcome, outcomes
 from .purposes import cost_of
@@ -35,10 +34,8 @@ from .rig_limits import RigLimits, with_given
 from .search import Goal
 from .shaking_limits import limits_of_shaking
 from .shaking_table import ShakingTable
-from .table_planner import DRAWS, TablePlanner
+from .table_planner import TablePlanner
 from .wish import Wish, errs, note_of_missing
-
-Array = NDArray[np.float64]
 
 CANDIDATES, IMPROVED = 64, 10
 """Tests that are looked at, and evaluations in which a picked one is improved: each is a run of the

@@ -25,9 +25,6 @@ from .questions import AT, SizedRival
 
 LAYER = "layer"
 BOTH = (DAMPER, LAYER)
-DRAWS = 4
-"""Draws of the smoother's error."""
-
 Key = tuple[str, str, str]
 
 
@@ -87,7 +84,7 @@ def _of_damper(stand: Stated, runs: Sequence[Sequence[Run]]) -> dict[Key, float]
     names = [*asked.names, *(one.name for one in asked.question.rivals)]
     own = np.array([not _of_structure(name) for name in names])
     own = np.append(own, np.ones(asked.question.width - len(own), dtype=bool))
-    normal = asked.of(list(chain(*runs)), DRAWS) * np.outer(own, own)
+    normal = asked.of(list(chain(*runs))) * np.outer(own, own)
     known = now.with_runs(normal, *_counted(runs))
     purposes = replace(stand.purposes, rivals=())
     return {
@@ -112,7 +109,7 @@ def _of_layer(
     if not effects:
         return {}
     asked = Asked(question, problem)
-    known = Known(question, asked.of(problem.runs, DRAWS), *_counted(runs))
+    known = Known(question, asked.of(problem.runs), *_counted(runs))
     return {(DAMPER, one.purpose, one.name): one.value for one in seen(known, SITE)}
 
 
@@ -152,5 +149,5 @@ def _distance(problem: Problem, runs: Sequence[Run], one: Model, other: Model) -
     if (one.law, one.effects) == (other.law, other.effects):
         return 0.0
     question = Question(one, (Rival("other", other, one),))
-    known = Known(question, Asked(question, problem).of(runs, DRAWS))
+    known = Known(question, Asked(question, problem).of(runs))
     return known.distances()["other"]

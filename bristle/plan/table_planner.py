@@ -14,9 +14,6 @@ from .planned_test import Signals, Test
 from .search import LEAST, Planner, Seen
 from .shaking_table import Columns, ShakingTable
 
-DRAWS = 4
-"""Draws of the smoother's error that planned runs are judged with."""
-
 TRIES, GENTLE, STEEP = 6, 0.97, 0.3
 """How often a motion beyond a limit is made smaller, how far below that limit, at the most by."""
 
@@ -73,7 +70,7 @@ class TablePlanner(Planner):
         normals, samples = [], []
         for site, asked in zip(self.places, self.goal.asked, strict=True):
             runs = found[site].runs if site in found else []
-            normals.append(asked.of(runs, DRAWS))
+            normals.append(asked.of(runs))
             samples.append(sum(len(run.x) - run.skip for run in runs))
         return Seen(test, signals, tuple(normals), tuple(samples))
 

@@ -25,7 +25,7 @@ from bristle.example.perform import perform_plan
 from bristle.plan.added_sensors import Added
 from bristle.plan.building_plan import ONE_FORCE, BuildingPlan
 from bristle.plan.building_sites import are_twins, default_wishes, twins_of
-from bristle.plan.folder import read_plan
+from bristle.plan.folder import ROLES, read_plan
 from bristle.plan.ground import displacement_of, records_at_hand, scalable
 from bristle.plan.motions import Command, Waveform, shape_of
 from bristle.plan.outcome import Outcome
@@ -360,7 +360,7 @@ def test_a_load_cell_settles_what_no_motion_does(tmp_path: Path) -> None:
     plan.write(tmp_path / "plan")
     done = perform_plan(tmp_path / "tower", tmp_path / "plan")
     assert len(done.runs) == len(plan.tests)
-    seen = {run.name: run for role in ("train", "holdout") for run in study.read(role)}
+    seen = {run.name: run for role in ROLES for run in done.study.read(role)}
     for k, moved in enumerate(plan.predicted, 1):
         peak = float(np.max(np.abs(seen[f"plan_{k}"]["base_displacement"])))
         assert peak == pytest.approx(float(np.max(np.abs(moved))), rel=0.15)
