@@ -81,12 +81,19 @@ class Component:
 
 @dataclass(frozen=True)
 class Connection:
-    """Component and port that take a value, component and port that give it."""
+    """Component and port that take a value, component and port that give it.
+
+    input = factor output + offset; `transformed` is whether the scenario says so, even if by 1 and
+    0: units are its own matter then.
+    """
 
     target: str
     input: str
     source: str
     output: str
+    factor: float = 1.0
+    offset: float = 0.0
+    transformed: bool = False
 
 
 @dataclass(frozen=True)
@@ -219,7 +226,10 @@ def _read(
     )
     if ("title",) not in document.overridden and needs_title(document.changed):
         title = changed_title(components, document.changed)
-    connections = tuple(Connection(w.target, w.input, w.source, w.output) for w in wires)
+    connections = tuple(
+        Connection(w.target, w.input, w.source, w.output, w.factor, w.offset, w.transformed)
+        for w in wires
+    )
     scenario = Scenario(
         path, title, run.stop, run.step, run.algorithm, components, connections, tuple(found)
     )

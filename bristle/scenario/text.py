@@ -42,7 +42,11 @@ def scenario_text(scenario: Scenario) -> str:
     lines += ["", "[connections]"]
     for wire in scenario.connections:
         target, source = f"{wire.target}.{wire.input}", f"{wire.source}.{wire.output}"
-        lines.append(f"{_value(target)} = {_value(source)}")
+        said = _value(source)
+        if wire.transformed:
+            numbers = f"factor = {_value(wire.factor)}, offset = {_value(wire.offset)}"
+            said = f"{{ from = {said}, {numbers} }}"
+        lines.append(f"{_value(target)} = {said}")
     return "\n".join(lines) + "\n"
 
 
