@@ -24,6 +24,7 @@ from .document import (
     parse_overrides,
     read_document,
 )
+from .import_ssp import unpacked
 from .library import Library, installed
 from .naming import changed_title, needs_title
 from .parts import DamperLaw
@@ -140,7 +141,7 @@ def load_scenario(
     Parameters
     ----------
     file : path
-        The TOML file, or the name of a stock scenario.
+        The TOML file, or the name of a stock scenario, or an SSP package.
     overrides : mapping, optional
         Dotted names with values that take the place of the file's, e.g.
         `{"damper.f_c": 2.0, "run.step": 1e-3, "damper.fmu": "BinghamDamper"}`.
@@ -183,12 +184,17 @@ def check_scenario(
 def worded(file: str | Path, finding: Finding) -> str:
     """Return a finding as one line that begins with its place, `FILE:LINE: text`."""
     place = f"{file}:{finding.line}" if finding.line else str(file)
-    return f"{place}: {finding.text}"
+    return finding.text if finding.text.startswith(f"{place}: ") else f"{place}: {finding.text}"
 
 
 def _read(
     path: Path, overrides: Mapping[str, object], library: Library | None
 ) -> tuple[Scenario | None, list[Finding]]:
+    if path.suffix.lower() == ".ssp":
+        try:
+            path = unpacked(path)
+        except ScenarioError as error:
+            return None, [Finding(0, "error", str(error))]
     document = read_document(path)
     if isinstance(document, Finding):
         return None, [document]

@@ -230,3 +230,12 @@ def test_a_name_that_is_no_package_is_refused(scenario: Path, tmp_path: Path) ->
     (tmp_path / "is.ssp").mkdir()
     with pytest.raises(ScenarioError, match="is a folder"):
         export_ssp(load_scenario(scenario), tmp_path / "is.ssp")
+
+
+def test_the_package_runs_here_as_the_scenario_does(package: Path, rows: pd.DataFrame) -> None:
+    again = run(package)
+    assert list(again.columns) == list(rows.columns)
+    assert again.attrs["made"]["algorithm"] == "jacobi"
+    wanted = rows.select_dtypes("float").to_numpy()
+    found = again.select_dtypes("float").to_numpy()
+    assert np.abs(found - wanted).max() <= 1e-12 * np.abs(wanted).max()
