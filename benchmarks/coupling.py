@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 import pandas as pd
@@ -219,8 +220,7 @@ def costs() -> Iterator[Row]:
         jobs: dict[str, Callable[[], float]] = {}
         for algorithm in ("gauss-seidel", *goals):
             scenario = load_scenario(name, {"run.algorithm": algorithm, "run.stop": 8.0})
-            fmus = find_fmus(scenario)
-            jobs[algorithm] = lambda scenario=scenario, fmus=fmus: time_master(scenario, fmus)
+            jobs[algorithm] = partial(time_master, scenario, find_fmus(scenario))
         times = interleave(jobs, REPETITIONS)
         for algorithm, goal in goals.items():
             ratio = ratio_of(times[algorithm], times["gauss-seidel"])

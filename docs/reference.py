@@ -11,8 +11,9 @@ from typing import Any
 import bristle
 
 ORDER = (
-    "run", "load_results", "ensemble", "design", "identify", "compare", "diagnose", "Study",
-    "Results", "Ensemble", "DesignResult", "Identified", "Comparison", "Diagnosis", "Measurement",
+    "run", "load_results", "ensemble", "design", "identify", "compare", "diagnose", "plan", "Study",
+    "Results", "Ensemble", "DesignResult", "Identified", "Comparison", "Diagnosis", "Plan",
+    "Measurement",
     "Effect", "Law", "Parameter", "BristleError",
 )  # fmt: skip
 """The public names in the order in which they are used."""

@@ -155,7 +155,12 @@ def beside(mailed: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    "line", ["identify --dry-run --no-table --starts 1", "add {} stribeck", "diagnose --dry-run"]
+    "line",
+    [
+        "identify --dry-run --no-table --starts 1",
+        "add {} stribeck",
+        pytest.param("diagnose --dry-run", marks=pytest.mark.slow),
+    ],
 )
 def test_work_goes_on_without_an_effect_that_the_model_does_without(
     line: str, beside: Path, marker: Path, capsys: pytest.CaptureFixture[str]

@@ -26,6 +26,8 @@ seed = 1
 model = "my_rig"
 """
 
+# Longer than 300 lines: half of it are messages that say what would be right.
+
 from __future__ import annotations
 
 import hashlib

@@ -169,16 +169,7 @@ def read_identified(
     StudyError
         If the model, or its verdict, cannot be read.
     """
-    for key, value in table.items():
-        if key not in KEYS:
-            raise EnsembleError(unknown("key", key, KEYS))
-        if not isinstance(value, str):
-            raise EnsembleError(f"{key} = {written(value)}; a text is right.")
-    if not table.get("model"):
-        raise EnsembleError('model is missing: the folder of a study, as in model = "my_rig".')
-    path = beside / str(table["model"])
-    folder = path if path.is_dir() else path.parent
-    model = read_model(folder / "model.toml" if path.is_dir() else path)
+    folder, model = _model_of(table, beside)
     damper = str(table.get("component", "damper"))
     structure = str(table.get("structure", "structure"))
     there = {one.name for one in base.components}
@@ -207,12 +198,30 @@ def read_identified(
     )  # fmt: skip
 
 
+def _model_of(table: Mapping[str, Any], beside: Path) -> tuple[Path, StudyModel]:
+    """Return the folder of the study that a table names, and its model."""
+    for key, value in table.items():
+        if key not in KEYS:
+            raise EnsembleError(unknown("key", key, KEYS))
+        if not isinstance(value, str):
+            raise EnsembleError(f"{key} = {written(value)}; a text is right.")
+    if not table.get("model"):
+        raise EnsembleError('model is missing: the folder of a study, as in model = "my_rig".')
+    path = beside / str(table["model"])
+    folder = path if path.is_dir() else path.parent
+    return folder, read_model(folder / "model.toml" if path.is_dir() else path)
+
+
 def _fixed(model: StudyModel, places: Places) -> dict[str, Value]:
-    """Return all values of a model, and the switches of its effects, by a scenario's names."""
+    """Return all values of a model, and the switches of its effects, by a scenario's names.
+
+    Not what follows a channel of the runs: the damper has it as an input.
+    """
     values = model.values()
     found: dict[str, Value] = {places.of(name): values[name] for name in model.parameters}
     for effect, own in model.effects.items():
-        found |= places.of_effect(effect, {f"{effect}.{n}": values[f"{effect}.{n}"] for n in own})
+        given = [f"{effect}.{n}" for n in own if n not in EFFECTS[effect].channels]
+        found |= places.of_effect(effect, {name: values[name] for name in given})
     return found
 
 

@@ -3,6 +3,8 @@
 Each test is a CSV file that begins and ends at rest, with a picture. Half of them are to fit to,
 half to judge by. Without a purpose, they settle what the verdict leaves open: rivals where it is
 ambiguous, a part without a form where it is unknown, or else all effects and parameters.
+
+On a building the tests are ground motions and commands, and sensors are named that would show more.
 """
 
 from __future__ import annotations
@@ -45,7 +47,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--rig", type=Path, metavar="FILE", help="a rig.toml with [limits]")
     for name, text in LIMITS.items():
-        parser.add_argument(f"--{name}", metavar="QUANTITY", help=text)
+        parser.add_argument(f"--{name.replace('_', '-')}", metavar="QUANTITY", help=text)
+    parser.add_argument(
+        "--record", nargs="+", default=[], metavar="FILE",
+        help="further ground motions that may be scaled: files, or names; of a building",
+    )  # fmt: skip
     parser.add_argument("--runs", type=int, metavar="N", help="how many tests; 4 by default")
     parser.add_argument("--seed", type=int, default=1, help="draws the tests that are looked at")
     parser.add_argument(
@@ -65,6 +71,8 @@ LIMITS = {
     "heat": 'energy that the damper may take up in a test, such as "200 J"',
     "duration": 'of a test, such as "20 s"; 12 s by default',
     "rate": 'samples per second of the controller, such as "500 Hz"',
+    "damper_stroke": "of a building: motion of the damper to either side, such as 10mm",
+    "drift": "of a building: drift of a storey to either side, such as 5mm",
 }
 """Limits that are options: quantities with their unit."""
 
@@ -88,6 +96,7 @@ def main(arguments: argparse.Namespace) -> int:
         sharpen=_asked(arguments.sharpen),
         learn=_asked(arguments.learn),
         rig=arguments.rig,
+        record=arguments.record,
         seed=arguments.seed,
         **given,
     )

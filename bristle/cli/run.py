@@ -202,15 +202,18 @@ def _print_errors(frame: pd.DataFrame) -> None:
         return
     step = 1e3 * frame.attrs["made"]["step"]
     heading = f"Coupling error at {step:g} ms, by {frame.attrs['coupling_error_by']}, in %"
-    table = Table(title=heading, title_justify="left", box=None, pad_edge=False)
-    table.add_column("output")
-    for column in ("along the run", "of peak", "of RMS", "order"):
-        table.add_column(column, justify="right")
     shown = [name for name in judged_by(frame) if found[name]["along"] > 0.0]
+    if not shown:
+        print(f"{heading}: none, for nothing here depends on the step.")
+        return
+    table = Table(title=heading, title_justify="left", box=None, pad_edge=False)
+    table.add_column("output", overflow="fold")
+    for column in ("along run", "of peak", "of RMS", "order"):
+        table.add_column(column, justify="right")
     for name in shown:
         error = found[name]
         shares = (plain(100.0 * error[key], 2) for key in ("along", "peak", "rms"))
         order = f"{error['order']:.1f}" + ("" if error["worth"] else ", no use")
         table.add_row(name, *shares, order)
     Console(highlight=False).print(table)
-    print("The other outputs follow no exchange of values." if shown else "There is none.")
+    print("The other outputs do not depend on the step.")

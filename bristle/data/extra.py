@@ -31,6 +31,12 @@ HOLE = 0.25
 ABSURD = 1e30
 """What some recorders write where a value is missing; so do larger numbers."""
 
+MOST = 40
+"""Columns of a file that are taken for such channels, at the most."""
+
+LOOKED = 2000
+"""Values of a column that are compared with those of another."""
+
 SAME = 1e-6
 """Share of its spread by which a column may leave a line in another one and hold the same."""
 
@@ -126,6 +132,8 @@ def found_in(table: Table, used: Iterable[str], names: Iterable[str]) -> dict[st
     out: dict[str, ChannelSpec] = {}
     for column in table.columns:
         unit = unit_as_written(column)
+        if len(out) == MOST:
+            break
         if column.text in used or column.text in table.not_numeric or not unit:
             continue
         values = _known_values(table.values[column.text])
@@ -145,9 +153,10 @@ def _known_values(values: Array) -> Array:
 
 def _on_a_line(values: Array, other: Array) -> bool:
     """Return whether a column is another one in other units; a constant one is not."""
-    both = np.isfinite(values) & np.isfinite(other)
-    if both.sum() < FEWEST:
+    both = np.flatnonzero(np.isfinite(values) & np.isfinite(other))
+    if len(both) < FEWEST:
         return False
+    both = both[:: -(-len(both) // LOOKED)]
     y, x = (one[both] - one[both].mean() for one in (values, other))
     spread, power = float(np.std(y)), float(x @ x)
     if not spread > 1e-12 * float(np.max(np.abs(values[both]))) or not power > 0.0:
@@ -163,7 +172,13 @@ class Read:
     notes: tuple[str, ...]
 
     def beside(self, name: str, time: Array, values: Array, unit: str) -> Read:
-        """Return the same with one more channel, where it has values enough."""
+        """Return the same with one more channel, where it has values enough.
+
+        Parameters
+        ----------
+        name, unit : of the channel
+        time, values : (n,) s, and in that unit, NaN where a value is missing
+        """
         there = np.isfinite(values) & np.isfinite(time)
         try:
             _refuse_holes(time, there)

@@ -132,6 +132,24 @@ class BuildingRuns:
         damper = fit_damper(problem[DAMPER][0], at_site(present, DAMPER, problem))
         return within_prior(damper.model, self._train, self._building, present.law, straight)
 
+    def planned(self, runs: Sequence[Measurement], draws: int) -> dict[str, StructureProblem]:
+        """Return, by site, runs that were not measured yet: the channels that they would show.
+
+        Parameters
+        ----------
+        runs : with one sampling step
+        draws : how many draws of the smoother's error
+
+        Raises
+        ------
+        RecordError
+            If a channel is missing, or the base moves in no run.
+        """
+        found = responses(list(runs), self._building, draws)
+        law = ANY_LAW if self._free else self._present.law
+        made = problems_of(found, [], self._building, law, self._straight)
+        return {site: pair[0] for site, pair in made.items()}
+
     def sites(self) -> tuple[str, ...]:
         """Return the names of the sites that the runs show."""
         return tuple(self._problems)

@@ -85,7 +85,8 @@ def _checked(known: Known, limit: EffectLimit) -> EffectLimit:
             break
         size *= float(np.clip(end, 1.0 / FARTHEST, FARTHEST))
     share = None if limit.share is None else limit.share * size / first
-    return replace(limit, largest=sized.value(size), share=share, profiled=True)
+    moved = known.moved(sized.change(size))
+    return replace(limit, largest=sized.value(size), share=share, moved=moved, profiled=True)
 
 
 def _fitted(sized: Sized, model: Model) -> Array:

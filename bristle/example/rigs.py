@@ -55,7 +55,14 @@ def draw_frame(rng: np.random.Generator) -> tower.Frame:
 
 
 def tower_of(frame: tower.Frame, law: str, values: Values, secret: Values) -> tower.Tower:
-    """Return a building with its damper, and what is hidden in either."""
+    """Return a building with its damper, and what is hidden in either.
+
+    Parameters
+    ----------
+    frame : of the building
+    law, values : of its damper
+    secret : what is hidden, of both
+    """
     layer = {name: value for name, value in secret.items() if name in LAYER}
     inner = {name: value for name, value in secret.items() if name not in LAYER}
     return tower.Tower(frame, Damper(law, values, inner), layer, scales_of("building", law))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from ..diagnose.learned.along import ALONG
 from ..identify.model import Run
+from ..identify.structure import StructureRun
 from .rig_limits import RESERVE, RigLimits
 
 Array = NDArray[np.float64]
@@ -52,8 +53,11 @@ class Basis:
         return len(self.knots) * (2 if self.friction else 1)
 
     def history(self, run: Run) -> Array:
-        """Return the coordinate (n,) on a run."""
-        return ALONG[self.name].history(run, dict(self.memory))
+        """Return the coordinate (n,) on a run, at the samples that count."""
+        along, memory = ALONG[self.name], dict(self.memory)
+        if isinstance(run, StructureRun) and run.whole is not None:
+            return along.history(run.whole, memory)[run.keep]
+        return along.history(run, memory)
 
     def columns(self, run: Run) -> Array:
         """Return the parts (n, size) on a run, 1 where they are whole."""

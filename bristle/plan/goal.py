@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..diagnose.rule import BENCH, DecisionRule
 from ..identify.model import Model, Problem, Run
 from .knowledge import Asked, Known, Question
 from .purposes import Figure, cost_of, learned, seen, separated, sharpened
@@ -37,7 +38,8 @@ class Purposes:
     """What a plan is for; a purpose that is not asked is empty.
 
     `effects` to be seen; `rivals` questions whose rivals are each other; `parameters` to be
-    sharpened; `parts` the question with a part without a form, None where nothing is to be learned.
+    sharpened; `parts` the question with a part without a form, None where nothing is to be learned;
+    `rule` the numbers that decide there.
     """
 
     model: Model
@@ -45,6 +47,7 @@ class Purposes:
     rivals: tuple[Question, ...] = ()
     parameters: tuple[str, ...] = ()
     parts: Question | None = None
+    rule: DecisionRule = BENCH
 
     def questions(self) -> list[Question]:
         """Return the questions, in the order in which `figures` takes them."""
@@ -56,7 +59,7 @@ class Purposes:
     def figures(self, known: Sequence[Known]) -> list[Figure]:
         """Return what a plan makes smaller, of what runs say of the questions."""
         own, *rivals = known
-        out = seen(own) if self.effects else []
+        out = seen(own, self.rule) if self.effects else []
         out += separated(rivals) if rivals else []
         out += sharpened(own, self.parameters) if self.parameters else []
         return out + (learned(own) if self.parts is not None else [])

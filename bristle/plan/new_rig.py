@@ -17,10 +17,11 @@ from ..identify.model import REFERENCE, Model, Problem, Run, law_parameters
 from ..identify.smooth import posterior_draws
 from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.laws import DEFAULT, law_names
+from .bench import DRAWS, planned
 from .goal import Measured, Purposes, stated
 from .knowledge import Question
 from .motions import Command, Waveform
-from .plan import DRAWS, Plan, Wish, parameters_of, planned
+from .plan import Plan
 from .planned_test import Test
 from .questions import (
     NONE,
@@ -33,6 +34,7 @@ from .questions import (
 )
 from .rig_limits import RigLimits, read_quantity, read_rig, with_given
 from .search import Planner
+from .wish import Wish, parameters_of
 
 NOISE = 0.01
 """Noise of each channel, over its RMS, where rig.toml says nothing."""

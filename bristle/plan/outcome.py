@@ -14,7 +14,6 @@ from ..quantity import plain, quantity
 from .goal import Purposes
 from .knowledge import Asked, Known
 from .purposes import seen, separated
-from .questions import SizedRival
 
 OUTCOMES = "outcomes.json"
 """The file of a plan's folder with the table."""
@@ -43,9 +42,10 @@ class Outcome:
 
     def cells(self) -> list[str]:
         """Return the row of a table."""
-        return [self.name, self.what, self._shown(self.now), self._shown(self.then)]
+        return [self.name, self.what, self.shown(self.now), self.shown(self.then)]
 
-    def _shown(self, value: float) -> str:
+    def shown(self, value: float) -> str:
+        """Return one of its numbers with the unit."""
         if not isfinite(value):
             return "not visible"
         if self.purpose == "separate":
@@ -76,7 +76,7 @@ def outcomes(
     now, then : what the runs at hand say of them, and what these and the tests would say
     """
     out = _separated(now[1:], then[1:]) if purposes.rivals else []
-    out += _seen(purposes.effects, now[0], then[0])
+    out += _seen(purposes, now[0], then[0])
     out += _sharpened(purposes, asked[0], now[0], then[0])
     return out + _learned(purposes, now[0], then[0])
 
@@ -93,13 +93,13 @@ def _separated(now: Sequence[Known], then: Sequence[Known]) -> list[Outcome]:
     ]  # fmt: skip
 
 
-def _seen(effects: Sequence[SizedRival], now: Known, then: Known) -> list[Outcome]:
+def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
     """Return from what size each effect is named, largest gain first, and how large it may be."""
-    before = {one.name: one.value for one in seen(now)}
-    after = {one.name: one.value for one in seen(then)}
+    before = {one.name: one.value for one in seen(now, purposes.rule)}
+    after = {one.name: one.value for one in seen(then, purposes.rule)}
     near = [known.distances() for known in (now, then)]
     out = []
-    for one in effects:
+    for one in purposes.effects:
         sized, name = one.sized, one.sized.name
         unit = parameter(sized.model.law, sized.key).unit
         apart = one.size * (TWO_SIDED if sized.signed else ONE_SIDED)

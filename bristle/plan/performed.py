@@ -16,26 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate, correlation_lags
 
-from ..data.channels import channel_unit
 from ..data.measurement import Measurement, measurements_of
 from ..data.read import read_table
 from ..errors import StudyError
-from ..quantity import plain, scale
+from ..quantity import plain
 from ..study.study import Study
+from .differences import DIFFERS, command_differences, percent_of, share_reached
 from .folder import PlanFolder, PlannedRun
 
 Array = NDArray[np.float64]
 
-DIFFERS = 0.05
-"""Share from which a difference is told."""
 ALIKE = 0.6
 """Correlation of the motions below which a run is not the one that was planned."""
-EDGE = 0.02
-"""Share of a planned range that counts as its upper, or its lower, end."""
-OFF = 0.1
-"""Share of a command's range by which it may differ at any instant."""
-LATEST = 0.5
-"""Seconds up to which a command may come late, or early."""
 MOST_PAIRS = 5000
 """Ways of pairing runs that are compared; beyond them their order alone decides."""
 
@@ -164,16 +156,18 @@ def compared(run: Measurement, planned: PlannedRun, motion: str) -> Pair:
         text = f"{run.name}: its {_words(shown)} is another one than that of {planned.name}"
         return Pair(run.name, planned.name, (f"{text} (correlation {plain(likeness, 2)})",))
     out = []
-    share = _share(aligned.measured[shown], aligned.planned[shown])
+    share = share_reached(aligned.measured[shown], aligned.planned[shown])
     if abs(share - 1.0) > DIFFERS:
-        out.append(f"the {_words(shown)} reached {_percent(share)} of what was planned")
+        out.append(f"the {_words(shown)} reached {percent_of(share)} of what was planned")
     command = next((name for name in planned.signals if name != motion), "")
-    if command:
-        there = run.has(command)
-        out += _of_command(command, aligned) if there else [f"the {command} was not measured"]
+    if command and not run.has(command):
+        out.append(f"the {command} was not measured")
+    elif command:
+        pair = aligned.measured[command], aligned.planned[command]
+        out += command_differences(command, *pair, aligned.step)
     if aligned.covered < 1.0 - DIFFERS:
         out.append(
-            f"the recording covers {_percent(aligned.covered)} of the "
+            f"the recording covers {percent_of(aligned.covered)} of the "
             f"{plain(planned.duration)} s that were planned"
         )
     return Pair(run.name, planned.name, tuple(f"{run.name}: {text}" for text in out))
@@ -240,76 +234,5 @@ def _aligned(
     )
 
 
-def _share(measured: Array, planned: Array) -> float:
-    """Return which share of the planned range was reached, at the instants of its ends."""
-    low, high = float(np.min(planned)), float(np.max(planned))
-    edge = EDGE * (high - low)
-    upper, lower = planned >= high - edge, planned <= low + edge
-    if high == low:
-        return float(np.mean(measured)) / high if high else 1.0
-    # Medians: at the ends of a command that comes late, some samples show another level.
-    reached = float(np.median(measured[upper]) - np.median(measured[lower]))
-    return reached / float(np.median(planned[upper]) - np.median(planned[lower]))
-
-
-def _of_command(name: str, aligned: _Aligned) -> list[str]:
-    """Return how a measured command differs from the planned one: its range, then its time."""
-    planned, measured = aligned.planned[name], aligned.measured[name]
-    late = _late(measured, planned, aligned.step)
-    in_time, wanted = _shifted(measured, planned, late)
-    share, reached, clipped = _reached(in_time, wanted)
-    goal = np.minimum(planned, reached) if clipped else share * planned
-    wrong = _off(measured, goal)
-    if _off(*_shifted(measured, goal, late)) > DIFFERS:
-        wrong = _off(measured, planned)
-        return [f"the {name} was another one than planned for {_percent(wrong)} of the run"]
-    out = []
-    if abs(share - 1.0) > DIFFERS:
-        factor, unit = scale(channel_unit(name), float(np.max(planned)))
-        how = f"was clipped at {plain(factor * reached)} {unit}, " if clipped else "reached "
-        out.append(f"the {name} {how}{_percent(share)} of what was planned")
-    if late and wrong > DIFFERS:
-        way = "late" if late > 0 else "early"
-        out.append(
-            f"the {name} came {plain(1e3 * abs(late) * aligned.step)} ms {way}, and was another "
-            f"one than planned for {_percent(wrong)} of the run"
-        )
-    return out
-
-
-def _reached(measured: Array, planned: Array) -> tuple[float, float, bool]:
-    """Return the share of a command that was reached, its upper level, and whether it is cut."""
-    share, top = _share(measured, planned), float(np.max(planned))
-    reached = float(np.median(measured[planned >= top - EDGE * float(np.ptp(planned))]))
-    if abs(share - 1.0) <= DIFFERS:
-        return 1.0, reached, False
-    clipped = _off(measured, np.minimum(planned, reached)) < _off(measured, share * planned)
-    return share, reached, share < 1.0 and clipped
-
-
-def _off(measured: Array, goal: Array) -> float:
-    """Return the share of instants at which a command is another one [1]."""
-    size = float(np.ptp(goal)) or abs(float(goal[0])) or 1.0
-    return float(np.mean(np.abs(measured - goal) > OFF * size))
-
-
-def _late(measured: Array, goal: Array, step: float) -> int:
-    """Return by how many samples a command is late, less than 0 where it is early."""
-    most = min(round(LATEST / step), goal.size // 4)
-    lags = sorted(range(-most, most + 1), key=abs)
-    return min(lags, key=lambda lag: _off(*_shifted(measured, goal, lag)))
-
-
-def _shifted(measured: Array, goal: Array, late: int) -> tuple[Array, Array]:
-    """Return a command that is late by some samples, and its goal, at the same instants."""
-    size = goal.size
-    own = slice(max(late, 0), size + min(late, 0))
-    return measured[own], goal[slice(max(-late, 0), size - max(late, 0))]
-
-
 def _words(channel: str) -> str:
     return channel.replace("_", " ")
-
-
-def _percent(share: float) -> str:
-    return f"{plain(100.0 * share, 2 if share < 1.0 else 3)} %"

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .plan import Plan
     from .planned_test import Signals
 
-_SHOWN = 4000
+SHOWN = 4000
 """Samples per line: more are not seen."""
 
 
@@ -26,7 +26,7 @@ def plan_files(plan: Plan) -> dict[str, str | bytes]:
         f"{run.name}.png": png(draw_test(run, signals, plan.drive), 110)
         for run, signals in zip(plan.runs(), plan.signals, strict=True)
     }
-    return {**pictures, "plan.md": plan_text(plan), OUTCOMES: outcomes_json(plan)}
+    return {**pictures, "plan.md": plan_text(plan, _limits(plan)), OUTCOMES: outcomes_json(plan)}
 
 
 def outcomes_json(plan: Plan) -> str:
@@ -35,9 +35,9 @@ def outcomes_json(plan: Plan) -> str:
     return json.dumps(told, indent=2, ensure_ascii=False) + "\n"
 
 
-def plan_text(plan: Plan) -> str:
-    """Return the plan as a page of text."""
-    lines = [f"# Tests for {plan.study or 'a new rig'}", "", *_limits(plan), "", "## Runs", ""]
+def plan_text(plan: Plan, limits: list[str]) -> str:
+    """Return the plan as a page of text; `limits` says what it asks of the rig."""
+    lines = [f"# Tests for {plan.study or 'a new rig'}", "", *limits, "", "## Runs", ""]
     lines += ["| run | for | what |", "|---|---|---|"]
     lines += [
         f"| [{run.name}]({run.name}.csv) | {'fitting' if run.role == 'train' else 'judging'} | "
@@ -63,7 +63,7 @@ def _limits(plan: Plan) -> list[str]:
 
 def draw_test(run: PlannedRun, signals: Signals, drive: str) -> Page:
     """Return the picture of a planned test: motion and command over time, speed over stroke."""
-    every = max(1, len(signals.time) // _SHOWN)
+    every = max(1, len(signals.time) // SHOWN)
     commanded = drive in DRIVES
     with look():
         page = Page(9.2, 3.2 if commanded else 2.2, f"{run.name}: {run.about}", "")

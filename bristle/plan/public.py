@@ -9,9 +9,12 @@ from typing import Any
 from ..errors import StudyError
 from ..findings import written
 from ..study.study import Study
+from .bench import plan_study
+from .building import plan_building
 from .new_rig import plan_new
-from .plan import Plan, Wish, plan_study
+from .plan import Plan
 from .rig_limits import SIZES, RigLimits, read_quantity, read_rig
+from .wish import Wish
 
 Names = str | Sequence[str] | bool | None
 
@@ -24,6 +27,7 @@ def plan(
     sharpen: Names = None,
     learn: Names = None,
     rig: str | Path | None = None,
+    record: str | Path | Sequence[str | Path] = (),
     seed: int = 1,
     **limits: Any,
 ) -> Plan:
@@ -35,8 +39,8 @@ def plan(
     Parameters
     ----------
     study : Study or path
-        A study of a damper on a bench; or a rig.toml with `[damper]` and `[limits]`, before the
-        first measurement.
+        A study of a damper on a bench, or of a building; or a rig.toml with `[damper]` and
+        `[limits]`, before the first measurement.
     separate : str or sequence of str, optional
         Rivals to tell apart: effects, laws, or "none" for the model as it is.
     see : str, sequence of str or True, optional
@@ -47,11 +51,13 @@ def plan(
         Coordinates on which an unknown part may depend; True for the usual ones.
     rig : path, optional
         A rig.toml with the limits of the rig; what it does not say is what the runs have done.
+    record : str, path or sequence, optional
+        Of a building: further ground motions that may be scaled, by name or as files.
     seed : int
         Draws the tests that are looked at.
-    **limits
-        Limits in place of those, by the names of rig.toml: numbers in SI or texts with a unit, such
-        as `stroke="20 mm"`, `runs=6`.
+    limits : float, str or sequence
+        Limits as keywords, in place of those, by the names of rig.toml: numbers in SI or texts with
+        a unit, such as `stroke="20 mm"`, `runs=6`.
 
     Returns
     -------
@@ -92,6 +98,13 @@ def plan(
         return plan_new(Path(study), wish, limits=given, seed=seed)
     opened = study if isinstance(study, Study) else Study(study)
     of_file = read_rig(Path(rig), opened.drive) if rig is not None else {}
+    if opened.settings.has_building:
+        names = [str(one) for one in ((record,) if isinstance(record, str | Path) else record)]
+        return plan_building(opened, wish, limits={**of_file, **given}, records=names, seed=seed)
+    if record:
+        raise StudyError(
+            f"{opened.folder}: a damper on a bench has no ground motion; record is for a building."
+        )
     return plan_study(opened, wish, limits={**of_file, **given}, seed=seed)
 
 

@@ -72,9 +72,9 @@ def wanted_distance(samples: int, held_out: int, rule: DecisionRule = BENCH) -> 
     return (NINE_OF_TEN + sqrt(NINE_OF_TEN**2 + asked)) * sqrt(samples / held_out)
 
 
-def seen(known: Known) -> list[Figure]:
+def seen(known: Known, rule: DecisionRule = BENCH) -> list[Figure]:
     """Return from what size each effect would be named, over the size that was asked for."""
-    wanted = wanted_distance(known.samples, known.held_out)
+    wanted = wanted_distance(known.samples, known.held_out, rule)
     left, raw = known.distances(), known.raw()
     return [
         Figure(

@@ -159,9 +159,14 @@ def _fitted(name: str, opened: Opening) -> Model:
         return identify(problem, name, model.effects).model
     plain = plain_name(name)
     refuse_unable(plain, able_beside(model, problem, opened.shown), model)
-    tell(f"fitting {plain}")
+    return fitted_with(plain, model, problem)
+
+
+def fitted_with(name: str, model: Model, problem: Problem) -> Model:
+    """Return a damper's model with one more effect, fitted to runs."""
+    tell(f"fitting {name}")
     context = SearchContext(model, problem)
-    found = short_search(plain, context, ranked_guesses(plain, context), False)
+    found = short_search(name, context, ranked_guesses(name, context), False)
     return refine(found.model, problem, LONG)
 
 

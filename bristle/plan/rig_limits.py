@@ -35,7 +35,7 @@ ZERO = 0.02
 
 SIZES = {
     "stroke": "m", "speed": "m/s", "acceleration": "m/s2", "force": "N", "heat": "J",
-    "duration": "s", "pause": "s", "rate": "Hz",
+    "duration": "s", "pause": "s", "rate": "Hz", "damper_stroke": "m", "drift": "m",
 }  # fmt: skip
 """Units of the quantities of rig.toml, and what they are called there."""
 
@@ -47,7 +47,7 @@ class RigLimits:
     Attributes
     ----------
     stroke, speed, acceleration : float
-        Of the motion, to either side [m, m/s, m/s2].
+        Of the motion, to either side [m, m/s, m/s2]; of the table, where a building stands on it.
     force : float
         Of the actuator [N].
     band : tuple of float
@@ -68,6 +68,8 @@ class RigLimits:
         Samples per second of the controller.
     motions, commands : tuple of str
         The waveforms that the controller has: of `motions.MOTIONS` and `motions.COMMANDS`.
+    damper_stroke, drift : float
+        Of a building: the motion of its damper, and of its storeys, to either side [m].
     """
 
     stroke: float
@@ -85,6 +87,8 @@ class RigLimits:
     rate: float = 500.0
     motions: tuple[str, ...] = ("sine", "sweep", "triangle", "multisine")
     commands: tuple[str, ...] = tuple(COMMANDS)
+    damper_stroke: float = inf
+    drift: float = inf
 
     def check(self) -> None:
         """Refuse limits that allow no test.
@@ -94,7 +98,10 @@ class RigLimits:
         StudyError
             Saying which limit, and what would be right.
         """
-        for name in ("stroke", "speed", "acceleration", "force", "duration", "heat", "rate"):
+        for name in (
+            "stroke", "speed", "acceleration", "force", "duration", "heat", "rate",
+            "damper_stroke", "drift",
+        ):  # fmt: skip
             if not getattr(self, name) > 0.0:
                 raise StudyError(
                     f"{name} = {getattr(self, name):g}: these limits allow no motion; more than 0 "

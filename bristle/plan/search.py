@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from os import cpu_count
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,12 +50,15 @@ SECOND = 1000
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A test as it would be seen: what it prescribes, its normal equations per question."""
+    """A test as it would be seen: what it prescribes.
+
+    `normals`, `samples` its normal equations, and the samples that count, per question.
+    """
 
     test: Test
     signals: Signals
     normals: tuple[Array, ...]
-    samples: int
+    samples: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -73,12 +77,13 @@ class Goal:
 
     def with_tests(self, tests: Sequence[Seen]) -> list[Known]:
         """Return what the runs at hand and tests would say of each question."""
-        samples = sum(one.samples for one in tests)
-        held_out = sum(one.samples for one in tests[1::2])
         return [
-            known.with_runs(sum((one.normals[k] for one in tests), np.zeros(1)), samples, held_out)
+            known.with_runs(
+                sum((one.normals[k] for one in tests), np.zeros(1)),
+                sum(one.samples[k] for one in tests), sum(one.samples[k] for one in tests[1::2]),
+            )
             for k, known in enumerate(self.known)
-        ]
+        ]  # fmt: skip
 
     def value(self, tests: Sequence[Seen]) -> float:
         """Return the cost of the runs at hand with tests."""
@@ -104,6 +109,9 @@ class Planner:
     seed : int
     drive : str
         The channel of the command.
+    candidates, improved : int
+        Tests that are looked at before the best ones are picked, and evaluations in which a picked
+        one is improved.
     """
 
     goal: Goal
@@ -114,7 +122,13 @@ class Planner:
     record: Waveform | None = None
     seed: int = 1
     drive: str = "voltage"
+    candidates: int = CANDIDATES
+    improved: int = IMPROVED
     _seen: dict[Test, Seen | None] = field(default_factory=dict, repr=False)
+    nothing_kept: ClassVar[str] = (
+        "no test stays within the limits: even small motions ask for more force or put more heat "
+        "into the damper than the rig allows. More force, more heat or a smaller command is needed."
+    )
 
     def plan(self) -> list[Seen]:
         """Return the tests, in pairs: one to fit to, and one of its kind to judge by.
@@ -122,7 +136,7 @@ class Planner:
         Raises
         ------
         StudyError
-            If the limits of force or heat allow none of them.
+            If the limits allow none of them.
         """
         tests = self._candidates()
         count = Count("test", len(tests))
@@ -135,11 +149,7 @@ class Planner:
         with ThreadPoolExecutor(cpu_count()) as pool:
             found = [one for one in pool.map(look, tests) if one is not None]
         if not found:
-            raise StudyError(
-                "no test stays within the limits: even small motions ask for more force or put "
-                "more heat into the damper than the rig allows. More force, more heat or a smaller "
-                "command is needed."
-            )
+            raise StudyError(self.nothing_kept)
         picked: list[Seen] = []
         for number in range(-(-self.limits.runs // 2)):
             best = min(found, key=lambda one: self.goal.value([*picked, *self._both(one)]))
@@ -182,7 +192,7 @@ class Planner:
         else:
             return None
         normals = tuple(asked.of([run]) for asked in self.goal.asked)
-        return Seen(test, signals, normals, len(run.x) - run.skip)
+        return Seen(test, signals, normals, (len(run.x) - run.skip,) * len(normals))
 
     def _run(self, signals: Signals) -> Run:
         count = len(signals.x)
@@ -221,25 +231,26 @@ class Planner:
 
     def _candidates(self) -> list[Test]:
         """Return tests spread evenly over all that the rig can do (scrambled Sobol points)."""
-        points = qmc.Sobol(8, seed=self.seed).random(CANDIDATES)
+        points = qmc.Sobol(8, seed=self.seed).random(self.candidates)
         return [self._test(row) for row in points]
 
     def _test(self, row: Array) -> Test:
         """Return the test of a point (8,) between 0 and 1."""
-        limits = self.limits
-        kinds = [*limits.motions, *(["record"] if self.record else [])]
-        kind = kinds[min(int(row[0] * len(kinds)), len(kinds) - 1)]
         seed = self.seed + int(1e4 * row[1])
+        share = LEAST ** ((1.0 - float(row[3])) ** 2)
+        motion = self._motion(float(row[0]), float(row[2]), seed)
+        return Test(motion, self._command(row[4:], seed), share, self.limits.duration)
+
+    def _motion(self, which: float, at: float, seed: int) -> Waveform:
+        """Return a motion by two numbers between 0 and 1: its kind, and its highest frequency."""
+        kinds = [*self.limits.motions, *(["record"] if self.record else [])]
+        kind = kinds[min(int(which * len(kinds)), len(kinds) - 1)]
         low, high = self.limits.usable_band
         if kind == "record" and self.record is not None:
-            motion = self.record
-        elif kind in ("sine", "triangle"):
-            motion = Waveform(kind, low, low * (high / low) ** float(row[2]))
-        else:
-            top = low * (high / low) ** (0.3 + 0.7 * float(row[2]))
-            motion = Waveform(kind, low, top, seed)
-        share = LEAST ** ((1.0 - float(row[3])) ** 2)
-        return Test(motion, self._command(row[4:], seed), share, limits.duration)
+            return self.record
+        if kind in ("sine", "triangle"):
+            return Waveform(kind, low, low * (high / low) ** at)
+        return Waveform(kind, low, low * (high / low) ** (0.3 + 0.7 * at), seed)
 
     def _command(self, row: Array, seed: int) -> Command:
         low, high = self.limits.command
@@ -269,7 +280,7 @@ class Planner:
 
         start = np.zeros(5)
         simplex = np.vstack([start, 0.4 * np.eye(5)])
-        options = {"maxfev": IMPROVED, "initial_simplex": simplex}
+        options = {"maxfev": self.improved, "initial_simplex": simplex}
         minimize(cost, start, method="Nelder-Mead", options=options)
         return min(known.values(), key=lambda one: self.goal.value([*picked, *self._both(one)]))
 

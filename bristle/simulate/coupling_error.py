@@ -63,7 +63,7 @@ class CouplingError:
     def doubt(self) -> str:
         """Return why the estimate is worth nothing, where it is."""
         if LEAST_ORDER <= self.order <= MOST_ORDER:
-            return "the coupling error follows a controller whose output does not settle"
+            return "the coupling error follows a controller that switches, or does not settle"
         said = "the coupling error does not fall with the step as an algorithm's does"
         return f"{said} (order {self.order:.2g})"
 
@@ -103,10 +103,16 @@ def estimate(
             found[name] = extrapolated(h, h2, quarter[name].to_numpy()[:rows])
     if exact is not None:
         return "coupled engine", found
-    if any(not found[name].worth for name in discrete_outputs(scenario) if name in found):
+    discrete = [name for name in discrete_outputs(scenario) if name in found]
+    if any(not found[name].worth or switches(frame[name].to_numpy()) for name in discrete):
         # Where a switch falls otherwise the runs part for good, or agree on the wrong side of it.
         found = {name: replace(one, worth=not one.some) for name, one in found.items()}
     return "h, h/2, h/4", found
+
+
+def switches(values: Array) -> bool:
+    """Return whether a signal (rows,) goes through half of its range or more in one step."""
+    return float(np.abs(np.diff(values)).max(initial=0.0)) >= 0.5 * float(np.ptp(values)) > 0.0
 
 
 def discrete_outputs(scenario: Scenario) -> list[str]:

@@ -125,6 +125,14 @@ def lay_out(
 
 
 def at_level(levels: Mapping[Port, int], component: int, level: int) -> list[str]:
+    """Return the names of a component's ports at a level.
+
+    Parameters
+    ----------
+    levels : by port
+    component : its index
+    level : 0 for what follows nothing
+    """
     return [name for (c, name), at in levels.items() if c == component and at == level]
 
 

@@ -256,9 +256,9 @@ class _Job:
 
         with Master(self.scenario, paths, descriptions, parameters, self._listen) as master:
             self._master = master
-            self.made["energy_residual"] = dict.fromkeys(
-                bond_names(master.nodes, self.scenario.algorithm)
-            )
+            bonds = bond_names(master.nodes, self.scenario.algorithm)
+            if bonds:
+                self.made["energy_residual"] = dict.fromkeys(bonds)
             hang = self._end_process if end_process else None
             stopped: RunError | None = None
             with Interrupt(hang) as interrupt:
@@ -269,9 +269,10 @@ class _Job:
                         raise
                     stopped = error
             table = master.table()
-            self.made["energy_residual"] = energy_residuals(
-                master.nodes, self.scenario.algorithm, self.scenario.step, table
-            )
+            if bonds:
+                self.made["energy_residual"] = energy_residuals(
+                    master.nodes, self.scenario.algorithm, self.scenario.step, table
+                )
             return self._end(table, stopped, interrupt.asked and master.rows <= master.steps)
 
     def _go(self, master: Master, interrupt: Interrupt, progress: bool) -> None:

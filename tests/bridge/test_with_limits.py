@@ -167,6 +167,19 @@ def test_what_cannot_be_is_refused(
     assert answer["rows"][0]["parts"]["the parameters"] > 0.99
 
 
+def test_effects_of_every_site_have_their_part(rig: Path) -> None:
+    bumper = limit("end_stop", "k", 500.0, others={"clearance": 0.002, "shape": 1.0})
+    soft = limit("storey_softening", "d_half", 0.02, side="above", others={"shape": 2.0})
+    late = limit("delay", "time", 1e-3, moved={"c_0": -0.2})  # it moves the model alone
+    mass = limit("fluid_inertia", "m_f", 0.02)
+    sites = {"damper": [mass, late], "layer": [bumper], "storey1": [soft]}
+    findings = [{"site": site, "limits": limits} for site, limits in sites.items()]
+    Study(rig).write_verdict({**verdict(), "findings": findings})
+    found = closed_loop(Study(rig), draws=6, with_limits=True)
+    assert found.notes == ()
+    assert set(row(found).parts) >= {"fluid_inertia", "delay", "end_stop", "storey_softening"}
+
+
 def test_an_effect_with_which_nothing_can_be_simulated_is_in_no_band(
     rig: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -53,6 +53,7 @@ def test_a_limit_that_is_wrong_is_moved_to_where_it_belongs(known: Known) -> Non
     (found,) = profiled(known, [wrong])
     assert found.largest == pytest.approx(limit.largest, rel=0.15)
     assert found.share == pytest.approx(limit.share, rel=0.15)
+    assert dict(found.moved) == pytest.approx(dict(limit.moved), rel=0.2)
 
 
 def test_what_has_no_size_stays_as_it_is(known: Known) -> None:

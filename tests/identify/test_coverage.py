@@ -39,6 +39,7 @@ def test_truth_within_its_intervals(law, rig, noise):
     assert 0.9 < z < 1.1
 
 
+@pytest.mark.slow
 def test_a_rough_loss_widens_its_intervals_by_the_spread_of_its_ends():
     """Impacts leave a loss of many dents, each far narrower than the errors are."""
     train, truth = hidden_case(21, "backlash", "rigid", 0.15, "bench_10N", "lugre")

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from shaken import building, friction, measured, shake
 
+from bristle.compare.prediction import coordinates_of_run
+from bristle.data.extra import Extra
 from bristle.diagnose.sites import shortened
 from bristle.errors import RecordError
 from bristle.identify.level import jumps
@@ -17,6 +19,7 @@ from bristle.identify.response import base_equilibrium, respond, responses, shea
 from bristle.identify.rig import Site
 from bristle.identify.rig_fit import RigFit
 from bristle.identify.structure import (
+    StructureProblem,
     damper_run,
     damping_below,
     layer_run,
@@ -48,6 +51,17 @@ def test_smoothed_motion_errs_as_much_as_it_says(truth):
             # The redundancy of three instruments: several times better than the one alone.
             assert np.std(error) < 0.7 * 0.01 * np.std(clean[f"{level}_{what}"])
             assert np.std(response.draws[i, :, :, j]) == pytest.approx(response.std[i, j], rel=0.2)
+
+
+def test_an_extra_channel_is_a_coordinate_at_every_site(truth):
+    b, _, response = truth
+    tilt = np.sin(3.0 * response.dt * np.arange(response.x.shape[1]))
+    known = replace(response, extra={"tilt": Extra(tilt, "rad")})
+    for found in (damper_run(known, b, "bingham"), layer_run(known, b), storey_run(known, b, 1)):
+        assert found.whole.extra["tilt"].values is tilt
+        np.testing.assert_array_equal(coordinates_of_run(found)["tilt"], tilt[found.keep])
+        thin = thinned(StructureProblem([found])).runs[0]
+        np.testing.assert_array_equal(thin.extra["tilt"].values, tilt[thin.keep])
 
 
 def test_a_jump_of_the_acceleration_is_no_noise():

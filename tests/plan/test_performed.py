@@ -75,6 +75,12 @@ def test_a_command_that_was_clipped_or_weaker_is_told() -> None:
     volts = planned().signals["voltage"]
     (clipped,) = differences(measured(planned(), voltage=np.minimum(volts, 5.0)))
     assert clipped == "plan_1: the voltage was clipped at 5 V, 62 % of what was planned"
+    above = planned()
+    above.signals["voltage"] = 1.0 + 0.875 * volts
+    (clipped,) = differences(
+        measured(above, voltage=np.minimum(above.signals["voltage"], 5.0)), above
+    )
+    assert clipped == "plan_1: the voltage was clipped at 5 V, 62 % of what was planned"
     (weaker,) = differences(measured(planned(), voltage=0.7 * volts))
     assert weaker == "plan_1: the voltage reached 70 % of what was planned"
 

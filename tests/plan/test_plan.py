@@ -13,8 +13,8 @@ from bristle.example.make import Choice, make_bench
 from bristle.identify.model import Model, Problem, Run
 from bristle.plan.folder import read_plan
 from bristle.plan.knowledge import Asked, Known, Question, Rival
-from bristle.plan.plan import Wish, default_wish
 from bristle.plan.purposes import Figure, cost_of
+from bristle.plan.wish import Wish, default_wish
 
 SHEET = """schema = 1
 [damper]

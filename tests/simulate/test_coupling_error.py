@@ -112,18 +112,25 @@ def test_a_controller_that_does_not_settle_spoils_every_estimate_from_finer_step
         parts = round(one.steps / scenario.steps)
         frame = quiet.loc[quiet.index.repeat(parts)].iloc[parts - 1 :].copy()
         frame["damper.force"] += 0.1 * one.step  # of first order
-        if switches:
+        if switching:
             frame["controller.voltage"] += 8.0 * (parts % 4 == 2)
         return frame
 
     first = quiet.copy()
     first["damper.force"] += 0.1 * scenario.step
-    for switches in (False, True):
+    for switching in (False, True):
         how, found = estimate(scenario, first, again)
         assert how == "h, h/2, h/4"
         assert found["damper.force"].order == pytest.approx(1.0)
-        assert found["damper.force"].worth is not switches
+        assert found["damper.force"].worth is not switching
         assert found["structure.drift1"].worth  # no step changes it
+    first.loc[0.01:, "controller.voltage"] = 8.0  # in all three runs: they agree, perhaps wrongly
+    quiet.loc[0.01:, "controller.voltage"] = 8.0
+    switching = False
+    _, found = estimate(scenario, first, again)
+    assert found["controller.voltage"].along == 0.0
+    assert "switches" in found["damper.force"].doubt()
+    assert not found["damper.force"].worth
 
 
 def test_our_own_components_are_held_against_the_coupled_engine(

@@ -124,6 +124,7 @@ def test_the_forms_are_compared_and_the_better_one_is_named(
     assert "table" not in said
 
 
+@pytest.mark.slow
 def test_a_diagnosis_keeps_the_form(rig: tuple[list[pd.DataFrame], list[pd.DataFrame]]) -> None:
     bent = bristle.identify(rig[0], "bingham", holdout=rig[1], command="quadratic")
     verdict = bristle.diagnose(rig[0], bent, holdout=rig[1])
