@@ -25,7 +25,7 @@ BASE = (
     {"component"},
     {"draw", "check"},
 )
-SIMULATE = ({"fmu"}, {"scenario", "conformance", "design"}, {"simulate"}, {"batch"})
+SIMULATE = ({"fmu"}, {"ssp"}, {"scenario", "conformance", "design"}, {"simulate"}, {"batch"})
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
 ROOF = ({"study"}, {"bridge"}, {"plan"}, {"example"}, {"report"}, {"paper"}, {"cli"})
 STOREYS: tuple[tuple[tuple[set[str], ...], ...], ...] = ((BASE,), (SIMULATE, MEASURE), (ROOF,))

@@ -19,7 +19,7 @@ from typing import NoReturn
 from ..errors import BristleError, TrustError
 from ._common import add_common
 
-_NAMES = {"list_": "list"}
+_NAMES = {"list_": "list", "export_ssp": "export-ssp", "import_ssp": "import-ssp"}
 
 
 def build_parser() -> argparse.ArgumentParser:

@@ -18,7 +18,9 @@ HELP = "run a scenario and draw what happens"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle run`."""
-    parser.add_argument("file", metavar="FILE", help="scenario file, or name of a stock scenario")
+    parser.add_argument(
+        "file", metavar="FILE", help="scenario file, name of a stock scenario, or SSP package"
+    )
     parser.add_argument(
         "--out",
         metavar="FOLDER",

@@ -33,8 +33,13 @@ _ELF_MACHINES = {"x86_64": 62, "amd64": 62, "aarch64": 183, "arm64": 183, "i686"
 
 
 @contextmanager
-def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+def open_archive(path: Path, kind: str = "FMU") -> Iterator[zipfile.ZipFile]:
     """Open `path` as a zip whose members are all sound.
+
+    Parameters
+    ----------
+    path : Path
+    kind : what it should be, for messages: "FMU" or "SSP"
 
     Raises
     ------
@@ -43,15 +48,19 @@ def open_archive(path: Path) -> Iterator[zipfile.ZipFile]:
         link, too large, or named so that it would leave the folder it is unpacked into.
     """
     if path.is_dir():
-        raise FmuError(f"{path}: this is a folder. An FMU is one zip file named *.fmu.")
+        raise FmuError(
+            f"{path}: this is a folder. An {kind} is one zip file named *.{kind.lower()}."
+        )
     if not path.exists():
         raise FmuError(f"{path}: there is no such file.")
     if not path.is_file():  # a pipe would be waited for without end
-        raise FmuError(f"{path}: this is a device or pipe. An FMU is one zip file named *.fmu.")
+        raise FmuError(
+            f"{path}: this is a device or pipe. An {kind} is one zip file named *.{kind.lower()}."
+        )
     try:
         archive = zipfile.ZipFile(path)
     except (zipfile.BadZipFile, EOFError, struct.error, NotImplementedError, ValueError) as error:
-        raise FmuError(f"{path}: not a zip file, so not an FMU ({error}).") from None
+        raise FmuError(f"{path}: not a zip file, so not an {kind} ({error}).") from None
     except OSError as error:
         raise FmuError(f"{path}: cannot be read: {error.strerror or error}.") from None
     with archive:

@@ -10,7 +10,6 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from xml.parsers import expat
 
 from ..component import OVER_STEP
 from ..errors import FmuError
@@ -23,6 +22,7 @@ from .archive import (
     read_member,
 )
 from .model_description import JUMPS_TAG, OVER_STEP_TAG, TOOL
+from .xml_text import parse_xml
 
 __all__ = ["Description", "Value", "Variable", "extract", "read_description"]
 
@@ -108,7 +108,8 @@ def read_description(path: Path | str, *, any_platform: bool = False) -> Descrip
 def read_root(path: Path, *, any_platform: bool = False) -> ElementTree.Element:
     """Return the XML root of an FMU that may be opened; FmuError says why it may not."""
     with open_archive(path) as archive:
-        root = _parse(path, read_member(path, archive, DESCRIPTION, MAX_DESCRIPTION))
+        data = read_member(path, archive, DESCRIPTION, MAX_DESCRIPTION)
+        root = parse_xml(data, f"{path}: {DESCRIPTION}")
         identifier = _check_kind(path, root)
         if not any_platform:
             check_library(path, archive, identifier)
@@ -141,23 +142,6 @@ def describe(root: ElementTree.Element) -> Description:
         variables=variables,
         capabilities={k: v for k, v in slave.attrib.items() if k != "modelIdentifier"},
     )
-
-
-def _parse(path: Path, data: bytes) -> ElementTree.Element:
-    def refuse(name: str, *_: object) -> None:
-        raise FmuError(
-            f"{path}: {DESCRIPTION} has a document type declaration ({name}): refused, "
-            "since entities can expand without bound. FMI needs none."
-        )
-
-    # ElementTree expands entities, so a first pass refuses every declaration of one.
-    scout = expat.ParserCreate()
-    scout.StartDoctypeDeclHandler = refuse
-    try:
-        scout.Parse(data, True)
-        return ElementTree.fromstring(data)
-    except (expat.ExpatError, ElementTree.ParseError, LookupError, ValueError) as error:
-        raise FmuError(f"{path}: {DESCRIPTION} is not well-formed XML: {error}.") from None
 
 
 def _check_kind(path: Path, root: ElementTree.Element) -> str:

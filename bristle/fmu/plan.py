@@ -85,6 +85,7 @@ def plan(
     name: str | None = None,
     building: Path | None = None,
     record: Path | None = None,
+    samples: Path | None = None,
     starts: Mapping[str, Any] | None = None,
     effects: Iterable[Path] = (),
     controller: Path | None = None,
@@ -102,6 +103,8 @@ def plan(
         Building file, for a Structure.
     record : path, optional
         Ground motion in any format that `records` reads, for a GroundMotion.
+    samples : path, optional
+        Two-column CSV for a component that plays a signal: its parameter `file`.
     starts : mapping, optional
         Start values of parameters that differ from the component's.
     effects : iterable of path
@@ -136,6 +139,9 @@ def plan(
             files[f"{stem}.csv"] = Path(found)
             found = stem
         baked["record"] = found
+    if samples is not None:
+        baked["samples"] = re.sub(r"[^A-Za-z0-9_]", "_", samples.stem)
+        files[f"{baked['samples']}.csv"] = samples
     if controller is not None:
         files[catalogue.design_file(component, kind, controller)] = controller
     effects = tuple(effects)

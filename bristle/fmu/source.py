@@ -48,7 +48,7 @@ class SignalSlave(SourceSlave):
             self.add_parameter(name, parameter.value, own, text, parameter.bounds)
         self.add_parameter("steps", "0:0", None, "TIME:VALUE pairs of the kind steps")
         text = "two-column CSV of the kind csv, its header `time [s],NAME [UNIT]`"
-        self.add_parameter("file", "", None, text)
+        self.add_parameter("file", self.baked.get("samples", ""), None, text)
 
     def setup(self) -> tuple[Any, list[float], int]:
         if self["kind"] not in KINDS:
@@ -58,6 +58,8 @@ class SignalSlave(SourceSlave):
         if code == STEPS:
             times, samples = read_steps(self["steps"])
         elif code == CSV:
-            times, samples = read_two_column(self["file"], header=None)
+            baked = self["file"] and self["file"] == self.baked.get("samples")
+            file = self.resource(f"{self['file']}.csv") if baked else self["file"]
+            times, samples = read_two_column(file, header=None)
         numbers: list[float] = [self[name] for name in PARAMETERS]
         return source.Constants(code, numbers, times, samples, rated=self.rated), [], 0

@@ -28,8 +28,8 @@ STEP_TOLERANCE = 1e-6
 
 _TOP = ("schema", "title", "run", "components", "connections")
 _RUN = ("stop", "step", "algorithm")
-_NAME = re.compile(r"[^\W\d][\w-]*")
-_RESERVED = (*_TOP, "time")
+NAME = re.compile(r"[^\W\d][\w-]*")
+RESERVED = (*_TOP, "time")
 
 
 def table(findings: Findings, data: Mapping[str, Any], path: KeyPath) -> dict[str, Any] | None:
@@ -192,11 +192,11 @@ def check_components(document: Document, library: Library, findings: Findings) -
         findings.error(("components",), "no components: [components.NAME] with fmu = ... adds one.")
     for name in data:
         path: KeyPath = ("components", name)
-        if not _NAME.fullmatch(name) or name in _RESERVED:
+        if not NAME.fullmatch(name) or name in RESERVED:
             findings.error(
                 path,
                 f'[components."{name}"]: a component cannot be called so; letters, digits, _ and - '
-                f"are right, beginning with a letter, and none of {', '.join(_RESERVED)}.",
+                f"are right, beginning with a letter, and none of {', '.join(RESERVED)}.",
             )
         settings = table(findings, data, path)
         if settings is not None:

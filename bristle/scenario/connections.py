@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ..errors import UnitError
-from ..findings import Findings, nearest, unknown, written
+from ..findings import Findings, nearest, number, unknown, written
 from ..fmu.description import Variable
 from ..lines import KeyPath
 from ..units import Unit, parse
@@ -14,18 +14,27 @@ from .checks import table
 from .document import Document, flatten
 from .parts import Part
 
+FROM, FACTOR, OFFSET = TRANSFORMED = ("from", "factor", "offset")
+"""Keys of a connection whose value is transformed on its way: input = factor output + offset."""
+
 _ARTICLE = {"input": "an input", "output": "an output"}
 
 
 @dataclass(frozen=True)
 class Wire:
-    """One connection that could be read, with the path of its key."""
+    """One connection that could be read, with the path of its key; input = factor output + offset.
+
+    `transformed` is whether the scenario says so, even if by 1 and 0.
+    """
 
     target: str
     input: str
     source: str
     output: str
     path: KeyPath
+    factor: float = 1.0
+    offset: float = 0.0
+    transformed: bool = False
 
 
 def check_connections(
@@ -37,7 +46,7 @@ def check_connections(
     data = table(findings, document.data, ("connections",))
     if data is None:
         return []
-    for target, source, path in flatten(data, ("connections",)):
+    for target, source, path in flatten(data, ("connections",), whole=_is_transformed):
         if target in claimed:
             findings.error(path, f'"{target}" has two sources; one connection per input is right.')
             continue
@@ -48,7 +57,7 @@ def check_connections(
                 f'"{target}" is fed by a list; an input has one source, one text in quotes. To add '
                 "forces up use a second input, such as structure.extra_force.",
             )
-        elif not isinstance(source, str):
+        elif not isinstance(source, str | dict):
             findings.error(
                 path, f'"{target}" is fed by {written(source)}; "component.output" is right.'
             )
@@ -57,14 +66,47 @@ def check_connections(
             if wire:
                 wires[target] = wire
             else:
-                claimed |= _meant(target, source, parts)
+                claimed |= _meant(target, source, parts) if isinstance(source, str) else set()
     _check_inputs(parts, wires, claimed, findings)
     return list(wires.values())
 
 
+def _is_transformed(name: str, table: Mapping[str, object]) -> bool:
+    """Return whether a table is a connection of its own, and no part of a dotted name."""
+    return "." in name and FROM in table and set(table) <= set(TRANSFORMED)
+
+
+def _transformation(
+    target: str, table: Mapping[str, object], path: KeyPath, findings: Findings
+) -> tuple[float, float] | None:
+    """Return factor and offset of a connection; None after saying what is wrong with them."""
+    found = [number(table.get(key, usual)) for key, usual in ((FACTOR, 1.0), (OFFSET, 0.0))]
+    for key, value in zip((FACTOR, OFFSET), found, strict=True):
+        if isinstance(value, str):
+            findings.error((*path, key), f'"{target}": {key} {value}; a number is right.')
+    factor, offset = found
+    return None if isinstance(factor, str) or isinstance(offset, str) else (factor, offset)
+
+
 def _check_wire(
-    target: str, source: str, path: KeyPath, parts: Mapping[str, Part], findings: Findings
+    target: str,
+    said: str | dict[str, object],
+    path: KeyPath,
+    parts: Mapping[str, Part],
+    findings: Findings,
 ) -> Wire | None:
+    source = said[FROM] if isinstance(said, dict) else said
+    if not isinstance(source, str):
+        findings.error(
+            (*path, FROM), f'"{target}" is fed by {written(source)}; "component.output" is right.'
+        )
+        return None
+    transformation = (1.0, 0.0)
+    if isinstance(said, dict):
+        found = _transformation(target, said, path, findings)
+        if found is None:
+            return None
+        transformation = found
     into = _end(target, path, "input", parts, findings)
     out = _end(source, path, "output", parts, findings)
     if into is None or out is None:
@@ -91,6 +133,11 @@ def _check_wire(
         findings.error(
             path, f'"{target}" is {entry.kind} and "{source}" is {exit_.kind}; both must be alike.'
         )
+    elif isinstance(said, dict):
+        if entry.kind != "Real":
+            findings.error(
+                path, f'"{target}" is {entry.kind}: only Real has a factor and an offset.'
+            )
     elif entry.kind == "Real":
         _check_units(target, entry.unit, source, exit_.unit, path, findings)
     if entry.name in to.places:
@@ -99,7 +146,9 @@ def _check_wire(
             f'"{target}" is connected here and set in the parameters of {to.name} too; '
             "one of them must go.",
         )
-    return Wire(to.name, entry.name, origin.name, exit_.name, path)
+    return Wire(
+        to.name, entry.name, origin.name, exit_.name, path, *transformation, isinstance(said, dict)
+    )
 
 
 def _meant(target: str, source: str, parts: Mapping[str, Part]) -> set[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -109,18 +109,29 @@ def _syntax(text: str, message: str) -> Finding:
     return Finding(line, "error", f"not TOML: {what}{column} of `{row[:80]}`{hint}.")
 
 
-def flatten(table: Mapping[str, Any], path: KeyPath) -> Iterator[tuple[str, object, KeyPath]]:
+def flatten(
+    table: Mapping[str, Any],
+    path: KeyPath,
+    whole: Callable[[str, Mapping[str, Any]], bool] = lambda name, table: False,
+    before: str = "",
+) -> Iterator[tuple[str, object, KeyPath]]:
     """Yield (dotted name, value, path) of a table whose dotted names may lack their quotes.
 
     TOML reads `gas_spring.on = true` as a table in a table and `"gas_spring.on" = true` as one
     key; in a scenario both mean the same.
+
+    Parameters
+    ----------
+    table, path : the table, and the keys that lead to it
+    whole : (dotted name, table) -> whether a table is a value, and no part of a name
+    before : what stands before the names in this table
     """
     for key, value in table.items():
-        if isinstance(value, dict):
-            for name, inner, inner_path in flatten(value, (*path, key)):
-                yield f"{key}.{name}", inner, inner_path
+        name = f"{before}{key}"
+        if isinstance(value, dict) and not whole(name, value):
+            yield from flatten(value, (*path, key), whole, f"{name}.")
         else:
-            yield key, value, (*path, key)
+            yield name, value, (*path, key)
 
 
 def apply_overrides(

@@ -24,6 +24,7 @@ from .document import (
     parse_overrides,
     read_document,
 )
+from .import_ssp import unpacked
 from .library import Library, installed
 from .naming import changed_title, needs_title
 from .parts import DamperLaw
@@ -81,12 +82,19 @@ class Component:
 
 @dataclass(frozen=True)
 class Connection:
-    """Component and port that take a value, component and port that give it."""
+    """Component and port that take a value, component and port that give it.
+
+    input = factor output + offset; `transformed` is whether the scenario says so, even if by 1 and
+    0: units are its own matter then.
+    """
 
     target: str
     input: str
     source: str
     output: str
+    factor: float = 1.0
+    offset: float = 0.0
+    transformed: bool = False
 
 
 @dataclass(frozen=True)
@@ -133,7 +141,7 @@ def load_scenario(
     Parameters
     ----------
     file : path
-        The TOML file, or the name of a stock scenario.
+        The TOML file, or the name of a stock scenario, or an SSP package.
     overrides : mapping, optional
         Dotted names with values that take the place of the file's, e.g.
         `{"damper.f_c": 2.0, "run.step": 1e-3, "damper.fmu": "BinghamDamper"}`.
@@ -176,12 +184,17 @@ def check_scenario(
 def worded(file: str | Path, finding: Finding) -> str:
     """Return a finding as one line that begins with its place, `FILE:LINE: text`."""
     place = f"{file}:{finding.line}" if finding.line else str(file)
-    return f"{place}: {finding.text}"
+    return finding.text if finding.text.startswith(f"{place}: ") else f"{place}: {finding.text}"
 
 
 def _read(
     path: Path, overrides: Mapping[str, object], library: Library | None
 ) -> tuple[Scenario | None, list[Finding]]:
+    if path.suffix.lower() == ".ssp":
+        try:
+            path = unpacked(path)
+        except ScenarioError as error:
+            return None, [Finding(0, "error", str(error))]
     document = read_document(path)
     if isinstance(document, Finding):
         return None, [document]
@@ -219,7 +232,10 @@ def _read(
     )
     if ("title",) not in document.overridden and needs_title(document.changed):
         title = changed_title(components, document.changed)
-    connections = tuple(Connection(w.target, w.input, w.source, w.output) for w in wires)
+    connections = tuple(
+        Connection(w.target, w.input, w.source, w.output, w.factor, w.offset, w.transformed)
+        for w in wires
+    )
     scenario = Scenario(
         path, title, run.stop, run.step, run.algorithm, components, connections, tuple(found)
     )

@@ -26,66 +26,74 @@ def scenario_text(scenario: Scenario) -> str:
     """
     lines = [
         "schema = 1",
-        f"title = {_value(scenario.title)}",
+        f"title = {toml_value(scenario.title)}",
         "",
         "[run]",
-        f"stop = {_value(scenario.stop)}",
-        f"step = {_value(scenario.step)}",
-        f"algorithm = {_value(scenario.algorithm)}",
+        f"stop = {toml_value(scenario.stop)}",
+        f"step = {toml_value(scenario.step)}",
+        f"algorithm = {toml_value(scenario.algorithm)}",
     ]
     for component in scenario.components:
         lines += [
             "",
-            f"[components.{_key(component.name)}]",
+            f"[components.{toml_key(component.name)}]",
             *_component(component, scenario.file.parent),
         ]
     lines += ["", "[connections]"]
     for wire in scenario.connections:
         target, source = f"{wire.target}.{wire.input}", f"{wire.source}.{wire.output}"
-        lines.append(f"{_value(target)} = {_value(source)}")
+        said = toml_value(source)
+        if wire.transformed:
+            numbers = f"factor = {toml_value(wire.factor)}, offset = {toml_value(wire.offset)}"
+            said = f"{{ from = {said}, {numbers} }}"
+        lines.append(f"{toml_value(target)} = {said}")
     return "\n".join(lines) + "\n"
 
 
 def _component(component: Component, folder: Path) -> list[str]:
     fmu = component.fmu if component.path is None else component.path.absolute().as_posix()
-    lines = [f"fmu = {_value(fmu)}"] if component.law is None else _law(component.law)
+    lines = [f"fmu = {toml_value(fmu)}"] if component.law is None else _law(component.law)
     if component.building is not None:
-        lines.append(f"building = {_value(component.building.absolute().as_posix())}")
+        lines.append(f"building = {toml_value(component.building.absolute().as_posix())}")
     if component.effects:
-        files = ", ".join(_value(file.absolute().as_posix()) for file in component.effects)
+        files = ", ".join(toml_value(file.absolute().as_posix()) for file in component.effects)
         lines.append(f"effects = [{files}]")
     if component.controller is not None:
-        lines.append(f"controller = {_value(component.controller.absolute().as_posix())}")
+        lines.append(f"controller = {toml_value(component.controller.absolute().as_posix())}")
     if component.step is not None:
-        lines.append(f"step = {_value(component.step)}")
+        lines.append(f"step = {toml_value(component.step)}")
     if component.over_step:
-        told = [f"{_key(name)} = {_value(word)}" for name, word in component.over_step.items()]
+        told = [
+            f"{toml_key(name)} = {toml_value(word)}" for name, word in component.over_step.items()
+        ]
         lines.append(f"over_step = {{ {', '.join(told)} }}")
     if component.parameters:
         values = dict(component.parameters)
         for name in FILE_PARAMETERS:
             if (folder / str(values.get(name, ""))).is_file():
                 values[name] = (folder / str(values[name])).absolute().as_posix()
-        pairs = [f"{_key(name)} = {_value(value)}" for name, value in values.items()]
+        pairs = [f"{toml_key(name)} = {toml_value(value)}" for name, value in values.items()]
         lines.append(f"parameters = {{ {', '.join(pairs)} }}")
     return lines
 
 
 def _law(law: DamperLaw) -> list[str]:
     name, form, knots = split_form(law.name)
-    lines = [f"law = {_value(law.file.absolute().as_posix() if law.file else name)}"]
+    lines = [f"law = {toml_value(law.file.absolute().as_posix() if law.file else name)}"]
     if form:
-        lines.append(f"command = {_value(form)}")
+        lines.append(f"command = {toml_value(form)}")
     if knots:
         lines.append(f"command_knots = {list(knots)}")
     return lines
 
 
-def _key(name: str) -> str:
-    return name if _BARE.fullmatch(name) else _value(name)
+def toml_key(name: str) -> str:
+    """Return a name as a key of TOML, with quotes where it needs them."""
+    return name if _BARE.fullmatch(name) else toml_value(name)
 
 
-def _value(value: Value) -> str:
+def toml_value(value: Value) -> str:
+    """Return a value as TOML writes it."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float) and not math.isfinite(value):

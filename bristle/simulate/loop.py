@@ -95,7 +95,9 @@ class Memory:
         )
         names = tuple(name for _, name in places)
         offsets = [offset for offset, _ in places]
+        changed = node.transformed if isinstance(operation, Write) else {}
         plain = isinstance(operation, Read) or not operation.values
+        plain = plain and not changed.keys() & set(names)
         if plain and all(offset == offsets[0] + i * size for i, offset in enumerate(offsets)):
             return names, offsets[0], []
         if isinstance(operation, Read):
@@ -107,6 +109,9 @@ class Memory:
         for i, (name, offset) in enumerate(zip(names, offsets, strict=True)):
             past = self.past.get(node.sources[name], 0)
             value = _VALUE[values[name]].format(now=offset // size, past=past // size)
+            if name in changed:
+                factor, shift = changed[name]
+                value = f"{factor!r} * ({value}) + {shift!r}"
             lines.append(f"m[{start // size + i}] = {value}")
         return names, start, lines
 

@@ -211,7 +211,7 @@ class Master:
                 for name, value in instance.get(self.nodes[c].outputs).items()
             }
             wanted = {
-                (c, name): outputs[source]
+                (c, name): node.taken(name, outputs[source])
                 for c, node in enumerate(self.nodes)
                 for name, source in node.sources.items()
             }
@@ -265,7 +265,10 @@ class Master:
     def _inputs(self, component: int) -> str:
         """Return the inputs of a component with their values, those not finite first."""
         node = self.nodes[component]
-        values = {name: self._memory.value(source) for name, source in node.sources.items()}
+        values = {
+            name: node.taken(name, self._memory.value(source))
+            for name, source in node.sources.items()
+        }
         names = sorted(values, key=lambda name: math.isfinite(values[name]))
         parts = [f"{name} = {values[name]:.9g}{_unit(node, name)}" for name in names]
         return ".\n  Inputs: " + ", ".join(parts) if parts else "."

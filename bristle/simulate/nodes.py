@@ -18,6 +18,7 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
     """Return the components as the schedule sees them, in the order of the file."""
     numbers = {component.name: c for c, component in enumerate(scenario.components)}
     sources: list[dict[str, Port]] = [{} for _ in scenario.components]
+    transformed: list[dict[str, tuple[float, float]]] = [{} for _ in scenario.components]
     for connection in scenario.connections:
         if descriptions[connection.target].variables[connection.input].kind == "String":
             raise ScenarioError(
@@ -26,6 +27,9 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
             )
         port = numbers[connection.source], connection.output
         sources[numbers[connection.target]][connection.input] = port
+        how = connection.factor, connection.offset
+        if how != (1.0, 0.0):
+            transformed[numbers[connection.target]][connection.input] = how
     nodes = []
     for c, component in enumerate(scenario.components):
         description = descriptions[component.name]
@@ -33,5 +37,5 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
         told = component.over_step
         outputs = {v.name: as_told(v, told) for v in description.of("output") if v.kind != "String"}
         inputs = {v.name: as_told(v, told) for v in description.of("input")}
-        nodes.append(Node(component.name, inputs, outputs, sources[c], substeps))
+        nodes.append(Node(component.name, inputs, outputs, sources[c], substeps, transformed[c]))
     return nodes

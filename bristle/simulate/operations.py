@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from ..component import HELD
-from ..fmu.description import Variable
+from ..fmu.description import Value, Variable
 
 Port = tuple[int, str]
 """A component's number in the order of the file, and the name of one of its variables."""
@@ -22,13 +22,17 @@ u; (u + p)/2; (3 u - p)/2, the middle of a step that the source has still to mak
 
 @dataclass(frozen=True)
 class Node:
-    """A component as the schedule sees it: outputs, and the source of each connected input."""
+    """A component as the schedule sees it: outputs, and the source of each connected input.
+
+    `transformed` has (factor, offset) of the inputs that get factor output + offset.
+    """
 
     name: str
     inputs: Mapping[str, Variable]
     outputs: Mapping[str, Variable]
     sources: Mapping[str, Port]
     substeps: int = 1
+    transformed: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def followed(self, output: str) -> tuple[str, ...]:
         """Return the connected inputs that an output follows without a step."""
@@ -50,6 +54,11 @@ class Node:
             return False
         told = all(v.dependencies is not None for v in self.outputs.values())
         return variable.over_step == HELD or (variable.over_step is None and told)
+
+    def taken(self, name: str, value: Value) -> Value:
+        """Return what an input gets where its source gives a value."""
+        factor, offset = self.transformed.get(name, (1.0, 0.0))
+        return factor * value + offset if isinstance(value, float) else value
 
     def jumps(self, output: str) -> bool:
         """Return whether an output may jump: it is discrete, or tells so of itself."""

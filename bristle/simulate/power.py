@@ -54,11 +54,12 @@ def bond_names(nodes: Sequence[Node], algorithm: str) -> list[str]:
 
 
 def _wires(nodes: Sequence[Node], unit: str) -> Iterator[tuple[Port, Port]]:
-    """Yield source and target of the connections of a unit, but for what is sampled."""
+    """Yield both ends of the connections of a unit, but for what is sampled or transformed."""
     for c, node in enumerate(nodes):
         for name, source in node.sources.items():
             variable = node.inputs[name]
-            if variable.over_step != SAMPLED and _is_unit(variable.unit, unit):
+            plain = variable.over_step != SAMPLED and name not in node.transformed
+            if plain and _is_unit(variable.unit, unit):
                 yield source, (c, name)
 
 

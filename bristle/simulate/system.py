@@ -44,6 +44,12 @@ class System:
         self.names: dict[str, list[str]] = {
             kind: [] for kind in ("source", "damper", "structure", "sampled")
         }
+        for c in scenario.connections:
+            if (c.factor, c.offset) != (1.0, 0.0):
+                raise ScenarioError(
+                    f'{scenario.file}: "{c.target}.{c.input}" has a factor or an offset, which is '
+                    "not compiled. Run it with the engine fmu."
+                )
         for component in scenario.components:
             self.names[kind_of(component, scenario)].append(component.name)
         self.slaves: dict[str, Any] = {

@@ -1,0 +1,86 @@
+"""Write a scenario as an SSP package for other tools, and say how far off they will be.
+
+OMSimulator, libcosim, Ecos and others run it where bristle is not installed. They hold inputs over
+a step, which makes a coupling error: its size is printed, with the step that keeps it below 0.5 %.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from ._consent import add_trust
+
+if TYPE_CHECKING:
+    from ..scenario.export_ssp import ExportedPackage
+    from ..simulate.elsewhere import Expected
+
+HELP = "write a scenario as an SSP package for other tools"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle export-ssp`."""
+    text = "scenario file, or name of a stock scenario"
+    parser.add_argument("scenario", metavar="SCENARIO", help=text)
+    text = "the package, in place of an older one; else NAME.ssp in the current folder"
+    parser.add_argument("-o", "--out", type=Path, metavar="FILE.ssp", help=text)
+    text = "write OspSystemStructure.xml with the FMUs beside it as well"
+    parser.add_argument("--osp", type=Path, metavar="FOLDER", help=text)
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="take a value in place of the file's, e.g. --set damper.f_c=2",
+    )
+    text = "run nothing: do not estimate the coupling error in other tools"
+    parser.add_argument("--no-coupling-error", action="store_true", help=text)
+    add_trust(parser)
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Export; print the files, what is otherwise elsewhere, and the error to expect there."""
+    from ..scenario.export_ssp import export_ssp
+    from ..scenario.naming import run_name
+    from ..scenario.scenario import load_scenario, parse_overrides, resolve_scenario
+
+    overrides = parse_overrides(arguments.overrides)
+    file = resolve_scenario(arguments.scenario)
+    scenario = load_scenario(file, overrides)
+    target = arguments.out or Path(f"{run_name(file, overrides)}.ssp")
+    exported = export_ssp(scenario, target, arguments.osp)
+    expected: tuple[Expected, ...] = ()
+    if not arguments.no_coupling_error:
+        from ..simulate.elsewhere import expect
+        from ..simulate.run import run_quietly
+
+        print("estimating the coupling error in other tools ...", file=sys.stderr)
+        expected = expect(scenario, run_quietly)
+    if arguments.json:
+        _print_json(exported, expected)
+    else:
+        for written in exported.files:
+            print(written)
+        for note in exported.notes:
+            print(note)
+        if expected:
+            print(f"Coupling error to expect at {1e3 * scenario.step:g} ms:")
+        for one in expected:
+            print(f"  {one}")
+    return 0
+
+
+def _print_json(exported: ExportedPackage, expected: tuple[Expected, ...]) -> None:
+    import json
+    from dataclasses import asdict
+
+    answer = {
+        "files": [str(file.absolute()) for file in exported.files],
+        "notes": list(exported.notes),
+        "coupling_error": [asdict(one) for one in expected],
+    }
+    print(json.dumps(answer, indent=2))
