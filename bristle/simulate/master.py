@@ -269,7 +269,7 @@ class Master:
             name: node.taken(name, self._memory.value(source))
             for name, source in node.sources.items()
         }
-        names = sorted(values, key=lambda name: math.isfinite(values[name]))
+        names = sorted(values, key=lambda name: math.isfinite(float(values[name])))
         parts = [f"{name} = {values[name]:.9g}{_unit(node, name)}" for name in names]
         return ".\n  Inputs: " + ", ".join(parts) if parts else "."
 
