@@ -11,7 +11,8 @@ from math import ceil, isfinite, log2
 from typing import TYPE_CHECKING
 
 from ..errors import RunError
-from .coupling_error import estimate, finer, worst
+from .coupling_error import CouplingError, estimate, worst
+from .summary import judged_by
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -22,15 +23,14 @@ ALGORITHMS = ("jacobi", "gauss-seidel")
 """What tools do that hold inputs over a step."""
 TOLERANCE = 0.005
 """Error along a run [1] that a step is named for."""
-MOST_HALVINGS = 8
 
 
 @dataclass(frozen=True)
 class Expected:
     """What to expect of an algorithm: `error` [1] along the run of the worst output, and a step.
 
-    `step` [s] is the scenario's divided by a power of two, None where none keeps the tolerance;
-    `error` is None where it cannot be told, and `why` says so.
+    `step` [s] is the scenario's divided by a power of two, small enough for the tolerance by the
+    order seen; `error` and `step` are None where they cannot be told, and `why` says so.
     """
 
     algorithm: str
@@ -39,11 +39,9 @@ class Expected:
     why: str = ""
 
     def __str__(self) -> str:
-        if self.error is None:
+        if self.error is None or self.step is None:
             return f"{self.algorithm}: the coupling error cannot be told: {self.why}"
         told = f"{self.algorithm}: {100 * self.error:.2g} % along the run"
-        if self.step is None:
-            return f"{told}; no step keeps it below {100 * TOLERANCE:g} %"
         return f"{told}; a step of {1e3 * self.step:.4g} ms keeps it below {100 * TOLERANCE:g} %"
 
 
@@ -71,19 +69,18 @@ def expect(
 
 def _expected(scenario: Scenario, again: Callable[[Scenario, str], pd.DataFrame]) -> Expected:
     try:
-        error = _error(scenario, again)
-        halvings, found = 0, error
-        while found > TOLERANCE and halvings < MOST_HALVINGS:
-            # Both algorithms are of first order, so most steps need not be tried.
-            more = max(1, ceil(log2(found / TOLERANCE))) if isfinite(found) else 1
-            halvings += more
-            found = _error(finer(scenario, 2.0**halvings), again)
+        frame = again(scenario, "fmu")
+        errors = estimate(scenario, frame, again)[1]
+        error = worst(errors, frame)
     except RunError as failure:
         return Expected(scenario.algorithm, None, None, str(failure))
-    step = scenario.step / 2.0**halvings if found <= TOLERANCE else None
-    return Expected(scenario.algorithm, error, step)
+    judged = [errors[name] for name in judged_by(frame) if errors[name].worth]
+    halvings = max((_halvings(one) for one in judged), default=0)
+    return Expected(scenario.algorithm, error, scenario.step / 2.0**halvings)
 
 
-def _error(scenario: Scenario, again: Callable[[Scenario, str], pd.DataFrame]) -> float:
-    frame = again(scenario, "fmu")
-    return worst(estimate(scenario, frame, again)[1], frame)
+def _halvings(error: CouplingError) -> int:
+    """Return how often the step is halved until an error is small enough; it falls by its order."""
+    if error.along <= TOLERANCE or not isfinite(error.order):
+        return 0
+    return ceil(log2(error.along / TOLERANCE) / error.order)

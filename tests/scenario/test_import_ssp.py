@@ -14,6 +14,7 @@ from bristle.errors import ScenarioError
 from bristle.fmu.build import ensure
 from bristle.scenario.import_ssp import import_ssp
 from bristle.scenario.scenario import Scenario, check_scenario, load_scenario
+from bristle.scenario.text import scenario_text
 from bristle.ssp.conversion import Measure, convert
 from bristle.ssp.package import open_package
 from bristle.ssp.structure import read_structure
@@ -154,6 +155,9 @@ def test_linear_transformations_come_on_top_of_units(pack: Packer) -> None:
     told = connect(*joint, more='suppressUnitConversion="true"')
     scenario = pack.load(system(motion + DAMPER, told))
     assert wires(scenario)["damper.displacement"][1:] == (2.0, 3.0)
+    again = pack.folder / "again.toml"
+    again.write_text(scenario_text(scenario))
+    assert wires(load_scenario(again)) == wires(scenario)
 
 
 def test_values_find_their_way_in(pack: Packer) -> None:
