@@ -105,7 +105,14 @@ def linear(element: Element, package: Package, where: str) -> Change:
 
 
 def number(element: Element, key: str, usual: float, package: Package, where: str) -> float:
-    """Return a finite number in an attribute, `usual` where it is not there."""
+    """Return a finite number in an attribute.
+
+    Parameters
+    ----------
+    element, key : the element, and the name of its attribute
+    usual : the number where the attribute is not there
+    package, where : what it is read from, and the place that an error names
+    """
     text = element.get(key)
     if text is None:
         return usual
