@@ -184,6 +184,7 @@ def test_a_dampers_own_stop_and_friction_are_in_the_fmu(bench: Study) -> None:
     assert rms(alone(found.fmu, run, {}) - expected) < late + AGREEMENT * rms(expected)
 
 
+@pytest.mark.slow
 def test_an_effect_of_ones_own_is_in_the_fmu(bench: Study) -> None:
     (bench.effects_folder / "own_spring.py").write_text(OWN, encoding="utf-8")
     study = Study(bench.folder)

@@ -28,6 +28,7 @@ def found(held):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "phi"),
     [

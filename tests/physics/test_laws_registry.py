@@ -180,7 +180,14 @@ def test_an_old_effect_that_names_its_laws_keeps_to_them(law: type[Law]) -> None
 
 
 @pytest.mark.parametrize(
-    "effects", [[], ["stribeck"], ["coil_lag"], ["mount_compliance"], ["temperature"]]
+    "effects",
+    [
+        [],
+        pytest.param(["stribeck"], marks=pytest.mark.slow),
+        ["coil_lag"],
+        ["mount_compliance"],
+        ["temperature"],
+    ],
 )
 @pytest.mark.parametrize("name", ["hyperbolic", "lagging"])
 def test_python_and_numba_agree(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -42,7 +43,9 @@ def verdict(kind, z, *gains):
 class Folder:
     """A study in name alone: it counts the effects of its model."""
 
-    settings = SimpleNamespace(law="", has_building=False)
+    settings = SimpleNamespace(law="", has_building=False, runs=())
+    history = SimpleNamespace(numbers=lambda: [])
+    folder = Path("nowhere")
 
     def __init__(self):
         self.names = []
