@@ -7,6 +7,7 @@ import itertools
 import os
 import sys
 import tempfile
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -19,12 +20,16 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from ..errors import FmuError, RunError
+from ..fmu.binary import reset_at_exit
 from ..fmu.archive import extract
 from ..fmu.description import Description, Value, Variable
 from ..interrupt import Interrupt
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 WARNING, DISCARD, FATAL = 1, 2, 4
+
+_CHANGES_FOLDER = threading.Lock()
+"""Held while fmpy loads a library: it works in the FMU's folder meanwhile, the whole process does."""
 
 _SHARED_PYTHON = (
     "It runs Python code and needs the symbols of libpython. Use a Python that offers them to "
@@ -214,22 +219,23 @@ class Instance:
 
     def _load(self, folder: Path) -> Any:
         self._need_binary(folder / "binaries")
-        before = Path.cwd()
-        try:
-            return fmi2.FMU2Slave(
-                guid=self.description.guid,
-                modelIdentifier=self.description.identifier,
-                unzipDirectory=str(folder),
-                instanceName=self.name,
-            )
-        except Exception as error:  # fmpy raises Exception itself
-            _LISTENERS.pop(self._key)
-            cure = ""
-            if "_Py" in str(error) or "libpython" in str(error):
-                cure = "\n  " + _SHARED_PYTHON.format(*sys.version_info)
-            raise FmuError(f"{self._where()}: {error}{cure}") from error
-        finally:
-            os.chdir(before)  # fmpy changes into the FMU's folder and stays there on failure
+        with _CHANGES_FOLDER:
+            before = Path.cwd()
+            try:
+                return fmi2.FMU2Slave(
+                    guid=self.description.guid,
+                    modelIdentifier=self.description.identifier,
+                    unzipDirectory=str(folder),
+                    instanceName=self.name,
+                )
+            except Exception as error:  # fmpy raises Exception itself
+                _LISTENERS.pop(self._key)
+                cure = ""
+                if "_Py" in str(error) or "libpython" in str(error):
+                    cure = "\n  " + _SHARED_PYTHON.format(*sys.version_info)
+                raise FmuError(f"{self._where()}: {error}{cure}") from error
+            finally:
+                os.chdir(before)  # fmpy changes into the FMU's folder and stays there on failure
 
     def _need_binary(self, binaries: Path) -> None:
         name = self.description.identifier + fmpy.sharedLibraryExtension
