@@ -26,6 +26,7 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+import bristle
 from bristle.fmu.build import ensure
 from bristle.resources import fmus_folder
 
@@ -253,6 +254,7 @@ def count(numbers: range, harsh: bool = False, show: bool = False) -> list[End]:
     """Run scripts one after the other; return how they ended."""
     for name in LOADED:
         ensure(name)
+    bristle.run("bench_sine_bingham", {"run.stop": 0.1}, engine="compiled")  # compiled once
     with tempfile.TemporaryDirectory(prefix="bristle-exits-") as folder:
         library = harsh_library(Path(folder)) if harsh else None
         if harsh and library is None:
