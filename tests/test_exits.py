@@ -17,7 +17,7 @@ from benchmarks import exits
 from bristle.errors import FmuError
 from bristle.fmu.build import ensure
 from bristle.fmu.description import extract, read_description
-from bristle.simulate import session
+from bristle.simulate import binding, session
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the binary ends in order")
 compiles = pytest.mark.skipif(
@@ -111,7 +111,7 @@ def test_libraries_are_loaded_one_after_the_other(
             inside[0] -= 1
             raise OSError("enough")
 
-    monkeypatch.setattr(session.fmi2, "FMU2Slave", Slow)
+    monkeypatch.setattr(binding.fmi2, "FMU2Slave", Slow)
     path = ensure("ConstantVoltage")
     about, folder = read_description(path), extract(path, tmp_path / "one")
 

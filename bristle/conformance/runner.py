@@ -73,7 +73,9 @@ def judge(
         plan = make_plan(path, root, Path(folder), timeout)
         if beside is not None:
             read_description(beside, versions=KNOWN)  # which says what is wrong with it
-            plan.beside = make_plan(beside, read_root(beside, versions=KNOWN), Path(folder) / "beside", timeout)
+            plan.beside = make_plan(
+                beside, read_root(beside, versions=KNOWN), Path(folder) / "beside", timeout
+            )
         elif only is None or any(name.startswith("another FMU") for name in only):
             plan.beside = _companion(plan, Path(folder))
         with Subprocesses(Path(plan.work)) as subprocesses:

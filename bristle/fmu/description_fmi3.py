@@ -21,6 +21,13 @@ KINDS = {
     "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration",
 }  # fmt: skip
 """The kind of each type's values."""
+_BITS = {"Int8": 8, "Int16": 16, "Int32": 32}
+_RANGES = {
+    **{name: (-(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1) for name, bits in _BITS.items()},
+    **{f"U{name}": (0.0, 2.0**bits - 1) for name, bits in _BITS.items()},
+    "UInt64": (0.0, None),
+}
+"""What an integer of a type can hold, where that is less than the master's 32 bits or unsigned."""
 _CAPABILITIES = {
     "canGetAndSetFMUState": "canGetAndSetFMUstate",
     "canSerializeFMUState": "canSerializeFMUstate",
@@ -81,6 +88,8 @@ def _variable(element: ElementTree.Element, types: Mapping[str, ElementTree.Elem
     name, kind = element.attrib["name"], KINDS[element.tag]
     declared = types.get(element.get("declaredType", ""))
     own = {**(declared.attrib if declared is not None else {}), **element.attrib}
+    low, high = _RANGES.get(element.tag, (None, None))
+    least, most = (number_of(name, key, own.get(key)) for key in ("min", "max"))
     start = element.get("start")
     if kind == "String" and (given := element.find("Start")) is not None:
         start = given.get("value")
@@ -92,8 +101,8 @@ def _variable(element: ElementTree.Element, types: Mapping[str, ElementTree.Elem
         reference=reference_of(name, element.get("valueReference")),
         unit=own.get("unit"),
         start=start_of(name, kind, start),
-        minimum=number_of(name, "min", own.get("min")),
-        maximum=number_of(name, "max", own.get("max")),
+        minimum=low if least is None else least,
+        maximum=high if most is None else most,
         nominal=number_of(name, "nominal", own.get("nominal")),
         description=element.get("description", ""),
         type=element.tag,

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fmpy import fmi2, fmi3
+from fmpy.fmi1 import FMICallException
 
 from ..fmu.binary import reset_at_exit
 from ..fmu.description import Description, Value, Variable
@@ -156,7 +157,15 @@ class Fmi3(Fmi2):
     def set(self, kind: str, variables: Sequence[Variable], values: Sequence[Value]) -> None:
         for name, places in _by_type(variables).items():
             given = [values[i] for i in places]
+            for i, value in zip(places, given, strict=True):
+                self._refuse_large(name, variables[i], value)
             getattr(self.slave, f"set{name}")([variables[i].reference for i in places], given)
+
+    def _refuse_large(self, name: str, variable: Variable, value: Value) -> None:
+        """Refuse a whole number that its type would cut off: C does so without a word."""
+        if isinstance(value, int) and _C_TYPES[name](value).value != value:
+            self._say("Error", f"{variable.name} = {value} does not fit into {name}.")
+            raise FMICallException(f"fmi3Set{name}", ERROR)
 
     def get(self, kind: str, variables: Sequence[Variable]) -> list[Value]:
         found: list[Value] = [0] * len(variables)
