@@ -76,7 +76,7 @@ def reset_binaries(ctypes: Any) -> int:
 def _loaded_libraries(ctypes: Any) -> list[str]:
     """Return the names of the shared libraries in this process, as they were given to load them."""
 
-    class Begin(ctypes.Structure):  # type: ignore[misc, name-defined]
+    class Begin(ctypes.Structure):  # type: ignore[misc]
         """The begin of a dl_phdr_info."""
 
         _fields_ = (("address", ctypes.c_void_p), ("name", ctypes.c_char_p))

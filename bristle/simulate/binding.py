@@ -225,7 +225,7 @@ class Fmi3(Fmi2):
         function = self._raw("fmi3DoStep")
         event, end, early = (ctypes.c_bool() for _ in range(3))
         last = ctypes.c_double()
-        answers = tuple(map(ctypes.byref, (event, end, early, last)))
+        answers = tuple(ctypes.byref(one) for one in (event, end, early, last))
 
         def step(component: Any, time: Any, length: Any, past: Any) -> int:
             status = function(component, time, length, past, *answers)

@@ -71,7 +71,7 @@ def test_rows_are_those_of_the_same_model_in_fmi_2(
         assert three["one.x"].iloc[-1] == pytest.approx(0.9**100, rel=1e-12)
     if name == "BouncingBall":  # before the first bounce; Euler steps of 1 ms
         assert three["one.h"].iloc[40] == pytest.approx(1 - 9.81 * 0.4**2 / 2, abs=3e-3)
-        assert three.attrs["units"] == {"one.h": "m", "one.v": "m/s"}
+        assert three.attrs["units"] == {"time": "s", "one.h": "m", "one.v": "m/s"}
 
 
 def chain(folder: Path, **given: Any) -> Path:
