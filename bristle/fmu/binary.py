@@ -16,6 +16,7 @@ This module is bundled in every FMU: standard library only.
 
 from __future__ import annotations
 
+import _thread
 import atexit
 import os
 import sys
@@ -30,7 +31,9 @@ _registered: list[str] = []
 def reset_at_exit() -> None:
     """Let `reset_binaries` run before the interpreter ends, whoever has loaded FMUs by then.
 
-    On Windows the binary resets its pointer in time; for other systems PythonFMU has none.
+    In a host that is not Python a thread of the binary ends the interpreter, when the C library has
+    begun to end the process: it is too late then, and nothing is done. On Windows the binary resets
+    its pointer in time; for other systems PythonFMU has none.
     """
     if _registered or not sys.platform.startswith("linux"):
         return
@@ -39,7 +42,13 @@ def reset_at_exit() -> None:
     except ImportError:  # a Python without libffi: it ends as it would without this module
         return
     _registered.append(RESET)
-    atexit.register(reset_binaries, ctypes)
+    atexit.register(_reset_in_time, ctypes)
+
+
+def _reset_in_time(ctypes: Any) -> None:
+    """Reset the pointers if this is the main thread of a Python host."""
+    if _thread.get_native_id() == os.getpid():
+        reset_binaries(ctypes)
 
 
 def hold(*objects: object) -> None:
