@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import BristleError, RunError
+from ..scenario.checks import STEP_TOLERANCE
 from .summary import judged_by, reals
 
 if TYPE_CHECKING:
@@ -244,7 +245,7 @@ def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> float:
 
 def _fits(scenario: Scenario) -> bool:
     count = scenario.stop / scenario.step
-    return count >= FEWEST_STEPS and abs(count - round(count)) < 1e-6
+    return count >= FEWEST_STEPS and abs(count - round(count)) <= STEP_TOLERANCE
 
 
 def finer(scenario: Scenario, parts: float) -> Scenario:
