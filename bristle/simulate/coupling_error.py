@@ -92,7 +92,7 @@ def estimate(
     """
     rows = len(frame)
     half = again(finer(scenario, 2), "fmu").iloc[::2]
-    exact = _coupled(scenario, again)
+    exact = coupled_run(scenario, again)
     quarter = again(finer(scenario, 4), "fmu").iloc[::4] if exact is None else None
     found = {}
     for name in reals(frame):
@@ -134,8 +134,8 @@ def against(h: Array, half: Array, exact: Array) -> CouplingError:
     ----------
     h, half, exact : (rows,) one output at the same times, at the step, at half of it, without error
     """
-    scale = _largest(exact) or 1.0
-    wrong, better = _largest(h - exact) / scale, _largest(half - exact) / scale
+    scale = largest(exact) or 1.0
+    wrong, better = largest(h - exact) / scale, largest(half - exact) / scale
     found = _judged(wrong, better, 1.0, h, exact)
     # Measured, not extrapolated: an error that falls faster than expected is as good as any.
     return replace(found, worth=found.worth or not found.order <= MOST_ORDER)
@@ -150,8 +150,8 @@ def extrapolated(h: Array, half: Array, quarter: Array) -> CouplingError:
     ----------
     h, half, quarter : (rows,) one output at the same times, at the step, half and a quarter of it
     """
-    scale = _largest(quarter) or 1.0
-    first, second = _largest(h - half) / scale, _largest(half - quarter) / scale
+    scale = largest(quarter) or 1.0
+    first, second = largest(h - half) / scale, largest(half - quarter) / scale
     ratio = first / second if second > 0.0 else nan
     factor = ratio / (ratio - 1.0) if ratio > 1.0 else 1.0
     return _judged(first, second, factor, h, half)
@@ -169,10 +169,10 @@ def _judged(wrong: float, better: float, factor: float, h: Array, other: Array) 
     if wrong <= ROUNDING:
         return CouplingError(0.0, 0.0, 0.0, nan, True)
     order = log2(wrong / better) if better > 0.0 else nan
-    peak, rms = _largest(other), _rms(other)
+    peak, rms = largest(other), _rms(other)
     return CouplingError(
         along=factor * wrong,
-        peak=factor * (_largest(h) / peak - 1.0) if peak > 0.0 else nan,
+        peak=factor * (largest(h) / peak - 1.0) if peak > 0.0 else nan,
         rms=factor * (_rms(h) / rms - 1.0) if rms > 0.0 else nan,
         order=order,
         worth=isfinite(order) and LEAST_ORDER <= order <= MOST_ORDER,
@@ -261,7 +261,7 @@ def as_data(errors: dict[str, CouplingError]) -> dict[str, dict[str, Any]]:
     return {name: asdict(error) for name, error in errors.items()}
 
 
-def _coupled(
+def coupled_run(
     scenario: Scenario, again: Callable[[Scenario, str], pd.DataFrame]
 ) -> pd.DataFrame | None:
     """Return the run without coupling error, None where there is no such engine for it."""
@@ -271,7 +271,8 @@ def _coupled(
         return None
 
 
-def _largest(values: Array) -> float:
+def largest(values: Array) -> float:
+    """Return the largest absolute value, 0 where there is none."""
     return float(np.abs(values).max(initial=0.0))
 
 

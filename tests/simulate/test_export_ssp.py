@@ -19,8 +19,9 @@ from bristle import run
 from bristle.errors import ScenarioError
 from bristle.fmu.description import read_description
 from bristle.scenario.export_ssp import export_ssp
-from bristle.scenario.scenario import load_scenario
+from bristle.scenario.scenario import Scenario, load_scenario
 from bristle.simulate.elsewhere import expect
+from bristle.simulate.run import run_quietly
 
 SCENARIO = """
 schema = 1
@@ -288,8 +289,47 @@ def sampled(order: float, scale: float = 0.1) -> Any:
 def test_the_error_to_expect_and_the_step_that_keeps_it_small(scenario: Path) -> None:
     for one in expect(load_scenario(scenario), sampled(1.0)):
         assert one.error == pytest.approx(0.1, rel=0.1)
-        assert one.step == 0.002 / 32  # 0.1/32 is the first below 0.005
-        assert "0.0625 ms" in str(one)
+        assert one.step == one.tried == 0.002 / 32  # 0.1/32 is the first below 0.005
+        assert one.tried_error == pytest.approx(0.1 / 32, rel=0.02)
+        assert "0.31 % at a step of 0.0625 ms" in str(one)
+
+
+def test_a_step_that_the_order_promises_and_a_run_does_not_keep_is_halved(scenario: Path) -> None:
+    def again(one: Scenario, engine: str) -> pd.DataFrame:
+        frame = sampled(1.0)(one, engine)
+        if one.step == 0.002 / 32:
+            frame["damper.force"] += 0.004 * np.sin(frame.index)
+        return frame
+
+    assert [one.step for one in expect(load_scenario(scenario), again)] == [0.002 / 64] * 2
+
+
+def test_where_no_step_is_short_enough_the_error_at_the_shortest_is_told(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bristle.simulate.elsewhere.MOST_STEPS", 1000)  # 250 in the scenario
+    for one in expect(load_scenario(scenario), sampled(1.0)):
+        assert (one.step, one.tried) == (None, 0.002 / 4)
+        assert one.tried_error == pytest.approx(0.1 / 4, rel=0.05)
+        assert "no step down to 0.5 ms keeps it below 0.5 %: it is 2.5 % there" in str(one)
+
+
+def test_a_small_error_needs_no_shorter_step(scenario: Path) -> None:
+    for one in expect(load_scenario(scenario), sampled(1.0, scale=0.002)):
+        assert one.step == 0.002
+        assert str(one).endswith("0.2 % along the run")
+
+
+@pytest.mark.slow
+def test_the_step_that_is_told_keeps_the_error_of_a_closed_loop(loop: Path) -> None:
+    file = loop.with_suffix(".toml")
+    for one in expect(load_scenario(file), run_quietly):
+        given = {"run.step": one.step, "run.algorithm": one.algorithm}
+        frame, exact = run(file, given), run(file, given, engine="compiled")
+        wrong = (frame - exact).abs().max() / exact.abs().max()
+        assert wrong["damper.force"] <= 0.005
+        assert one.tried_error is not None
+        assert wrong["damper.force"] <= 1.001 * one.tried_error
 
 
 def test_an_error_that_does_not_fall_is_told(scenario: Path) -> None:
