@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
 from bristle.scenario.text import toml_key, toml_value
 
@@ -27,6 +28,7 @@ DAMPERS = {
     "ModifiedBoucWenDamper": "modified_bouc_wen",
 }
 DAMPER_EFFECTS = ("gas_spring", "coil_lag", "stribeck", "mount_compliance", "remanence")
+"""Drawn from where the law takes them."""
 DESIGNED = ("ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped")
 """Controllers that were designed for the default building."""
 ALGORITHMS = ("midpoint", "gauss-seidel", "jacobi", "midpoint-iterated")
@@ -112,7 +114,8 @@ def _damper(random: np.random.Generator) -> dict[str, object]:
         if name not in ("exponent", "n")
     }
     if random.random() < 0.25:
-        given[f"{random.choice(DAMPER_EFFECTS)}.on"] = True
+        taken = [name for name in DAMPER_EFFECTS if EFFECTS[name].joins(LAWS[DAMPERS[fmu]])]
+        given[f"{random.choice(taken)}.on"] = True
     return {"fmu": fmu, "parameters": given}
 
 

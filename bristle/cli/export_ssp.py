@@ -1,7 +1,7 @@
 """Write a scenario as an SSP package for other tools, and say how far off they will be.
 
 OMSimulator, libcosim, Ecos and others run it where bristle is not installed. They hold inputs over
-a step, which makes a coupling error: its size is printed, with a step at which a run keeps it below 0.5 %.
+a step, which makes a coupling error: its size is printed, with a step that keeps it below 0.5 %.
 """
 
 from __future__ import annotations

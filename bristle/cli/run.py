@@ -103,8 +103,8 @@ def _step_for(
     """Return the step [s] that keeps the tolerance, and say it."""
     from ..errors import not_usable
     from ..scenario.scenario import load_scenario
-    from ..simulate.coupling_error import find_step
     from ..simulate.run import run_quietly
+    from ..simulate.tolerance import find_step
 
     if arguments.engine != "fmu":
         raise not_usable('--tolerance: engine "compiled" makes no coupling error; "fmu" does.')

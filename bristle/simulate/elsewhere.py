@@ -11,8 +11,9 @@ from math import ceil, isfinite, log2
 from typing import TYPE_CHECKING
 
 from ..errors import RunError
-from .coupling_error import CouplingError, coupled_run, estimate, finer, largest, worst
+from .coupling_error import CouplingError, coupled_run, estimate, finer, largest
 from .summary import judged_by
+from .tolerance import worst
 
 if TYPE_CHECKING:
     import pandas as pd
