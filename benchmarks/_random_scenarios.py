@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ ALGORITHMS = ("midpoint", "gauss-seidel", "jacobi", "midpoint-iterated")
 SHARES = (0.4, 0.25, 0.2, 0.15)
 """How often each of them is drawn."""
 
-Parts = dict[str, dict[str, object]]
+Parts = dict[str, dict[str, Any]]
 
 
 def write_random(seed: int, folder: Path) -> Path:
@@ -66,13 +67,13 @@ def write_random(seed: int, folder: Path) -> Path:
     else:
         _voltage(random, parts, wires, level)
     if parts["damper"]["fmu"] == "BinghamDamper" and designed and random.random() < 0.5:
-        parts["damper"]["parameters"] |= {"moving_mass": 1.9693563369446}  # type: ignore[operator]
+        parts["damper"]["parameters"] |= {"moving_mass": 1.9693563369446}
         wires["damper.holding_force"] = "structure.holding_force"
     # The ground comes before the structure, all else in any order.
     order = list(random.permutation([name for name in parts if name != "ground"]))
     order.insert(random.integers(order.index("structure") + 1), "ground")
     step = float(random.choice([0.0005, 0.001, 0.002, 0.0025, 0.004]))
-    run = {
+    run: dict[str, Any] = {
         "stop": round(LENGTH / step) * step,
         "step": step,
         "algorithm": str(random.choice(ALGORITHMS, p=SHARES)),
@@ -93,7 +94,7 @@ def _building(random: np.random.Generator, file: Path) -> str:
     if isolated:
         layer = masses.sum() * (2.0 * np.pi * random.uniform(0.6, 1.6)) ** 2
         stiffnesses = np.concatenate([[layer], stiffnesses])
-    data = {
+    data: dict[str, Any] = {
         "schema": 1,
         "masses": [round(float(m), 3) for m in masses],
         "stiffnesses": [round(float(k), 1) for k in stiffnesses],
@@ -105,10 +106,10 @@ def _building(random: np.random.Generator, file: Path) -> str:
     return "base" if isolated else "floor1"
 
 
-def _damper(random: np.random.Generator) -> dict[str, object]:
+def _damper(random: np.random.Generator) -> dict[str, Any]:
     """Return a damper of any law, its parameters off the usual ones, an effect now and then."""
     fmu = str(random.choice(list(DAMPERS)))
-    given: dict[str, object] = {
+    given: dict[str, Any] = {
         name: parameter.value * float(np.exp(random.uniform(-0.3, 0.3)))
         for name, parameter in LAWS[DAMPERS[fmu]].parameters.items()
         if name not in ("exponent", "n")
@@ -119,7 +120,7 @@ def _damper(random: np.random.Generator) -> dict[str, object]:
     return {"fmu": fmu, "parameters": given}
 
 
-def _ground(random: np.random.Generator, file: Path) -> tuple[dict[str, object], str]:
+def _ground(random: np.random.Generator, file: Path) -> tuple[dict[str, Any], str]:
     """Return a record, written into a file, or a signal, and the name of its output."""
     size = float(random.uniform(0.5, 4.0))
     if random.random() < RECORDED:
@@ -132,7 +133,7 @@ def _ground(random: np.random.Generator, file: Path) -> tuple[dict[str, object],
         given = {"record": file.name, "peak": size, "factor": 1.0}
         return {"fmu": "GroundMotion", "parameters": given}, "ground_acceleration"
     kind = str(random.choice(["half_sine", "sine", "chirp"]))
-    signal: dict[str, object] = {"kind": kind, "amplitude": size}
+    signal: dict[str, Any] = {"kind": kind, "amplitude": size}
     if kind == "half_sine":
         signal["duration"] = float(random.uniform(0.1, 0.6))
     elif kind == "sine":
@@ -151,7 +152,7 @@ def _voltage(random: np.random.Generator, parts: Parts, wires: dict[str, str], l
         given = {"kind": str(kind), "gain": float(random.uniform(20.0, 120.0))}
         _controller(parts, wires, {"fmu": "Skyhook", "parameters": given}, level)
         return
-    signal: dict[str, object] = {"level": float(random.uniform(0.0, 8.0))}
+    signal: dict[str, Any] = {"level": float(random.uniform(0.0, 8.0))}
     if kind == "sine":
         signal = {"kind": "sine", "offset": 4.0, "amplitude": 4.0}
         signal["frequency"] = float(random.uniform(0.3, 3.0))
@@ -166,7 +167,7 @@ def _voltage(random: np.random.Generator, parts: Parts, wires: dict[str, str], l
 
 
 def _controller(
-    parts: Parts, wires: dict[str, str], controller: dict[str, object], floor: str
+    parts: Parts, wires: dict[str, str], controller: dict[str, Any], floor: str
 ) -> None:
     parts["controller"] = controller
     moved = wires["damper.displacement"].removesuffix("_displacement")
@@ -179,7 +180,7 @@ def _controller(
     }
 
 
-def _text(run: dict[str, object], parts: Parts, wires: dict[str, str]) -> str:
+def _text(run: dict[str, Any], parts: Parts, wires: dict[str, str]) -> str:
     lines = ["schema = 1", "", "[run]"]
     lines += [f"{key} = {toml_value(value)}" for key, value in run.items()]
     for name, part in parts.items():
@@ -190,7 +191,7 @@ def _text(run: dict[str, object], parts: Parts, wires: dict[str, str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _value(value: object) -> str:
+def _value(value: Any) -> str:
     if isinstance(value, dict):
         return f"{{ {', '.join(f'{toml_key(k)} = {toml_value(v)}' for k, v in value.items())} }}"
     return toml_value(value)

@@ -24,7 +24,9 @@ from bristle.simulate.coupling_error import (
     extrapolated,
     without_doubtful,
 )
+from bristle.simulate.nodes import make_nodes
 from bristle.simulate.run import run_quietly
+from bristle.simulate.schedule import held_inputs
 from bristle.simulate.tolerance import find_step
 
 T = np.linspace(0.0, 3.0, 301)
@@ -184,6 +186,10 @@ def test_a_signal_of_steps_is_not_told_ahead_and_spoils_jacobi_alone() -> None:
         changed = {**given, **steps, "run.stop": 0.02, "run.algorithm": algorithm}
         scenario = load_scenario("half_sine_pulse", changed)
         assert discrete_outputs(scenario) == ["voltage.value"]
+        nodes = make_nodes(scenario, {c.name: c.description for c in scenario.components})
+        damper = [node.name for node in nodes].index("damper")
+        assert (damper, "voltage") not in held_inputs(nodes)
+        assert (damper, "velocity") in held_inputs(nodes)
         frame = run_quietly(scenario, "fmu")
         good = against(off(0.01), off(0.005), EXACT)
         found = dict.fromkeys(map(str, frame), good) | {
