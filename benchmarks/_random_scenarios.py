@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+import bristle.physics.effects  # noqa: F401  all of them are then registered
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import LAWS
 from bristle.scenario.text import toml_key, toml_value
