@@ -19,7 +19,7 @@ from dataclasses import asdict
 from . import __path__ as folder
 from ._rows import Row
 
-COUNTED = ("instruments", "lab", "law_free", "learned", "limits", "plan", "prediction")
+COUNTED = ("instruments", "lab", "law_free", "learned", "limits", "plan", "prediction", "stated")
 """Benchmarks whose own options say how many cases are made."""
 
 
