@@ -276,7 +276,10 @@ class _Job:
                 self.made["energy_residual"] = energy_residuals(
                     master.nodes, self.scenario.algorithm, self.scenario.step, table
                 )
-            return self._end(table, stopped, interrupt.asked and master.rows <= master.steps)
+            frame = self._end(table, stopped, interrupt.asked and master.rows <= master.steps)
+            if interrupt.asked:  # a caller that makes many runs is to stop as well
+                raise RunInterrupted("interrupted after the last step; every row is kept.", frame)
+            return frame
 
     def _go(self, master: Master, interrupt: Interrupt, progress: bool) -> None:
         from ..progress import Progress
