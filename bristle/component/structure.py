@@ -210,11 +210,12 @@ def effect_steps(
     copy(state, size, z1, 0, states)
     setup = Setup(n, c.isolated, c.stiffnesses, c.phi, c.held, c.ramp, c.h, c.p, c.on, True)
     a0, a1 = before[GROUND_ACCELERATION], now[GROUND_ACCELERATION]
+    forces_between(before, now, 0.0, c, f1)
     for k in range(c.substeps):
         s, e = k / c.substeps, (k + 1.0) / c.substeps
         copy(new_state, 0, x0, 0, size)
         copy(z1, 0, z0, 0, states)
-        forces_between(before, now, s, c, f0)
+        copy(f1, 0, f0, 0, n)
         forces_between(before, now, e, c, f1)
         loads = Loads(a0 + s * (a1 - a0), a0 + e * (a1 - a0), f0, f1, 0.0)
         effects_step(setup, loads, x0, z0, new_state, z1, room)

@@ -27,7 +27,7 @@ from ..component.damper import (
     VOLTAGE,
     VOLTAGE_AT_END,
 )
-from ..component.structure import DAMPER_FORCE, EXTRA_FORCE
+from ..component.devices import DAMPER_FORCE, DEVICE_FORCES, EXTRA_FORCE
 from ..control.switching import limited
 from ..physics.inputs import Setup
 from ..physics.laws import laws_of
@@ -55,7 +55,8 @@ INLINE = (
     *("time_loop.damper_constants", "time_loop.structure_constants"),
     *("damper.step", "damper.stick_force", "switching.limited"),
     *("structure.step", "structure.settle", "structure.output", "structure.show_motion"),
-    *("structure.free_step", "structure.add_force", "structure.copy"),
+    *("structure.free_step", "structure.add_force", "structure.copy", "devices.add_devices"),
+    *("devices.show_device_motion", "devices.load_upper_levels", "devices.show_holding_forces"),
     *("controller.step", "controller.sample", "sensors.step"),
     *("codegen.step_law", "falling.falling"),
     *(
@@ -163,7 +164,7 @@ def start(dampers: Any, structures: Any, h: float, s: Any) -> None:
             d = dampers[i]
             gather(d.inputs, s, d.now)
             if d.on_structure >= 0:
-                d.now[HOLDING_FORCE] = s[structures[d.on_structure].holding] / d.sharing
+                d.now[HOLDING_FORCE] = s[d.holding] / d.sharing
             c, state = damper_constants(d), d.state[:]
             damper_start(0.0, d.now[:], c, state, s[d.first :], d.work[:])
             state[LAST_STEP] = h
@@ -175,10 +176,12 @@ def begin(dampers: Any, structures: Any, s: Any) -> None:
     """Keep what a substep begins from, and extrapolate the forces to its end."""
     for i in range(len(structures)):
         b = structures[i]
-        gather(b.inputs, s, b.before)
+        gather(b.inputs[0 : DEVICE_FORCES + b.devices], s, b.before)
         b.smooth0 = (
             b.before[DAMPER_FORCE] + b.before[EXTRA_FORCE] - s[b.friction] - s[b.extra_friction]
         )
+        for k in range(b.devices):
+            b.smooths[k] = b.before[DEVICE_FORCES + k] - s[b.frictions[k]]
     for i in range(len(dampers)):
         d = dampers[i]
         gather(d.inputs, s, d.before)
@@ -188,9 +191,11 @@ def begin(dampers: Any, structures: Any, s: Any) -> None:
 
 def move(b: Any, clock: Any, s: Any) -> None:
     """Take a structure to the end of the substep under the forces of the present sweep."""
-    gather(b.inputs, s, b.now)
+    gather(b.inputs[0 : DEVICE_FORCES + b.devices], s, b.now)
     b.before[DAMPER_FORCE] = b.smooth0 + s[b.friction] + s[b.extra_friction]
     b.before[EXTRA_FORCE] = 0.0
+    for k in range(b.devices):
+        b.before[DEVICE_FORCES + k] = b.smooths[k] + s[b.frictions[k]]
     structure_step(
         clock, b.before[:], b.now[:], structure_constants(b), b.state[0 : b.n_states],
         b.new_state[0 : b.n_states], s[b.first :], b.work[:],
@@ -363,7 +368,7 @@ def respond(dampers: Any, structures: Any, s: Any) -> None:
 
 def show(b: Any, state: Any, s: Any) -> None:
     """Write accelerations and holding force of a structure in a state into the signals."""
-    gather(b.inputs, s, b.now)
+    gather(b.inputs[0 : DEVICE_FORCES + b.devices], s, b.now)
     c, now = structure_constants(b), state[0 : b.n_states]
     settle(c, now, b.work[:])
     structure_output(0.0, b.now[:], c, now, s[b.first :], b.work[:])
@@ -389,4 +394,5 @@ def structure_constants(b: Any) -> structure.Constants:
     return StructureConstants(
         b.n, b.isolated, b.mass, b.m_inverse[:], b.damping[:], b.stiffness[:], b.stiffnesses[:],
         b.p[:], b.on[:], b.active, b.touches, True, 1, b.h, b.phi[:], b.held[:], b.ramp[:],
+        b.lower[0 : b.devices], b.upper[0 : b.devices], b.driven[0 : b.devices],
     )  # fmt: skip
