@@ -38,12 +38,13 @@ def add_devices(before: Row, now: Row, c: Constants, new_state: Row) -> None:
     c : Constants
     new_state : state at the end, changed in place
     """
-    for k in range(len(c.upper)):
+    for k in range(c.devices):
+        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
         f1 = now[DEVICE_FORCES + k]
         f0 = before[DEVICE_FORCES + k] if c.linear else f1
-        add_force(c.n, c.held, c.ramp, c.upper[k], f0, f1, new_state)
-        if c.lower[k] != GROUND:
-            add_force(c.n, c.held, c.ramp, c.lower[k], -f0, -f1, new_state)
+        add_force(c.n, c.held, c.ramp, upper, f0, f1, new_state)
+        if lower != GROUND:
+            add_force(c.n, c.held, c.ramp, lower, -f0, -f1, new_state)
 
 
 def forces_between(before: Row, now: Row, share: float, c: Constants, forces: Row) -> None:
@@ -61,13 +62,25 @@ def forces_between(before: Row, now: Row, share: float, c: Constants, forces: Ro
     f1 = now[DAMPER_FORCE] + now[EXTRA_FORCE]
     f0 = before[DAMPER_FORCE] + before[EXTRA_FORCE] if c.linear else f1
     forces[0] = f0 + share * (f1 - f0)
-    for k in range(len(c.upper)):
+    for k in range(c.devices):
+        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
         f1 = now[DEVICE_FORCES + k]
         f0 = before[DEVICE_FORCES + k] if c.linear else f1
         force = f0 + share * (f1 - f0)
-        forces[c.upper[k]] += force
-        if c.lower[k] != GROUND:
-            forces[c.lower[k]] -= force
+        forces[upper] += force
+        if lower != GROUND:
+            forces[lower] -= force
+
+
+def devices_at_first_level(inputs: Row, c: Constants) -> float:
+    """Return the force of the building's own devices on the first level [N]."""
+    total = 0.0
+    for k in range(c.devices):
+        if c.ends[2 * k + 1] == 0:
+            total += inputs[DEVICE_FORCES + k]
+        elif c.ends[2 * k] == 0:
+            total -= inputs[DEVICE_FORCES + k]
+    return total
 
 
 def show_device_motion(c: Constants, state: Row, outputs: Row, at: int) -> None:
@@ -80,10 +93,11 @@ def show_device_motion(c: Constants, state: Row, outputs: Row, at: int) -> None:
     outputs : as in `structure.start`, changed in place
     at : place of the first device's outputs
     """
-    for k in range(len(c.upper)):
+    for k in range(c.devices):
+        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
         for j in range(2):
-            i = c.upper[k] + j * c.n
-            below = state[c.lower[k] + j * c.n] if c.lower[k] != GROUND else 0.0
+            i = upper + j * c.n
+            below = state[lower + j * c.n] if lower != GROUND else 0.0
             outputs[at + j] = state[i] - below
         at += PER_DEVICE
 
@@ -98,14 +112,15 @@ def load_upper_levels(inputs: Row, c: Constants, outputs: Row) -> None:
     outputs : as in `structure.start`, the absolute accelerations among them changed in place
     """
     n = c.n
-    for k in range(len(c.upper)):
+    for k in range(c.devices):
+        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
         force = inputs[DEVICE_FORCES + k]
         for i in range(n):
             row, at = i * n, PER_LEVEL * i + 2
-            if c.upper[k] > 0:
-                outputs[at] -= c.m_inverse[row + c.upper[k]] * force
-            if c.lower[k] > 0:
-                outputs[at] += c.m_inverse[row + c.lower[k]] * force
+            if upper > 0:
+                outputs[at] -= c.m_inverse[row + upper] * force
+            if lower > 0:
+                outputs[at] += c.m_inverse[row + lower] * force
 
 
 def show_holding_forces(inputs: Row, left: float, c: Constants, outputs: Row, at: int) -> None:
@@ -122,15 +137,25 @@ def show_holding_forces(inputs: Row, left: float, c: Constants, outputs: Row, at
     outputs : as in `structure.start`, with the absolute accelerations; holding forces are filled
     at : place of the first device's
     """
-    for k in range(len(c.upper)):
+    for k in range(c.devices):
+        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
         force = inputs[DEVICE_FORCES + k]
-        if c.upper[k] == 0:
+        if upper == 0:
             outputs[at] = left + force
         else:
-            apart = outputs[PER_LEVEL * c.upper[k] + 2]
-            if c.lower[k] == GROUND:
+            apart = outputs[PER_LEVEL * upper + 2]
+            if lower == GROUND:
                 apart -= inputs[GROUND_ACCELERATION]
             else:
-                apart -= outputs[PER_LEVEL * c.lower[k] + 2]
-            outputs[at] = force + c.driven[k] * apart
+                apart -= outputs[PER_LEVEL * lower + 2]
+            outputs[at] = force + apart / gain(lower, upper, c)
         at += PER_DEVICE
+
+
+def gain(lower: int, upper: int, c: Constants) -> float:
+    """Return what a device's force accelerates its ends to each other by [1/kg]."""
+    n, total = c.n, c.m_inverse[upper * c.n + upper]
+    if lower != GROUND:
+        total += c.m_inverse[lower * n + lower]
+        total -= c.m_inverse[lower * n + upper] + c.m_inverse[upper * n + lower]
+    return total

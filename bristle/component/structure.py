@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..physics.building import Building
-from ..physics.device import driven_mass
 from ..physics.effect import effects_of
 from ..physics.linear import Row, copy
 from ..physics.structure import (
@@ -32,12 +32,12 @@ from ..physics.structure import step as effects_step
 from .damper import stick_force
 from .devices import (
     DAMPER_FORCE,
-    DEVICE_FORCES,
     EXTRA_FORCE,
     GROUND_ACCELERATION,
     PER_DEVICE,
     PER_LEVEL,
     add_devices,
+    devices_at_first_level,
     forces_between,
     load_upper_levels,
     show_device_motion,
@@ -52,8 +52,8 @@ class Constants(NamedTuple):
     `physics.structure.Matrices`; `p`, `on` the parameters and switches of effects, any of which is
     `active`, one of which is a contact that `touches`. `substeps` of `h` [s] make a step, whose
     matrices are `phi`, `held`, `ramp` (see `discretise`). Forces are `linear` over a step, or held.
-    Each device acts between level `lower` and level `upper` (d,), and accelerates the mass `driven`
-    (d,) [kg].
+    Each of the `devices` acts between two levels, which follow each other in `ends`, the lower one
+    first; -1 is the ground.
     """
 
     n: int
@@ -73,9 +73,8 @@ class Constants(NamedTuple):
     phi: Row = ()
     held: Row = ()
     ramp: Row = ()
-    lower: Row = ()
-    upper: Row = ()
-    driven: Row = ()
+    devices: int = 0
+    ends: Sequence[int] = ()
 
 
 def setup(
@@ -93,9 +92,8 @@ def setup(
         [effect.name in effects for effect in effects_of("structure")], bool(effects),
         any(effect.contact and effect.name in effects for effect in effects_of("structure")),
         linear=False,
-        lower=[device.lower for device in building.devices],
-        upper=[device.upper for device in building.devices],
-        driven=[driven_mass(building.M, device) for device in building.devices],
+        devices=len(building.devices),
+        ends=[level for device in building.devices for level in device.levels],
     )  # fmt: skip
     state = [0.0] * (2 * m.n) + start_states(m.n, values) + [0.0] * (m.n + 1)
     work = [0.0] * room(m.n)
@@ -179,7 +177,8 @@ def step(
         f1 = now[DAMPER_FORCE] + now[EXTRA_FORCE]
         f0 = before[DAMPER_FORCE] + before[EXTRA_FORCE] if c.linear else f1
         add_force(n, c.held, c.ramp, 0, f0, f1, new_state)
-        add_devices(before, now, c, new_state)
+        if c.devices > 0:
+            add_devices(before, now, c, new_state)
     show_motion(c, new_state, outputs)
     if c.linear:
         return 0
@@ -245,7 +244,8 @@ def show_motion(c: Constants, state: Row, outputs: Row) -> None:
     for i in range(1 if c.isolated else 0, n):
         outputs[at] = state[i] - (state[i - 1] if i > 0 else 0.0)
         at += 1
-    show_device_motion(c, state, outputs, at + 1)
+    if c.devices > 0:
+        show_device_motion(c, state, outputs, at + 1)
 
 
 def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
@@ -270,28 +270,25 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     """
     n, end = c.n, len(state) - c.n - 1
     others = inputs[EXTRA_FORCE]
-    for k in range(len(c.upper)):
-        if c.upper[k] == 0:
-            others += inputs[DEVICE_FORCES + k]
-        elif c.lower[k] == 0:
-            others -= inputs[DEVICE_FORCES + k]
+    if c.devices > 0:
+        others += devices_at_first_level(inputs, c)
     force = inputs[DAMPER_FORCE] + others
     hold = state[end + n] - c.mass * inputs[GROUND_ACCELERATION]
-    contact = 0.0
+    left = hold - force
     if c.touches:
-        stick = stick_force(hold - force, state[n], c.mass, EFFECT_STEP)
-        contact = resting_contact(
+        stick = stick_force(left, state[n], c.mass, EFFECT_STEP)
+        force += resting_contact(
             n, c.isolated, c.stiffnesses, state, stick, state[2 * n : end], c.p, c.on
         )
     m_inverse, at = c.m_inverse, 2
     for i in range(n):
-        outputs[at] = state[end + i] - m_inverse[i * n] * (force + contact)
+        outputs[at] = state[end + i] - m_inverse[i * n] * force
         at += PER_LEVEL
     at = PER_LEVEL * n + (n - 1 if c.isolated else n)
     outputs[at] = hold - others
-    if len(c.upper) > 0:
+    if c.devices > 0:
         load_upper_levels(inputs, c, outputs)
-        show_holding_forces(inputs, hold - force, c, outputs, at + PER_DEVICE)
+        show_holding_forces(inputs, left, c, outputs, at + PER_DEVICE)
     return 0
 
 

@@ -80,8 +80,9 @@ def damper_record() -> np.dtype[np.void]:
 def structure_record() -> np.dtype[np.void]:
     """Return the record of a structure: see `component.structure.Constants`, and what couples it.
 
-    `friction`, `extra_friction` and `frictions` are slots of signals: how much of the damper's
-    force, the extra one and those of the `devices` is friction.
+    `forces` are the slots of the inputs behind the first three, those of the `devices`; `friction`,
+    `extra_friction` and `frictions` those of how much of the damper's force, the extra one and the
+    devices' is friction.
     smooth0 is the damper's and the extra force without friction at the begin, `smooths` that of
     each device. It is `followed` by a component that reads more than its motion.
     """
@@ -92,11 +93,10 @@ def structure_record() -> np.dtype[np.void]:
     return np.dtype(
         [
             *((name, _INT) for name in ("n", "n_states", "devices", *slots)),
-            *((name, _INT, (most,)) for name in ("lower", "upper", "frictions")),
-            *((name, _FLOAT, (most,)) for name in ("driven", "smooths")),
             *((name, _FLOAT) for name in ("mass", "h", "smooth0")),
             *((name, _FLAG) for name in ("active", "touches", "isolated", "followed")),
-            *_inputs(DEVICE_FORCES + most),
+            ("inputs", _INT, (DEVICE_FORCES,)),
+            *((name, _FLOAT, (DEVICE_FORCES + most,)) for name in ("before", "now")),
             *((name, _FLOAT, (states,)) for name in ("state", "new_state")),
             ("stiffnesses", _FLOAT, (n,)),
             *((name, _FLOAT, (n * n,)) for name in ("m_inverse", "damping", "stiffness")),
@@ -105,6 +105,9 @@ def structure_record() -> np.dtype[np.void]:
             ("p", _FLOAT, (max(1, slots_of_effects.p_size),)),
             ("on", _SWITCH, (max(1, len(slots_of_effects.effects)),)),
             ("work", _FLOAT, (structure_component.room(n),)),
+            ("ends", _INT, (2 * most,)),
+            *((name, _INT, (most,)) for name in ("forces", "frictions")),
+            ("smooths", _FLOAT, (most,)),
         ],
         align=True,
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..component import controller, damper, sensors, source, structure
+from ..component.devices import DEVICE_FORCES
 from ..data import ground_motion_file
 from ..errors import ScenarioError
 from ..fmu import catalogue
@@ -199,8 +200,9 @@ class System:
                 stiffness=c.stiffness, phi=c.phi, held=c.held, ramp=c.ramp, p=c.p, on=c.on,
                 state=state, new_state=state,
             )  # fmt: skip
-            _fill(record, inputs=self._inputs(name), lower=c.lower, upper=c.upper, driven=c.driven)
-            record["first"], record["devices"] = self._first(name), len(c.upper)
+            inputs = self._inputs(name)
+            _fill(record, inputs=inputs[:DEVICE_FORCES], forces=inputs[DEVICE_FORCES:], ends=c.ends)
+            record["first"], record["devices"] = self._first(name), c.devices
             record["n_states"], record["followed"] = len(state), self._followed(name)
             for field, port in (("friction", "damper_force"), ("extra_friction", "extra_force")):
                 record[field] = self._friction_at(name, port)

@@ -52,11 +52,10 @@ MAX_SWEEPS = 40
 INLINE = (
     *("time_loop.play", "time_loop.start", "time_loop.begin", "time_loop.move"),
     *("time_loop.correct", "time_loop.accept", "time_loop.gather"),
-    *("time_loop.damper_constants", "time_loop.structure_constants"),
+    *("time_loop.gather_forces", "time_loop.damper_constants", "time_loop.structure_constants"),
     *("damper.step", "damper.stick_force", "switching.limited"),
     *("structure.step", "structure.settle", "structure.output", "structure.show_motion"),
-    *("structure.free_step", "structure.add_force", "structure.copy", "devices.add_devices"),
-    *("devices.show_device_motion", "devices.load_upper_levels", "devices.show_holding_forces"),
+    *("structure.free_step", "structure.add_force", "structure.copy"),
     *("controller.step", "controller.sample", "sensors.step"),
     *("codegen.step_law", "falling.falling"),
     *(
@@ -176,7 +175,7 @@ def begin(dampers: Any, structures: Any, s: Any) -> None:
     """Keep what a substep begins from, and extrapolate the forces to its end."""
     for i in range(len(structures)):
         b = structures[i]
-        gather(b.inputs[0 : DEVICE_FORCES + b.devices], s, b.before)
+        gather_forces(b, s, b.before)
         b.smooth0 = (
             b.before[DAMPER_FORCE] + b.before[EXTRA_FORCE] - s[b.friction] - s[b.extra_friction]
         )
@@ -191,7 +190,7 @@ def begin(dampers: Any, structures: Any, s: Any) -> None:
 
 def move(b: Any, clock: Any, s: Any) -> None:
     """Take a structure to the end of the substep under the forces of the present sweep."""
-    gather(b.inputs[0 : DEVICE_FORCES + b.devices], s, b.now)
+    gather_forces(b, s, b.now)
     b.before[DAMPER_FORCE] = b.smooth0 + s[b.friction] + s[b.extra_friction]
     b.before[EXTRA_FORCE] = 0.0
     for k in range(b.devices):
@@ -368,7 +367,7 @@ def respond(dampers: Any, structures: Any, s: Any) -> None:
 
 def show(b: Any, state: Any, s: Any) -> None:
     """Write accelerations and holding force of a structure in a state into the signals."""
-    gather(b.inputs[0 : DEVICE_FORCES + b.devices], s, b.now)
+    gather_forces(b, s, b.now)
     c, now = structure_constants(b), state[0 : b.n_states]
     settle(c, now, b.work[:])
     structure_output(0.0, b.now[:], c, now, s[b.first :], b.work[:])
@@ -378,6 +377,13 @@ def gather(slots: Any, s: Any, values: Any) -> None:
     """Read a component's inputs from the signals."""
     for j in range(len(slots)):
         values[j] = s[slots[j]]
+
+
+def gather_forces(b: Any, s: Any, values: Any) -> None:
+    """Read a structure's inputs from the signals."""
+    gather(b.inputs, s, values)
+    for k in range(b.devices):
+        values[DEVICE_FORCES + k] = s[b.forces[k]]
 
 
 def damper_constants(d: Any) -> damper.Constants:
@@ -394,5 +400,5 @@ def structure_constants(b: Any) -> structure.Constants:
     return StructureConstants(
         b.n, b.isolated, b.mass, b.m_inverse[:], b.damping[:], b.stiffness[:], b.stiffnesses[:],
         b.p[:], b.on[:], b.active, b.touches, True, 1, b.h, b.phi[:], b.held[:], b.ramp[:],
-        b.lower[0 : b.devices], b.upper[0 : b.devices], b.driven[0 : b.devices],
+        b.devices, b.ends[:],
     )  # fmt: skip
