@@ -94,6 +94,12 @@ def compiled(
             numba.config.CACHE_DIR = before
 
 
+def kept(function: Callable[..., Any]) -> bool:
+    """Return whether machine code of a function is on disk, or cannot be kept there."""
+    folder = _folder(function)
+    return folder is None or any(folder.rglob("*.nbi"))
+
+
 def _folder(function: Callable[..., Any]) -> Path | None:
     """Return where machine code is kept, or None where nothing can be written."""
     folder = cache_folder() / "numba" / digest(function)

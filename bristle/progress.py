@@ -159,7 +159,7 @@ class Count:
     def __init__(self, what: str, total: int) -> None:
         self._what, self._total, self._done = what, total, 0
         self._teller = _teller.get()
-        self._began = time.monotonic()
+        self._first = 0.0
         self._lock = threading.Lock()
 
     def done(self, name: str = "", note: str = "") -> None:
@@ -168,8 +168,9 @@ class Count:
             return
         with self._lock:
             self._done += 1
-            spent = time.monotonic() - self._began
-            left = spent / self._done * (self._total - self._done)
+            now = time.monotonic()
+            self._first = self._first or now  # the first one compiles: it says nothing of the rest
+            left = (now - self._first) / max(1, self._done - 1) * (self._total - self._done)
             text = f"{self._what} {self._done} of {self._total}"
             text += f", {name}" if name else ""
             text += f"; {note}" if note else ""

@@ -19,6 +19,7 @@ from ..identify.model import steady
 from ..identify.search import HUBER, loss
 from ..physics.effect import EFFECTS
 from .effect_size import Known, Sized
+from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
 
@@ -39,6 +40,11 @@ ONE_SIDED, TWO_SIDED = 1.645, 1.96
 
 NINE_OF_TEN = 1.282
 """Standard deviations above the mean that 9 of 10 stay below."""
+
+MARGIN = 1.2
+"""Factor on the distance from which an effect is named: z is robust, so that large residuals count
+less than their squares, and other effects take up a part. `python -m benchmarks limits --named`
+counts what comes of it."""
 
 GROWS, GROWS_ROUGH = 1.1, 1.3
 """By what factor a change must grow with twice the size to be the effect's own; of what makes the
@@ -274,10 +280,24 @@ def resolved(sized: Sized, size: float) -> float:
     return size
 
 
-def _named(sized: Sized, least: float) -> tuple[float | None, float | None]:
-    """Return the value and the share of the force from which 9 of 10 verdicts name an effect.
+def named_distance(samples: int, held_out: int, rule: DecisionRule = BENCH) -> float:
+    """Return the distance, in standard deviations, from which 9 of 10 verdicts name an effect.
 
     A verdict asks that z on held-out runs falls by `rule.gain`, which scatters with the noise.
+
+    Parameters
+    ----------
+    samples : over which the distance is taken
+    held_out : samples that decide
+    rule : the numbers that decide
+    """
+    asked = held_out * ((1.0 + rule.gain) ** 2 - 1.0)
+    whole = NINE_OF_TEN + sqrt(NINE_OF_TEN**2 + asked)
+    return MARGIN * whole * sqrt(samples / held_out)
+
+
+def _named(sized: Sized, least: float) -> tuple[float | None, float | None]:
+    """Return the value and the share of the force from which 9 of 10 verdicts name an effect.
 
     Parameters
     ----------
@@ -285,17 +305,16 @@ def _named(sized: Sized, least: float) -> tuple[float | None, float | None]:
     least : where it is looked at first
     """
     known, size = sized.known, least
-    asked = known.held_out * ((1.0 + known.rule.gain) ** 2 - 1.0)
-    wanted = NINE_OF_TEN + sqrt(NINE_OF_TEN**2 + asked)
-    wanted *= sqrt(len(known.plain) / known.held_out)
+    wanted = named_distance(len(known.plain), known.held_out, known.rule)
 
     def beyond(size: float) -> float:
         return float(np.linalg.norm(known.beyond(sized.change(size)))) / wanted - 1.0
 
     for _ in range(STRAIGHT):  # in proportion, as a rule
         size = float(np.clip(size / (1.0 + beyond(size)), SMALLEST, LARGEST))
-        if not sized.ended(size) and abs(beyond(size)) <= ALIKE:
-            return sized.value(size), wanted / known.size
+        off = beyond(size)
+        if not sized.ended(size) and abs(off) <= ALIKE:
+            return sized.value(size / (1.0 + off)), wanted / known.size
     low = size = least
     while beyond(size) < 0.0:
         if sized.ended(size) or size >= LARGEST:

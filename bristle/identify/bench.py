@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from threading import Lock
 from types import MappingProxyType
@@ -15,6 +15,7 @@ from ..data.command_limits import JUMP
 from ..physics import damper
 from ..physics.inputs import Inputs, Setup
 from ..physics.laws import LAWS
+from .ahead import Ahead, begun
 
 Array = NDArray[np.float64]
 
@@ -25,6 +26,7 @@ law_step = damper.step_law
 
 
 _ONE_AT_A_TIME = Lock()
+_ahead: Ahead | None = None
 _NO_TRACKS: Mapping[str, Array] = MappingProxyType({})
 
 
@@ -121,16 +123,56 @@ def compiled_history(effects: bool = True) -> Callable[..., None]:
     The first call on a machine takes seconds, that without effects one or two.
     """
     with _ONE_AT_A_TIME:  # threads that try effects ask for it at once
+        if _ahead is not None:
+            _ahead.wait((force_history if effects else law_history).__name__)
         return _compiled(damper.evaluate) if effects else _compiled_law(damper.step_law)
+
+
+def compile_ahead(effects: bool = True) -> None:
+    """Begin to compile what predicts forces in another process, where no machine code is kept yet.
+
+    Parameters
+    ----------
+    effects : whether effects will be asked for too, not a law alone
+    """
+    global _ahead
+    from ..jit import digest, kept
+
+    _hold_generated()
+    wanted = (law_history, force_history) if effects else (law_history,)
+    missing = [one for one in wanted if not kept(one)]
+    if missing and (_ahead is None or not _ahead.at_work):
+        _ahead = begun({one.__name__: digest(one) for one in missing})
+
+
+def keep(asked: Sequence[str]) -> None:
+    """Compile functions, each given as NAME=DIGEST, and print the name of each that is kept.
+
+    It ends at the first digest that is another one here.
+    """
+    from ..jit import digest
+
+    for name, _, wanted in (one.partition("=") for one in asked):
+        if digest({one.__name__: one for one in (law_history, force_history)}[name]) != wanted:
+            return
+        still = np.zeros(2)
+        effects = [] if name == law_history.__name__ else [damper.SLOTS.effects[0].name]
+        Bench(next(iter(LAWS)), effects).force(still, still, still, still, 1e-3, {})
+        print(name, flush=True)
+
+
+def _hold_generated() -> None:
+    """Hold the newest generated functions: there are new ones after a new effect or law."""
+    global damper_evaluate, law_step
+    damper_evaluate, law_step = damper.evaluate, damper.step_law
 
 
 @cache
 def _compiled(evaluate: Any) -> Callable[..., None]:
     """Compile the history with this generated function: there is a new one after a new effect."""
-    global damper_evaluate
     from ..jit import compiled
 
-    damper_evaluate = evaluate
+    _hold_generated()
     function: Callable[..., None] = compiled(force_history)
     return function
 
@@ -138,10 +180,9 @@ def _compiled(evaluate: Any) -> Callable[..., None]:
 @cache
 def _compiled_law(step_law: Any) -> Callable[..., None]:
     """Compile the history of laws alone: there is a new one after a new law."""
-    global law_step
     from ..jit import compiled
 
-    law_step = step_law
+    _hold_generated()
     function: Callable[..., None] = compiled(law_history, ("codegen.step_law", "falling.falling"))
     return function
 
@@ -190,6 +231,8 @@ class Bench:
             initial[f"{state}_0"] = first[signal]
         z = np.array(damper.start_states(self.law, {**initial, **values}))
         out = np.empty(len(x))
+        # Each layout in memory would be compiled by itself.
+        x, v, a, V = (np.ascontiguousarray(channel) for channel in (x, v, a, V))
         motion = Inputs(x, v, a, V, dt, 0.0, 0.0, False)
         slots = [damper.SLOTS.parameters[name] for name in tracks]
         changing = Tracks(

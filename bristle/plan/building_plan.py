@@ -63,7 +63,10 @@ class BuildingPlan(Plan):
 
     def sentences(self) -> list[str]:
         """Return the plan as an engineer would say it."""
-        return [*super().sentences(), *(one.sentence() for one in self.sensors)]
+        told = [*super().sentences(), *(one.sentence() for one in self.sensors)]
+        if self.worth and not super().worth:
+            told.append("Without that sensor these tests show nothing new: add it before them.")
+        return told
 
     @property
     def worth(self) -> bool:

@@ -59,7 +59,8 @@ class Purposes:
     def figures(self, known: Sequence[Known]) -> list[Figure]:
         """Return what a plan makes smaller, of what runs say of the questions."""
         own, *rivals = known
-        out = seen(own, self.rule) if self.effects else []
+        least = {one.sized.name: one.least / one.size for one in self.effects}
+        out = seen(own, self.rule, least) if self.effects else []
         out += separated(rivals) if rivals else []
         out += sharpened(own, self.parameters) if self.parameters else []
         return out + (learned(own) if self.parts is not None else [])

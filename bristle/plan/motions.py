@@ -133,8 +133,6 @@ class Command:
         if self.high == self.low:
             return f"{name} held at {self.high:.3g} {unit}"
         between = f"between {self.low:.3g} and {self.high:.3g} {unit}"
-        if self.low == self.high:
-            return f"{name} held at {self.high:.3g} {unit}"
         return {
             "held": f"{name} held at {self.high:.3g} {unit}",
             "switched": f"{name} switched {between} every {self.period:.3g} s",

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -28,8 +27,6 @@ Array = NDArray[np.float64]
 
 ALIKE = 0.6
 """Correlation of the motions below which a run is not the one that was planned."""
-MOST_PAIRS = 5000
-"""Ways of pairing runs that are compared; beyond them their order alone decides."""
 
 
 @dataclass(frozen=True)
@@ -183,23 +180,33 @@ def _paired(
     runs: Sequence[Measurement], left: Sequence[PlannedRun], plan: PlanFolder
 ) -> list[PlannedRun | None]:
     """Return the planned run of each measured one: of all ways in order, the most alike."""
-    count = min(len(runs), len(left))
-    if not count:
+    if not runs or not left:
         return [None] * len(runs)
     alike = np.array(
         [[_aligned(run, one, plan.motion, _shown(run, plan.motion))[0] for one in left]
          for run in runs]
     )  # fmt: skip
-    ways = [
-        (rows, columns)
-        for rows in combinations(range(len(runs)), count)
-        for columns in combinations(range(len(left)), count)
-    ]
-    if len(ways) > MOST_PAIRS:
-        ways = [(tuple(range(count)), tuple(range(count)))]
-    rows, columns = max(ways, key=lambda way: float(np.sum(alike[list(way[0]), list(way[1])])))
-    own = dict(zip(rows, columns, strict=True))
-    return [left[own[k]] if k in own else None for k in range(len(runs))]
+    if len(runs) <= len(left):
+        return [left[k] for k in _in_order(alike)]
+    own = dict(zip(_in_order(alike.T), left, strict=True))
+    return [own.get(k) for k in range(len(runs))]
+
+
+def _in_order(alike: Array) -> list[int]:
+    """Return a column for each row (n, m >= n) of likenesses: rising, and the most alike in sum."""
+    rows, columns = alike.shape
+    best = np.zeros((rows + 1, columns + 1))  # of the first rows within the first columns
+    for i in range(1, rows + 1):
+        best[i, :i] = -np.inf
+        for j in range(i, columns + 1):
+            best[i, j] = max(best[i, j - 1], best[i - 1, j - 1] + alike[i - 1, j - 1])
+    found, j = [], columns
+    for i in range(rows, 0, -1):
+        while best[i, j] == best[i, j - 1]:
+            j -= 1
+        j -= 1
+        found.append(j)
+    return found[::-1]
 
 
 def _shown(run: Measurement, motion: str) -> str:

@@ -8,13 +8,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, log, sqrt
+from math import inf, log
 
 import numpy as np
 
-from ..diagnose.effect_limits import NINE_OF_TEN
+from ..diagnose.effect_limits import named_distance
 from ..diagnose.rule import BENCH, DecisionRule
 from .knowledge import Known
 
@@ -55,31 +55,27 @@ class Figure:
         return log(min(max(self.value / self.enough, 1.0), HIDDEN))
 
 
-def wanted_distance(samples: int, held_out: int, rule: DecisionRule = BENCH) -> float:
-    """Return the distance, in standard deviations, from which 9 of 10 verdicts name an effect.
-
-    As in `diagnose.effect_limits`: a verdict asks that z on held-out runs falls by `rule.gain`.
+def seen(
+    known: Known, rule: DecisionRule = BENCH, least: Mapping[str, float] | None = None
+) -> list[Figure]:
+    """Return from what size each effect would be named, over the size that was asked for.
 
     Parameters
     ----------
-    samples : of all runs
-    held_out : of them that are held out
+    known : what runs say
     rule : the numbers that decide
+    least : by effect, the size over the one asked for below which the integration's steps decide:
+        no test shows less
     """
-    if not held_out:
-        return inf
-    asked = held_out * ((1.0 + rule.gain) ** 2 - 1.0)
-    return (NINE_OF_TEN + sqrt(NINE_OF_TEN**2 + asked)) * sqrt(samples / held_out)
-
-
-def seen(known: Known, rule: DecisionRule = BENCH) -> list[Figure]:
-    """Return from what size each effect would be named, over the size that was asked for."""
-    wanted = wanted_distance(known.samples, known.held_out, rule)
+    least = least or {}
+    held_out = known.held_out
+    wanted = named_distance(known.samples, held_out, rule) if held_out else inf
     left, raw = known.distances(), known.raw()
     return [
         Figure(
             "see", name,
-            wanted / left[name] if left[name] > LEAST * raw[name] > 0.0 else inf, SEEN,
+            wanted / left[name] if left[name] > LEAST * raw[name] > 0.0 else inf,
+            max(SEEN, least.get(name, 0.0)),
         )
         for name in left
     ]  # fmt: skip

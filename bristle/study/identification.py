@@ -12,6 +12,7 @@ from ..data.measurement import Measurement
 from ..data.model import StudyModel, new_model
 from ..errors import StudyError
 from ..identify.begin import under_load_text
+from ..identify.bench import compile_ahead
 from ..identify.fit import Fit, Model
 from ..identify.residuals import robust_z
 from ..identify.rig import DAMPER, Rig
@@ -86,6 +87,7 @@ def identify_study(
     if law is not None:
         refuse_left_out(study.laws_folder / f"{law}.py")
     model = _of_law(model or study.model(), law)
+    compile_ahead(bool(model.effects))
     cutoff = study.settings.cut_off if cutoff is None else cutoff
     task = FitTask(cutoff, starts, table, command=command, show=show or _show_nothing)
     task = replace(task, laws=all_of_them)

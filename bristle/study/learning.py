@@ -15,6 +15,7 @@ from ..diagnose.faults import SensorFault
 from ..diagnose.law_free import diagnose_laws
 from ..errors import StudyError
 from ..findings import command, unknown
+from ..identify.bench import compile_ahead
 from ..physics.laws import law_names
 from ..progress import tell, telling
 from .added_runs import unknown_to_model
@@ -64,6 +65,7 @@ def diagnose_study(
     law = law_or_all(study, law)
     for why in study.usable_effects():
         say(f"left out: {why}")
+    compile_ahead()
     model, runs = study.model(), study.runs()
     if law not in (None, ALL, model.law):
         if law not in law_names():

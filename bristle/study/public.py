@@ -18,6 +18,7 @@ from ..diagnose.law_choice import simplest
 from ..diagnose.law_free import diagnose_laws
 from ..errors import StudyError
 from ..findings import written
+from ..identify.bench import compile_ahead
 from ..identify.rig import Rig, bench_rig, building_rig
 from ..physics.building import Building
 from ..physics.laws import DEFAULT
@@ -124,6 +125,7 @@ def identify(
     chosen = model_of(model, effects, DEFAULT)
     house = building_from(building)
     refuse_in_building(ALL if free else None, house is not None)
+    compile_ahead(bool(chosen.effects))
     runs = _runs(given, holdout, channels, house)
     rig = _rig(runs, house)
     drives = [run.drive for run in runs.all if run.drive]
@@ -299,6 +301,7 @@ def diagnose(
     chosen = model_of(None if _is_all(model) else model, effects, DEFAULT)
     house = building_from(building)
     free = _is_all(model) or (model is None and not effects and house is None)
+    compile_ahead()
     runs = _runs(given, holdout, channels, house)
     if free:
         return diagnose_laws(runs.train, runs.holdout, as_model(chosen), house, profile=profile)

@@ -303,6 +303,7 @@ def test_a_plan_is_worth_its_tests_where_a_sensor_settles() -> None:
     assert "voltage held at 3 V; the base moves by " in said[0]
     assert "no motion helps" in said[2]
     assert said[3].startswith("A load cell at the damper would settle")
+    assert said[4].endswith("add it before them.")
     told = json.loads(json.dumps(plan.as_dict(), allow_nan=False))
     assert told["sensors"][0]["settles"] is True
     alone = a_plan(sensors=())

@@ -15,7 +15,7 @@ from bristle.data.measurement import Measurement, measurements_of
 from bristle.data.table import from_arrays
 from bristle.errors import StudyError
 from bristle.plan.folder import PlanFolder, PlannedRun, write_plan
-from bristle.plan.performed import compared, performed, planned_for
+from bristle.plan.performed import _in_order, compared, performed, planned_for
 from bristle.study.create import create_study
 from bristle.study.study import Study
 
@@ -179,3 +179,11 @@ def test_what_cannot_be_held_against_a_plan_is_refused(
     study.settings = replace(study.settings, split="restart")
     with pytest.raises(StudyError, match="files of one run"):
         performed(study, [], PlanFolder("bench", "", RATE, (planned(),)))
+
+
+def test_many_runs_are_paired_in_order_with_the_most_alike() -> None:
+    alike = np.full((12, 40), 0.1)
+    wanted = [3 * k + k % 2 for k in range(12)]
+    alike[range(12), wanted] = 0.9
+    assert _in_order(alike) == wanted
+    assert _in_order(np.array([[0.2, 0.9], [0.9, 0.8]])) == [0, 1]  # the order is kept

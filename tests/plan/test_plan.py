@@ -13,7 +13,7 @@ from bristle.example.make import Choice, make_bench
 from bristle.identify.model import Model, Problem, Run
 from bristle.plan.folder import read_plan
 from bristle.plan.knowledge import Asked, Known, Question, Rival
-from bristle.plan.purposes import Figure, cost_of
+from bristle.plan.purposes import Figure, cost_of, seen
 from bristle.plan.wish import Wish, default_wish
 
 SHEET = """schema = 1
@@ -93,10 +93,10 @@ def test_a_figure_costs_nothing_below_what_is_enough() -> None:
 
 def test_a_plan_of_a_new_rig_keeps_its_limits_and_sees_what_it_is_for(sheet: Path) -> None:
     found = bristle.plan(sheet, see="coil_lag")
-    (seen,) = [one for one in found.outcomes if one.purpose == "see"]
-    assert seen.name == "coil_lag"
-    assert 0.0 < seen.then < 0.02  # s; nothing measured tells before
-    assert not np.isfinite(seen.now)
+    (row,) = [one for one in found.outcomes if one.purpose == "see"]
+    assert row.name == "coil_lag"
+    assert 0.0 < row.then < 0.02  # s; nothing measured tells before
+    assert not np.isfinite(row.now)
     # A coil that lags shows where its command changes.
     assert all(np.ptp(one.V) > 1.0 for one in found.signals)
     for one in found.signals:
@@ -135,6 +135,13 @@ def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
 def test_the_same_seed_gives_the_same_plan(sheet: Path) -> None:
     first, again = (bristle.plan(sheet, sharpen="f_c", seed=5).runs() for _ in range(2))
     assert [run.about for run in first] == [run.about for run in again]
+
+
+def test_what_is_at_the_resolution_of_the_integration_gains_nothing() -> None:
+    question = Question(PLAIN, (Rival("lag", PLAIN, PLAIN),))
+    known = Known(question, 4e4 * np.eye(question.width), 1000, 500)
+    coarse, fine = (seen(known, least={"lag": least})[0].cost for least in (1.0, 1e-6))
+    assert coarse == 0.0 < fine
 
 
 def test_rivals_that_no_test_tells_apart_are_said_to_be_so(rig: bristle.Study) -> None:

@@ -1,0 +1,56 @@
+"""Machine code is made in another process where it is not kept yet, and nothing waits in vain."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bristle import jit
+from bristle.identify import bench
+from bristle.identify.ahead import Ahead, begun
+from bristle.physics.inputs import Inputs
+
+
+def test_a_process_that_knows_other_functions_ends_without_compiling() -> None:
+    found = Ahead({"law_history": "that of a user's own law"})
+    found.wait("law_history")
+    assert not found.at_work
+    found.wait("law_history")  # whoever asks again compiles it
+
+
+def test_where_no_process_can_be_begun_nothing_waits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", str(Path("there") / "is" / "none"))
+    assert begun({"law_history": "0"}) is None
+
+
+def test_what_is_kept_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jit, "kept", lambda _: True)
+    monkeypatch.setattr(bench, "begun", lambda _: pytest.fail("it begins a process"))
+    bench.compile_ahead()
+
+
+def test_strided_motions_take_the_same_machine_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    law = bench.Bench("bingham", [])
+    x, v, a, V = np.random.default_rng(3).normal(size=(50, 4)).T
+    plain = law.force(x.copy(), v.copy(), a.copy(), V.copy(), 0.01, {})
+    assert np.array_equal(law.force(x, v, a, V, 0.01, {}), plain)
+    seen: list[Inputs] = []
+    monkeypatch.setattr(law, "_history", lambda setup, motion, *_: seen.append(motion))
+    law.force(x, v, a, V, 0.01, {})
+    assert all(np.asarray(one).flags.c_contiguous for one in seen[0][:4])
+
+
+@pytest.mark.slow
+def test_another_process_keeps_what_fits_need(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path))
+    monkeypatch.setattr(bench, "_ahead", None)
+    bench.compile_ahead(effects=False)
+    assert isinstance(bench._ahead, Ahead)
+    bench._ahead.wait("law_history")
+    assert jit.kept(bench.law_history)
+    assert not jit.kept(bench.force_history)
