@@ -19,14 +19,7 @@ from math import floor, inf, isfinite
 from typing import Any
 
 from ..component import clock, controller, damper, sensors, source, structure
-from ..component.damper import (
-    FORCE,
-    FRICTION,
-    HOLDING_FORCE,
-    LAST_STEP,
-    VOLTAGE,
-    VOLTAGE_AT_END,
-)
+from ..component.damper import FORCE, FRICTION, HOLDING_FORCE, LAST_STEP, VOLTAGE, VOLTAGE_AT_END
 from ..component.devices import DAMPER_FORCE, DEVICE_FORCES, EXTRA_FORCE
 from ..control.switching import limited
 from ..physics.inputs import Setup
