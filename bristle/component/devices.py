@@ -123,7 +123,9 @@ def load_upper_levels(inputs: Row, c: Constants, outputs: Row) -> None:
                 outputs[at] += c.m_inverse[row + lower] * force
 
 
-def show_holding_forces(inputs: Row, left: float, c: Constants, outputs: Row, at: int) -> None:
+def show_holding_forces(
+    inputs: Row, left: float, first: float, c: Constants, free: Row, outputs: Row, at: int
+) -> None:  # fmt: skip
     """Give the force at which the ends of each device would not accelerate to each other.
 
     The other devices' forces stay. So does that of a contact, but for a device between the ground
@@ -133,29 +135,41 @@ def show_holding_forces(inputs: Row, left: float, c: Constants, outputs: Row, at
     ----------
     inputs : (3 + d,) as in `structure.start`
     left : what all devices' forces on the first level leave of what would hold it [N]
+    first : force on the first level of all but the building's own devices [N]
     c : Constants
-    outputs : as in `structure.start`, with the absolute accelerations; holding forces are filled
+    free : (n,) absolute accelerations without any of these forces [m/s2]
+    outputs : as in `structure.start`; the holding forces are filled
     at : place of the first device's
     """
     for k in range(c.devices):
         lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
-        force = inputs[DEVICE_FORCES + k]
         if upper == 0:
-            outputs[at] = left + force
+            outputs[at] = left + inputs[DEVICE_FORCES + k]
         else:
-            apart = outputs[PER_LEVEL * upper + 2]
-            if lower == GROUND:
-                apart -= inputs[GROUND_ACCELERATION]
-            else:
-                apart -= outputs[PER_LEVEL * lower + 2]
-            outputs[at] = force + apart / gain(lower, upper, c)
+            apart = free[upper] - gain(GROUND, 0, lower, upper, c) * first
+            apart -= free[lower] if lower != GROUND else inputs[GROUND_ACCELERATION]
+            for j in range(c.devices):
+                if j != k:  # else its own force would count by its rounding
+                    each = gain(c.ends[2 * j], c.ends[2 * j + 1], lower, upper, c)
+                    apart -= each * inputs[DEVICE_FORCES + j]
+            outputs[at] = apart / gain(lower, upper, lower, upper, c)
         at += PER_DEVICE
 
 
-def gain(lower: int, upper: int, c: Constants) -> float:
-    """Return what a device's force accelerates its ends to each other by [1/kg]."""
-    n, total = c.n, c.m_inverse[upper * c.n + upper]
+def gain(lower: int, upper: int, below: int, above: int, c: Constants) -> float:
+    """Return what a device's force takes off the acceleration of another's ends [1/kg].
+
+    Parameters
+    ----------
+    lower, upper : levels that the first device connects
+    below, above : levels that the other one connects, or the same
+    c : Constants
+    """
+    total: float = c.m_inverse[above * c.n + upper]
     if lower != GROUND:
-        total += c.m_inverse[lower * n + lower]
-        total -= c.m_inverse[lower * n + upper] + c.m_inverse[upper * n + lower]
+        total -= c.m_inverse[above * c.n + lower]
+    if below != GROUND:
+        total -= c.m_inverse[below * c.n + upper]
+        if lower != GROUND:
+            total += c.m_inverse[below * c.n + lower]
     return total

@@ -274,12 +274,13 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
         others += devices_at_first_level(inputs, c)
     force = inputs[DAMPER_FORCE] + others
     hold = state[end + n] - c.mass * inputs[GROUND_ACCELERATION]
-    left = hold - force
+    left, contact = hold - force, 0.0
     if c.touches:
         stick = stick_force(left, state[n], c.mass, EFFECT_STEP)
-        force += resting_contact(
+        contact = resting_contact(
             n, c.isolated, c.stiffnesses, state, stick, state[2 * n : end], c.p, c.on
         )
+        force += contact
     m_inverse, at = c.m_inverse, 2
     for i in range(n):
         outputs[at] = state[end + i] - m_inverse[i * n] * force
@@ -288,7 +289,8 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     outputs[at] = hold - others
     if c.devices > 0:
         load_upper_levels(inputs, c, outputs)
-        show_holding_forces(inputs, left, c, outputs, at + PER_DEVICE)
+        first, free = inputs[DAMPER_FORCE] + inputs[EXTRA_FORCE] + contact, state[end : end + n]
+        show_holding_forces(inputs, left, first, c, free, outputs, at + PER_DEVICE)
     return 0
 
 

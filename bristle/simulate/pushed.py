@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from ..physics.building import Building
 from ..physics.device import GROUND, Device
@@ -67,3 +69,24 @@ def velocity_per_force(structure: Any, felt: Device, pushed: Device) -> float:
             if i != GROUND and j != GROUND:
                 total += up * along * float(structure["held"][(n + i) * (n + 1) + j])
     return total
+
+
+def sharing(structure: Any, sticking: Sequence[Device]) -> float:
+    """Return by how much dampers that stick together must each hold less than it would alone.
+
+    What one holds moves the others' ends. All correct their forces at once, which is Richardson's
+    iteration: it settles soonest at half the sum of its least and largest eigenvalue (Saad 2003,
+    Iterative Methods for Sparse Linear Systems, example 4.1). At one place that is their number.
+
+    Parameters
+    ----------
+    structure : its record
+    sticking : what each of its dampers that stick pushes
+    """
+    if len({device.levels for device in sticking}) < 2:
+        return float(max(1, len(sticking)))
+    G = np.array([[-velocity_per_force(structure, a, b) for b in sticking] for a in sticking])
+    scale = np.sqrt(np.diag(G))
+    values = np.linalg.eigvalsh(G / np.outer(scale, scale))
+    moving = values[values > 1e-9 * values[-1]]  # forces against each other move nothing
+    return max(1.0, 0.5 * float(moving[0] + moving[-1]))

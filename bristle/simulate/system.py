@@ -18,7 +18,7 @@ from ..physics.signals import CONSTANT
 from ..scenario.scenario import Component, Scenario
 from . import records
 from .clocks import Clocks
-from .pushed import pushed_by, velocity_per_force
+from .pushed import pushed_by, sharing, velocity_per_force
 
 Array = NDArray[Any]
 Port = tuple[str, str]
@@ -177,14 +177,9 @@ class System:
             if at:
                 there = structures[at.structure]
                 gain = velocity_per_force(there, at.device, at.device)
-                # What one holds moves the others' ends: their sum bounds it (Gershgorin).
-                shares = [
-                    abs(velocity_per_force(there, at.device, other.device) / gain)
-                    for other in sticking
-                    if other.structure == at.structure
-                ]
+                beside = [other.device for other in sticking if other.structure == at.structure]
                 record["on_structure"], record["holding"] = at.structure, at.holding
-                record["sharing"] = max(1.0, sum(shares))
+                record["sharing"] = sharing(there, beside)
                 record["moving_mass"] = -h / (gain * record["sharing"])
         return found
 
