@@ -302,6 +302,24 @@ def read_building(path: str | Path) -> Building:
     return from_data(data, str(path))
 
 
+def with_one_damper(building: Building) -> Building:
+    """Return a building whose one damper is on the first level: one without devices of its own.
+
+    Raises
+    ------
+    PhysicsError
+        If it has some: what is measured on a building knows the one damper.
+    """
+    if building.devices:
+        names = ", ".join(device.name for device in building.devices)
+        raise PhysicsError(
+            f"building {building.name!r} has devices of its own ({names}): studies and what comes "
+            "of them know one damper, on the first level. Take [[devices]] out of its file, for "
+            "runs in which none of them acts."
+        )
+    return building
+
+
 def _number(value: Any, key: str, where: str) -> float:
     try:
         if isinstance(value, (int, float)) and not isinstance(value, bool) and isfinite(value):
