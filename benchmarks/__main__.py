@@ -2,9 +2,9 @@
 
 A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them. `blind`
 named first has options of its own (`python -m benchmarks blind --help`): it takes hours, and the
-table here shows what its last run found. So have `instruments`, `lab`, `law_free`, `learned`,
-`limits`, `plan`, `prediction` and `calibrate`, whose own table shows what each value of the rule
-trades.
+table here shows what its last run found. So have `compatibility`, `exits`, `instruments`, `lab`,
+`law_free`, `learned`, `limits`, `plan`, `prediction` and `calibrate`, whose own table shows what
+each value of the rule trades.
 """
 
 from __future__ import annotations
@@ -19,8 +19,11 @@ from dataclasses import asdict
 from . import __path__ as folder
 from ._rows import Row
 
-COUNTED = ("instruments", "lab", "law_free", "learned", "limits", "plan", "prediction")
-"""Benchmarks whose own options say how many cases are made."""
+COUNTED = (
+    "compatibility", "exits", "instruments", "lab", "law_free", "learned", "limits", "plan",
+    "prediction", "stated",
+)  # fmt: skip
+"""Benchmarks whose own options say how many cases are made, or where."""
 
 
 def main() -> int:

@@ -121,7 +121,7 @@ def _run_members(plan: Plan, pipe: Connection, inherited: list[Connection]) -> N
     with suppress(EOFError, OSError):
         while True:
             pipe.send(run_one(plan, pipe.recv()))
-    os._exit(0)  # libraries of FMUs must not be called again
+    os._exit(0)  # at once: taking down compiled code takes a second
 
 
 def _end(processes: list[_Process]) -> None:

@@ -96,7 +96,7 @@ def compare_fmu(
         The first also where the unit or the sign of a port is in doubt.
     """
     path = Path(fmu)
-    description = read_description(path)
+    description = read_description(path, versions=("2.0",))
     table = read_table(data)
     structural = any(
         v.causality in ("input", "output") and v.name.startswith(("ground_", "base_", "floor"))

@@ -122,7 +122,7 @@ def main(folder: str) -> None:
         part.write_text(json.dumps({"kind": type(error).__name__, "text": str(error)}))
         part.replace(work / "trouble.json")
     finally:
-        os._exit(0)  # the binary of a Python FMU may abort a process that ends with it loaded
+        os._exit(0)  # whatever an FMU of others would do as its library is unloaded
 
 
 def _all_passes(work: Path) -> dict[str, Array]:
@@ -169,8 +169,8 @@ def _time_loop(instance: Any, job: Job, step: float, inputs: Array, rows: Array)
     variables = instance.description.variables
     into = [variables[name].reference for name in job.inputs]
     out = [variables[name].reference for name in job.outputs]
-    set_real, get_real = instance.function("fmi2SetReal"), instance.function("fmi2GetReal")
-    do_step = instance.function("fmi2DoStep")
+    set_real, get_real = (instance.library.function(name) for name in ("SetReal", "GetReal"))
+    do_step = instance.library.function("DoStep")
     component = ctypes.c_void_p(instance.component)
     in_refs, out_refs = (ctypes.c_uint * len(into))(*into), (ctypes.c_uint * len(out))(*out)
     n_in, n_out = ctypes.c_size_t(len(into)), ctypes.c_size_t(len(out))

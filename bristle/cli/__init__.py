@@ -139,9 +139,8 @@ def _with_consent(arguments: argparse.Namespace) -> int:
 def run_and_exit() -> NoReturn:
     """Run one command and end the process with its exit code; what the shell calls.
 
-    The binary of a Python FMU reads memory that it has freed when a process ends with it loaded,
-    which now and then aborts a process whose work is done and written. So a process that ran
-    FMUs ends without calling such libraries again.
+    Taking down a process with FMUs and compiled code in it takes up to a second, after its work is
+    done and written: such a process ends at once.
     """
     code = main()
     if code == 130:

@@ -30,6 +30,8 @@ _FIRST = {  # what a probe rests on, by its level
     "library": {_LIBRARY, _LEGAL},
     "run": {_LIBRARY, _LEGAL, _REFERENCE, _REPEATABLE},
 }
+KNOWN = ("2.0",)
+"""Versions of FMI that the probes know."""
 _DEFAULT_STEPS = 100  # where the FMU names no step
 
 
@@ -66,12 +68,14 @@ def judge(
     unknown = sorted(set(only or ()) - set(PROBES))
     if unknown:
         raise FmuError(f"no probe is named {', '.join(unknown)}. There are: {', '.join(PROBES)}.")
-    root = read_root(path)
+    root = read_root(path, versions=KNOWN)
     with tempfile.TemporaryDirectory(prefix="bristle-conform-") as folder:
         plan = make_plan(path, root, Path(folder), timeout)
         if beside is not None:
-            read_description(beside)  # which says what is wrong with it
-            plan.beside = make_plan(beside, read_root(beside), Path(folder) / "beside", timeout)
+            read_description(beside, versions=KNOWN)  # which says what is wrong with it
+            plan.beside = make_plan(
+                beside, read_root(beside, versions=KNOWN), Path(folder) / "beside", timeout
+            )
         elif only is None or any(name.startswith("another FMU") for name in only):
             plan.beside = _companion(plan, Path(folder))
         with Subprocesses(Path(plan.work)) as subprocesses:

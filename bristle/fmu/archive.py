@@ -29,6 +29,8 @@ _SUSPECT_RATIO = 500  # deflate reaches 1032 on zeros; real members stay below 5
 _SUSPECT_SIZE = 64 * 1024**2  # bytes; below it, no ratio does harm
 
 _CHUNK = 1024**2
+_MACHINES = {"amd64": "x86_64", "arm64": "aarch64", "i386": "x86", "i686": "x86"}
+"""Machines by another name than in FMI 3.0."""
 _ELF_MACHINES = {"x86_64": 62, "amd64": 62, "aarch64": 183, "arm64": 183, "i686": 3, "i386": 3}
 
 
@@ -127,8 +129,12 @@ def extract(path: Path | str, folder: Path | str) -> Path:
     return folder
 
 
-def platform_folder() -> str:
-    """Return the name that FMI 2.0 gives this platform ("linux64", "win64", "darwin64" ...)."""
+def platform_folder(version: str = "2.0") -> str:
+    """Return the name that a version of FMI gives this platform ("linux64", "x86_64-linux" ...)."""
+    if version == "3.0":
+        machine = platform.machine().lower()
+        system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
+        return f"{_MACHINES.get(machine, machine)}-{system}"
     system = {"win32": "win", "darwin": "darwin"}.get(sys.platform, "linux")
     return f"{system}{64 if sys.maxsize > 2**32 else 32}"
 
@@ -138,15 +144,17 @@ def library_suffix() -> str:
     return {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
-def library_member(identifier: str) -> str:
-    """Return where an FMU keeps its shared library for this platform."""
-    return f"binaries/{platform_folder()}/{identifier}{library_suffix()}"
+def library_member(identifier: str, version: str = "2.0") -> str:
+    """Return where an FMU of a version of FMI keeps its shared library for this platform."""
+    return f"binaries/{platform_folder(version)}/{identifier}{library_suffix()}"
 
 
-def check_library(path: Path, archive: zipfile.ZipFile, identifier: str) -> None:
+def check_library(
+    path: Path, archive: zipfile.ZipFile, identifier: str, version: str = "2.0"
+) -> None:
     """Raise FmuError unless the archive holds a binary that this platform can load."""
     names = member_names(archive)
-    wanted = library_member(identifier)
+    wanted = library_member(identifier, version)
     if wanted not in names:
         raise FmuError(
             f"{path}: no binary for this platform: {wanted} is missing. "

@@ -1,18 +1,17 @@
 """What an FMU says of itself: its variables with units, starts and dependencies."""
 
-# Longer than 300 lines: what can be wrong with a description is told attribute by attribute.
-
 from __future__ import annotations
 
-import math
 import re
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ..component import OVER_STEP
 from ..errors import FmuError
+from . import description_fmi3
 from .archive import (
     DESCRIPTION,
     MAX_DESCRIPTION,
@@ -22,62 +21,22 @@ from .archive import (
     read_member,
 )
 from .model_description import JUMPS_TAG, OVER_STEP_TAG, TOOL
+from .variables import Description, Value, Variable, number_of, reference_of, start_of, unsigned
 from .xml_text import parse_xml
 
 __all__ = ["Description", "Value", "Variable", "extract", "read_description"]
 
-Value = float | int | bool | str
-
+VERSIONS = ("2.0", "3.0")
+"""Versions of FMI that are read."""
+_OTHER_KINDS = {"ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
 _KINDS = ("Real", "Integer", "Boolean", "String", "Enumeration")
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
-@dataclass(frozen=True, slots=True)
-class Variable:
-    """One scalar variable of an FMU.
-
-    `kind` is "Real", "Integer", "Boolean", "String" or "Enumeration"; `unit` is None where the
-    FMU gives none ("1" for a dimensionless real that says so). `dependencies` are the names of
-    the inputs that the output follows directly, None where the FMU does not say. `over_step` is how
-    an input is taken over a step, one of `component.OVER_STEP`, None where the FMU does not say.
-    `jumps_without` names the input without which an output may jump, None where the FMU names none.
-    """
-
-    name: str
-    kind: str
-    causality: str
-    variability: str | None
-    reference: int
-    unit: str | None = None
-    start: Value | None = None
-    minimum: float | None = None
-    maximum: float | None = None
-    nominal: float | None = None
-    description: str = ""
-    dependencies: tuple[str, ...] | None = None
-    optional: bool = False
-    over_step: str | None = None
-    jumps_without: str | None = None
-
-
-@dataclass(frozen=True)
-class Description:
-    """What a scenario needs to know of a component before it runs."""
-
-    name: str
-    guid: str
-    identifier: str
-    description: str = ""
-    variables: dict[str, Variable] = field(default_factory=dict)
-    capabilities: dict[str, str] = field(default_factory=dict)
-
-    def of(self, causality: str) -> list[Variable]:
-        """Return the variables of one causality ("input", "output", "parameter"), in order."""
-        return [v for v in self.variables.values() if v.causality == causality]
-
-
-def read_description(path: Path | str, *, any_platform: bool = False) -> Description:
-    """Return what an FMI 2.0 co-simulation FMU says of itself.
+def read_description(
+    path: Path | str, *, any_platform: bool = False, versions: Sequence[str] = VERSIONS
+) -> Description:
+    """Return what a co-simulation FMU of FMI 2.0 or 3.0 says of itself.
 
     Parameters
     ----------
@@ -85,6 +44,8 @@ def read_description(path: Path | str, *, any_platform: bool = False) -> Descrip
         The .fmu file. Nothing is unpacked and no code of it runs.
     any_platform : bool
         Accept an FMU that has no binary for this platform.
+    versions : sequence of str
+        Versions of FMI that are accepted.
 
     Returns
     -------
@@ -95,29 +56,34 @@ def read_description(path: Path | str, *, any_platform: bool = False) -> Descrip
     ------
     FmuError
         If the file cannot or must not be opened (see `bristle.fmu.archive.open_archive`), is
-        not FMI 2.0 for co-simulation, has no binary for this platform, or contradicts itself.
+        not FMI 2.0 or 3.0 for co-simulation, has no binary for this platform, contradicts itself,
+        or has ports of FMI 3.0 that are arrays or belong to clocks.
     """
     path = Path(path)
-    root = read_root(path, any_platform=any_platform)
+    root = read_root(path, any_platform=any_platform, versions=versions)
     try:
         return describe(root)
     except FmuError as error:
         raise FmuError(f"{path} {DESCRIPTION}: {error}") from None
 
 
-def read_root(path: Path, *, any_platform: bool = False) -> ElementTree.Element:
+def read_root(
+    path: Path, *, any_platform: bool = False, versions: Sequence[str] = VERSIONS
+) -> ElementTree.Element:
     """Return the XML root of an FMU that may be opened; FmuError says why it may not."""
     with open_archive(path) as archive:
         data = read_member(path, archive, DESCRIPTION, MAX_DESCRIPTION)
         root = parse_xml(data, f"{path}: {DESCRIPTION}")
-        identifier = _check_kind(path, root)
+        identifier = _check_kind(path, root, versions)
         if not any_platform:
-            check_library(path, archive, identifier)
+            check_library(path, archive, identifier, root.get("fmiVersion", ""))
     return root
 
 
 def describe(root: ElementTree.Element) -> Description:
     """Return the description in an XML tree that `read_root` let through."""
+    if root.get("fmiVersion") == "3.0":
+        return description_fmi3.describe(root)
     slave = root.find("CoSimulation")
     assert slave is not None  # read_root refuses what has none
     types = {
@@ -144,18 +110,20 @@ def describe(root: ElementTree.Element) -> Description:
     )
 
 
-def _check_kind(path: Path, root: ElementTree.Element) -> str:
-    """Return the model identifier of an FMI 2.0 co-simulation FMU, or raise FmuError."""
+def _check_kind(path: Path, root: ElementTree.Element, versions: Sequence[str]) -> str:
+    """Return the model identifier of a co-simulation FMU, or raise FmuError."""
     if root.tag != "fmiModelDescription":
         raise FmuError(f"{path}: the root of {DESCRIPTION} is <{root.tag}>, not FMI's.")
     version = root.get("fmiVersion", "")
-    if version != "2.0":
+    if version not in versions:
         raise FmuError(
-            f"{path}: FMI version {version or 'not given'}; only FMI 2.0 for co-simulation is read."
+            f"{path}: FMI version {version or 'not given'}; FMI {' or '.join(versions)} for "
+            "co-simulation is right here."
         )
     slave = root.find("CoSimulation")
     if slave is None:
-        only = " (model exchange only)" if root.find("ModelExchange") is not None else ""
+        others = [words for tag, words in _OTHER_KINDS.items() if root.find(tag) is not None]
+        only = f" ({' and '.join(others)} only)" if others else ""
         raise FmuError(f"{path}: not for co-simulation{only}; bristle runs co-simulation FMUs.")
     identifier = slave.get("modelIdentifier", "")
     if not _IDENTIFIER.fullmatch(identifier):
@@ -183,12 +151,12 @@ def _variable(
         kind=value.tag,
         causality=element.get("causality", "local"),
         variability=element.get("variability", "continuous" if value.tag == "Real" else None),
-        reference=_reference(name, element.get("valueReference")),
+        reference=reference_of(name, element.get("valueReference")),
         unit=own.get("unit"),
-        start=_start(name, value.tag, value.get("start")),
-        minimum=_number(name, "min", own.get("min")),
-        maximum=_number(name, "max", own.get("max")),
-        nominal=_number(name, "nominal", own.get("nominal")),
+        start=start_of(name, value.tag, value.get("start")),
+        minimum=number_of(name, "min", own.get("min")),
+        maximum=number_of(name, "max", own.get("max")),
+        nominal=number_of(name, "nominal", own.get("nominal")),
         description=element.get("description", ""),
         over_step=_over_step(name, element),
         jumps_without=_annotation(element, JUMPS_TAG),
@@ -213,43 +181,6 @@ def _annotation(element: ElementTree.Element, tag: str) -> str | None:
     return None
 
 
-def _reference(name: str, text: str | None) -> int:
-    number = _unsigned(text)
-    if number is None or number >= 2**32:
-        raise FmuError(f'variable "{name}": the value reference {text!r} is no unsigned integer.')
-    return number
-
-
-def _unsigned(text: str | None) -> int | None:
-    digits = (text or "").strip()
-    return int(digits) if digits.isdecimal() and len(digits) <= 10 else None
-
-
-def _number(name: str, attribute: str, text: str | None) -> float | None:
-    if text is None:
-        return None
-    try:
-        number = float(text)
-    except ValueError:
-        raise FmuError(f'variable "{name}": {attribute} is {text!r}, not a number.') from None
-    if math.isnan(number):
-        raise FmuError(f'variable "{name}": {attribute} is not a number.')
-    return number
-
-
-def _start(name: str, kind: str, text: str | None) -> Value | None:
-    if text is None or kind == "String":
-        return text
-    try:
-        if kind == "Real":
-            return float(text)
-        if kind == "Boolean":
-            return {"true": True, "1": True, "false": False, "0": False}[text.strip()]
-        return int(text)
-    except (ValueError, KeyError):
-        raise FmuError(f'variable "{name}": the start {text!r} is no {kind}.') from None
-
-
 def _add_dependencies(
     root: ElementTree.Element, listed: list[Variable], variables: dict[str, Variable]
 ) -> None:
@@ -264,7 +195,7 @@ def _add_dependencies(
 
 
 def _indexed(listed: list[Variable], text: str | None) -> Variable:
-    number = _unsigned(text)
+    number = unsigned(text)
     if number is None or not 1 <= number <= len(listed):
         raise FmuError(
             f"ModelStructure names variable {text!r}; the variables are 1 to {len(listed)}."

@@ -23,8 +23,8 @@ from .description import Variable
 PACKAGE = Path(__file__).resolve().parent.parent
 _BUNDLED = (
     "errors.py", "units.py", "physics/**/*.py", "control/**/*.py", "component/**/*.py",
-    "fmu/slave.py", "fmu/model_description.py", "fmu/component.py", "fmu/source.py",
-    "fmu/damper.py", "fmu/controller.py", "fmu/own_controller.py",
+    "fmu/slave.py", "fmu/model_description.py", "fmu/binary.py", "fmu/component.py",
+    "fmu/source.py", "fmu/damper.py", "fmu/controller.py", "fmu/own_controller.py",
 )  # fmt: skip
 _NAMESPACE = UUID("7c0b8c8e-3d0f-5d0a-9b55-62726973746c")
 

@@ -12,7 +12,8 @@ This module is bundled in every FMU: standard library and pythonfmu only.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import wraps
 from math import isfinite
 from operator import itemgetter
 from pathlib import Path
@@ -34,6 +35,7 @@ from pythonfmu.enums import Fmi2Status
 
 from .. import units
 from ..component import OVER_STEP
+from .binary import hold, reset_at_exit
 from .model_description import add_dependencies, complete
 
 BAKED = "baked.json"
@@ -49,6 +51,20 @@ FAULTS = {
 }
 
 _INSTANTIATED, _INITIALISING, STEPPING, _TERMINATED = range(4)
+
+
+def outermost(method: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a method that the binary calls, made safe against what it raises, as Ctrl-C does."""
+
+    @wraps(method)
+    def call(slave: Slave, *arguments: Any, **named: Any) -> Any:
+        try:
+            return method(slave, *arguments, **named)
+        except BaseException:
+            slave._hold()
+            raise
+
+    return call
 
 
 class _Slot:
@@ -85,6 +101,8 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, baked: dict[str, Any] | None = None, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        if "visible" in kwargs:  # from the FMU's binary
+            reset_at_exit()
         self._values: list[Any] = []
         self._index: dict[str, int] = {}
         self._units: dict[str, str] = {}
@@ -118,6 +136,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._shown = itemgetter(*self._outputs, fault, fault)
         for name, value in self.baked.get("starts", {}).items():
             self._values[self._index[name]] = value
+
+    def _hold(self) -> None:
+        """Keep alive what the binary lets go of as an exception passes it."""
+        hold(self, type(self), self.log_queue)
 
     # -- what a component fills in
 
@@ -275,6 +297,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     # -- the life of an instance
 
+    @outermost
     def setup_experiment(
         self,
         start_time: float,
@@ -285,6 +308,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self.time = start_time
         self._stale = True
 
+    @outermost
     def enter_initialization_mode(self) -> None:
         """Begin the initialisation: once, until the instance is reset."""
         if self._mode != _INSTANTIATED:
@@ -292,6 +316,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             return
         self._mode = _INITIALISING
 
+    @outermost
     def exit_initialization_mode(self) -> None:
         """Build the model from its parameters and show the first outputs; steps may follow."""
         if self._mode != _INITIALISING:
@@ -301,38 +326,47 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._follow(final=True)
         self._mode = STEPPING
 
+    @outermost
     def terminate(self) -> None:
         """End the run; the last values can still be read."""
         self._mode = _TERMINATED
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Step from `current_time` [s] over `step_size` [s]; False, with a fault, if it cannot."""
-        if self.fault:
-            return False
-        if self._mode != STEPPING:
-            return self._stop(WRONG_MODE, "doStep belongs between initialisation and terminate.")
-        if not (step_size > 0.0 and isfinite(step_size) and isfinite(current_time)):
-            return self._stop(BAD_STEP, f"time {current_time!r} s, step {step_size!r} s.")
-        values = self._values
-        for index in self._inputs:
-            if not isfinite(values[index]):
-                return self._stop(NOT_FINITE_INPUT, f"{self.vars[index].name} = {values[index]!r}.")
-        held = self._shown(values)
-        before = self.time
-        self.time = current_time + step_size
         try:
-            self.advance(current_time, step_size)
-            self.refresh()
-            wrong = self._not_finite()
-        except Exception as error:  # an exception would poison the binary: it becomes a fault
-            wrong = f"{type(error).__name__}: {error}"
-        if wrong:
-            for index, value in zip(self._outputs, held):
-                values[index] = value
-            self.time = before
-            return self._stop(BAD_STATE, wrong)
-        self._stale = False
-        return True
+            if self.fault:
+                return False
+            if self._mode != STEPPING:
+                return self._stop(
+                    WRONG_MODE, "doStep belongs between initialisation and terminate."
+                )
+            if not (step_size > 0.0 and isfinite(step_size) and isfinite(current_time)):
+                return self._stop(BAD_STEP, f"time {current_time!r} s, step {step_size!r} s.")
+            values = self._values
+            for index in self._inputs:
+                if not isfinite(values[index]):
+                    return self._stop(
+                        NOT_FINITE_INPUT, f"{self.vars[index].name} = {values[index]!r}."
+                    )
+            held = self._shown(values)
+            before = self.time
+            self.time = current_time + step_size
+            try:
+                self.advance(current_time, step_size)
+                self.refresh()
+                wrong = self._not_finite()
+            except Exception as error:  # an exception would poison the binary: it becomes a fault
+                wrong = f"{type(error).__name__}: {error}"
+            if wrong:
+                for index, value in zip(self._outputs, held):
+                    values[index] = value
+                self.time = before
+                return self._stop(BAD_STATE, wrong)
+            self._stale = False
+            return True
+        except BaseException:
+            self._hold()
+            raise
 
     def _not_finite(self) -> str:
         values = self._values
@@ -422,56 +456,74 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     def get_real(self, vrs: list[int]) -> list[float]:
         """Return the values of Real variables by their references."""
-        if self._stale:
-            self._follow()
-        values = self._values
         try:
-            return [float(values[vr]) for vr in vrs]
-        except (IndexError, ValueError):
-            return [
-                0.0 if isinstance(values[vr], str) else float(values[vr]) for vr in self._known(vrs)
-            ]
+            if self._stale:
+                self._follow()
+            values = self._values
+            try:
+                return [float(values[vr]) for vr in vrs]
+            except (IndexError, ValueError):
+                return [
+                    0.0 if isinstance(values[vr], str) else float(values[vr])
+                    for vr in self._known(vrs)
+                ]
+        except BaseException:
+            self._hold()
+            raise
 
     def get_integer(self, vrs: list[int]) -> list[int]:
         """Return the values of Integer variables by their references."""
-        if self._stale:
-            self._follow()
-        values = self._values
         try:
-            return [int(values[vr]) for vr in vrs]
-        except (IndexError, ValueError, OverflowError):
-            return [int(self._values[self._index["fault"]]) for _ in self._known(vrs)]
+            if self._stale:
+                self._follow()
+            values = self._values
+            try:
+                return [int(values[vr]) for vr in vrs]
+            except (IndexError, ValueError, OverflowError):
+                return [int(self._values[self._index["fault"]]) for _ in self._known(vrs)]
+        except BaseException:
+            self._hold()
+            raise
 
+    @outermost
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         """Return the values of Boolean variables by their references."""
         return [bool(self._values[vr]) for vr in self._known(vrs)]
 
+    @outermost
     def get_string(self, vrs: list[int]) -> list[str]:
         """Return the values of String variables by their references."""
         return [str(self._values[vr]) for vr in self._known(vrs)]
 
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         """Set Real variables by their references."""
-        if self._mode == STEPPING:
-            inputs, store = self._inputs, self._values
-            for vr, value in zip(vrs, values):
-                if vr in inputs:
-                    store[vr] = value
-                    self._set.add(vr)
-                else:
-                    self._set_any([vr], [value], float)
-            self._stale = True
-        else:
-            self._set_any(vrs, values, float)
+        try:
+            if self._mode == STEPPING:
+                inputs, store = self._inputs, self._values
+                for vr, value in zip(vrs, values):
+                    if vr in inputs:
+                        store[vr] = value
+                        self._set.add(vr)
+                    else:
+                        self._set_any([vr], [value], float)
+                self._stale = True
+            else:
+                self._set_any(vrs, values, float)
+        except BaseException:
+            self._hold()
+            raise
 
+    @outermost
     def set_integer(self, vrs: list[int], values: list[int]) -> None:
         """Set Integer variables by their references."""
         self._set_any(vrs, values, int)
 
+    @outermost
     def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
         """Set Boolean variables by their references."""
         self._set_any(vrs, values, bool)
 
+    @outermost
     def set_string(self, vrs: list[int], values: list[str]) -> None:
         """Set String variables by their references."""
         self._set_any(vrs, values, str)
@@ -487,6 +539,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
 
     # -- the whole state
 
+    @outermost
     def _get_fmu_state(self) -> dict[str, Any]:
         if self._stale:
             self._follow()
@@ -500,6 +553,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
             "inner": None if self._unbuilt else self.get_inner(),
         }
 
+    @outermost
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         try:
             self._take(state)

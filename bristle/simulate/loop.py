@@ -205,7 +205,7 @@ def compile_loop(
 def _step(
     number: int, instance: Instance, step: float, substeps: int, names: dict[str, Any]
 ) -> list[str]:
-    names[f"f{number}"] = instance.function("fmi2DoStep")
+    names[f"f{number}"] = instance.library.function("DoStep")
     names[f"c{number}"] = ctypes.c_void_p.from_param(instance.component)
     names[f"h{number}"] = ctypes.c_double.from_param(step / substeps)
     names["past"] = ctypes.c_int.from_param(1)  # the state before this step is not needed again
@@ -221,16 +221,17 @@ def _transfer(
     number: int, operation: Read | Write, instance: Instance, memory: Memory, names: dict[str, Any]
 ) -> list[str]:
     order, offset, lines = memory.place(operation)
-    variables = instance.description.variables
-    references = (ctypes.c_uint * len(order))(*(variables[name].reference for name in order))
+    variables = [instance.description.variables[name] for name in order]
+    references = (ctypes.c_uint * len(order))(*(variable.reference for variable in variables))
     names[f"r{number}"] = references  # kept: its address is used below
     kind = _FUNCTION[operation.kind]
     verb = "Get" if isinstance(operation, Read) else "Set"
-    names[f"f{number}"] = instance.function(f"fmi2{verb}{kind}")
+    address = memory.address(offset)
+    names[f"f{number}"] = instance.library.transfer(verb, kind, variables, address)
     names[f"c{number}"] = ctypes.c_void_p.from_param(instance.component)
     names[f"v{number}"] = ctypes.c_void_p.from_param(ctypes.addressof(references))
     names[f"n{number}"] = ctypes.c_size_t.from_param(len(order))
-    names[f"p{number}"] = ctypes.c_void_p.from_param(memory.address(offset))
+    names[f"p{number}"] = ctypes.c_void_p.from_param(address)
     if lines:
         names[f"m{number}"] = memory.views[kind]
         lines = [line.replace("m[", f"m{number}[") for line in lines]
@@ -244,12 +245,15 @@ def _state(
     """Return the lines that get a component's state, or set it and free it: a get may allocate."""
     component = ctypes.c_void_p.from_param(instance.component)
     state = names.setdefault(f"state{operation.component}", ctypes.c_void_p())
-    calls = {"fmi2GetFMUstate": ctypes.byref(state)}
+    calls = {"GetFMUstate": ctypes.byref(state)}
     if isinstance(operation, Restore):
-        calls = {"fmi2SetFMUstate": state, "fmi2FreeFMUstate": ctypes.byref(state)}
+        calls = {"SetFMUstate": state, "FreeFMUstate": ctypes.byref(state)}
     lines = []
     for i, (function, given) in enumerate(calls.items()):
-        names[f"f{number}_{i}"], names[f"c{number}"] = instance.function(function), component
+        names[f"f{number}_{i}"], names[f"c{number}"] = (
+            instance.library.function(function),
+            component,
+        )
         names[f"p{number}_{i}"] = given
         lines.append(f"if s := f{number}_{i}(c{number}, p{number}_{i}): fail(o{number}, s)")
     return lines

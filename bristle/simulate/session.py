@@ -14,14 +14,14 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, NoReturn, Self
 
-import fmpy
 from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from ..errors import FmuError, RunError
-from ..fmu.archive import extract
+from ..fmu.archive import extract, library_member, platform_folder
 from ..fmu.description import Description, Value, Variable
 from ..interrupt import Interrupt
+from . import binding
 
 STATUS = ("OK", "Warning", "Discard", "Error", "Fatal", "Pending")
 WARNING, DISCARD, FATAL = 1, 2, 4
@@ -122,9 +122,9 @@ class Instance:
         self._key = _register(self)
         # A KeyboardInterrupt in an FMU written in Python would be told as that FMU's failure.
         with Interrupt() as interrupt:
-            self._slave = self._load(folder)
+            self.library = self._load(folder)
             try:
-                self._slave.instantiate(callbacks=_callbacks(self._key), loggingOn=True)
+                self.library.instantiate()
             except Exception as error:  # fmpy raises Exception itself
                 _LISTENERS.pop(self._key)
                 raise FmuError(f"{self._where()}: cannot be instantiated.{self.said()}") from error
@@ -135,29 +135,17 @@ class Instance:
     @property
     def component(self) -> int:
         """The address of the FMU's instance."""
-        return int(self._slave.component)
-
-    def function(self, name: str) -> Callable[..., int]:
-        """Return a C function without argument conversion, for arguments prepared once.
-
-        An FMU that runs in this interpreter takes its lock at once, so the lock is not given up
-        around the call; that saves a tenth of the call.
-        """
-        address = ctypes.cast(getattr(self._slave.dll, name), ctypes.c_void_p).value
-        assert address is not None
-        inside = Path(self._slave.unzipDirectory, "resources", "slavemodule.txt").is_file()
-        prototype = ctypes.PYFUNCTYPE if inside else ctypes.CFUNCTYPE
-        return prototype(ctypes.c_int)(address)
+        return int(self.library.slave.component)
 
     def initialise(self, parameters: Mapping[str, Value], stop: float) -> None:
         """Set parameters and inputs, and enter initialisation mode at t = 0."""
-        self._call("setupExperiment", startTime=0.0, stopTime=stop)
+        self._call(self.library.set_up, stop)
         self.set(parameters)
-        self._call("enterInitializationMode")
+        self._call(self.library.enter_initialisation, stop)
 
     def finish_initialisation(self) -> None:
         """Leave initialisation mode."""
-        self._call("exitInitializationMode")
+        self._call(self.library.slave.exitInitializationMode)
         self._initialised = True
         self._last.clear()
 
@@ -167,13 +155,14 @@ class Instance:
             given: list[Value] = [values[name] for name in names]
             if kind == "Real":
                 given = [float(value) for value in given]
-            self._call(f"set{kind}", self._references(names), given)
+            self._call(self.library.set, kind, self._variables(names), given)
 
     def get(self, names: Iterable[str]) -> dict[str, Value]:
         """Return variables by name, one call per kind."""
         found: dict[str, Value] = {}
         for kind, group in _by_call(self.description, names).items():
-            found |= zip(group, self._call(f"get{kind}", self._references(group)), strict=True)
+            values = self._call(self.library.get, kind, self._variables(group))
+            found |= zip(group, values, strict=True)
         return found
 
     def close(self) -> None:
@@ -181,8 +170,8 @@ class Instance:
         if not self.poisoned:
             try:
                 if self._initialised:
-                    self._call("terminate")
-                self._slave.freeInstance()
+                    self._call(self.library.slave.terminate)
+                self.library.slave.freeInstance()
             except RunError as error:
                 self.say("Warning", str(error))
         _LISTENERS.pop(self._key, None)
@@ -202,25 +191,21 @@ class Instance:
         answer = STATUS[status] if 0 <= status < len(STATUS) else f"status {status}"
         raise RunError(f"{self._where()}: {function} answered {answer}.{self.said()}")
 
-    def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
+    def _call(self, method: Callable[..., Any], *arguments: Any) -> Any:
         self._last.clear()
         try:
-            return getattr(self._slave, method)(*arguments, **named)
+            return method(*arguments)
         except FMICallException as error:
             self.fail(error.function, error.status)
 
-    def _references(self, names: Iterable[str]) -> list[int]:
-        return [self.description.variables[name].reference for name in names]
+    def _variables(self, names: Iterable[str]) -> list[Variable]:
+        return [self.description.variables[name] for name in names]
 
-    def _load(self, folder: Path) -> Any:
-        self._need_binary(folder / "binaries")
-        before = Path.cwd()
+    def _load(self, folder: Path) -> binding.Binding:
+        self._need_binary(folder)
         try:
-            return fmi2.FMU2Slave(
-                guid=self.description.guid,
-                modelIdentifier=self.description.identifier,
-                unzipDirectory=str(folder),
-                instanceName=self.name,
+            return binding.load(
+                self.description, folder, self.name, _callbacks(self._key), self.say
             )
         except Exception as error:  # fmpy raises Exception itself
             _LISTENERS.pop(self._key)
@@ -228,18 +213,16 @@ class Instance:
             if "_Py" in str(error) or "libpython" in str(error):
                 cure = "\n  " + _SHARED_PYTHON.format(*sys.version_info)
             raise FmuError(f"{self._where()}: {error}{cure}") from error
-        finally:
-            os.chdir(before)  # fmpy changes into the FMU's folder and stays there on failure
 
-    def _need_binary(self, binaries: Path) -> None:
-        name = self.description.identifier + fmpy.sharedLibraryExtension
-        if not (binaries / fmpy.platform / name).is_file():
-            has = sorted(entry.name for entry in binaries.glob("*")) or ["none"]
+    def _need_binary(self, folder: Path) -> None:
+        version = self.description.version
+        if not (folder / library_member(self.description.identifier, version)).is_file():
+            has = sorted(entry.name for entry in (folder / "binaries").glob("*")) or ["none"]
             _LISTENERS.pop(self._key)
             raise FmuError(
-                f"{self._where()} has no binary for this platform ({fmpy.platform}); it has: "
-                f"{', '.join(has)}.\n  A scenario of built-in components runs without binaries: "
-                '--engine compiled, in Python engine="compiled".'
+                f"{self._where()} has no binary for this platform ({platform_folder(version)}); "
+                f"it has: {', '.join(has)}.\n  A scenario of built-in components runs without "
+                'binaries: --engine compiled, in Python engine="compiled".'
             )
 
     def _where(self) -> str:

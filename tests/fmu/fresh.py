@@ -43,9 +43,6 @@ else:
     sys.exit("the project could be imported after all")
 with open(sys.argv[2], "w", encoding="utf-8") as file:
     json.dump(answer, file)
-# PythonFMU's library reads its own freed state when a process unloads it at exit, which once in
-# some hundred runs aborts; the C host holds that a host which frees its FMUs exits cleanly.
-os._exit(0)
 """
 
 

@@ -22,6 +22,7 @@ import bristle
 from bristle.errors import RunError
 from bristle.scenario.scenario import load_scenario, stock_scenarios
 from bristle.scenario.text import scenario_text
+from bristle.simulate import master
 from bristle.simulate.results import load_results
 from bristle.simulate.run import RunInterrupted, run
 
@@ -339,6 +340,22 @@ def test_ctrl_c_ends_a_component_that_hangs(scenario_of: Maker, tmp_path: Path) 
     assert process.returncode == 130
     assert "a component does not end its step. Rows up to t = 2.9 s are kept" in errors
     assert len(left(tmp_path)) == 30
+
+
+def test_ctrl_c_in_the_last_block_of_steps_is_not_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The run is whole, and a caller's loop of runs ends all the same."""
+    advance = master.Master.advance
+
+    def last(self: master.Master, count: int) -> None:
+        advance(self, count)
+        if self.rows > self.steps:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(master.Master, "advance", last)
+    with pytest.raises(RunInterrupted, match="after the last step") as caught:
+        run("bench_sine_bingham", {"run.stop": 0.05})
+    assert len(caught.value.frame) == 101
+    assert caught.value.frame.attrs["complete"]
 
 
 def test_ctrl_c_in_python_gives_the_rows(scenario_of: Maker) -> None:

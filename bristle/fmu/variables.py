@@ -1,0 +1,98 @@
+"""What is known of an FMU's variables, whatever version of FMI it follows, and how numbers read."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from ..errors import FmuError
+
+Value = float | int | bool | str
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One scalar variable of an FMU.
+
+    `kind` is "Real", "Integer", "Boolean", "String" or "Enumeration"; `unit` is None where the
+    FMU gives none ("1" for a dimensionless real that says so). `dependencies` are the names of
+    the inputs that the output follows directly, None where the FMU does not say. `over_step` is how
+    an input is taken over a step, one of `component.OVER_STEP`, None where the FMU does not say.
+    `jumps_without` names the input without which an output may jump, None where the FMU names none.
+    `type` is FMI 3.0's ("Float64", "Int32" ...), "" in FMI 2.0.
+    """
+
+    name: str
+    kind: str
+    causality: str
+    variability: str | None
+    reference: int
+    unit: str | None = None
+    start: Value | None = None
+    minimum: float | None = None
+    maximum: float | None = None
+    nominal: float | None = None
+    description: str = ""
+    dependencies: tuple[str, ...] | None = None
+    optional: bool = False
+    over_step: str | None = None
+    jumps_without: str | None = None
+    type: str = ""
+
+
+@dataclass(frozen=True)
+class Description:
+    """What a scenario needs to know of a component before it runs; `version` is that of FMI."""
+
+    name: str
+    guid: str
+    identifier: str
+    description: str = ""
+    variables: dict[str, Variable] = field(default_factory=dict)
+    capabilities: dict[str, str] = field(default_factory=dict)
+    version: str = "2.0"
+
+    def of(self, causality: str) -> list[Variable]:
+        """Return the variables of one causality ("input", "output", "parameter"), in order."""
+        return [v for v in self.variables.values() if v.causality == causality]
+
+
+def reference_of(name: str, text: str | None) -> int:
+    """Return a value reference of the variable of this name."""
+    number = unsigned(text)
+    if number is None or number >= 2**32:
+        raise FmuError(f'variable "{name}": the value reference {text!r} is no unsigned integer.')
+    return number
+
+
+def unsigned(text: str | None) -> int | None:
+    """Return a number without a sign, None where the text is none."""
+    digits = (text or "").strip()
+    return int(digits) if digits.isdecimal() and len(digits) <= 10 else None
+
+
+def number_of(name: str, attribute: str, text: str | None) -> float | None:
+    """Return the number in an attribute of a variable, None where it has none."""
+    if text is None:
+        return None
+    try:
+        number = float(text)
+    except ValueError:
+        raise FmuError(f'variable "{name}": {attribute} is {text!r}, not a number.') from None
+    if math.isnan(number):
+        raise FmuError(f'variable "{name}": {attribute} is not a number.')
+    return number
+
+
+def start_of(name: str, kind: str, text: str | None) -> Value | None:
+    """Return the start value of a variable, None where it has none."""
+    if text is None or kind == "String":
+        return text
+    try:
+        if kind == "Real":
+            return float(text)
+        if kind == "Boolean":
+            return {"true": True, "1": True, "false": False, "0": False}[text.strip()]
+        return int(text)
+    except (ValueError, KeyError):
+        raise FmuError(f'variable "{name}": the start {text!r} is no {kind}.') from None
