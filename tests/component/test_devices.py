@@ -252,3 +252,26 @@ def test_outputs_follow_no_input_that_they_do_not_list(tmp_path: Path) -> None:
         followed = {v.name for v, a, b in zip(outputs, before, run.outputs, strict=True) if a != b}
         listed = {v.name for v in outputs if name in (v.dependencies or ())}
         assert followed <= listed, name
+
+
+# -- what knows one damper alone
+
+
+def test_studies_refuse_a_building_with_devices_and_say_what_would_be_right() -> None:
+    from bristle import identify
+    from bristle.physics.building import with_one_damper
+
+    text = r"has devices of its own \(brace, tie\): studies .* Take \[\[devices\]\] out"
+    with pytest.raises(PhysicsError, match=text):
+        with_one_damper(tower(BRACE, TIE))
+    with pytest.raises(PhysicsError, match=text):
+        identify({"time": [0.0, 1.0]}, building=tower(BRACE, TIE))
+    assert with_one_damper(tower()) == tower()
+
+
+def test_a_batch_writes_the_devices_of_a_building(tmp_path: Path) -> None:
+    from bristle.batch.buildings import write
+
+    data = {**TOWER, "devices": [BRACE, TIE]}
+    write(data, tmp_path / "tower.toml")
+    assert read_building(tmp_path / "tower.toml") == from_data(data)
