@@ -21,7 +21,7 @@ from ._rows import Row
 
 COUNTED = (
     "compatibility", "exits", "instruments", "lab", "law_free", "learned", "limits", "plan",
-    "prediction",
+    "prediction", "stated",
 )  # fmt: skip
 """Benchmarks whose own options say how many cases are made, or where."""
 

@@ -6,6 +6,7 @@ import statistics
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -55,3 +56,23 @@ def interleave(jobs: Mapping[str, Callable[[], float]], repetitions: int) -> dic
 def ratio_of(one: Times, other: Times) -> float:
     """Return the median over repetitions of the ratio of neighbours in time."""
     return statistics.median(a / b for a, b in zip(one.seconds, other.seconds, strict=True))
+
+
+def least_times(
+    jobs: Mapping[Any, Callable[[int], None]], amount: int, slices: int
+) -> dict[Any, float]:
+    """Return the least processor time [s] of a slice of each job; slices of all take turns.
+
+    Parameters
+    ----------
+    jobs : name to what does so much of it at a call
+    amount : of a slice
+    slices : of each job
+    """
+    least = dict.fromkeys(jobs, float("inf"))
+    for _ in range(slices):
+        for name, job in jobs.items():
+            before = time.process_time()
+            job(amount)
+            least[name] = min(least[name], time.process_time() - before)
+    return least

@@ -6,8 +6,14 @@ from bristle.physics.building import from_data, paper_building
 from bristle.physics.structure import matrices
 
 
+def moves(coupled, device, level):
+    """Return whether a device's force accelerates a level, `coupled` (n, n) the inverse of M."""
+    n = round(len(coupled) ** 0.5)
+    return any(coupled[level * n + end] for end in device.levels if end >= 0)
+
+
 class Structure(ComponentSlave):
-    """Building, isolated or fixed, under ground motion and the forces of one or two devices."""
+    """Building, isolated or fixed, under ground motion and the forces of devices."""
 
     functions = structure
 
@@ -18,15 +24,20 @@ class Structure(ComponentSlave):
         text = "acceleration of the ground, positive along +x"
         self.add_input("ground_acceleration", "m/s2", text, over_step=LINEAR)
         text = "force of the damper, positive against +x"
-        self.add_input("damper_force", "N", text, over_step=HELD)
+        devices = self.building.devices  # one that has its own may do without the damper
+        self.add_input("damper_force", "N", text, over_step=HELD, optional=bool(devices))
         text = "force of a second device, positive against +x"
         self.add_input("extra_force", "N", text, over_step=HELD, optional=True)
+        for device in devices:
+            text = f"force of the device {device.name}, positive against its displacement"
+            self.add_input(device.ports[0], "N", text, over_step=HELD)
         levels = self.building.levels()
         coupled = matrices(self.building).M_inverse
         for i, level in enumerate(levels):
             self.add_output(level + "_displacement", "m", "relative to the ground", nominal=0.01)
             self.add_output(level + "_velocity", "m/s", "relative to the ground", nominal=0.1)
             depends = forces if coupled[i * len(levels)] else []
+            depends = [*depends, *(d.ports[0] for d in devices if moves(coupled, d, i))]
             text = "absolute acceleration"
             self.add_output(level + "_acceleration_absolute", "m/s2", text, depends=depends)
         first = 1 if self.building.isolated else 0
@@ -36,9 +47,30 @@ class Structure(ComponentSlave):
             "damper force at which the damper's level would not accelerate relative to the ground"
         )
         depends = ["ground_acceleration", "extra_force"]
+        depends += [device.ports[0] for device in devices if 0 in device.levels]
         self.add_output("holding_force", "N", text, depends=depends)
+        for device in devices:
+            self.add_motion(device, coupled)
         self.add_parameter("attached_mass", 0.0, "kg", "adds to the damper's level", (0.0, 1e9))
         self.add_effects("structure")
+
+    def add_motion(self, device, coupled):
+        """Declare what a device shows: its motion, and the force that would hold it."""
+        _, displacement, velocity, holding = device.ports
+        above = self.building.levels()[device.upper]
+        below = self.building.levels()[device.lower] if device.lower >= 0 else "the ground"
+        text = f"of {above} relative to {below}"
+        self.add_output(displacement, "m", text, nominal=0.01)
+        self.add_output(velocity, "m/s", text, nominal=0.1)
+        ends = [level for level in device.levels if level >= 0]
+        depends = ["ground_acceleration"]
+        if any(coupled[i * self.building.size] for i in ends):
+            depends += ["damper_force", "extra_force"]
+        for other in self.building.devices:
+            if other is not device and any(moves(coupled, other, i) for i in ends):
+                depends.append(other.ports[0])
+        text = f"force of {device.name} at which {above} would not accelerate relative to {below}"
+        self.add_output(holding, "N", text, depends=depends)
 
     def setup(self):
         self._steps = {}

@@ -1,4 +1,4 @@
-"""The options that every command takes, and every action of a command that has several."""
+"""Options that every command takes, or every action of a command, or several commands."""
 
 from __future__ import annotations
 
@@ -14,6 +14,20 @@ def add_common_to_actions(commands: argparse._SubParsersAction[argparse.Argument
     """Add them to the actions of a command: after an action they count as before it."""
     for action in commands.choices.values():
         _add(action, argparse.SUPPRESS)
+
+
+def add_overrides(
+    parser: argparse.ArgumentParser, of: str = "file", example: str = "damper.f_c=2"
+) -> None:
+    """Add --set to a command that loads a scenario; `of` is what the values are else taken from."""
+    parser.add_argument(
+        "--set",
+        dest="overrides",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help=f"take a value in place of the {of}'s, e.g. --set {example}",
+    )
 
 
 def _add(parser: argparse.ArgumentParser, default: object) -> None:

@@ -1,7 +1,7 @@
 """Write a scenario as an SSP package for other tools, and say how far off they will be.
 
 OMSimulator, libcosim, Ecos and others run it where bristle is not installed. They hold inputs over
-a step, which makes a coupling error: its size is printed, with the step that keeps it below 0.5 %.
+a step, which makes a coupling error: its size is printed, with a step that keeps it below 0.5 %.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._common import add_overrides
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -28,14 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.ssp", help=text)
     text = "write OspSystemStructure.xml with the FMUs beside it as well"
     parser.add_argument("--osp", type=Path, metavar="FOLDER", help=text)
-    parser.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="take a value in place of the file's, e.g. --set damper.f_c=2",
-    )
+    add_overrides(parser)
     text = "run nothing: do not estimate the coupling error in other tools"
     parser.add_argument("--no-coupling-error", action="store_true", help=text)
     add_trust(parser)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..quantity import plain
+from ._common import add_overrides
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -65,14 +66,7 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--grid", type=int, default=17, metavar="N", help="voltages that are run first; else 17"
     )
-    parser.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="take a value in place of the scenario's, e.g. --set damper.sigma_a=600",
-    )
+    add_overrides(parser, "scenario", "damper.sigma_a=600")
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..quantity import plain
+from ._common import add_overrides
 from ._consent import add_trust
 
 if TYPE_CHECKING:
@@ -27,14 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="where results, figure and log go, in place of older ones; else results/NAME/, "
         "or results/NAME_a.b=value/ with --set a.b=value",
     )
-    parser.add_argument(
-        "--set",
-        dest="overrides",
-        action="append",
-        default=[],
-        metavar="NAME=VALUE",
-        help="take a value in place of the file's, e.g. --set damper.f_c=2",
-    )
+    add_overrides(parser)
     parser.add_argument(
         "--engine",
         choices=("fmu", "compiled"),
@@ -109,8 +103,8 @@ def _step_for(
     """Return the step [s] that keeps the tolerance, and say it."""
     from ..errors import not_usable
     from ..scenario.scenario import load_scenario
-    from ..simulate.coupling_error import find_step
     from ..simulate.run import run_quietly
+    from ..simulate.tolerance import find_step
 
     if arguments.engine != "fmu":
         raise not_usable('--tolerance: engine "compiled" makes no coupling error; "fmu" does.')

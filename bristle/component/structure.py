@@ -1,9 +1,10 @@
-"""A building under ground motion and the forces of devices on its first level."""
+"""A building under ground motion and the forces of devices, on its first level and between any."""
 
 # Longer than 300 lines: a docstring says of every argument which shape and unit it has.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..physics.building import Building
@@ -29,14 +30,19 @@ from ..physics.structure import (
 )
 from ..physics.structure import step as effects_step
 from .damper import stick_force
-
-GROUND_ACCELERATION, DAMPER_FORCE, EXTRA_FORCE = range(3)
-
-PER_LEVEL = 3
-"""Outputs of each level: displacement, velocity, absolute acceleration.
-
-The drifts follow, then the holding force.
-"""
+from .devices import (
+    DAMPER_FORCE,
+    EXTRA_FORCE,
+    GROUND_ACCELERATION,
+    PER_DEVICE,
+    PER_LEVEL,
+    add_devices,
+    devices_at_first_level,
+    forces_between,
+    load_upper_levels,
+    show_device_motion,
+    show_holding_forces,
+)
 
 
 class Constants(NamedTuple):
@@ -46,6 +52,8 @@ class Constants(NamedTuple):
     `physics.structure.Matrices`; `p`, `on` the parameters and switches of effects, any of which is
     `active`, one of which is a contact that `touches`. `substeps` of `h` [s] make a step, whose
     matrices are `phi`, `held`, `ramp` (see `discretise`). Forces are `linear` over a step, or held.
+    Each of the `devices` acts between two levels, which follow each other in `ends`, the lower one
+    first; -1 is the ground.
     """
 
     n: int
@@ -65,6 +73,8 @@ class Constants(NamedTuple):
     phi: Row = ()
     held: Row = ()
     ramp: Row = ()
+    devices: int = 0
+    ends: Sequence[int] = ()
 
 
 def setup(
@@ -82,6 +92,8 @@ def setup(
         [effect.name in effects for effect in effects_of("structure")], bool(effects),
         any(effect.contact and effect.name in effects for effect in effects_of("structure")),
         linear=False,
+        devices=len(building.devices),
+        ends=[level for device in building.devices for level in device.levels],
     )  # fmt: skip
     state = [0.0] * (2 * m.n) + start_states(m.n, values) + [0.0] * (m.n + 1)
     work = [0.0] * room(m.n)
@@ -91,7 +103,7 @@ def setup(
 
 def room(n: int) -> int:
     """Return the size of work of a structure of n levels."""
-    return work_size(n) + 2 * n + 2 * state_size(n)
+    return work_size(n) + 4 * n + 2 * state_size(n)
 
 
 def discretise(dt: float, c: Constants) -> Constants:
@@ -108,11 +120,13 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     Parameters
     ----------
     time : s, not used
-    inputs : (3,) ground acceleration [m/s2], damper force [N], extra force [N]
+    inputs : (3 + d,) ground acceleration [m/s2], damper force [N], extra force [N]; the force [N]
+        of each of the d devices
     c : Constants
     state : as `setup` returns it, kept
     outputs : displacement [m], velocity [m/s], absolute acceleration [m/s2] of each of the n
-        levels; the drifts [m], n of them or, isolated, n - 1; the holding force [N]; filled
+        levels; the drifts [m], n of them or, isolated, n - 1; the holding force [N]; displacement
+        [m], velocity [m/s] and holding force [N] of each of the d devices; filled
     work : (`room(n)`,) room to work
 
     Returns
@@ -137,7 +151,7 @@ def step(
     ----------
     clock : tuple
         Time at the begin [s], dt [s], sweep: 0 for the first of a step.
-    before, now : (3,) inputs at begin and end, as in `start`
+    before, now : (3 + d,) inputs at begin and end, as in `start`
     c : Constants
         With the matrices of a step of dt, as `discretise` returns them.
     state, new_state : states at begin (kept) and end (filled), as `setup` returns them
@@ -151,10 +165,8 @@ def step(
     """
     n, size = c.n, 2 * c.n
     a0, a1 = before[GROUND_ACCELERATION], now[GROUND_ACCELERATION]
-    f1 = now[DAMPER_FORCE] + now[EXTRA_FORCE]
-    f0 = before[DAMPER_FORCE] + before[EXTRA_FORCE] if c.linear else f1
     if c.active:
-        effect_steps(a0, a1, f0, f1, c, state, new_state, work)
+        effect_steps(before, now, c, state, new_state, work)
     else:
         # Without the devices' force no sweep differs from the one before.
         if clock[2] == 0 or work[size] != a1:
@@ -162,7 +174,11 @@ def step(
             work[size] = a1
         for i in range(size):
             new_state[i] = work[i]
+        f1 = now[DAMPER_FORCE] + now[EXTRA_FORCE]
+        f0 = before[DAMPER_FORCE] + before[EXTRA_FORCE] if c.linear else f1
         add_force(n, c.held, c.ramp, 0, f0, f1, new_state)
+        if c.devices > 0:
+            add_devices(before, now, c, new_state)
     show_motion(c, new_state, outputs)
     if c.linear:
         return 0
@@ -171,14 +187,14 @@ def step(
 
 
 def effect_steps(
-    a0: float, a1: float, f0: float, f1: float, c: Constants, state: Row, new_state: Row, work: Row
+    before: Row, now: Row, c: Constants, state: Row, new_state: Row, work: Row
 ) -> None:
     """Advance motion and states of effects over the substeps of a step.
 
     Parameters
     ----------
-    a0, a1 : ground acceleration at begin and end [m/s2], linear between
-    f0, f1 : force of the devices on the first level at begin and end [N], linear between
+    before, now : (3 + d,) inputs at begin and end, as in `start`; the ground acceleration goes
+        linearly from one to the other
     c : Constants
     state, new_state : states at begin (kept) and end (filled), as `setup` returns them
     work : (`room(n)`,) room to work
@@ -186,18 +202,21 @@ def effect_steps(
     n, size, states = c.n, 2 * c.n, len(state) - 3 * c.n - 1
     room = work[0 : 6 * n]
     x0 = work[6 * n : 8 * n]
-    z0 = work[8 * n : 8 * n + states]
-    z1 = work[8 * n + states : 8 * n + 2 * states]
+    f0, f1 = work[8 * n : 9 * n], work[9 * n : 10 * n]
+    z0 = work[10 * n : 10 * n + states]
+    z1 = work[10 * n + states : 10 * n + 2 * states]
     copy(state, 0, new_state, 0, size)
     copy(state, size, z1, 0, states)
     setup = Setup(n, c.isolated, c.stiffnesses, c.phi, c.held, c.ramp, c.h, c.p, c.on, True)
+    a0, a1 = before[GROUND_ACCELERATION], now[GROUND_ACCELERATION]
+    forces_between(before, now, 0.0, c, f1)
     for k in range(c.substeps):
         s, e = k / c.substeps, (k + 1.0) / c.substeps
         copy(new_state, 0, x0, 0, size)
         copy(z1, 0, z0, 0, states)
-        loads = Loads(
-            a0 + s * (a1 - a0), a0 + e * (a1 - a0), f0 + s * (f1 - f0), f0 + e * (f1 - f0), 0.0
-        )
+        copy(f1, 0, f0, 0, n)
+        forces_between(before, now, e, c, f1)
+        loads = Loads(a0 + s * (a1 - a0), a0 + e * (a1 - a0), f0, f1, 0.0)
         effects_step(setup, loads, x0, z0, new_state, z1, room)
     copy(z1, 0, new_state, size, states)
 
@@ -217,7 +236,7 @@ def settle(c: Constants, state: Row, work: Row) -> None:
 
 
 def show_motion(c: Constants, state: Row, outputs: Row) -> None:
-    """Give displacements, velocities and drifts of a state."""
+    """Give displacements, velocities and drifts of a state, and the motion of devices."""
     n, at = c.n, 0
     for i in range(n):
         outputs[at], outputs[at + 1] = state[i], state[n + i]
@@ -225,10 +244,12 @@ def show_motion(c: Constants, state: Row, outputs: Row) -> None:
     for i in range(1 if c.isolated else 0, n):
         outputs[at] = state[i] - (state[i - 1] if i > 0 else 0.0)
         at += 1
+    if c.devices > 0:
+        show_device_motion(c, state, outputs, at + 1)
 
 
 def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
-    """Let absolute accelerations and the holding force follow the inputs, the motion held.
+    """Let absolute accelerations and holding forces follow the inputs, the motion held.
 
     A contact that sticks carries what the devices' force leaves of the holding force, for the
     devices hold first; the level then has the ground's acceleration.
@@ -236,7 +257,7 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     Parameters
     ----------
     time : s, not used
-    inputs : (3,) as in `start`
+    inputs : (3 + d,) as in `start`
     c : Constants
     state : as `setup` returns it, after `settle`; kept
     outputs : as in `start`; displacements, velocities and drifts stay, the others are filled
@@ -248,19 +269,28 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
         0.
     """
     n, end = c.n, len(state) - c.n - 1
-    force = inputs[DAMPER_FORCE] + inputs[EXTRA_FORCE]
+    others = inputs[EXTRA_FORCE]
+    if c.devices > 0:
+        others += devices_at_first_level(inputs, c)
+    force = inputs[DAMPER_FORCE] + others
     hold = state[end + n] - c.mass * inputs[GROUND_ACCELERATION]
+    left, contact = hold - force, 0.0
     if c.touches:
-        stick = stick_force(hold - force, state[n], c.mass, EFFECT_STEP)
-        force += resting_contact(
+        stick = stick_force(left, state[n], c.mass, EFFECT_STEP)
+        contact = resting_contact(
             n, c.isolated, c.stiffnesses, state, stick, state[2 * n : end], c.p, c.on
         )
+        force += contact
     m_inverse, at = c.m_inverse, 2
     for i in range(n):
         outputs[at] = state[end + i] - m_inverse[i * n] * force
         at += PER_LEVEL
-    drifts = n - 1 if c.isolated else n
-    outputs[PER_LEVEL * n + drifts] = hold - inputs[EXTRA_FORCE]
+    at = PER_LEVEL * n + (n - 1 if c.isolated else n)
+    outputs[at] = hold - others
+    if c.devices > 0:
+        load_upper_levels(inputs, c, outputs)
+        first, free = inputs[DAMPER_FORCE] + inputs[EXTRA_FORCE] + contact, state[end : end + n]
+        show_holding_forces(inputs, left, first, c, free, outputs, at + PER_DEVICE)
     return 0
 
 
@@ -282,7 +312,9 @@ class StructureModel:
         self.x, self.z = state[0:size], state[size : size + state_size(self.m.n)]
         self.p, self.on = self.constants.p, self.constants.on
         self._work = [0.0] * work
-        self._outputs = [0.0] * (PER_LEVEL * self.m.n + self.m.n + 1)
+        self._idle = [0.0] * len(building.devices)
+        shown = PER_LEVEL * self.m.n + self.m.n + 1 + PER_DEVICE * len(building.devices)
+        self._outputs = [0.0] * shown
         self._h = 0.0
         self.settle()
 
@@ -302,7 +334,8 @@ class StructureModel:
         """
         if dt != self._h:
             self.constants, self._h = discretise(dt, self.constants), dt
-        new, inputs = list(self._state), ((a0, 0.0, 0.0), (a1, force, 0.0))
+        new = list(self._state)
+        inputs = [a0, 0.0, 0.0, *self._idle], [a1, force, 0.0, *self._idle]
         clock = (0.0, dt, 0)
         step(clock, *inputs, self.constants, self._state, new, self._outputs, self._work)
         self._state, size = new, 2 * self.m.n
@@ -319,5 +352,5 @@ class StructureModel:
         return self._outputs[PER_LEVEL * self.m.n + self.m.n - self.m.isolated]
 
     def _show(self, a_g: float, force: float, extra: float) -> None:
-        inputs = (a_g, force, extra)
+        inputs = [a_g, force, extra, *self._idle]
         output(0.0, inputs, self.constants, self._state, self._outputs, self._work)

@@ -3,6 +3,7 @@
 schema = 1
 kind = "lpv"                     # or "hinf", "lqg"; the rest may be left out
 building = "my_building.toml"    # else the paper's model
+device = "brace"                 # what is commanded; else the damper on the first level
 sample_period = 0.002            # s
 tau = 2.0                        # 1 or more; larger: a slower controller
 order = 12                       # balanced states to keep; else all
@@ -21,6 +22,9 @@ known_to = 0.4                   # m/s, the largest speed of the data behind the
 grid = [0.0, 0.01, 0.02, 0.04, 0.08, 0.15, 0.3]        # m/s
 varies = "none"                  # or "X", "Y": which Lyapunov matrix follows the speed
 rate = 1.0                       # m/s2
+
+[passive]                        # dampers at other places, which are not commanded
+damper = { damping = 80.0, stiffness = 650.0 }         # N.s/m, N/m; "damper": on the first level
 
 [lqg]                            # lqg: acceleration, drift, force, ground, noise
 force = 0.2
@@ -41,6 +45,7 @@ from ..data.model import read_model
 from ..errors import BristleError, DesignError, StudyError
 from ..physics.building import paper_building, read_building
 from ..physics.laws import DEFAULT_OF_DESIGN
+from .passive import Share
 from .sliding import Damper
 from .task import Scheduling, Task
 from .weights import LqgWeights, Weight, Weights
@@ -51,7 +56,7 @@ SCHEMA = 1
 _TABLES = {"hinf": {"weights", "damper"}, "lpv": {"weights", "damper", "scheduling"}}
 _TABLES["lqg"] = {"lqg", "damper"}
 _NO_NUMBERS = ("grid", "rows", "varies")
-_TOP = {"schema", "kind", "title", "building", "sample_period", "tau", "order"}
+_TOP = {"schema", "kind", "title", "building", "device", "sample_period", "tau", "order", "passive"}
 _WEIGHT_FORMS: dict[frozenset[str], Callable[..., Weight]] = {
     frozenset({"gain", "corner"}): Weight.low_pass,
     frozenset({"gain", "zero", "pole"}): Weight.lead,
@@ -102,6 +107,7 @@ def task_from_data(data: Mapping[str, Any], folder: Path, where: str = "design")
             given[key] = _number(data[key], key, where)
     if "order" in data:
         given["order"] = _whole(data["order"], "order", where)
+    given["device"] = _text(data, "device", where)
     building = _text(data, "building", where)
     given["building"] = read_building(folder / building) if building else paper_building()
     readers: dict[str, Callable[[Mapping[str, Any], str], Any]] = {
@@ -109,8 +115,9 @@ def task_from_data(data: Mapping[str, Any], folder: Path, where: str = "design")
         "damper": lambda table, at: _damper(table, folder, at),
         "scheduling": _scheduling,
         "lqg": lambda table, at: _plain(LqgWeights, table, at),
+        "passive": _passive,
     }
-    for name in sorted(_TABLES[kind] & set(data)):
+    for name in sorted((_TABLES[kind] | {"passive"}) & set(data)):
         if not isinstance(data[name], dict):
             raise DesignError(f"{where}: {name} must be a table, [{name}].")
         at = f"{where} [{name}]"
@@ -188,6 +195,18 @@ def _damper(table: Mapping[str, Any], folder: Path, where: str) -> Damper:
     values = {str(name): _number(value, str(name), where) for name, value in parameters.items()}
     law = _text(table, "law", where) or DEFAULT_OF_DESIGN
     return Damper(law, values, tuple(map(str, effects)), **limits)
+
+
+def _passive(table: Mapping[str, Any], where: str) -> dict[str, Share]:
+    shares = {}
+    for name, share in table.items():
+        if not isinstance(share, dict):
+            raise DesignError(f"{where}: {name} must be {{ damping = ..., stiffness = ... }}.")
+        _known(share, set(Share._fields), f"{where} {name}")
+        shares[name] = Share(
+            **{key: _number(value, key, f"{where} {name}") for key, value in share.items()}
+        )
+    return shares
 
 
 def _scheduling(table: Mapping[str, Any], where: str) -> Scheduling:

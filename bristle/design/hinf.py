@@ -48,7 +48,9 @@ def design_hinf(task: Task) -> DesignResult:
         If the solver fails, a number does not stand up to its check, or the controller is unstable
         or too fast for its sample period.
     """
-    plant = generalized(task.building, task.weights, stiffness=stiffness(task.damper))
+    plant = generalized(
+        task.plant_building, task.weights, stiffness=stiffness(task.damper), device=task.place
+    )
     least = least_gamma(plant)
     units = units_for(plant, least)
     normalised = units.normalised(plant)

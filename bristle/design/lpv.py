@@ -42,7 +42,7 @@ def plants_at(task: Task, r: Array) -> list[Plant]:
         raise DesignError(
             f"damper: at {speed:g} m/s voltage does not raise the force; nothing could control it."
         )
-    return family(task.building, task.weights, b, d, stiffness(task.damper))
+    return family(task.plant_building, task.weights, b, d, stiffness(task.damper), task.place)
 
 
 def _frame(task: Task, plants: list[Plant]) -> tuple[Units, States]:

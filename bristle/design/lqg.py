@@ -34,7 +34,7 @@ def design_lqg(task: Task) -> DesignResult:
     import control
 
     weights, h = task.lqg, task.sample_period
-    s = structure(task.building, stiffness=stiffness(task.damper))
+    s = structure(task.plant_building, stiffness=stiffness(task.damper), device=task.place)
     push, ground = s.B[:, :1], s.B[:, 1:]
     y, drift, direct = s.C[:1], s.C[1:2], s.D[:1, :1]
     Q = weights.acceleration * y.T @ y + weights.drift * drift.T @ drift

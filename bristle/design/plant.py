@@ -17,6 +17,7 @@ from scipy import linalg
 
 from ..errors import DesignError
 from ..physics.building import Building
+from ..physics.device import Device
 from .weights import Weights
 
 Array = NDArray[np.float64]
@@ -104,28 +105,35 @@ class Units(NamedTuple):
         )
 
 
-def structure(building: Building, damping: float = 0.0, stiffness: float = 0.0) -> StateSpace:
+def structure(
+    building: Building,
+    damping: float = 0.0,
+    stiffness: float = 0.0,
+    device: Device | None = None,
+) -> StateSpace:
     """Return the building from [force, ground acceleration] to [top acceleration, displacement].
 
     Parameters
     ----------
     building : Building
     damping, stiffness : float
-        What the damper adds on the first level [N s/m, N/m].
+        What the damper adds where it is [N s/m, N/m].
+    device : Device, optional
+        Where the damper is, if not on the first level.
 
     Returns
     -------
     StateSpace
         States [q, q']; inputs force [N, positive against +x] and ground acceleration [m/s2];
-        outputs the top level's absolute acceleration [m/s2], the first level's displacement [m] and
+        outputs the top level's absolute acceleration [m/s2], the damper's displacement [m] and
         velocity [m/s].
     """
     M, C, K = (np.array(matrix) for matrix in building[1:4])
     n = building.size
-    C[0, 0] += damping
-    K[0, 0] += stiffness
-    push = np.zeros(n)
-    push[0] = -1.0
+    b = np.array((device or building.device("")).incidence(n))
+    C += damping * np.outer(b, b)
+    K += stiffness * np.outer(b, b)
+    push = -b
     acceleration = np.linalg.solve(M, np.column_stack([-K, -C, push]))
     A = np.zeros((2 * n, 2 * n))
     A[:n, n:] = np.eye(n)
@@ -135,8 +143,8 @@ def structure(building: Building, damping: float = 0.0, stiffness: float = 0.0) 
     B[n:, 1] = -1.0
     outputs = np.zeros((3, 2 * n))
     outputs[0] = A[-1]
-    outputs[1, 0] = 1.0
-    outputs[2, n] = 1.0
+    outputs[1, :n] = b
+    outputs[2, n:] = b
     D = np.zeros((3, 2))
     D[0, 0] = B[-1, 0]
     return StateSpace(A, B, outputs, D)
@@ -148,6 +156,7 @@ def generalized(
     gain: float = 1.0,
     damping: float = 0.0,
     stiffness: float = 0.0,
+    device: Device | None = None,
 ) -> Plant:
     """Return the generalized plant.
 
@@ -158,9 +167,11 @@ def generalized(
     gain : float
         Force per unit of command [N or N/V]: 1 when the command is the force itself.
     damping, stiffness : float
-        What the damper adds on the first level without a command [N s/m, N/m].
+        What the damper adds where it is without a command [N s/m, N/m].
+    device : Device, optional
+        Where the damper is, if not on the first level.
     """
-    s = structure(building, damping, stiffness)
+    s = structure(building, damping, stiffness, device)
     Ay, By, Cy, Dy = weights.acceleration.state_space()
     Au, Bu, Cu, Du = weights.command.state_space()
     n, ny, nu = len(s.A), len(Ay), len(Au)
@@ -184,8 +195,9 @@ def generalized(
 
 
 def family(
-    building: Building, weights: Weights, gains: Array, dampings: Array, stiffness: float = 0.0
-) -> list[Plant]:
+    building: Building, weights: Weights, gains: Array, dampings: Array, stiffness: float = 0.0,
+    device: Device | None = None,
+) -> list[Plant]:  # fmt: skip
     """Return the generalized plants of several gains and dampings; see `generalized`.
 
     Gains and dampings enter affinely: three plants make them all.
@@ -197,13 +209,15 @@ def family(
     gains : (k,) array
         Force per unit of command [N or N/V].
     dampings : (k,) array
-        What the damper adds on the first level without a command [N s/m].
+        What the damper adds where it is without a command [N s/m].
     stiffness : float
         The same [N/m], one for all plants.
+    device : Device, optional
+        Where the damper is, if not on the first level.
     """
-    origin = generalized(building, weights, 0.0, 0.0, stiffness)
-    by_gain = generalized(building, weights, 1.0, 0.0, stiffness)
-    by_damping = generalized(building, weights, 0.0, 1.0, stiffness)
+    origin = generalized(building, weights, 0.0, 0.0, stiffness, device)
+    by_gain = generalized(building, weights, 1.0, 0.0, stiffness, device)
+    by_damping = generalized(building, weights, 0.0, 1.0, stiffness, device)
     return [
         Plant(
             *(
@@ -215,19 +229,20 @@ def family(
     ]
 
 
-def check_building(building: Building) -> None:
-    """Refuse a building whose modes a damper on the first level cannot damp.
+def check_building(building: Building, device: Device | None = None) -> None:
+    """Refuse a building whose modes a damper cannot damp, on the first level or as a `device`.
 
     Raises
     ------
     DesignError
         Naming the mode that is undamped, unstable or out of the damper's reach.
     """
-    s = structure(building)
+    s = structure(building, device=device)
     values, left = linalg.eig(s.A, left=True, right=False)
     reach = np.abs(left.conj().T @ s.B[:, 0]) / (
         np.linalg.norm(left, axis=0) * np.linalg.norm(s.B[:, 0])
     )
+    where = f"at {device.name}" if device and device.name else "on the first level"
     for value, share in sorted(zip(values, reach, strict=True), key=lambda pair: abs(pair[0])):
         mode = f"building {building.name!r}: the mode of {abs(value) / (2 * np.pi):.4g} Hz"
         if value.real > -1e-9 * abs(value):
@@ -236,9 +251,7 @@ def check_building(building: Building) -> None:
                 "needs every mode stable without control; give the building damping."
             )
         if share < 1e-9:
-            raise DesignError(
-                f"{mode} is not controllable: the damper on the first level does not move it."
-            )
+            raise DesignError(f"{mode} is not controllable: the damper {where} does not move it.")
 
 
 NOTHING = 1e-13

@@ -57,7 +57,7 @@ def implausible(task: Task) -> list[str]:
 
 def _reach(task: Task) -> _Reach:
     """Return peak gains over frequency, per unit of command: N, or V for "lpv"."""
-    s = structure(task.building, stiffness=stiffness(task.damper))
+    s = structure(task.plant_building, stiffness=stiffness(task.damper), device=task.place)
     gain = 1.0
     if task.kind == "lpv":
         speeds = np.array(task.scheduling.grid)

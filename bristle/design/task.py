@@ -15,11 +15,15 @@ from numpy.typing import NDArray
 from ..control.controller import KINDS
 from ..errors import DesignError
 from ..physics.building import Building, frequencies, paper_building
+from ..physics.device import Device
 from .lmi import VARIES
+from .passive import Share, with_share
 from .plant import check_building
 from .sliding import Damper
 from .weights import LqgWeights, Weights
 
+DAMPER = "damper"
+"""The name of the place on the first level, where it stands among those of devices."""
 SAMPLES_PER_PERIOD = 10
 """Fewest samples in a period of the first mode, which a controller must damp."""
 MOST_SAMPLES = 1000
@@ -116,11 +120,20 @@ class Task:
         states gamma is that of the reduced plant, the norm that of the whole.
     sample_period : float
         [s]
+    device : str
+        Name of the building's device that is commanded; "": the damper on the first level. The
+        controller's measured displacement, velocity and force are those of this device.
+    passive : dict
+        What dampers at other places add to the plant, by the device's name; "damper" is the one on
+        the first level. A device that is not named here adds nothing.
 
     Raises
     ------
     DesignError
-        If a number is out of place, or the building has a mode that no damper can damp.
+        If a number or a device is out of place, or the building has a mode that the damper cannot
+        damp.
+    PhysicsError
+        If the building lacks a device.
     """
 
     kind: str
@@ -133,6 +146,8 @@ class Task:
     tau: float = 2.0
     order: int | None = None
     sample_period: float = 0.002
+    device: str = ""
+    passive: dict[str, Share] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
@@ -143,8 +158,14 @@ class Task:
             raise DesignError(
                 f"order = {self.order!r} must lie in 1 .. {self.states}, the plant's states."
             )
-        check_building(self.building)
-        check_sample_period(self.sample_period, self.building)
+        for name, share in self.passive.items():
+            if name == (self.device or DAMPER):
+                raise DesignError(f"passive: {name} is what is commanded; its law is in [damper].")
+            for what, value in share._asdict().items():
+                if not (isfinite(value) and value >= 0.0):
+                    raise DesignError(f"passive: {name}.{what} = {value!r} must not be negative.")
+        check_building(self.plant_building, self.place)
+        check_sample_period(self.sample_period, self.plant_building)
         known = self.damper.known_to
         if self.kind == "lpv" and known is not None and self.scheduling.grid[-1] > known:
             raise DesignError(
@@ -158,6 +179,20 @@ class Task:
                 f"damper's speed: the law's typical speed is {typical:g} m/s; up to "
                 f"{SPEEDS[1] * typical:g} m/s is plausible."
             )
+
+    @property
+    def place(self) -> Device:
+        """Where the damper is that is commanded."""
+        return self.building.device(self.device)
+
+    @property
+    def plant_building(self) -> Building:
+        """The building with the linear shares of the dampers that are not commanded."""
+        building = self.building
+        for name, share in self.passive.items():
+            device = building.device("" if name == DAMPER else name)
+            building = with_share(building, device, share)
+        return building
 
     @property
     def states(self) -> int:
@@ -180,6 +215,10 @@ class Task:
             "sample_period": self.sample_period,
             "damper": self.damper.data(),
         }
+        if self.device:
+            content["device"] = self.device
+        if self.passive:
+            content["passive"] = {name: share._asdict() for name, share in self.passive.items()}
         if self.kind == "lqg":
             return {**content, "lqg": dict(vars(self.lqg))}
         content |= {"tau": self.tau, "order": self.order}
@@ -195,7 +234,9 @@ class Task:
 
     def digest(self) -> str:
         """Return 16 hexadecimal digits that stand for the task."""
-        text = json.dumps([self.data(), self.building], sort_keys=True)
+        plain = self.building[:-1]  # one without devices keeps its digest of before
+        named = self.building if self.building.devices else plain
+        text = json.dumps([self.data(), named], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -24,7 +24,7 @@ from ..data.extra import Extra
 from ..data.labels import Labels
 from ..data.measurement import Measurement
 from ..errors import RecordError
-from ..physics.building import Building, frequencies
+from ..physics.building import Building, frequencies, with_one_damper
 from .drive import smooth_steps
 from .level import corrected, level_draws, smoothed_level
 from .prepare import SHORTEST
@@ -142,6 +142,7 @@ def responses(
     RecordError
         If a channel is missing, or the building has other levels than were measured.
     """
+    with_one_damper(building)
     for measurement in measurements:
         check_channels(measurement, building)
     smoothed = [

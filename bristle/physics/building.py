@@ -1,5 +1,7 @@
 """A building as masses, damping and stiffness: the data behind a Structure."""
 
+# Longer than 300 lines: every mistake of a building file has a message of its own.
+
 from __future__ import annotations
 
 from math import isfinite, pi
@@ -7,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import PhysicsError
+from .device import GROUND, Device, read_devices
 from .linear import cholesky
 
 MAX_FLOORS = 20
@@ -19,6 +22,7 @@ class Building(NamedTuple):
 
     `M`, `C`, `K` (n, n) in kg, N s/m, N/m; the base comes first when `isolated`. The damper acts on
     the first mass. `stiffnesses` (n,) N/m are those below each mass (for effects of a storey).
+    `devices` are those that have a place and a name besides the damper.
     """
 
     name: str
@@ -27,6 +31,7 @@ class Building(NamedTuple):
     K: Matrix
     isolated: bool
     stiffnesses: tuple[float, ...]
+    devices: tuple[Device, ...] = ()
 
     @property
     def size(self) -> int:
@@ -43,6 +48,22 @@ class Building(NamedTuple):
         M = [list(row) for row in self.M]
         M[0][0] += mass
         return self._replace(M=_freeze(M))
+
+    def device(self, name: str) -> Device:
+        """Return a device by name; "" is the damper, between the ground and the first level.
+
+        Raises
+        ------
+        PhysicsError
+            If there is none of that name.
+        """
+        if not name:
+            return Device("", GROUND, 0)
+        for device in self.devices:
+            if device.name == name:
+                return device
+        known = ", ".join(device.name for device in self.devices) or "none but the damper"
+        raise PhysicsError(f"building {self.name!r} has no device {name!r}; there are {known}.")
 
 
 PAPER: dict[str, Any] = {
@@ -75,7 +96,7 @@ def from_data(data: dict[str, Any], where: str = "building") -> Building:
         are not symmetric or not positive definite.
     """
     known = {"schema", "name", "masses", "stiffnesses", "base", "damping_ratio", "modal"}
-    known |= {"rayleigh", "M", "C", "K"}
+    known |= {"rayleigh", "M", "C", "K", "devices"}
     for key in data:
         if key not in known:
             raise PhysicsError(f"{where}: unknown key {key!r}; there are {sorted(known)}.")
@@ -94,7 +115,8 @@ def from_data(data: dict[str, Any], where: str = "building") -> Building:
     for letter, matrix in (("M", building.M), ("K", building.K)):
         if cholesky([value for row in matrix for value in row], building.size) is None:
             raise PhysicsError(f"{where}: {letter} is not positive definite.")
-    return building
+    devices = read_devices(data.get("devices", []), building.levels(), where)
+    return building._replace(devices=devices)
 
 
 def _from_matrices(data: dict[str, Any], name: str, isolated: bool, where: str) -> Building:
@@ -278,6 +300,24 @@ def read_building(path: str | Path) -> Building:
     except (ValueError, RecursionError) as error:  # also numbers and nests beyond all measure
         raise PhysicsError(f"{path}: not valid TOML: {error}.") from error
     return from_data(data, str(path))
+
+
+def with_one_damper(building: Building) -> Building:
+    """Return a building whose one damper is on the first level: one without devices of its own.
+
+    Raises
+    ------
+    PhysicsError
+        If it has some: what is measured on a building knows the one damper.
+    """
+    if building.devices:
+        names = ", ".join(device.name for device in building.devices)
+        raise PhysicsError(
+            f"building {building.name!r} has devices of its own ({names}): studies and what comes "
+            "of them know one damper, on the first level. Take [[devices]] out of its file, for "
+            "runs in which none of them acts."
+        )
+    return building
 
 
 def _number(value: Any, key: str, where: str) -> float:

@@ -28,6 +28,9 @@ KINDS = {
     "csv": CSV,
 }
 
+INSTANT = 1e-9
+"""A step of a signal happens at most so much early [s]: times that hosts add up are rounded."""
+
 _ANY = (-1e12, 1e12)
 PARAMETERS: dict[str, Parameter] = {
     "level": Parameter(0.0, "", _ANY, "value of the kind constant"),
@@ -61,7 +64,7 @@ def value(
     if kind == STEPS:
         held = 0.0
         for i in range(len(times)):
-            if times[i] > t:
+            if times[i] > t + INSTANT:
                 break
             held = values[i]
         return held

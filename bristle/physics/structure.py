@@ -204,14 +204,14 @@ class Setup(NamedTuple):
 class Loads(NamedTuple):
     """What acts over a step, linear from begin to end.
 
-    `a0`, `a1` ground acceleration [m/s2]; `f0`, `f1` force of the devices on the first level [N];
+    `a0`, `a1` ground acceleration [m/s2]; `f0`, `f1` (n,) force of the devices on each level [N];
     `energy` dissipated so far [J], for effects that know it.
     """
 
     a0: float
     a1: float
-    f0: float
-    f1: float
+    f0: Row
+    f1: Row
     energy: float
 
 
@@ -229,7 +229,9 @@ def step(setup: Setup, loads: Loads, x0: Row, z0: Row, x1: Row, z1: Row, work: R
     isolated, stiffnesses, p, on = setup.isolated, setup.stiffnesses, setup.p, setup.on
     h, energy = setup.h, loads.energy
     free_step(n, setup.phi, held, ramp, x0, loads.a0, loads.a1, x1)
-    add_force(n, held, ramp, 0, loads.f0, loads.f1, x1)
+    for i in range(n):
+        if loads.f0[i] != 0.0 or loads.f1[i] != 0.0:
+            add_force(n, held, ramp, i, loads.f0[i], loads.f1[i], x1)
     if not setup.active:
         return
     size = 2 * n

@@ -4,6 +4,8 @@ Components are known by their ports, not by their names, so that a structure or 
 somebody else's making gets the same advice.
 """
 
+# Longer than 300 lines: each advice is a function of its own, with its message.
+
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
@@ -43,14 +45,19 @@ class Network:
         wire = self.feeding.get((part.name, name))
         return (self.parts[wire.source], wire.output) if wire else None
 
-    def driven_by(self, damper: Part) -> Part | None:
-        """Return the structure that takes the damper's force and gives it its velocity."""
+    def driven_by(self, damper: Part) -> tuple[Part, str] | None:
+        """Return the structure that takes the damper's force and gives it its velocity.
+
+        And which of the structure's inputs takes the force.
+        """
         motion = self.source(damper, "velocity")
         for wire in self.wires:
-            if (wire.source, wire.output) == (damper.name, "force") and wire.input in _FORCES:
-                structure = self.parts[wire.target]
-                if motion and motion[0] is structure:
-                    return structure
+            if (wire.source, wire.output) != (damper.name, "force"):
+                continue
+            structure = self.parts[wire.target]
+            takes = wire.input in _FORCES or own_velocity(wire.input) in structure.variables
+            if takes and motion and motion[0] is structure:
+                return structure, wire.input
         return None
 
     def measured_by(self, controller: Part) -> Part | None:
@@ -62,6 +69,11 @@ class Network:
             if part and part.variables.keys() >= _STRUCTURE_PORTS:
                 return part
         return None
+
+
+def own_velocity(force: str) -> str:
+    """Return the velocity that goes with the force of a structure's device, by their names."""
+    return force.removesuffix("force") + "velocity"
 
 
 def advise(
@@ -286,18 +298,47 @@ def slopes(damper: Part, level: float) -> tuple[float, float]:
 def _coupling(
     run: Run, structure: Part, network: Network, library: Library, findings: Findings
 ) -> None:
-    """Warn where a damper's mass terms or the step make the explicit coupling unstable."""
-    dampers = [
-        (damper, drive)
-        for damper, drive in dampers_of(network)
-        if network.driven_by(damper) is structure
-    ]
-    if not dampers or structure.fmu != "Structure":
+    """Warn where a damper's mass terms or the step make the explicit coupling unstable.
+
+    Of dampers on one level together, of those elsewhere in the building each by itself.
+    """
+    driven: dict[str, list[tuple[Part, Drive]]] = {}
+    for damper, drive in dampers_of(network):
+        pushed = network.driven_by(damper)
+        if pushed and pushed[0] is structure:
+            port = pushed[1]
+            _other_motion(damper, structure, port, network, findings)
+            driven.setdefault(_FORCES[0] if port in _FORCES else port, []).append((damper, drive))
+    if structure.fmu != "Structure":
         return  # the mass behind the ports of another structure is not known
-    try:
-        mass = library.driven_mass(structure.building) + (structure.real("attached_mass") or 0.0)
-    except BristleError:
-        return  # the component's own check has said what is wrong with the building
+    for port, dampers in driven.items():
+        attached = structure.real("attached_mass") or 0.0
+        try:
+            mass = library.driven_mass(structure.building, port, attached)
+        except BristleError:
+            return  # the component's own check has said what is wrong with the building
+        _stability(run, structure, dampers, mass, network, findings)
+
+
+def _other_motion(
+    damper: Part, structure: Part, port: str, network: Network, findings: Findings
+) -> None:
+    """Warn where a damper feels another motion than that of the device whose force it gives."""
+    wire = network.feeding[damper.name, "velocity"]
+    right = own_velocity(port)
+    if port not in _FORCES and wire.output != right:
+        findings.warning(
+            wire.path,
+            f"{damper.name} feels {structure.name}.{wire.output} and pushes "
+            f"{structure.name}.{port}; the motion there is {structure.name}.{right}.",
+        )
+
+
+def _stability(
+    run: Run, structure: Part, dampers: list[tuple[Part, Drive]], mass: float, network: Network,
+    findings: Findings,
+) -> None:  # fmt: skip
+    """Warn where dampers that drive one mass [kg] make the coupling unstable at the run's step."""
     c, k = 0.0, 0.0
     for damper, drive in dampers:
         _mass_terms(damper, mass, findings)

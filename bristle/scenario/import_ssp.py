@@ -19,7 +19,7 @@ from ..ssp.flatten import FlatConnection, FlatSystem, flatten_system
 from ..ssp.flatten import Path as Names
 from ..ssp.package import Package, open_package
 from ..ssp.structure import Structure, read_structure
-from .checks import NAME, RESERVED
+from .checks import NAME, RESERVED, STEP_TOLERANCE
 from .parts import ALGORITHMS
 from .text import toml_key, toml_value
 
@@ -29,6 +29,8 @@ USUAL_STOP = 1.0
 """Stop [s] where neither the package nor its FMUs name one."""
 USUAL_STEPS = 1000
 """Steps until then where none of them names a step."""
+DIGITS = 24
+"""Of a digest, in the name of a folder: 96 bits, no two packages share them."""
 _START: dict[str, Value] = {"Real": 0.0, "Integer": 0, "Enumeration": 0, "Boolean": False}
 
 
@@ -89,7 +91,7 @@ def unpacked(package: Path) -> Path:
     except OSError as error:
         text = f"cannot be read: {error.strerror or error}."
         raise ScenarioError(f"{package}: {text}") from None
-    folder = resources.cache_folder() / "ssp" / content.hexdigest()[:24]
+    folder = resources.cache_folder() / "ssp" / content.hexdigest()[:DIGITS]
     if not folder.is_dir():
         try:
             folder.parent.mkdir(parents=True, exist_ok=True)
@@ -241,7 +243,7 @@ def _times(structure: Structure, fmus: Iterable[Path], notes: list[str]) -> tupl
     if not 0.0 < step <= stop:
         raise ScenarioError(f"stop = {stop:g} s, step = {step:g} s: 0 < step <= stop is right.")
     count = stop / step
-    if abs(count - round(count)) > 1e-6:
+    if abs(count - round(count)) > STEP_TOLERANCE:
         step = stop / math.ceil(count)
         notes.append(f"The stop is no whole number of steps: a step of {step:g} s is taken.")
     return stop, step

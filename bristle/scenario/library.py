@@ -42,14 +42,15 @@ class Library:
     law_of
         (component) -> the law of a built-in damper, "" of what is none.
     driven_mass
-        (building file or None) -> mass [kg] that a damper's force acts on; raises PhysicsError.
+        (building file or None, the Structure's force input, attached mass [kg]) -> mass [kg] that
+        a damper's force there acts on; raises PhysicsError.
     """
 
     names: Callable[[], Sequence[str]]
     describe: Callable[..., Description]
     describe_file: Callable[[Path], Description]
     read_record: Callable[[str, Path], object]
-    driven_mass: Callable[[Path | None], float]
+    driven_mass: Callable[[Path | None, str, float], float]
     check_controller: Callable[[str, Path | None, Path | None], None]
     check_carried: Callable[[Path, Path | None], None]
     damper_of: Callable[[str | Path, str, tuple[float, ...]], DamperLaw]
@@ -109,11 +110,24 @@ def law_of(component: str) -> str:
     return getattr(catalogue.component_class(catalogue.source(component)), "law", "")
 
 
-def driven_mass(building: Path | None) -> float:
-    """Return the mass [kg] that a damper's force acts on: the base, or floor 1 of a fixed base."""
-    from ..physics.building import paper_building, read_building
+def driven_mass(building: Path | None, port: str = "damper_force", attached: float = 0.0) -> float:
+    """Return the mass [kg] that a damper's force acts on.
 
-    return (read_building(building) if building else paper_building()).M[0][0]
+    Of the damper that is the base, or floor 1 of a fixed base; of a device of the building what it
+    moves against each other.
+
+    Parameters
+    ----------
+    building : its file, None for the built-in one
+    port : the Structure's input that takes the force
+    attached : mass [kg] more on the first level
+    """
+    from ..physics.building import paper_building, read_building
+    from ..physics.device import driven_mass as driven_by
+
+    found = read_building(building) if building else paper_building()
+    pushed = next((d for d in found.devices if d.ports[0] == port), found.device(""))
+    return driven_by(found.with_attached_mass(attached).M, pushed)
 
 
 def check_carried(file: Path, building: Path | None) -> None:

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..component import OVER_STEP, SAMPLED
 from ..findings import Findings, unknown, written
 from ..fmu.description import Variable
+from ..physics.signals import KINDS, STEPS
 from .parts import Part
+
+if TYPE_CHECKING:
+    from .scenario import Component
 
 
 def choose_over_step(part: Part, settings: Mapping[str, Any], findings: Findings) -> None:
@@ -53,6 +57,18 @@ def choose_over_step(part: Part, settings: Mapping[str, Any], findings: Findings
             )
         else:
             part.over_step[name] = word
+
+
+def told_over_step(component: Component) -> dict[str, str]:
+    """Return what is known of a component's ports beside what its FMU says.
+
+    That is what a scenario says of a foreign FMU. The outputs of a built-in signal of the kind
+    "steps" stand between its steps: to go on from them would leave the range of the signal.
+    """
+    kind = str(component.parameters.get("kind", ""))
+    if component.path is None and KINDS.get(kind) == STEPS:
+        return {v.name: SAMPLED for v in component.description.of("output") if v.kind == "Real"}
+    return component.over_step
 
 
 def as_told(variable: Variable, told: Mapping[str, str]) -> Variable:

@@ -20,6 +20,8 @@ from .system import System
 
 LONGEST_SUBSTEP = 2e-4
 """Longest substep [s]; half-sine peaks are then within 0.001 % of a tight integration."""
+REFERENCE_SUBSTEP = 5e-5
+"""The same [s] where the errors of other runs are told by this one: it must be better than they."""
 
 Array = NDArray[Any]
 
@@ -35,13 +37,15 @@ class StoppedError(RunError):
         self.columns = columns
 
 
-def simulate(scenario: Scenario) -> dict[str, Array]:
+def simulate(scenario: Scenario, longest: float = LONGEST_SUBSTEP) -> dict[str, Array]:
     """Return the columns of a run, time [s] first, then every output as `component.port`.
 
     Parameters
     ----------
     scenario : Scenario
         Of built-in components only.
+    longest : float
+        Longest substep [s].
 
     Returns
     -------
@@ -57,7 +61,7 @@ def simulate(scenario: Scenario) -> dict[str, Array]:
         component and the time, `columns` holds the rows before.
     """
     system = System(scenario)
-    rows, substeps = scenario.steps, _substeps(scenario.step, system.periods())
+    rows, substeps = scenario.steps, _substeps(scenario.step, system.periods(), longest)
     h = scenario.step / substeps
     table = np.zeros((rows + 1, len(system.outputs)))
     slots = np.array(list(system.outputs.values()), dtype=np.int64)
@@ -92,9 +96,9 @@ def _columns(system: System, table: Array, step: float) -> dict[str, Array]:
     return columns
 
 
-def _substeps(step: float, periods: list[float]) -> int:
+def _substeps(step: float, periods: list[float], longest: float) -> int:
     """Return into how many substeps a step is cut: at best so that instants fall on their ends."""
-    least = max(1, ceil(step / LONGEST_SUBSTEP - 1e-9))
+    least = max(1, ceil(step / longest - 1e-9))
     return next((n for n in range(least, 4 * least) if are_whole(periods, step / n)), least)
 
 

@@ -6,15 +6,16 @@ extrapolated from runs at h, h/2 and h/4, whose differences fall by 2^p where th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from math import isfinite, log2, nan
+from math import log2, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import BristleError, RunError
-from .summary import judged_by, reals
+from ..errors import BristleError
+from ..scenario.over_step import told_over_step
+from .summary import reals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,11 +25,8 @@ if TYPE_CHECKING:
 LEAST_ORDER, MOST_ORDER = 0.5, 2.5
 """Orders between which the differences of runs tell the error; algorithms have 1 or 2."""
 
-FEWEST_STEPS = 100
-"""Steps of a run below which a search for a tolerance goes no further up."""
-
-MOST_TRIALS = 12
-"""Steps that a search for a tolerance tries."""
+MOST_ERROR = 1.0
+"""Error along a run, as a share of the peak, beyond which no power of the step describes it."""
 
 ROUNDING = 1e-9
 """Error along a run, as a share of the peak, below which an output has none worth telling."""
@@ -62,8 +60,10 @@ class CouplingError:
 
     def doubt(self) -> str:
         """Return why the estimate is worth nothing, where it is."""
+        if self.along > MOST_ERROR:
+            return "the coupling error is larger than the peak"
         if LEAST_ORDER <= self.order <= MOST_ORDER:
-            return "the coupling error follows a controller that switches, or does not settle"
+            return "the coupling error follows a signal that switches or jumps, or does not settle"
         said = "the coupling error does not fall with the step as an algorithm's does"
         return f"{said} (order {self.order:.2g})"
 
@@ -91,7 +91,7 @@ def estimate(
     """
     rows = len(frame)
     half = again(finer(scenario, 2), "fmu").iloc[::2]
-    exact = _coupled(scenario, again)
+    exact = coupled_run(scenario, again)
     quarter = again(finer(scenario, 4), "fmu").iloc[::4] if exact is None else None
     found = {}
     for name in reals(frame):
@@ -103,11 +103,34 @@ def estimate(
             found[name] = extrapolated(h, h2, quarter[name].to_numpy()[:rows])
     if exact is not None:
         return "coupled engine", found
-    discrete = [name for name in discrete_outputs(scenario) if name in found]
-    if any(not found[name].worth or switches(frame[name].to_numpy()) for name in discrete):
-        # Where a switch falls otherwise the runs part for good, or agree on the wrong side of it.
-        found = {name: replace(one, worth=not one.some) for name, one in found.items()}
-    return "h, h/2, h/4", found
+    return "h, h/2, h/4", without_doubtful(scenario, frame, found)
+
+
+def without_doubtful(
+    scenario: Scenario, frame: pd.DataFrame, found: dict[str, CouplingError]
+) -> dict[str, CouplingError]:
+    """Return estimates from finer steps, worth nothing where a signal between components spoils it.
+
+    Where a switch or a stick falls otherwise the runs part for good, or agree on the wrong side of
+    it. So it is with a discrete signal that switches or does not settle, and with any signal whose
+    error falls too slowly, as a friction's that jumps. The steps of a source fall on the same rows
+    in all runs; but Jacobi shows what follows them at once one row late, however short its step.
+    """
+    discrete = set(discrete_outputs(scenario))
+    fed = {wire.target for wire in scenario.connections}
+    doubtful = set()
+    for name in {f"{wire.source}.{wire.output}" for wire in scenario.connections} & found.keys():
+        error, stands = found[name], name in discrete
+        follows = name.partition(".")[0] in fed or scenario.algorithm == "jacobi"
+        settles = error.worth or (error.order > MOST_ORDER and not stands)
+        if not settles or (stands and follows and switches(frame[name].to_numpy())):
+            doubtful.add(name)
+    if not doubtful:
+        return found
+    wrong = {name for name in doubtful if name.partition(".")[0] in fed}  # even where runs agree
+    return {
+        name: replace(one, worth=not one.some and name not in wrong) for name, one in found.items()
+    }
 
 
 def switches(values: Array) -> bool:
@@ -122,7 +145,7 @@ def discrete_outputs(scenario: Scenario) -> list[str]:
         for component in scenario.components
         for variable in component.description.of("output")
         if variable.kind == "Real"
-        and (variable.variability == "discrete" or variable.name in component.over_step)
+        and (variable.variability == "discrete" or variable.name in told_over_step(component))
     ]
 
 
@@ -133,11 +156,12 @@ def against(h: Array, half: Array, exact: Array) -> CouplingError:
     ----------
     h, half, exact : (rows,) one output at the same times, at the step, at half of it, without error
     """
-    scale = _largest(exact) or 1.0
-    wrong, better = _largest(h - exact) / scale, _largest(half - exact) / scale
+    scale = largest(exact) or 1.0
+    wrong, better = largest(h - exact) / scale, largest(half - exact) / scale
     found = _judged(wrong, better, 1.0, h, exact)
     # Measured, not extrapolated: an error that falls faster than expected is as good as any.
-    return replace(found, worth=found.worth or not found.order <= MOST_ORDER)
+    falls = found.worth or not found.order <= MOST_ORDER
+    return replace(found, worth=falls and found.along <= MOST_ERROR)
 
 
 def extrapolated(h: Array, half: Array, quarter: Array) -> CouplingError:
@@ -149,8 +173,8 @@ def extrapolated(h: Array, half: Array, quarter: Array) -> CouplingError:
     ----------
     h, half, quarter : (rows,) one output at the same times, at the step, half and a quarter of it
     """
-    scale = _largest(quarter) or 1.0
-    first, second = _largest(h - half) / scale, _largest(half - quarter) / scale
+    scale = largest(quarter) or 1.0
+    first, second = largest(h - half) / scale, largest(half - quarter) / scale
     ratio = first / second if second > 0.0 else nan
     factor = ratio / (ratio - 1.0) if ratio > 1.0 else 1.0
     return _judged(first, second, factor, h, half)
@@ -168,83 +192,15 @@ def _judged(wrong: float, better: float, factor: float, h: Array, other: Array) 
     if wrong <= ROUNDING:
         return CouplingError(0.0, 0.0, 0.0, nan, True)
     order = log2(wrong / better) if better > 0.0 else nan
-    peak, rms = _largest(other), _rms(other)
+    along = factor * wrong
+    peak, rms = largest(other), _rms(other)
     return CouplingError(
-        along=factor * wrong,
-        peak=factor * (_largest(h) / peak - 1.0) if peak > 0.0 else nan,
+        along=along,
+        peak=factor * (largest(h) / peak - 1.0) if peak > 0.0 else nan,
         rms=factor * (_rms(h) / rms - 1.0) if rms > 0.0 else nan,
         order=order,
-        worth=isfinite(order) and LEAST_ORDER <= order <= MOST_ORDER,
+        worth=along <= MOST_ERROR and LEAST_ORDER <= order <= MOST_ORDER,
     )
-
-
-def find_step(
-    scenario: Scenario, tolerance: float, again: Callable[[Scenario, str], pd.DataFrame]
-) -> Scenario:
-    """Return the scenario with the largest step, 2^k times its own, whose error is small enough.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    tolerance : largest error [1] along the run of any output that a run is judged by
-    again : as in `estimate`
-
-    Raises
-    ------
-    RunError
-        If no step does, or no output has an estimate that is worth something.
-    """
-    runs: dict[tuple[float, str], pd.DataFrame] = {}
-
-    def kept(one: Scenario, engine: str) -> pd.DataFrame:
-        if (one.step, engine) not in runs:
-            runs[one.step, engine] = again(one, engine)
-        return runs[one.step, engine]
-
-    good: Scenario | None = None
-    tried = scenario
-    for _ in range(MOST_TRIALS):
-        if worst(estimate(tried, frame := kept(tried, "fmu"), kept)[1], frame) <= tolerance:
-            good, coarser = tried, finer(tried, 0.5)
-            if tried.step < scenario.step or not _fits(coarser):
-                return good
-            tried = coarser
-        elif good is not None:
-            return good
-        else:
-            tried = finer(tried, 2)
-    raise RunError(
-        f"no step down to {1e3 * tried.step:.3g} ms keeps the coupling error below "
-        f"{100 * tolerance:.3g} %."
-    )
-
-
-def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> float:
-    """Return the largest error along a run [1] of the outputs that it is judged by.
-
-    Parameters
-    ----------
-    errors : output to its error, as `estimate` returns it
-    frame : the results
-
-    Raises
-    ------
-    RunError
-        If none of them has an estimate that is worth something.
-    """
-    judged = [errors[name] for name in judged_by(frame)]
-    worth = [error.along for error in judged if error.worth]
-    if not worth:
-        raise RunError(
-            "no output's coupling error falls with the step: there is nothing to hold a tolerance "
-            "against. Dry friction without holding_force and switches behave so."
-        )
-    return max(worth)
-
-
-def _fits(scenario: Scenario) -> bool:
-    count = scenario.stop / scenario.step
-    return count >= FEWEST_STEPS and abs(count - round(count)) < 1e-6
 
 
 def finer(scenario: Scenario, parts: float) -> Scenario:
@@ -260,7 +216,7 @@ def as_data(errors: dict[str, CouplingError]) -> dict[str, dict[str, Any]]:
     return {name: asdict(error) for name, error in errors.items()}
 
 
-def _coupled(
+def coupled_run(
     scenario: Scenario, again: Callable[[Scenario, str], pd.DataFrame]
 ) -> pd.DataFrame | None:
     """Return the run without coupling error, None where there is no such engine for it."""
@@ -270,7 +226,8 @@ def _coupled(
         return None
 
 
-def _largest(values: Array) -> float:
+def largest(values: Array) -> float:
+    """Return the largest absolute value, 0 where there is none."""
     return float(np.abs(values).max(initial=0.0))
 
 

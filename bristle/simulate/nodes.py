@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import ScenarioError
 from ..fmu.description import Description
-from ..scenario.over_step import as_told
+from ..scenario.over_step import as_told, told_over_step
 from .operations import Node, Port
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
     for c, component in enumerate(scenario.components):
         description = descriptions[component.name]
         substeps = round(scenario.step / component.step) if component.step else 1
-        told = component.over_step
+        told = told_over_step(component)
         outputs = {v.name: as_told(v, told) for v in description.of("output") if v.kind != "String"}
         inputs = {v.name: as_told(v, told) for v in description.of("input")}
         nodes.append(Node(component.name, inputs, outputs, sources[c], substeps, transformed[c]))

@@ -15,9 +15,11 @@ import numpy as np
 
 from ..component import damper as damper_component
 from ..component import structure as structure_component
+from ..component.devices import DEVICE_FORCES
 from ..fmu.controller import MEASURED
 from ..physics import damper, structure
 from ..physics.building import MAX_FLOORS
+from ..physics.device import MOST_DEVICES
 from ..physics.signals import PARAMETERS
 
 LEVELS = MAX_FLOORS + 1
@@ -51,14 +53,16 @@ def damper_record() -> np.dtype[np.void]:
 
     smooth, smooth_1, smooth_2 are the force without friction at the ends of the last substeps;
     found, tried, excess belong to the sweeps; `jumps` says that its voltage has. `sharing` dampers
-    bring the first level of structure `on_structure` (-1: none) to rest together.
+    bring what they push of structure `on_structure` (-1: none) to rest together; `holding` is the
+    slot of the force that would hold it.
     """
     size, effects = damper.SLOTS.z_size, len(damper.SLOTS.effects)
     states = size + damper_component.REMEMBERED
     forces = ("smooth", "smooth_1", "smooth_2", "found", "tried", "excess")
     return np.dtype(
         [
-            *((name, _INT) for name in ("law", "n_moving", "n_own", "on_structure", "first")),
+            *((name, _INT) for name in ("law", "n_moving", "n_own", "first")),
+            *((name, _INT) for name in ("on_structure", "holding")),
             *((name, _FLOAT) for name in ("v_max", "stroke", "moving_mass", "sharing", *forces)),
             *((name, _FLAG) for name in ("active", "advances", "signed", "lags")),
             *((name, _FLAG) for name in ("measured", "jumps")),
@@ -76,19 +80,23 @@ def damper_record() -> np.dtype[np.void]:
 def structure_record() -> np.dtype[np.void]:
     """Return the record of a structure: see `component.structure.Constants`, and what couples it.
 
-    `friction`, `extra_friction` and `holding` are slots of signals; smooth0 is the devices' force
-    without friction at the begin. It is `followed` by a component that reads more than its motion.
+    `forces` are the slots of the inputs behind the first three, those of the `devices`; `friction`,
+    `extra_friction` and `frictions` those of how much of the damper's force, the extra one and the
+    devices' is friction.
+    smooth0 is the damper's and the extra force without friction at the begin, `smooths` that of
+    each device. It is `followed` by a component that reads more than its motion.
     """
-    n = LEVELS
+    n, most = LEVELS, MOST_DEVICES
     slots_of_effects = structure.SLOTS
     states = 3 * n + 1 + structure.state_size(n)
-    slots = ("first", "friction", "extra_friction", "holding")
+    slots = ("first", "friction", "extra_friction")
     return np.dtype(
         [
-            *((name, _INT) for name in ("n", "n_states", *slots)),
+            *((name, _INT) for name in ("n", "n_states", "devices", *slots)),
             *((name, _FLOAT) for name in ("mass", "h", "smooth0")),
             *((name, _FLAG) for name in ("active", "touches", "isolated", "followed")),
-            *_inputs(3),
+            ("inputs", _INT, (DEVICE_FORCES,)),
+            *((name, _FLOAT, (DEVICE_FORCES + most,)) for name in ("before", "now")),
             *((name, _FLOAT, (states,)) for name in ("state", "new_state")),
             ("stiffnesses", _FLOAT, (n,)),
             *((name, _FLOAT, (n * n,)) for name in ("m_inverse", "damping", "stiffness")),
@@ -97,6 +105,9 @@ def structure_record() -> np.dtype[np.void]:
             ("p", _FLOAT, (max(1, slots_of_effects.p_size),)),
             ("on", _SWITCH, (max(1, len(slots_of_effects.effects)),)),
             ("work", _FLOAT, (structure_component.room(n),)),
+            ("ends", _INT, (2 * most,)),
+            *((name, _INT, (most,)) for name in ("forces", "frictions")),
+            ("smooths", _FLOAT, (most,)),
         ],
         align=True,
     )

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..component import controller, damper, sensors, source, structure
+from ..component.devices import DEVICE_FORCES
 from ..data import ground_motion_file
 from ..errors import ScenarioError
 from ..fmu import catalogue
@@ -17,6 +18,7 @@ from ..physics.signals import CONSTANT
 from ..scenario.scenario import Component, Scenario
 from . import records
 from .clocks import Clocks
+from .pushed import pushed_by, sharing, velocity_per_force
 
 Array = NDArray[Any]
 Port = tuple[str, str]
@@ -157,10 +159,11 @@ class System:
         """Return the dampers; one that sticks does so with the structure that it pushes."""
         names = self.names["damper"]
         found = np.zeros(len(names), records.damper_record())
-        pushed = [self._pushed_by(name) for name in names]
+        buildings = {name: self.slaves[name].building for name in self.names["structure"]}
+        pushed = [pushed_by(name, buildings, self.source_of, self.slots) for name in names]
         signs = [self.slaves[name].constants.setup.signed for name in names]
-        sticking = [i for i, signed in zip(pushed, signs, strict=True) if signed]
-        for record, name, on in zip(found, names, pushed, strict=True):
+        sticking = [at for at, signed in zip(pushed, signs, strict=True) if at and signed]
+        for record, name, at in zip(found, names, pushed, strict=True):
             c, state = self.slaves[name].constants, self.slaves[name].state
             _copy(record, c.setup, ("law", "n_moving", "n_own"))
             _copy(record, c.setup, ("active", "advances", "signed", "lags"))
@@ -170,21 +173,15 @@ class System:
             record["inputs"], record["first"] = self._inputs(name), self._first(name)
             given = (name, "acceleration") in self.source_of
             record["measured"] = c.measured or given
-            record["on_structure"], record["sharing"] = on, max(1, sticking.count(on))
-            if on >= 0:  # velocity of the level per force that stands over a substep
-                gain = structures[on]["held"][structures[on]["n"] * (structures[on]["n"] + 1)]
+            record["on_structure"], record["sharing"] = -1, 1.0
+            if at:
+                there = structures[at.structure]
+                gain = velocity_per_force(there, at.device, at.device)
+                beside = [other.device for other in sticking if other.structure == at.structure]
+                record["on_structure"], record["holding"] = at.structure, at.holding
+                record["sharing"] = sharing(there, beside)
                 record["moving_mass"] = -h / (gain * record["sharing"])
         return found
-
-    def _pushed_by(self, damper: str) -> int:
-        """Return the structure whose first level a damper both feels and pushes, or -1."""
-        structures = self.names["structure"]
-        name, port = self.source_of.get((damper, "velocity"), ("", ""))
-        if name in structures and port == f"{self._levels(name)[0]}_velocity":
-            for force in ("damper_force", "extra_force"):
-                if self.source_of.get((name, force)) == (damper, "force"):
-                    return structures.index(name)
-        return -1
 
     def _structures(self, h: float) -> Array:
         names = self.names["structure"]
@@ -198,14 +195,21 @@ class System:
                 stiffness=c.stiffness, phi=c.phi, held=c.held, ramp=c.ramp, p=c.p, on=c.on,
                 state=state, new_state=state,
             )  # fmt: skip
-            record["inputs"], record["first"] = self._inputs(name), self._first(name)
+            inputs = self._inputs(name)
+            _fill(record, inputs=inputs[:DEVICE_FORCES], forces=inputs[DEVICE_FORCES:], ends=c.ends)
+            record["first"], record["devices"] = self._first(name), c.devices
             record["n_states"], record["followed"] = len(state), self._followed(name)
-            record["holding"] = self.slots[name, "holding_force"]
             for field, port in (("friction", "damper_force"), ("extra_friction", "extra_force")):
-                begin = self.source_of.get((name, port), ("", ""))
-                pushes = begin[0] in self.names["damper"] and begin[1] == "force"
-                record[field] = self.slots[begin[0], "hidden 0"] if pushes else len(self.slots)
+                record[field] = self._friction_at(name, port)
+            for k, device in enumerate(self.slaves[name].building.devices):
+                record["frictions"][k] = self._friction_at(name, device.ports[0])
         return found
+
+    def _friction_at(self, structure: str, port: str) -> int:
+        """Return the slot of the friction in a force on a structure; the last one is none."""
+        begin = self.source_of.get((structure, port), ("", ""))
+        pushes = begin[0] in self.names["damper"] and begin[1] == "force"
+        return self.slots[begin[0], "hidden 0"] if pushes else len(self.slots)
 
     def _followed(self, structure: str) -> bool:
         """Return whether a component reads more of a structure than displacement and velocity."""
@@ -215,6 +219,7 @@ class System:
             for level in self._levels(structure)
             for what in ("displacement", "velocity")
         }
+        motion |= {port for d in self.slaves[structure].building.devices for port in d.ports[1:3]}
         return bool(read - motion)
 
     def _levels(self, structure: str) -> list[str]:

@@ -19,15 +19,8 @@ from math import floor, inf, isfinite
 from typing import Any
 
 from ..component import clock, controller, damper, sensors, source, structure
-from ..component.damper import (
-    FORCE,
-    FRICTION,
-    HOLDING_FORCE,
-    LAST_STEP,
-    VOLTAGE,
-    VOLTAGE_AT_END,
-)
-from ..component.structure import DAMPER_FORCE, EXTRA_FORCE
+from ..component.damper import FORCE, FRICTION, HOLDING_FORCE, LAST_STEP, VOLTAGE, VOLTAGE_AT_END
+from ..component.devices import DAMPER_FORCE, DEVICE_FORCES, EXTRA_FORCE
 from ..control.switching import limited
 from ..physics.inputs import Setup
 from ..physics.laws import laws_of
@@ -52,7 +45,7 @@ MAX_SWEEPS = 40
 INLINE = (
     *("time_loop.play", "time_loop.start", "time_loop.begin", "time_loop.move"),
     *("time_loop.correct", "time_loop.accept", "time_loop.gather"),
-    *("time_loop.damper_constants", "time_loop.structure_constants"),
+    *("time_loop.gather_forces", "time_loop.damper_constants", "time_loop.structure_constants"),
     *("damper.step", "damper.stick_force", "switching.limited"),
     *("structure.step", "structure.settle", "structure.output", "structure.show_motion"),
     *("structure.free_step", "structure.add_force", "structure.copy"),
@@ -93,7 +86,9 @@ def integrate(
         none); the number of sweeps.
     """
     (rows, substeps, h), (dampers, structures) = span, coupled
-    scale, sweeps = 1e-9, 0
+    scale, sweeps, most = 1e-9, 0, MAX_SWEEPS
+    for i in range(len(structures)):  # friction at several places takes longer to agree
+        most += MAX_SWEEPS * structures[i].devices
     play(sources, 0.0, s)
     start(dampers, structures, h, s)
     sample(sampled, coupled, 0, h, s)
@@ -105,7 +100,7 @@ def integrate(
             begin(dampers, structures, s)
             play(sources, at * h, s)
             sweep, change = 0, inf
-            while change > TOLERANCE * scale and sweep < MAX_SWEEPS:
+            while change > TOLERANCE * scale and sweep < most:
                 for i in range(len(structures)):
                     move(structures[i], (at * h - h, h, sweep), s)
                 change = 0.0
@@ -163,7 +158,7 @@ def start(dampers: Any, structures: Any, h: float, s: Any) -> None:
             d = dampers[i]
             gather(d.inputs, s, d.now)
             if d.on_structure >= 0:
-                d.now[HOLDING_FORCE] = s[structures[d.on_structure].holding] / d.sharing
+                d.now[HOLDING_FORCE] = s[d.holding] / d.sharing
             c, state = damper_constants(d), d.state[:]
             damper_start(0.0, d.now[:], c, state, s[d.first :], d.work[:])
             state[LAST_STEP] = h
@@ -175,10 +170,12 @@ def begin(dampers: Any, structures: Any, s: Any) -> None:
     """Keep what a substep begins from, and extrapolate the forces to its end."""
     for i in range(len(structures)):
         b = structures[i]
-        gather(b.inputs, s, b.before)
+        gather_forces(b, s, b.before)
         b.smooth0 = (
             b.before[DAMPER_FORCE] + b.before[EXTRA_FORCE] - s[b.friction] - s[b.extra_friction]
         )
+        for k in range(b.devices):
+            b.smooths[k] = b.before[DEVICE_FORCES + k] - s[b.frictions[k]]
     for i in range(len(dampers)):
         d = dampers[i]
         gather(d.inputs, s, d.before)
@@ -188,9 +185,11 @@ def begin(dampers: Any, structures: Any, s: Any) -> None:
 
 def move(b: Any, clock: Any, s: Any) -> None:
     """Take a structure to the end of the substep under the forces of the present sweep."""
-    gather(b.inputs, s, b.now)
+    gather_forces(b, s, b.now)
     b.before[DAMPER_FORCE] = b.smooth0 + s[b.friction] + s[b.extra_friction]
     b.before[EXTRA_FORCE] = 0.0
+    for k in range(b.devices):
+        b.before[DEVICE_FORCES + k] = b.smooths[k] + s[b.frictions[k]]
     structure_step(
         clock, b.before[:], b.now[:], structure_constants(b), b.state[0 : b.n_states],
         b.new_state[0 : b.n_states], s[b.first :], b.work[:],
@@ -363,7 +362,7 @@ def respond(dampers: Any, structures: Any, s: Any) -> None:
 
 def show(b: Any, state: Any, s: Any) -> None:
     """Write accelerations and holding force of a structure in a state into the signals."""
-    gather(b.inputs, s, b.now)
+    gather_forces(b, s, b.now)
     c, now = structure_constants(b), state[0 : b.n_states]
     settle(c, now, b.work[:])
     structure_output(0.0, b.now[:], c, now, s[b.first :], b.work[:])
@@ -373,6 +372,13 @@ def gather(slots: Any, s: Any, values: Any) -> None:
     """Read a component's inputs from the signals."""
     for j in range(len(slots)):
         values[j] = s[slots[j]]
+
+
+def gather_forces(b: Any, s: Any, values: Any) -> None:
+    """Read a structure's inputs from the signals."""
+    gather(b.inputs, s, values)
+    for k in range(b.devices):
+        values[DEVICE_FORCES + k] = s[b.forces[k]]
 
 
 def damper_constants(d: Any) -> damper.Constants:
@@ -389,4 +395,5 @@ def structure_constants(b: Any) -> structure.Constants:
     return StructureConstants(
         b.n, b.isolated, b.mass, b.m_inverse[:], b.damping[:], b.stiffness[:], b.stiffnesses[:],
         b.p[:], b.on[:], b.active, b.touches, True, 1, b.h, b.phi[:], b.held[:], b.ramp[:],
+        b.devices, b.ends[:],
     )  # fmt: skip

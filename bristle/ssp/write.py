@@ -84,7 +84,7 @@ def ssd_text(system: WrittenSystem) -> str:
     step = repr(system.step)
     _add(
         information, "oms:FixedStepMaster", description="oms-ma", stepSize=step,
-        absoluteTolerance="0.0001", relativeTolerance="0.0001",
+        absoluteTolerance=_OMS_TOLERANCE, relativeTolerance=_OMS_TOLERANCE,
     )  # fmt: skip
     _units(root, system.components)
     experiment = _add(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(system.stop))
@@ -97,6 +97,8 @@ def ssd_text(system: WrittenSystem) -> str:
 
 
 _NAME_OF_SYSTEM = "system"
+_OMS_TOLERANCE = "0.0001"
+"""Beside a fixed step, as OMSimulator itself writes it."""
 
 
 def _component(elements: Element, component: WrittenComponent) -> None:

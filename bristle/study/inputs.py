@@ -19,7 +19,7 @@ from ..data.read import files_in, read_table
 from ..data.table import Table, from_arrays, table_from_frame
 from ..errors import RecordError, StudyError
 from ..findings import unknown, written
-from ..physics.building import Building, read_building
+from ..physics.building import Building, read_building, with_one_damper
 from ..physics.effect import EFFECTS
 from ..physics.laws import law_names
 from .identified import Identified
@@ -187,11 +187,13 @@ def names_of(effects: str | Sequence[str]) -> tuple[str, ...]:
 
 def building_from(given: str | Path | Building | None) -> Building | None:
     """Return the building that was given, or that in a file; StudyError for another type."""
-    if given is None or isinstance(given, Building):
-        return given
+    if given is None:
+        return None
+    if isinstance(given, Building):
+        return with_one_damper(given)
     if not isinstance(given, str | Path):
         raise StudyError(f"building is {told(given)}; a building's file is right.")
-    return read_building(given)
+    return with_one_damper(read_building(given))
 
 
 def _model(given: object) -> StudyModel:

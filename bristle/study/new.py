@@ -20,7 +20,7 @@ from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import BristleError, StudyError, UnitError
-from ..physics.building import read_building
+from ..physics.building import read_building, with_one_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
 from ..quantity import plain
@@ -197,7 +197,7 @@ def parse_channel(text: str) -> tuple[str, ChannelSpec]:
 
 def _levels(rig: str, building: Path | str | None) -> list[str] | None:
     if rig == "structure" and building is not None:
-        return read_building(building).levels()
+        return with_one_damper(read_building(building)).levels()
     if building is not None:
         raise StudyError("--building goes with --rig structure alone.")
     return None

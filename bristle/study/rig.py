@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ..data.model import StudyModel
 from ..identify.rig import Rig, bench_rig, building_rig
-from ..physics.building import Building, paper_building, read_building
+from ..physics.building import Building, paper_building, read_building, with_one_damper
 from .runs import Runs
 from .study import Study
 
@@ -30,7 +30,14 @@ def building_of(study: Study, model: StudyModel) -> Building | None:
     """Return the building of a study: its file, or the paper's where it names none.
 
     None where the damper was measured on a test bench.
+
+    Raises
+    ------
+    PhysicsError
+        If the building has devices besides the damper, or its file is wrong.
     """
     if not study.settings.has_building:
         return None
-    return read_building(study.folder / model.building) if model.building else paper_building()
+    if not model.building:
+        return paper_building()
+    return with_one_damper(read_building(study.folder / model.building))

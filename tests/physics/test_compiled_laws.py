@@ -116,10 +116,11 @@ def structure_run(step: Any, effects: list[str], to: Any) -> np.ndarray:
         m.n, m.isolated, stiffnesses, *matrices, s.h, p, on, active=bool(effects)
     )
     found = []
+    f0, f1 = to([1.0] + [0.0] * (m.n - 1)), to([1.5] + [0.0] * (m.n - 1))
     for k in range(400):
         x1, z1 = to([0.0] * len(model.x)), to([0.0] * max(1, len(model.z)))
         a0, a1 = (float(4.0 * np.sin(0.01 * i)) for i in (k, k + 1))
-        step(setup, structure.Loads(a0, a1, 1.0, 1.5, 0.0), x, z, x1, z1, work)
+        step(setup, structure.Loads(a0, a1, f0, f1, 0.0), x, z, x1, z1, work)
         x, z = x1, z1
         found.append(list(x))
     return np.array(found)

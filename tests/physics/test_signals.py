@@ -110,6 +110,15 @@ def test_steps_hold_each_value_until_the_next() -> None:
     assert rate(KINDS["steps"], 1.5, numbers(), times, samples) == 0.0
 
 
+def test_a_step_at_a_time_that_was_added_up_is_not_late() -> None:
+    times, samples = read_steps("0:1 0.3:2")
+    added = sum([0.1] * 3), 0.7 - 0.4  # hosts add up their steps
+    assert min(added) < 0.3 < max(added)
+    for t in (0.3, *added):
+        assert value(KINDS["steps"], t, numbers(), times, samples) == 2.0
+    assert value(KINDS["steps"], 0.3 - 1e-6, numbers(), times, samples) == 1.0
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [

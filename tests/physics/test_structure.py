@@ -447,7 +447,7 @@ def test_step_keeps_the_state_at_its_begin() -> None:
     setup = structure.Setup(
         m.n, m.isolated, m.stiffnesses, s.phi, s.held, s.ramp, s.h, [], [], active=False
     )
-    loads = structure.Loads(1.0, 2.0, 3.0, 3.0, 0.0)
+    loads = structure.Loads(1.0, 2.0, [3.0, 0.0, 0.0], [3.0, 0.0, 0.0], 0.0)
     structure.step(setup, loads, x0, [], x1, [], [0.0] * structure.work_size(m.n))
     assert x0 == before
     assert x1 != before

@@ -19,8 +19,9 @@ from bristle import run
 from bristle.errors import ScenarioError
 from bristle.fmu.description import read_description
 from bristle.scenario.export_ssp import export_ssp
-from bristle.scenario.scenario import load_scenario
+from bristle.scenario.scenario import Scenario, load_scenario
 from bristle.simulate.elsewhere import expect
+from bristle.simulate.run import run_quietly
 
 SCENARIO = """
 schema = 1
@@ -43,6 +44,40 @@ parameters = { gas_spring.on = true, gas_spring.k = 60.0 }
 "damper.velocity" = "motion.velocity"
 "damper.voltage" = { from = "voltage.value", factor = 0.5, offset = 1.0 }
 """
+LOOP = """
+schema = 1
+[run]
+stop = 0.3
+step = 0.002
+algorithm = "jacobi"
+[components.ground]
+fmu = "SignalSource"
+parameters = { kind = "half_sine", amplitude = 2.0, duration = 0.2 }
+[components.structure]
+fmu = "Structure"
+[components.damper]
+fmu = "LuGreDamper"
+[components.controller]
+fmu = "HinfInverse"
+[connections]
+"structure.ground_acceleration" = "ground.value"
+"structure.damper_force" = "damper.force"
+"damper.displacement" = "structure.base_displacement"
+"damper.velocity" = "structure.base_velocity"
+"damper.voltage" = "controller.voltage"
+"controller.floor_acceleration" = "structure.floor2_acceleration_absolute"
+"controller.base_displacement" = "structure.base_displacement"
+"controller.base_velocity" = "structure.base_velocity"
+"controller.damper_force" = "damper.force"
+"""
+MOVED = (
+    "structure.base_displacement",
+    "structure.base_velocity",
+    "structure.floor2_acceleration_absolute",
+    "controller.voltage",
+    "controller.command_raw",
+)
+FOLLOWING = ("damper.force", "damper.dissipated_energy", "structure.base_acceleration_absolute")
 WATCHED = ("damper.force", "damper.dissipated_energy", "motion.velocity")
 
 
@@ -70,6 +105,21 @@ def package(scenario: Path) -> Path:
 @pytest.fixture(scope="module")
 def rows(scenario: Path) -> pd.DataFrame:
     return run(scenario)
+
+
+@pytest.fixture(scope="module")
+def loop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the package of a building with damper and controller, closed, beside osp/."""
+    file = tmp_path_factory.mktemp("loop") / "loop.toml"
+    file.write_text(LOOP)
+    package = file.with_suffix(".ssp")
+    export_ssp(load_scenario(file), package, file.with_name("osp"))
+    return package
+
+
+@pytest.fixture(scope="module")
+def loop_rows(loop: Path) -> pd.DataFrame:
+    return run(loop.with_suffix(".toml"))
 
 
 def test_the_package_is_valid_ssp(package: Path) -> None:
@@ -154,15 +204,33 @@ def elsewhere(script: str, *job: Any) -> str:
     return done.stdout.splitlines()[-1]  # logs come before
 
 
+def hold_against_libcosim(
+    kind: str, package: Path, rows: pd.DataFrame, watched: tuple[str, ...]
+) -> None:
+    """Hold outputs to 1e-9 of their peaks; none that follow an input, which it reads too early."""
+    path = package if kind == "ssp" else package.with_name("osp")
+    found = np.array(json.loads(elsewhere(LIBCOSIM, kind, str(path), watched, len(rows) - 1)))
+    same_rows(found, rows, watched)
+
+
+def same_rows(found: np.ndarray, rows: pd.DataFrame, watched: tuple[str, ...]) -> None:
+    wanted = rows[list(watched)].to_numpy()[1:]  # other tools have no row at t = 0
+    assert (np.abs(wanted).max(axis=0) > 0.0).all(), "nothing moves"
+    assert (np.abs(found - wanted).max(axis=0) <= 1e-9 * np.abs(wanted).max(axis=0)).all()
+
+
 @pytest.mark.parametrize("kind", ["ssp", "osp"])
 def test_libcosim_gives_the_same_rows(kind: str, package: Path, rows: pd.DataFrame) -> None:
     need("libcosimpy")
-    watched = WATCHED[1:]  # it reads the force before the inputs of its row are set
-    path = package if kind == "ssp" else package.with_name("osp")
-    steps = len(rows) - 1
-    found = np.array(json.loads(elsewhere(LIBCOSIM, kind, str(path), watched, steps)))
-    wanted = rows[list(watched)].to_numpy()[1:]  # it has no row at t = 0
-    assert (np.abs(found - wanted).max(axis=0) <= 1e-9 * np.abs(wanted).max(axis=0)).all()
+    hold_against_libcosim(kind, package, rows, WATCHED[1:])
+
+
+@pytest.mark.parametrize("kind", ["ssp", "osp"])
+def test_libcosim_gives_the_same_rows_of_a_closed_loop(
+    kind: str, loop: Path, loop_rows: pd.DataFrame
+) -> None:
+    need("libcosimpy")
+    hold_against_libcosim(kind, loop, loop_rows, MOVED)
 
 
 ECOS = """
@@ -184,14 +252,20 @@ print(json.dumps(rows), flush=True)
 """
 
 
-def test_ecos_gives_the_same_rows(package: Path, rows: pd.DataFrame) -> None:
+def hold_against_ecos(package: Path, rows: pd.DataFrame, watched: tuple[str, ...]) -> None:
     need("ecospy")
     if sys.platform != "linux":
         pytest.skip("ecospy's library is loaded as on Linux")
-    steps = len(rows) - 1
-    found = np.array(json.loads(elsewhere(ECOS, str(package), WATCHED, 0.002, steps)))
-    wanted = rows[list(WATCHED)].to_numpy()[1:]
-    assert (np.abs(found - wanted).max(axis=0) <= 1e-9 * np.abs(wanted).max(axis=0)).all()
+    answer = elsewhere(ECOS, str(package), watched, 0.002, len(rows) - 1)
+    same_rows(np.array(json.loads(answer)), rows, watched)
+
+
+def test_ecos_gives_the_same_rows(package: Path, rows: pd.DataFrame) -> None:
+    hold_against_ecos(package, rows, WATCHED)
+
+
+def test_ecos_gives_the_same_rows_of_a_closed_loop(loop: Path, loop_rows: pd.DataFrame) -> None:
+    hold_against_ecos(loop, loop_rows, (*MOVED, *FOLLOWING))
 
 
 def sampled(order: float, scale: float = 0.1) -> Any:
@@ -213,8 +287,47 @@ def sampled(order: float, scale: float = 0.1) -> Any:
 def test_the_error_to_expect_and_the_step_that_keeps_it_small(scenario: Path) -> None:
     for one in expect(load_scenario(scenario), sampled(1.0)):
         assert one.error == pytest.approx(0.1, rel=0.1)
-        assert one.step == 0.002 / 32  # 0.1/32 is the first below 0.005
-        assert "0.0625 ms" in str(one)
+        assert one.step == one.tried == 0.002 / 32  # 0.1/32 is the first below 0.005
+        assert one.tried_error == pytest.approx(0.1 / 32, rel=0.02)
+        assert "0.31 % at a step of 0.0625 ms" in str(one)
+
+
+def test_a_step_that_the_order_promises_and_a_run_does_not_keep_is_halved(scenario: Path) -> None:
+    def again(one: Scenario, engine: str) -> pd.DataFrame:
+        frame = sampled(1.0)(one, engine)
+        if one.step == 0.002 / 32:
+            frame["damper.force"] += 0.004 * np.sin(frame.index)
+        return frame
+
+    assert [one.step for one in expect(load_scenario(scenario), again)] == [0.002 / 64] * 2
+
+
+def test_where_no_step_is_short_enough_the_error_at_the_shortest_is_told(
+    scenario: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("bristle.simulate.elsewhere.MOST_STEPS", 1000)  # 250 in the scenario
+    for one in expect(load_scenario(scenario), sampled(1.0)):
+        assert (one.step, one.tried) == (None, 0.002 / 4)
+        assert one.tried_error == pytest.approx(0.1 / 4, rel=0.05)
+        assert "no step down to 0.5 ms keeps it below 0.5 %: it is 2.5 % there" in str(one)
+
+
+def test_a_small_error_needs_no_shorter_step(scenario: Path) -> None:
+    for one in expect(load_scenario(scenario), sampled(1.0, scale=0.002)):
+        assert one.step == 0.002
+        assert str(one).endswith("0.2 % along the run")
+
+
+@pytest.mark.slow
+def test_the_step_that_is_told_keeps_the_error_of_a_closed_loop(loop: Path) -> None:
+    file = loop.with_suffix(".toml")
+    for one in expect(load_scenario(file), run_quietly):
+        given = {"run.step": one.step, "run.algorithm": one.algorithm}
+        frame, exact = run(file, given), run(file, given, engine="compiled")
+        wrong = (frame - exact).abs().max() / exact.abs().max()
+        assert wrong["damper.force"] <= 0.005
+        assert one.tried_error is not None
+        assert wrong["damper.force"] <= 1.001 * one.tried_error
 
 
 def test_an_error_that_does_not_fall_is_told(scenario: Path) -> None:
