@@ -152,7 +152,20 @@ def library_member(identifier: str, version: str = "2.0") -> str:
 def check_library(
     path: Path, archive: zipfile.ZipFile, identifier: str, version: str = "2.0"
 ) -> None:
-    """Raise FmuError unless the archive holds a binary that this platform can load."""
+    """Refuse an archive without a binary that this platform can load.
+
+    Parameters
+    ----------
+    path : the FMU, as messages name it
+    archive : its content
+    identifier : the model's, which the binary is named by
+    version : of FMI: it decides the binary's folder
+
+    Raises
+    ------
+    FmuError
+        Saying which binaries there are.
+    """
     names = member_names(archive)
     wanted = library_member(identifier, version)
     if wanted not in names:

@@ -180,6 +180,14 @@ class Fmi3(Fmi2):
         return self._step() if name == "DoStep" else self._raw(f"fmi3{_STATE.get(name, name)}")
 
     def transfer(self, verb: str, kind: str, variables: Sequence[Variable], address: int) -> Status:
+        """Return a function that gets or sets variables, whatever types FMI 3.0 gives them.
+
+        Parameters
+        ----------
+        verb, kind : "Get" or "Set"; "Real", "Integer" or "Boolean", as they lie in memory
+        variables : sequence of Variable
+        address : of the values, doubles or ints, in the order of the variables
+        """
         types = _by_type(variables)
         if list(types) == [_NATURAL.get(kind)]:
             function = self._raw(f"fmi3{verb}{_NATURAL[kind]}")

@@ -468,12 +468,12 @@ def test_the_reference_fmus_violate_nothing_but_lack_robustness(name: str) -> No
 
 # The line of the bundled slave base that is replaced, by what, the probe that must fail, its words.
 BREAKS_RULES = [
-    ("_stop(NOT_FINITE_INPUT,", "_stop(BAD_STATE,", "fault: input", "fault = 4"),
+    ('NOT_FINITE_INPUT, f"', 'BAD_STATE, f"', "fault: input", "fault = 4"),
     ("_stop(BAD_STEP,", "_stop(BAD_STATE,", "fault: step", "fault = 4"),
-    ('_stop(WRONG_MODE, "doStep', '_stop(BAD_STEP, "doStep', "fault: order", "fault = 2"),
+    ('WRONG_MODE, "doStep', 'BAD_STEP, "doStep', "fault: order", "fault = 2"),
     ("_stop(BAD_PARAMETER,", "_stop(BAD_STATE,", "fault: parameter", "fault = 4"),
     (
-        "if self.fault:\n            return False",
+        "if self.fault:\n                return False",
         "pass",
         "fault: input",
         "the step after displacement = nan: answered OK",
