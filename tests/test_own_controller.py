@@ -167,7 +167,12 @@ def test_a_copy_of_a_stock_scenario_runs_the_same(here: Path, stock: Path) -> No
     file = copy_scenario(stock.stem)
     assert file == Path(stock.name)
     one, other = load_scenario(file.absolute()), load_scenario(stock)
-    assert scenario_text(one) == scenario_text(other)
+    copied = scenario_text(one).replace(str(file.absolute().parent), str(stock.parent))
+    assert copied == scenario_text(other)
+    for component in one.components:
+        if component.building is not None:  # it stands beside the copy
+            assert Path(component.building).is_relative_to(file.absolute().parent)
+            assert Path(component.building).is_file()
     assert "#:schema" not in file.read_text()
 
 
