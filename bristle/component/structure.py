@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ..physics.building import Building
+from ..physics.device import GROUND
 from ..physics.effect import effects_of
 from ..physics.linear import Row, copy
 from ..physics.structure import (
@@ -93,7 +94,8 @@ def setup(
         any(effect.contact and effect.name in effects for effect in effects_of("structure")),
         linear=False,
         devices=len(building.devices),
-        ends=[level for device in building.devices for level in device.levels],
+        # Never empty: compiled code could not tell that its numbers are whole.
+        ends=[level for device in building.devices for level in device.levels] or [GROUND],
     )  # fmt: skip
     state = [0.0] * (2 * m.n) + start_states(m.n, values) + [0.0] * (m.n + 1)
     work = [0.0] * room(m.n)
