@@ -190,18 +190,19 @@ rows = []
 for _ in range(steps):
     assert execution.step()
     rows.append([observer.last_real_values(slave, [port])[0] for slave, port in at])
-print(json.dumps(rows), flush=True)
+print("rows", json.dumps(rows), flush=True)
 """
 
 
 def elsewhere(script: str, *job: Any) -> str:
-    """Return the last line that a script prints in a process where no other FMU was loaded."""
+    """Return the rows that a script prints in a process where no other FMU was loaded."""
     done = subprocess.run(
         [sys.executable, "-c", script, json.dumps(job)],
         capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout.splitlines()[-1]  # logs come before
+    lines = done.stdout.splitlines()  # logs come before and after
+    return next(line.removeprefix("rows ") for line in lines if line.startswith("rows "))
 
 
 def hold_against_libcosim(
@@ -248,7 +249,7 @@ with EcosSimulation(ssp_path=path, step_size=step) as simulation:
     for _ in range(steps):
         simulation.step()
         rows.append([simulation.get_real(name.replace(".", "::", 1)) for name in watched])
-print(json.dumps(rows), flush=True)
+print("rows", json.dumps(rows), flush=True)
 """
 
 
