@@ -94,6 +94,19 @@ def compiled(
             numba.config.CACHE_DIR = before
 
 
+def closed(function: Callable[..., Any], inline: tuple[str, ...] = ()) -> Any:
+    """Return a function with all that it calls as numba takes it, for a library without Python.
+
+    Nothing is compiled yet, and nothing kept: `compile` with a signature does.
+
+    Parameters
+    ----------
+    function, inline
+        As in `compiled`.
+    """
+    return numba.njit(**_CALLEE)(_closed(function, {}, inline))
+
+
 def kept(function: Callable[..., Any]) -> bool:
     """Return whether machine code of a function is on disk, or cannot be kept there."""
     folder = _folder(function)

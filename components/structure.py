@@ -3,7 +3,7 @@
 from bristle.component import HELD, LINEAR, structure
 from bristle.fmu.component import ComponentSlave
 from bristle.physics.building import from_data, paper_building
-from bristle.physics.structure import matrices
+from bristle.physics.structure import SLOTS, matrices
 
 
 def moves(coupled, device, level):
@@ -72,16 +72,24 @@ class Structure(ComponentSlave):
         text = f"force of {device.name} at which {above} would not accelerate relative to {below}"
         self.add_output(holding, "N", text, depends=depends)
 
+    def bake(self):
+        names = [self.vars[index].name for index in sorted(self._parameters)]
+        return structure.bake(self.building, names, SLOTS)
+
     def setup(self):
         self._steps = {}
-        building = self.building.with_attached_mass(self.attached_mass)
-        return structure.setup(building, self.numbers(), self.effects_on())
+        return super().setup()
 
-    def advance(self, time, step):
+    def constants_of(self, step):
+        """Return the constants with the matrices of a step [s]; those of the last ones are kept."""
         known = self._steps.get(step)
         if known is None:
             if len(self._steps) >= 8:  # a host with ever new steps must not fill the memory
                 self._steps.clear()
-            known = self._steps[step] = structure.discretise(step, self.constants)
-        self.constants = known
+            structure.discretise(step, self._store, self._work)
+            known = self._steps[step] = structure.constants(self._store)
+        return known
+
+    def advance(self, time, step):
+        self.constants = self.constants_of(step)
         super().advance(time, step)

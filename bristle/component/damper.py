@@ -3,24 +3,44 @@
 from __future__ import annotations
 
 from math import inf, isfinite
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..control.switching import limited
 from ..physics.codegen import hold
-from ..physics.damper import force_at, setup_of, start_states, work_size
+from ..physics.damper import force_at
 from ..physics.damper import step as law_step
-from ..physics.inputs import Inputs, Setup
+from ..physics.inputs import Inputs
 from ..physics.linear import Row
 from ..physics.tuples import record
+from .damper_setup import (
+    ACCELERATION,
+    DISPLACEMENT,
+    DISSIPATED_ENERGY,
+    FORCE,
+    FRICTION,
+    HOLDING_FORCE,
+    REMEMBERED,
+    STROKE_RATIO,
+    VELOCITY,
+    VOLTAGE,
+    Constants,
+    bake,
+    bind,
+    constants,
+    follow,
+    setup,
+    sizes,
+)
+
+__all__ = [
+    "ACCELERATION", "DISPLACEMENT", "DISSIPATED_ENERGY", "FORCE", "FRICTION", "HOLDING_FORCE",
+    "REMEMBERED", "STROKE_RATIO", "VELOCITY", "VOLTAGE", "Constants", "bake", "bind", "constants",
+    "follow", "output", "setup", "sizes", "start", "step", "stick_force",
+]  # fmt: skip
 
 hold_law: Any = None
 hold(globals(), "hold_law")
 
-DISPLACEMENT, VELOCITY, VOLTAGE, HOLDING_FORCE, ACCELERATION = range(5)
-FORCE, DISSIPATED_ENERGY, STROKE_RATIO, FRICTION = range(4)
-"""Outputs; friction, the part of the force that is, is hidden."""
-
-REMEMBERED = 8
 ENERGY, ENERGY_SHOWN, ENERGY_AT_BEGIN = range(-REMEMBERED, -5)
 VELOCITY_AT_END, FORCE_AT_END, ACCELERATION_AT_END, VOLTAGE_AT_END, LAST_STEP = range(-5, 0)
 """What the state holds behind the states of law and effects: counted from its end.
@@ -31,45 +51,6 @@ VELOCITY_AT_END, FORCE_AT_END, ACCELERATION_AT_END, VOLTAGE_AT_END, LAST_STEP = 
 
 SATURATED = 1
 """The voltage left its limits."""
-
-
-class Constants(NamedTuple):
-    """What a damper computes with.
-
-    `setup` is that of law and effects. `moving_mass` [kg] is what the holding force holds, 0: the
-    law slides. The acceleration is `measured`, or the difference of velocity over the step. Motion
-    and voltage are `linear` over a step, or held at their newest.
-    """
-
-    setup: Setup
-    v_max: float
-    stroke: float
-    moving_mass: float
-    measured: bool
-    linear: bool
-
-
-def setup(
-    law: str, values: dict[str, float], effects: list[str], measured: bool
-) -> tuple[Constants, list[float], int]:
-    """Return constants, state and size of work of a damper in plain Python, its inputs held.
-
-    Parameters
-    ----------
-    law : str
-        A damper's law, such as "bingham".
-    values : dict
-        Every Real parameter of the component, by name, in SI.
-    effects : list of str
-        The effects that are on.
-    measured : bool
-        Whether the acceleration is an input that is given.
-    """
-    constants = Constants(
-        setup_of(law, values, effects), values["v_max"], values["stroke"], values["moving_mass"],
-        measured, False,
-    )  # fmt: skip
-    return constants, start_states(law, values) + [0.0] * REMEMBERED, work_size(REMEMBERED)
 
 
 def stick_force(holding: float, v: float, mass: float, dt: float) -> float:
@@ -96,7 +77,7 @@ def present_force(
     V, a : voltage within its limits [V], acceleration [m/s2]
     c : Constants
     state : as in `start`, kept
-    work : room to work, of the size that `setup` returns
+    work : room to work, of the size that `sizes` gives
     """
     x, v, dt = inputs[DISPLACEMENT], inputs[VELOCITY], state[LAST_STEP]
     sticks = c.moving_mass > 0.0 and (isfinite(dt) or v == 0.0)
@@ -116,7 +97,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     c : Constants
     state : (`SLOTS.z_size` + 8,) the states of law and effects as given; the last eight are filled
     outputs : (4,) force [N], dissipated energy [J], stroke ratio [1], friction [N], filled
-    work : room to work, of the size that `setup` returns
+    work : room to work, of the size that `sizes` gives
 
     Returns
     -------
@@ -164,7 +145,7 @@ def step(
     c : Constants
     state, new_state : states at begin (kept) and end (filled), as in `start`
     outputs : (4,) as in `start`, filled
-    work : room to work, of the size that `setup` returns
+    work : room to work, of the size that `sizes` gives
 
     Returns
     -------
@@ -216,7 +197,7 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     c : Constants
     state : as in `start`, kept but for energy, velocity and force at the end
     outputs : (4,) as in `start`, filled
-    work : room to work, of the size that `setup` returns
+    work : room to work, of the size that `sizes` gives
 
     Returns
     -------

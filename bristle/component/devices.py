@@ -39,7 +39,7 @@ def add_devices(before: Row, now: Row, c: Constants, new_state: Row) -> None:
     new_state : state at the end, changed in place
     """
     for k in range(c.devices):
-        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
+        lower, upper = int(c.ends[2 * k]), int(c.ends[2 * k + 1])
         f1 = now[DEVICE_FORCES + k]
         f0 = before[DEVICE_FORCES + k] if c.linear else f1
         add_force(c.n, c.held, c.ramp, upper, f0, f1, new_state)
@@ -63,7 +63,7 @@ def forces_between(before: Row, now: Row, share: float, c: Constants, forces: Ro
     f0 = before[DAMPER_FORCE] + before[EXTRA_FORCE] if c.linear else f1
     forces[0] = f0 + share * (f1 - f0)
     for k in range(c.devices):
-        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
+        lower, upper = int(c.ends[2 * k]), int(c.ends[2 * k + 1])
         f1 = now[DEVICE_FORCES + k]
         f0 = before[DEVICE_FORCES + k] if c.linear else f1
         force = f0 + share * (f1 - f0)
@@ -94,7 +94,7 @@ def show_device_motion(c: Constants, state: Row, outputs: Row, at: int) -> None:
     at : place of the first device's outputs
     """
     for k in range(c.devices):
-        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
+        lower, upper = int(c.ends[2 * k]), int(c.ends[2 * k + 1])
         for j in range(2):
             i = upper + j * c.n
             below = state[lower + j * c.n] if lower != GROUND else 0.0
@@ -113,7 +113,7 @@ def load_upper_levels(inputs: Row, c: Constants, outputs: Row) -> None:
     """
     n = c.n
     for k in range(c.devices):
-        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
+        lower, upper = int(c.ends[2 * k]), int(c.ends[2 * k + 1])
         force = inputs[DEVICE_FORCES + k]
         for i in range(n):
             row, at = i * n, PER_LEVEL * i + 2
@@ -142,7 +142,7 @@ def show_holding_forces(
     at : place of the first device's
     """
     for k in range(c.devices):
-        lower, upper = c.ends[2 * k], c.ends[2 * k + 1]
+        lower, upper = int(c.ends[2 * k]), int(c.ends[2 * k + 1])
         if upper == 0:
             outputs[at] = left + inputs[DEVICE_FORCES + k]
         else:
@@ -150,7 +150,7 @@ def show_holding_forces(
             apart -= free[lower] if lower != GROUND else inputs[GROUND_ACCELERATION]
             for j in range(c.devices):
                 if j != k:  # else its own force would count by its rounding
-                    each = gain(c.ends[2 * j], c.ends[2 * j + 1], lower, upper, c)
+                    each = gain(int(c.ends[2 * j]), int(c.ends[2 * j + 1]), lower, upper, c)
                     apart -= each * inputs[DEVICE_FORCES + j]
             outputs[at] = apart / gain(lower, upper, lower, upper, c)
         at += PER_DEVICE

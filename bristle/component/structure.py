@@ -1,33 +1,21 @@
 """A building under ground motion and the forces of devices, on its first level and between any."""
 
-# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
-
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
-
 from ..physics.building import Building
-from ..physics.device import GROUND
-from ..physics.effect import effects_of
 from ..physics.linear import Row, copy
 from ..physics.structure import (
     EFFECT_STEP,
     Loads,
-    Matrices,
     Setup,
     accelerations,
     add_force,
     free_step,
     holding_force,
     matrices,
-    pack,
     resting_contact,
     resting_forces,
-    start_states,
     state_size,
-    step_matrices,
-    work_size,
 )
 from ..physics.structure import step as effects_step
 from .damper import stick_force
@@ -44,76 +32,21 @@ from .devices import (
     show_device_motion,
     show_holding_forces,
 )
+from .structure_setup import (
+    Constants,
+    bake,
+    constants,
+    discretise,
+    laid_down,
+    room,
+    setup,
+    sizes,
+)
 
-
-class Constants(NamedTuple):
-    """What a structure computes with.
-
-    `n`, `isolated`, `mass`, `m_inverse`, `damping`, `stiffness`, `stiffnesses` are those of
-    `physics.structure.Matrices`; `p`, `on` the parameters and switches of effects, any of which is
-    `active`, one of which is a contact that `touches`. `substeps` of `h` [s] make a step, whose
-    matrices are `phi`, `held`, `ramp` (see `discretise`). Forces are `linear` over a step, or held.
-    Each of the `devices` acts between two levels, which follow each other in `ends`, the lower one
-    first; -1 is the ground.
-    """
-
-    n: int
-    isolated: bool
-    mass: float
-    m_inverse: Row
-    damping: Row
-    stiffness: Row
-    stiffnesses: Row
-    p: Row
-    on: Row
-    active: bool
-    touches: bool
-    linear: bool
-    substeps: int = 1
-    h: float = 0.0
-    phi: Row = ()
-    held: Row = ()
-    ramp: Row = ()
-    devices: int = 0
-    ends: Sequence[int] = ()
-
-
-def setup(
-    building: Building, values: dict[str, float], effects: list[str]
-) -> tuple[Constants, list[float], int]:
-    """Return constants without a step, state and size of work, forces held.
-
-    The state holds displacements and velocities (2n,), the states of effects, and what `settle`
-    makes of them: absolute accelerations without devices (n,) and the holding force on still
-    ground.
-    """
-    m = matrices(building)
-    constants = Constants(
-        m.n, m.isolated, m.mass, m.M_inverse, m.C, m.K, m.stiffnesses, pack(values),
-        [effect.name in effects for effect in effects_of("structure")], bool(effects),
-        any(effect.contact and effect.name in effects for effect in effects_of("structure")),
-        linear=False,
-        devices=len(building.devices),
-        # Never empty: compiled code could not tell that its numbers are whole.
-        ends=[level for device in building.devices for level in device.levels] or [GROUND],
-    )  # fmt: skip
-    state = [0.0] * (2 * m.n) + start_states(m.n, values) + [0.0] * (m.n + 1)
-    work = [0.0] * room(m.n)
-    settle(constants, state, work)
-    return constants, state, len(work)
-
-
-def room(n: int) -> int:
-    """Return the size of work of a structure of n levels."""
-    return work_size(n) + 4 * n + 2 * state_size(n)
-
-
-def discretise(dt: float, c: Constants) -> Constants:
-    """Return the constants with the matrices of a step of dt [s]."""
-    substeps = max(1, int(dt / EFFECT_STEP + 0.999999)) if c.active else 1
-    m = Matrices(c.n, c.m_inverse, c.damping, c.stiffness, c.stiffnesses, c.mass, c.isolated)
-    step = step_matrices(m, dt / substeps)
-    return c._replace(substeps=substeps, h=step.h, phi=step.phi, held=step.held, ramp=step.ramp)
+__all__ = [
+    "Constants", "StructureModel", "bake", "constants", "discretise", "laid_down", "output",
+    "room", "setup", "sizes", "start", "step",
+]  # fmt: skip
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
@@ -125,7 +58,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     inputs : (3 + d,) ground acceleration [m/s2], damper force [N], extra force [N]; the force [N]
         of each of the d devices
     c : Constants
-    state : as `setup` returns it, kept
+    state : as `setup` leaves it; what `settle` makes of it is filled
     outputs : displacement [m], velocity [m/s], absolute acceleration [m/s2] of each of the n
         levels; the drifts [m], n of them or, isolated, n - 1; the holding force [N]; displacement
         [m], velocity [m/s] and holding force [N] of each of the d devices; filled
@@ -136,6 +69,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     int
         0.
     """
+    settle(c, state, work)
     show_motion(c, state, outputs)
     return output(time, inputs, c, state, outputs, work)
 
@@ -156,7 +90,7 @@ def step(
     before, now : (3 + d,) inputs at begin and end, as in `start`
     c : Constants
         With the matrices of a step of dt, as `discretise` returns them.
-    state, new_state : states at begin (kept) and end (filled), as `setup` returns them
+    state, new_state : states at begin (kept) and end (filled), as `setup` lays them down
     outputs : as in `start`, filled
     work : (`room(n)`,) room to work, kept from one sweep of a step to the next
 
@@ -198,7 +132,7 @@ def effect_steps(
     before, now : (3 + d,) inputs at begin and end, as in `start`; the ground acceleration goes
         linearly from one to the other
     c : Constants
-    state, new_state : states at begin (kept) and end (filled), as `setup` returns them
+    state, new_state : states at begin (kept) and end (filled), as `setup` lays them down
     work : (`room(n)`,) room to work
     """
     n, size, states = c.n, 2 * c.n, len(state) - 3 * c.n - 1
@@ -261,7 +195,7 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     time : s, not used
     inputs : (3 + d,) as in `start`
     c : Constants
-    state : as `setup` returns it, after `settle`; kept
+    state : as `setup` lays it down, after `settle`; kept
     outputs : as in `start`; displacements, velocities and drifts stay, the others are filled
     work : not used
 
@@ -309,11 +243,11 @@ class StructureModel:
         effects: list[str] | None = None,
     ) -> None:
         self.m = matrices(building)
-        self.constants, state, work = setup(building, values or {}, effects or [])
+        self._store, state, self._work = laid_down(building, values or {}, effects or [])
+        self.constants = constants(self._store)
         size = 2 * self.m.n
         self.x, self.z = state[0:size], state[size : size + state_size(self.m.n)]
         self.p, self.on = self.constants.p, self.constants.on
-        self._work = [0.0] * work
         self._idle = [0.0] * len(building.devices)
         shown = PER_LEVEL * self.m.n + self.m.n + 1 + PER_DEVICE * len(building.devices)
         self._outputs = [0.0] * shown
@@ -335,7 +269,8 @@ class StructureModel:
         force : of the devices on the first level [N], positive against +x
         """
         if dt != self._h:
-            self.constants, self._h = discretise(dt, self.constants), dt
+            discretise(dt, self._store, self._work)
+            self.constants, self._h = constants(self._store), dt
         new = list(self._state)
         inputs = [a0, 0.0, 0.0, *self._idle], [a1, force, 0.0, *self._idle]
         clock = (0.0, dt, 0)

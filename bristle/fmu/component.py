@@ -61,17 +61,41 @@ class EffectSlave(Slave):
 class ComponentSlave(EffectSlave):
     """A component made of ports, functions and texts.
 
-    A component fills `setup`; `functions` has `start`, `step` and `output`; `texts` tells what a
-    code means, with parameters in braces. `hidden` outputs have no port.
+    A component fills `bake`; `functions` has `sizes`, `setup`, `constants`, `start`, `step` and
+    `output`; `texts` tells what a code means, with parameters in braces. `hidden` outputs have no
+    port.
     """
 
     functions: ClassVar[Any]
     texts: ClassVar[dict[int, str]] = {}
     hidden: ClassVar[int] = 0
 
+    def bake(self) -> list[float]:
+        """Return what the build fixes, as the component's `setup` takes it."""
+        raise NotImplementedError
+
+    def flat_values(self) -> list[float]:
+        """Return the parameters in their order, as numbers: of a text 0."""
+        values = self._values
+        return [
+            0.0 if isinstance(values[index], str) else float(values[index])
+            for index in sorted(self._parameters)
+        ]
+
+    def given(self) -> list[float]:
+        """Return 1 for each input that the host has set, else 0."""
+        return [1.0 if index in self._set else 0.0 for index in self._inputs]
+
     def setup(self) -> tuple[Any, list[float], int]:
         """Return constants, state and size of work; raise what is wrong with the parameters."""
-        raise NotImplementedError
+        functions, baked, values = self.functions, self.bake(), self.flat_values()
+        counts = [0.0] * 4
+        functions.sizes(values, baked, counts)
+        self._store, state = ([0.0] * int(count) for count in counts[:2])
+        code = functions.setup(values, self.given(), baked, self._store, state)
+        if code:
+            self.tell(code, self.time, 0.0)
+        return functions.constants(self._store), state, int(counts[3])
 
     def configure(self) -> None:
         self.constants, self.state, work = self.setup()

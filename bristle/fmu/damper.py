@@ -6,6 +6,7 @@ from typing import Any, ClassVar
 
 from ..component import HELD, damper
 from ..physics import damper as laws
+from ..physics.damper_setup import refusals
 from ..physics.drive import Drive, declared_for, drive_named, text_for, unit_for
 from ..physics.laws import LAWS
 from .component import ComponentSlave
@@ -72,7 +73,6 @@ class DamperSlave(ComponentSlave):
     def _add_channels(self) -> list[str]:
         """Declare an input for each channel that effects follow; return their names."""
         self.following: dict[str, list[str]] = {}
-        self._tracks: list[tuple[int, int]] = []
         for effect in self.offered("damper", self.law):
             for parameter, channel in effect.channels.items():
                 name = input_of(channel, self.law, self.drive)
@@ -85,35 +85,45 @@ class DamperSlave(ComponentSlave):
                 self.following.setdefault(name, []).append(f"{effect.name}.{parameter}")
         return [*self.following]
 
-    def setup(self) -> tuple[Any, list[float], int]:
+    def bake(self) -> list[float]:
+        self.texts = {**self.texts, **refusals(laws.SLOTS)}  # type: ignore[misc]
         self._acceleration = self._index["acceleration"]
-        measured = self._acceleration in self._set
-        values = self.numbers()
-        values["v_max"] = values[self.drive.limit]  # what the functions call any limit
-        self._tracks = [
-            (laws.SLOTS.parameters[parameter], self._index[name])
+        ports = {self.vars[index].name: k for k, index in enumerate(self._inputs)}
+        tracks = [
+            (parameter, ports[name])
             for name, parameters in self.following.items()
             for parameter in parameters
         ]
-        return damper.setup(self.law, values, self.effects_on(), measured)
+        return damper.bake(self.law, self.known_names(), tracks, laws.SLOTS)
 
-    def _take_channels(self) -> None:
-        """Let parameters that follow a channel have its newest value."""
-        for slot, index in self._tracks:
-            self.constants.setup.p[slot] = self._values[index]
+    def setup(self) -> tuple[Any, list[float], int]:
+        on = tuple(f"{name}." for name in self.effects_on())
+        tracked = (one for parameters in self.following.values() for one in parameters)
+        self._follows = any(one.startswith(on) for one in tracked)
+        return super().setup()
+
+    def known_names(self) -> list[str]:
+        """Return the names of all parameters in their order, as law and effects know them."""
+        limit = self.drive.limit  # what the functions call v_max, whatever the command
+        names = [self.vars[index].name for index in sorted(self._parameters)]
+        return ["v_max" if name == limit else self._called.get(name, name) for name in names]
 
     def _bind(self) -> None:
         """Take the acceleration for measured from the moment on at which a host sets it."""
-        self.constants = self.constants._replace(measured=self._acceleration in self._set)
+        damper.bind(self.given(), self._store)
+        self.constants = damper.constants(self._store)
 
-    def advance(self, time: float, step: float) -> None:
+    def _update(self) -> None:
+        """Take over what follows the inputs and who has set them."""
         if (self._acceleration in self._set) is not self.constants.measured:
             self._bind()
-        self._take_channels()
+        if self._follows:
+            damper.follow(self._values[self._first : self._after], self.constants)
+
+    def advance(self, time: float, step: float) -> None:
+        self._update()
         super().advance(time, step)
 
     def refresh(self) -> None:
-        if (self._acceleration in self._set) is not self.constants.measured:
-            self._bind()
-        self._take_channels()
+        self._update()
         super().refresh()

@@ -5,23 +5,21 @@ advances the state over a time step and gives the force at its end. Both take re
 and flat sequences (`codegen.Slots`): lists inside FMUs, arrays under numba.
 """
 
-# Longer than 300 lines: a docstring says of every argument which shape and unit it has.
-
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..errors import PhysicsError
+from . import damper_setup
 from . import damper_source as source
 from . import effects as _effects  # noqa: F401  (importing it registers the effects)
 from .codegen import Slots, generate, hand_out, hold
-from .command import MOST_KNOTS
-from .effect import effects_of
+from .damper_setup import bake, fill, refusals, setup_from, state_places, store_size
 from .implicit import advance_implicit
 from .inputs import Inputs, Setup
-from .law import LAWS, Law, law_code
 from .linear import Row
+from .rows import packed
 from .series import INSTANT, SETTLE, Balance, advance_series, balanced_speed
 from .tuples import record
 
@@ -165,39 +163,24 @@ def jump(setup: Setup, now: Inputs, z: Row, work: Row) -> float:
 
 def work_size(more: int = 0) -> int:
     """Return how many floats `step` needs as room to work, where states have so many `more`."""
-    size = SLOTS.z_size + more
+    return room(SLOTS.z_size + more)
+
+
+def room(size: int) -> int:
+    """Return how many floats `step` needs as room to work, where the states are so many."""
     return 7 * size + 2 * size * size
 
 
 def moving_states(law: str, switched_on: Sequence[str]) -> list[int]:
-    """Return the slots that move by `rate` when these effects are on; empty if none does.
-
-    The law's own states move with them, unless a series element carries them along; alone, where
-    they have no `advance`.
-    """
-    effects = [effect for effect in SLOTS.effects if effect.name in switched_on]
-    slots = [
-        SLOTS.states[effect.name + "." + state]
-        for effect in effects
-        if "rate" in effect.hooks()
-        for state in effect.states
-        if state not in effect.joint
-    ]
-    carried = any(effect.joint for effect in effects)
-    own = list(range(len(LAWS[law].states)))
-    if slots or not LAWS[law].exact():
-        return ([] if carried else own) + slots
-    return []
-
-
-def advances(switched_on: Sequence[str]) -> bool:
-    """Return whether any of these effects moves its states by `advance`."""
-    return any("advance" in e.hooks() for e in SLOTS.effects if e.name in switched_on)
+    """Return the slots that move by `rate` when these effects are on; empty if none does."""
+    setup = setup_of(law, {}, switched_on)
+    return list(setup.moving[: setup.n_moving])
 
 
 def setup_of(
-    law: str, values: dict[str, float], effects: Sequence[str], row: Any = list, slots: Any = list
-) -> Setup:
+    law: str, values: Mapping[str, float], effects: Sequence[str], row: Any = list,
+    slots: Any = list,
+) -> Setup:  # fmt: skip
     """Return the setup of a damper.
 
     Parameters
@@ -216,30 +199,28 @@ def setup_of(
     PhysicsError
         If two effects are series elements.
     """
-    series = [effect.name for effect in SLOTS.effects if effect.joint and effect.name in effects]
-    if len(series) > 1:
-        raise PhysicsError("{} are series elements: one is right.".format(" and ".join(series)))
-    on = [effect.name in effects for effect in SLOTS.effects]
-    signed = LAWS[law].has("sign") or any(
-        source.is_friction(effect) for effect in SLOTS.effects if effect.name in effects
-    )
-    moving = moving_states(law, effects)
-    kind = LAWS[law]
-    return Setup(
-        law_code(law), row(pack(law, values)), slots(on), slots(moving or [0]), len(moving),
-        advances(effects), len(kind.states) if kind.exact() else 0, signed,
-        any(on) or not kind.exact(), bool(kind.felt),
-    )  # fmt: skip
+    names = [*values, *(f"{effect}.on" for effect in effects)]
+    baked = packed(*bake(law, names, SLOTS))
+    store, z = [0.0] * store_size(baked), [0.0] * SLOTS.z_size
+    if code := fill([*values.values(), *(1.0 for _ in effects)], baked, store, z):
+        raise PhysicsError(refusals(SLOTS)[code])
+    setup = setup_from(store)
+    moving = [int(slot) for slot in setup.moving[: setup.n_moving]]
+    switches = [switch != 0.0 for switch in setup.on]
+    return setup._replace(p=row(setup.p), on=slots(switches), moving=slots(moving or [0]))
 
 
-def start_states(law: str, values: dict[str, float]) -> list[float]:
+def start_states(law: str, values: Mapping[str, float]) -> list[float]:
     """Return the states at the begin; start values end in `_0`: "coil_lag.voltage_0"."""
     z = [0.0] * SLOTS.z_size
-    for slot, name in enumerate(LAWS[law].states):
-        z[slot] = values.get(name + "_0", 0.0)
-    for name, slot in SLOTS.states.items():
-        z[slot] = values.get(name + "_0", 0.0)
+    for name, slot in state_places(law, SLOTS).items():
+        z[slot] = values.get(name, 0.0)
     return z
+
+
+def pack(law: str, values: Mapping[str, float]) -> list[float]:
+    """Return the flat parameters of a law and of all effects; missing ones take their defaults."""
+    return damper_setup.pack(law, values, SLOTS)
 
 
 class DamperModel:
@@ -309,31 +290,3 @@ class DamperModel:
             force = hold_law(self.law, self.p, now, self.z, self._end)[0]
         self.z, self._end = self._end, self.z
         return force
-
-
-def pack(law: str, values: dict[str, float]) -> list[float]:
-    """Return the flat parameters of a law and of all effects; missing ones take their defaults."""
-    p = [0.0] * SLOTS.p_size
-    kind = LAWS[law]
-    for slot, name in enumerate(kind.base.parameters):
-        if name in kind.parameters:
-            p[slot] = values.get(name, kind.parameters[name].value)
-    if kind.form:
-        _pack_form(kind, values, p)
-    for effect in effects_of("damper"):
-        for name, parameter in effect.parameters.items():
-            key = effect.name + "." + name
-            p[SLOTS.parameters[key]] = values.get(key, parameter.value)
-    return p
-
-
-def _pack_form(law: type[Law], values: dict[str, float], p: list[float]) -> None:
-    """Write knots and numbers of a law's chosen form where `command.entered` reads them."""
-    place = SLOTS.law_parameters
-    p[place : place + len(law.knots)] = law.knots
-    for k, form in enumerate(law.command.values()):
-        own = place + MOST_KNOTS * (k + 1)
-        names = [n for one in form.names() for n in law.listed(one)]
-        if len(names) <= MOST_KNOTS:  # else it is a table of the law's own, which stays as it is
-            found = [values.get(name, law.parameters[name].value) for name in names]
-            p[own : own + len(found)] = found

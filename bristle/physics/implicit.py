@@ -72,28 +72,31 @@ def advance_implicit(setup: Setup, begin: Inputs, end: Inputs, z: Row, work: Row
         evaluate(setup, now, y, f, unused)
         evaluate(setup, then, y, g, unused)
         for i in range(n):
-            drift[i] = _GAMMA * (g[moving[i]] - f[moving[i]])  # gamma h times the rate's own rate
+            at = int(moving[i])  # a whole number, but a float among the others of a store
+            drift[i] = _GAMMA * (g[at] - f[at])  # gamma h times the rate's own rate
         for j in range(n):
-            slot = moving[j]
+            slot = int(moving[j])
             nudge = 1e-8 + 1e-6 * abs(z[slot])
             y[slot] = z[slot] + nudge
             evaluate(setup, then, y, unused, k1)
             y[slot] = z[slot]
             for i in range(n):
-                matrix[i * n + j] = -_GAMMA * h * (unused[moving[i]] - g[moving[i]]) / nudge
+                at = int(moving[i])
+                matrix[i * n + j] = -_GAMMA * h * (unused[at] - g[at]) / nudge
             # What grows is left to the explicit part: 1 - gamma h J would pass through zero there,
             # and the method keeps its order with any matrix.
             matrix[j * n + j] = 1.0 + max(matrix[j * n + j], 0.0)
         for i in range(n):
-            k1[i] = f[moving[i]] + drift[i]
+            k1[i] = f[int(moving[i])] + drift[i]
         for i in range(n * n):
             copy[i] = matrix[i]
         solve_in_place(copy, k1, n)
         for i in range(n):
-            y[moving[i]] = z[moving[i]] + h * k1[i]
+            at = int(moving[i])
+            y[at] = z[at] + h * k1[i]
         evaluate(setup, then, y, g, unused)
         for i in range(n):
-            k2[i] = g[moving[i]] - 2.0 * k1[i] - drift[i]
+            k2[i] = g[int(moving[i])] - 2.0 * k1[i] - drift[i]
         solve_in_place(matrix, k2, n)
         for i in range(n):
-            z[moving[i]] += h * (1.5 * k1[i] + 0.5 * k2[i])
+            z[int(moving[i])] += h * (1.5 * k1[i] + 0.5 * k2[i])

@@ -17,11 +17,6 @@ Row = Any
 """A flat sequence of numbers: a list inside FMUs, an array under numba."""
 
 
-def identity(n: int) -> Flat:
-    """Return the (n, n) identity."""
-    return [1.0 if i == j else 0.0 for i in range(n) for j in range(n)]
-
-
 def copy(source: Row, first: int, target: Row, at: int, count: int) -> None:
     """Copy some values from one sequence into another.
 
@@ -35,24 +30,26 @@ def copy(source: Row, first: int, target: Row, at: int, count: int) -> None:
         target[at + i] = source[first + i]
 
 
-def multiply(a: Sequence[float], b: Sequence[float], n: int, m: int, columns: int) -> Flat:
-    """Return the product of two matrices, (n, columns) flat.
+def multiply(a: Row, b: Row, n: int, m: int, columns: int, product: Row) -> None:
+    """Fill in the product of two matrices.
 
     Parameters
     ----------
-    a, b : (n, m) and (m, columns) flat
+    a, b : (n, m) and (m, columns) flat, kept
     n, m, columns : sizes
+    product : (n, columns) flat, filled; another sequence than a and b
     """
-    rows = [b[k * columns : (k + 1) * columns] for k in range(m)]
-    product: Flat = []
     for i in range(n):
-        total = [0.0] * columns
+        first = i * columns
+        for j in range(first, first + columns):
+            product[j] = 0.0
         for k in range(m):
             factor = a[i * m + k]
             if factor != 0.0:
-                total = [t + factor * value for t, value in zip(total, rows[k])]
-        product.extend(total)
-    return product
+                at = first
+                for j in range(k * columns, (k + 1) * columns):
+                    product[at] += factor * b[j]
+                    at += 1
 
 
 def solve_in_place(a: Row, b: Row, n: int) -> None:
@@ -78,6 +75,27 @@ def solve_in_place(a: Row, b: Row, n: int) -> None:
         b[i] = total / a[i * n + i]
 
 
+def invert(a: Row, n: int, inverse_of_a: Row, work: Row) -> None:
+    """Fill in the inverse of a (n, n) that is not singular.
+
+    Parameters
+    ----------
+    a : (n, n) flat, kept
+    n : size
+    inverse_of_a : (n, n) flat, filled
+    work : (n n + n,) or more, room to work
+    """
+    size = n * n
+    rest, column = work[0:size], work[size : size + n]
+    for j in range(n):
+        copy(a, 0, rest, 0, size)
+        for i in range(n):
+            column[i] = 1.0 if i == j else 0.0
+        solve_in_place(rest, column, n)
+        for i in range(n):
+            inverse_of_a[i * n + j] = column[i]
+
+
 def inverse(a: Sequence[float], n: int) -> Flat:
     """Return the inverse of a (n, n).
 
@@ -87,14 +105,10 @@ def inverse(a: Sequence[float], n: int) -> Flat:
         If `a` is singular.
     """
     result = [0.0] * (n * n)
-    for j in range(n):
-        column = [1.0 if i == j else 0.0 for i in range(n)]
-        try:
-            solve_in_place(list(a), column, n)
-        except ZeroDivisionError:
-            raise PhysicsError(f"a matrix of {n} x {n} is singular.") from None
-        for i in range(n):
-            result[i * n + j] = column[i]
+    try:
+        invert(a, n, result, [0.0] * (n * n + n))
+    except ZeroDivisionError:
+        raise PhysicsError(f"a matrix of {n} x {n} is singular.") from None
     return result
 
 
@@ -113,33 +127,70 @@ def cholesky(a: Sequence[float], n: int) -> Flat | None:
     return low
 
 
-def phi_functions(a: Sequence[float], n: int) -> tuple[Flat, Flat, Flat]:
-    """Return phi_0 = e^A, phi_1 = int_0^1 e^((1-s)A) ds and phi_2 = int_0^1 e^((1-s)A) s ds.
+LAST_TERM = 12
+"""Terms of the Taylor series of phi_2 that are summed: they leave less than 1e-17 at norm 0.25."""
+
+
+def phi_functions(a: Row, n: int, phi_0: Row, phi_1: Row, phi_2: Row, work: Row) -> None:
+    """Fill in phi_0 = e^A, phi_1 = int_0^1 e^((1-s)A) ds and phi_2 = int_0^1 e^((1-s)A) s ds.
 
     With A = h a they give the exact step of x' = a x + b u for u linear in time:
     x_1 = phi_0 x_0 + h phi_1 b u_0 + h phi_2 b (u_1 - u_0). Taylor series at 2^-s A, then doubling
     (Higham 2008, Functions of Matrices, section 10.7).
+
+    Parameters
+    ----------
+    a : (n, n) flat, kept
+    n : size
+    phi_0, phi_1, phi_2 : (n, n) flat, filled
+    work : (2 n n,) or more, room to work
     """
-    norm = max(sum(abs(a[i * n + j]) for j in range(n)) for i in range(n))
-    halvings = 0
+    size = n * n
+    small, product = work[0:size], work[size : 2 * size]
+    norm, halvings, scale = row_sum_norm(a, n), 0, 1.0
     while norm > 0.25:
         norm *= 0.5
+        scale *= 0.5
         halvings += 1
-    small = [value * 0.5**halvings for value in a]
-    # phi_2 = sum A^k / (k+2)!, by Horner; 12 terms leave less than 1e-17 at norm 0.25.
-    phi_2 = [0.0] * (n * n)
-    factorial = [1.0]
-    for k in range(1, 16):
-        factorial.append(factorial[-1] * k)
-    unit = identity(n)
-    for k in range(12, -1, -1):
-        phi_2 = multiply(small, phi_2, n, n, n)
-        phi_2 = [value + one / factorial[k + 2] for value, one in zip(phi_2, unit)]
-    phi_1 = [one + value for one, value in zip(unit, multiply(small, phi_2, n, n, n))]
-    phi_0 = [one + value for one, value in zip(unit, multiply(small, phi_1, n, n, n))]
+    for i in range(size):
+        small[i] = a[i] * scale
+        phi_2[i] = 0.0
+    # phi_2 = sum A^k / (k+2)!, by Horner.
+    factorial = 1.0
+    for k in range(2, LAST_TERM + 3):
+        factorial *= k
+    for k in range(LAST_TERM, -1, -1):
+        multiply(small, phi_2, n, n, n, product)
+        copy(product, 0, phi_2, 0, size)
+        add_to_diagonal(phi_2, n, 1.0 / factorial)
+        factorial /= k + 2.0
+    multiply(small, phi_2, n, n, n, phi_1)
+    add_to_diagonal(phi_1, n, 1.0)
+    multiply(small, phi_1, n, n, n, phi_0)
+    add_to_diagonal(phi_0, n, 1.0)
     for _ in range(halvings):
-        square = multiply(phi_1, phi_1, n, n, n)
-        phi_2 = [0.25 * value + 0.5 * two for value, two in zip(square, phi_2)]
-        phi_1 = [0.5 * (one + value) for one, value in zip(phi_1, multiply(phi_0, phi_1, n, n, n))]
-        phi_0 = multiply(phi_0, phi_0, n, n, n)
-    return phi_0, phi_1, phi_2
+        multiply(phi_1, phi_1, n, n, n, product)
+        for i in range(size):
+            phi_2[i] = 0.25 * product[i] + 0.5 * phi_2[i]
+        multiply(phi_0, phi_1, n, n, n, product)
+        for i in range(size):
+            phi_1[i] = 0.5 * (phi_1[i] + product[i])
+        multiply(phi_0, phi_0, n, n, n, product)
+        copy(product, 0, phi_0, 0, size)
+
+
+def row_sum_norm(a: Row, n: int) -> float:
+    """Return the largest sum of absolute values in a row of a (n, n)."""
+    largest = 0.0
+    for i in range(n):
+        total = 0.0
+        for j in range(i * n, (i + 1) * n):
+            total += abs(a[j])
+        largest = max(largest, total)
+    return largest
+
+
+def add_to_diagonal(a: Row, n: int, value: float) -> None:
+    """Add a number to each diagonal entry of a (n, n), in place."""
+    for i in range(0, n * n, n + 1):
+        a[i] += value

@@ -68,23 +68,54 @@ def matrices(building: Building) -> Matrices:
 
 def step_matrices(m: Matrices, h: float) -> StepMatrices:
     """Return the exact step over h [s]."""
-    n = m.n
-    size = 2 * n
-    minus_k = multiply(m.M_inverse, m.K, n, n, n)
-    minus_c = multiply(m.M_inverse, m.C, n, n, n)
-    a = [0.0] * (size * size)
-    b = [0.0] * (size * (n + 1))
+    size, forced = 4 * m.n * m.n, 2 * m.n * (m.n + 1)
+    phi, held, ramp = [0.0] * size, [0.0] * forced, [0.0] * forced
+    fill_step(m.n, m.M_inverse, m.C, m.K, h, phi, held, ramp, [0.0] * fill_size(m.n))
+    return StepMatrices(h, phi, held, ramp)
+
+
+def fill_size(n: int) -> int:
+    """Return the size of work of `fill_step` for n levels."""
+    return 22 * n * n + 2 * n * (n + 1)
+
+
+def fill_step(
+    n: int, M_inverse: Row, C: Row, K: Row, h: float, phi: Row, held: Row, ramp: Row, work: Row
+) -> None:
+    """Fill in the matrices of the exact step over h [s], see `StepMatrices`.
+
+    Parameters
+    ----------
+    n : number of levels
+    M_inverse, C, K : (n, n) flat [1/kg, N s/m, N/m]
+    h : length of the step [s]
+    phi, held, ramp : (2n, 2n), (2n, n + 1), (2n, n + 1) flat, filled
+    work : (`fill_size(n)`,) or more, room to work
+    """
+    size, square, whole = 2 * n, n * n, 4 * n * n
+    minus_k, minus_c = work[0:square], work[square : 2 * square]
+    at = 2 * square
+    a, phi_1 = work[at : at + whole], work[at + whole : at + 2 * whole]
+    at += 2 * whole
+    phi_2, spare = work[at : at + whole], work[at + whole : at + 3 * whole]
+    at += 3 * whole
+    b = work[at : at + size * (n + 1)]
+    multiply(M_inverse, K, n, n, n, minus_k)
+    multiply(M_inverse, C, n, n, n, minus_c)
+    for i in range(whole):
+        a[i] = 0.0
+    for i in range(size * (n + 1)):
+        b[i] = 0.0
     for i in range(n):
         a[i * size + n + i] = h
         for j in range(n):
             a[(n + i) * size + j] = -h * minus_k[i * n + j]
             a[(n + i) * size + n + j] = -h * minus_c[i * n + j]
-            b[(n + i) * (n + 1) + j] = -h * m.M_inverse[i * n + j]
+            b[(n + i) * (n + 1) + j] = -h * M_inverse[i * n + j]
         b[(n + i) * (n + 1) + n] = -h
-    phi_0, phi_1, phi_2 = phi_functions(a, size)
-    return StepMatrices(
-        h, phi_0, multiply(phi_1, b, size, size, n + 1), multiply(phi_2, b, size, size, n + 1)
-    )
+    phi_functions(a, size, phi, phi_1, phi_2, spare)
+    multiply(phi_1, b, size, size, n + 1, held)
+    multiply(phi_2, b, size, size, n + 1, ramp)
 
 
 def free_step(

@@ -187,8 +187,7 @@ class System:
         names = self.names["structure"]
         found = np.zeros(len(names), records.structure_record())
         for record, name in zip(found, names, strict=True):
-            c, state = self.slaves[name].constants, self.slaves[name].state
-            c = structure.discretise(h, c)
+            c, state = self.slaves[name].constants_of(h), self.slaves[name].state
             _copy(record, c, ("n", "mass", "h", "active", "touches", "isolated"))
             _fill(
                 record, stiffnesses=c.stiffnesses, m_inverse=c.m_inverse, damping=c.damping,

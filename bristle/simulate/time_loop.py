@@ -387,7 +387,8 @@ def damper_constants(d: Any) -> damper.Constants:
         d.law, d.p[:], d.on[:], d.moving[:], d.n_moving, d.advances, d.n_own, d.signed, d.active,
         d.lags,
     )  # fmt: skip
-    return DamperConstants(setup, d.v_max, d.stroke, d.moving_mass, d.measured, True)
+    none = d.p[:0]  # no parameter follows an input here
+    return DamperConstants(setup, d.v_max, d.stroke, d.moving_mass, d.measured, True, none)
 
 
 def structure_constants(b: Any) -> structure.Constants:

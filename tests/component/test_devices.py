@@ -38,9 +38,10 @@ class Run:
 
     def __init__(self, building: Building, effects: dict[str, float] | None = None) -> None:
         on = sorted({name.partition(".")[0] for name in effects or {}})
-        c, self.state, work = structure.setup(building, effects or {}, on)
-        self.c, self.n, self.d = structure.discretise(H, c), building.size, len(building.devices)
-        self.work, self.time = [0.0] * work, 0.0
+        store, self.state, self.work = structure.laid_down(building, effects or {}, on)
+        structure.discretise(H, store, self.work)
+        self.c, self.n, self.d = structure.constants(store), building.size, len(building.devices)
+        self.time = 0.0
         drifts = self.n - building.isolated
         self.outputs = [0.0] * (3 * self.n + drifts + 1 + 3 * self.d)
         self.before = [0.0] * (3 + self.d)

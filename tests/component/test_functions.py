@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bristle.component import damper, structure
+from bristle.component import damper
 from bristle.fmu import catalogue
 from bristle.jit import compiled
 
@@ -36,7 +36,7 @@ def set_up(name: str, given: dict[str, Any]) -> Any:
         slave._set_any([slave._index[key]], [value], type(slave[key]))
     slave.configure()
     if name == "Structure":
-        slave.constants = structure.discretise(STEP, slave.constants)
+        slave.constants = slave.constants_of(STEP)
     return slave
 
 

@@ -15,7 +15,7 @@ from bristle.component.structure import StructureModel
 from bristle.errors import PhysicsError
 from bristle.physics import damper
 from bristle.physics.building import paper_building
-from bristle.physics.damper import DamperModel, advances, moving_states
+from bristle.physics.damper import DamperModel, moving_states, setup_of
 from bristle.physics.effect import EFFECTS, Effect, Parameter, Q, effects_of
 from bristle.physics.law import LAWS as ALL_LAWS
 
@@ -700,8 +700,8 @@ def test_remanence_acts_on_the_voltage_that_the_coil_passes_on() -> None:
 def test_which_states_move_how() -> None:
     assert moving_states("lugre", ["gas_spring", "coil_lag"]) == []
     assert moving_states("lugre", ["mount_compliance"]) == []  # it has a solver of its own
-    assert not advances(["gas_spring", "mount_compliance"])
-    assert advances(["coil_lag"])
+    assert not setup_of("lugre", {}, ["gas_spring", "mount_compliance"]).advances
+    assert setup_of("lugre", {}, ["coil_lag"]).advances
 
 
 # -- definitions that are refused

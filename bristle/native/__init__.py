@@ -1,0 +1,1 @@
+"""Components as FMUs without Python: their functions compiled, with one shim in C for all."""

@@ -1,0 +1,39 @@
+"""modelDescription.xml of a native FMU: that of its Python form, but for how it runs."""
+
+from __future__ import annotations
+
+from typing import Any
+from xml.etree.ElementTree import Element, indent, tostring
+
+from ..fmu.component import ComponentSlave
+
+_CAPABILITIES = {
+    "needsExecutionTool": False,
+    "canHandleVariableCommunicationStepSize": True,
+    "canInterpolateInputs": False,
+    "canBeInstantiatedOnlyOncePerProcess": False,
+    "canGetAndSetFMUstate": True,
+    "canSerializeFMUstate": True,
+}
+
+TOOL = "bristle native"
+"""How the generation tool of native FMUs begins."""
+
+
+def description(slave: ComponentSlave, guid: str) -> bytes:
+    """Return the model description of a component that runs without Python.
+
+    Parameters
+    ----------
+    slave : ComponentSlave
+        The component as a Python object, its parameters at their start values.
+    guid : str
+        Of the FMU.
+    """
+    options: dict[str, Any] = dict(_CAPABILITIES)
+    root: Element = slave.to_xml(options)
+    root.set("guid", guid)
+    root.set("generationTool", TOOL)
+    indent(root)
+    text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
+    return text

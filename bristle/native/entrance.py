@@ -1,0 +1,149 @@
+"""One compiled function per component, which leads to all of its functions.
+
+It is generated, compiled by numba and written as LLVM's text, in which nothing of Python is left.
+Compiling runs in a process of its own: numba is told there to know no more of this machine's
+processor than every other has.
+"""
+
+from __future__ import annotations
+
+import re
+from types import FunctionType, ModuleType
+from typing import Any
+
+from ..errors import BuildError
+
+NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
+"""Functions that a component must have, see `bristle.component`."""
+OPTIONAL = ("bind", "follow")
+"""Functions that it may have."""
+
+INLINE = ("rows.row",)
+"""Callees that must become part of their callers: they return rows."""
+
+NAME = "bristle_entrance"
+ROWS = (
+    "values", "given", "baked", "times", "samples", "store", "state", "new_state", "before", "now",
+    "outputs", "work",
+)  # fmt: skip
+
+_SOURCE = """
+def entrance(call, time, dt, {rows}):
+    if call == 0:
+        return sizes(values, baked, work)
+    if call == 1:
+        return setup(values, given, baked, store, state)
+    {bind}
+    c = constants(store)
+    {follow}
+    if call == 2:
+        return start(time, now, c, state, outputs, work)
+    if call == 3:
+        return step((time, dt, 0), before, now, c, state, new_state, outputs, work)
+    return output(time, now, c, state, outputs, work)
+"""
+
+_OUTSIDE = frozenset(
+    "acos asin atan atan2 cbrt ceil cos cosh erf erfc exp exp2 expm1 fabs floor fmax fmin fmod "
+    "hypot ldexp lgamma log log10 log1p log2 memcpy memmove memset pow round sin sinh sqrt tan "
+    "tanh tgamma trunc".split()
+)
+"""What compiled functions may ask of the C library."""
+
+
+def entrance_of(functions: Any) -> FunctionType:
+    """Return the function that leads to a component's functions.
+
+    Parameters
+    ----------
+    functions : module or class
+        The component's, see `bristle.component`.
+
+    Raises
+    ------
+    BuildError
+        If it is not of flat functions throughout.
+    """
+    missing = [name for name in NEEDED if not isinstance(_part(functions, name), FunctionType)]
+    name = functions.__name__ if isinstance(functions, ModuleType) else functions.__qualname__
+    if missing:
+        raise BuildError(f"{name} has no flat {', '.join(missing)}: it runs in Python alone.")
+    found = {one: _part(functions, one) for one in (*NEEDED, *OPTIONAL)}
+    text = _SOURCE.format(
+        rows=", ".join(ROWS),
+        bind="bind(given, store)" if found["bind"] else "pass",
+        follow="follow(now, c)" if found["follow"] else "pass",
+    )
+    namespace = {one: function for one, function in found.items() if function}
+    exec(compile(text, f"<entrance of {name}>", "exec"), namespace)
+    entrance: FunctionType = namespace["entrance"]
+    entrance.__module__ = name
+    return entrance
+
+
+def _part(functions: Any, name: str) -> Any:
+    return getattr(functions, name, None)
+
+
+def llvm_text(functions: Any) -> str:
+    """Return LLVM's text of a component's functions behind one entrance.
+
+    Raises
+    ------
+    BuildError
+        If the compiler refuses a function, with file and line, or it needs what no C library has.
+    """
+    from numba.core import types
+    from numba.core.errors import NumbaError
+
+    from ..jit import closed
+
+    row = types.Array(types.float64, 1, "C")
+    kinds = (types.int64, types.float64, types.float64, *[row] * len(ROWS))
+    try:
+        dispatcher = closed(entrance_of(functions), INLINE)
+        dispatcher.compile(types.int64(*kinds))
+    except NumbaError as error:
+        raise BuildError(_refusal(str(error))) from error
+    found = dispatcher.overloads[kinds]
+    return plain_text(found.library.get_llvm_str(), found.fndesc.llvm_func_name)
+
+
+def _refusal(text: str) -> str:
+    """Return what numba says in one paragraph: the innermost place and why."""
+    places = re.findall(r'File "([^"]*)", line (\d+)', text)
+    why = re.sub(r"\x1b\[[0-9;]*m", "", text)
+    reasons = [line.strip() for line in why.splitlines() if line.strip()]
+    where = f"{places[-1][0]}, line {places[-1][1]}: " if places else ""
+    return f"{where}{' '.join(reasons)[:600]}"
+
+
+def plain_text(text: str, root: str) -> str:
+    """Return LLVM's text without what ties it to this machine and to Python.
+
+    Parameters
+    ----------
+    text : of a library of numba
+    root : name of its entrance
+
+    Raises
+    ------
+    BuildError
+        If it calls what is neither in it nor in a C library.
+    """
+    lines = [
+        line
+        for line in text.splitlines()
+        if not line.startswith(("target ", "source_filename", "; ModuleID"))
+    ]
+    text = "\n".join(lines) + "\n"
+    text = re.sub(r"^(@\S+ = )common ", r"\1internal ", text, flags=re.MULTILINE)
+    text = re.sub(r"^define (?:linkonce_odr |internal |hidden )*", "define internal ", text, flags=re.MULTILINE)
+    quoted = re.escape(root)
+    text = re.sub(rf'@"?{quoted}"?(?![\w.$])', f"@{NAME}", text)
+    text = re.sub(rf"^define internal (.*@{NAME}\()", r"define hidden \1", text, flags=re.MULTILINE)
+    outside = re.findall(r'^declare [^@]*@"?([^"(\s]+)"?\(', text, flags=re.MULTILINE)
+    strange = sorted(n for n in outside if not n.startswith("llvm.") and n not in _OUTSIDE)
+    if strange:
+        raise BuildError(f"the compiled functions call {', '.join(strange)}, which no host has.")
+    return text

@@ -1,0 +1,62 @@
+"""The platforms that native FMUs are built for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from ..errors import BuildError
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A platform of native FMUs.
+
+    Attributes
+    ----------
+    name
+        As users name it.
+    target
+        As the compiler names it.
+    folder
+        Folder in the archive of an FMU of FMI 2.0; that standard names those for x86-64 alone,
+        others follow FMI 3.0.
+    suffix
+        Ending of a shared library.
+    libraries
+        What the library is linked with, besides the C library.
+    """
+
+    name: str
+    target: str
+    folder: str
+    suffix: str
+    libraries: tuple[str, ...] = ()
+
+
+PLATFORMS = {
+    platform.name: platform
+    for platform in (
+        Platform("linux64", "x86_64-linux-gnu.2.17", "linux64", ".so", ("m",)),
+        Platform("win64", "x86_64-windows-gnu", "win64", ".dll"),
+        Platform("darwin64", "x86_64-macos", "darwin64", ".dylib"),
+        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", "aarch64-linux", ".so", ("m",)),
+        Platform("aarch64-darwin", "aarch64-macos", "aarch64-darwin", ".dylib"),
+    )
+}
+"""The platforms by name."""
+
+
+def chosen(names: Iterable[str]) -> tuple[Platform, ...]:
+    """Return the platforms of these names, all of them if there are none.
+
+    Raises
+    ------
+    BuildError
+        Naming one that is not known.
+    """
+    wanted = list(dict.fromkeys(name for given in names for name in given.split(",") if name))
+    for name in wanted:
+        if name not in PLATFORMS:
+            raise BuildError(f'no platform is named "{name}". There are: {", ".join(PLATFORMS)}.')
+    return tuple(PLATFORMS[name] for name in wanted or PLATFORMS)

@@ -1,0 +1,85 @@
+/* What is known of one component: its generated tables, and its compiled functions. */
+
+#ifndef COMPONENT_H
+#define COMPONENT_H
+
+#include <stdint.h>
+
+enum { REAL, INTEGER, BOOLEAN, STRING };
+enum { INPUT, OUTPUT, PARAMETER };
+
+/* A variable; its value reference is its place in the table. */
+typedef struct {
+    const char *name;
+    int kind, causality;
+    double start;             /* of a String: 0 */
+    const char *text;         /* start of a String, else NULL */
+    double low, high;         /* what a parameter may be; infinite: no bound */
+    const char *bounds;       /* both, as messages show them */
+    const char *const *words; /* what a String chooses from, NULL behind the last; NULL: any text */
+} Variable;
+
+/* What a code of the functions means: words and, between them, values of variables. */
+typedef struct {
+    const char *before; /* words before the value, NULL behind the last piece */
+    int variable;       /* whose value follows; below 0: one of the step's, or none */
+    char format;        /* 'g' as %g, 'r' as Python's repr */
+} Piece;
+
+enum { NO_VALUE = -1, STEP_LENGTH = -2 };
+
+typedef struct {
+    int64_t code;
+    const Piece *pieces;
+} Meaning;
+
+typedef struct {
+    const char *name, *guid;
+    const Variable *variables;
+    int count;
+    int fault;                     /* the Integer output with the fault's code */
+    int inputs_at, inputs;         /* inputs are neighbours, and so are Real outputs */
+    int outputs_at, outputs;
+    const Meaning *meanings;       /* code 0 ends them */
+    const double *baked;           /* what the build fixes */
+    int64_t baked_size;
+    int in_place;                  /* a step moves the state on where it lies */
+    int file, file_if, file_word;  /* String parameter with the file that is read, -1: none; where
+                                      the String `file_if` (-1: always) has the word `file_word` */
+    int steps, steps_word;         /* likewise a String of TIME:VALUE pairs */
+    const char *const *bundled;    /* names of files among the resources, NULL behind the last */
+    const char *header;            /* which such a file must have; NULL: any for a signal */
+} Component;
+
+extern const Component component;
+
+/* A row of numbers, and how a compiled function takes it: as seven words. */
+typedef struct {
+    double *at;
+    int64_t size;
+} Row;
+
+#define ROW_WORDS void *, void *, int64_t, int64_t, double *, int64_t, int64_t
+#define AS_ROW(row) 0, 0, (row).size, 8, (row).at, (row).size, 8
+
+enum { SIZES, SETUP, START, STEP, SHOW };
+
+/* The component's functions, compiled from Python, behind one entrance. Returns 0; what the
+   function returns goes to `code`. `thrown` is not used: none of them raises. */
+int bristle_entrance(
+    int64_t *code, void **thrown, int64_t call, double time, double dt,
+    ROW_WORDS, /* parameters */
+    ROW_WORDS, /* given: per input whether a host has set it */
+    ROW_WORDS, /* baked */
+    ROW_WORDS, /* times of samples */
+    ROW_WORDS, /* samples */
+    ROW_WORDS, /* store */
+    ROW_WORDS, /* state */
+    ROW_WORDS, /* new state */
+    ROW_WORDS, /* inputs before */
+    ROW_WORDS, /* inputs now */
+    ROW_WORDS, /* outputs */
+    ROW_WORDS  /* work */
+);
+
+#endif

@@ -1,0 +1,217 @@
+/* An instance from its begin to its end, the order of calls, and the step. */
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "slave.h"
+
+static char *copy_of(const char *text) {
+    size_t size = strlen(text) + 1;
+    char *copy = malloc(size);
+    if (copy) memcpy(copy, text, size);
+    return copy;
+}
+
+static void free_texts(Slave *slave) {
+    if (!slave->texts) return;
+    for (int i = 0; i < component.count; i++) free(slave->texts[i]);
+    memset(slave->texts, 0, (size_t)component.count * sizeof *slave->texts);
+}
+
+Slave *slave_new(const char *name, const char *resources) {
+    Slave *slave = calloc(1, sizeof *slave);
+    if (!slave) return 0;
+    size_t count = (size_t)component.count;
+    slave->name = copy_of(name);
+    slave->resources = copy_of(resources);
+    slave->values = calloc(count, sizeof *slave->values);
+    slave->texts = calloc(count, sizeof *slave->texts);
+    slave->given = calloc(count, 1);
+    slave->held = calloc((size_t)component.outputs + 1, sizeof *slave->held);
+    int whole = slave->name && slave->resources && slave->values && slave->texts &&
+                slave->given && slave->held;
+    if (whole && slave_reset(slave)) return slave;
+    slave_free(slave);
+    return 0;
+}
+
+void slave_free(Slave *slave) {
+    free_texts(slave);
+    free(slave->texts);
+    free(slave->name);
+    free(slave->resources);
+    free(slave->values);
+    free(slave->given);
+    free(slave->held);
+    free(slave->memory);
+    free(slave->sampled);
+    free(slave);
+}
+
+int slave_reset(Slave *slave) {
+    free_texts(slave);
+    for (int i = 0; i < component.count; i++) {
+        const Variable *v = &component.variables[i];
+        slave->values[i] = v->start;
+        if (v->kind == STRING && !(slave->texts[i] = copy_of(v->text))) return 0;
+    }
+    memset(slave->given, 0, (size_t)component.count);
+    slave->mode = INSTANTIATED;
+    slave->stale = slave->unbuilt = 1;
+    slave->fresh = slave->warnings = 0;
+    slave->time = 0.0;
+    return 1;
+}
+
+Status slave_enter(Slave *slave) {
+    if (slave->mode != INSTANTIATED)
+        return slave_stop(slave, WRONG_MODE,
+                          "initialisation entered twice; reset the instance first.");
+    slave->mode = INITIALISING;
+    return DONE;
+}
+
+Status slave_leave(Slave *slave) {
+    if (slave->mode != INITIALISING)
+        return slave_stop(slave, WRONG_MODE, "initialisation left without being entered.");
+    slave->unbuilt = 1;
+    slave_follow(slave, 1);
+    slave->mode = STEPPING;
+    /* What is wrong shows in `fault` and at the first step: hosts can still read the outputs. */
+    return DONE;
+}
+
+static void hold_outputs(Slave *slave) {
+    memcpy(slave->held, slave->values + component.outputs_at,
+           (size_t)component.outputs * sizeof(double));
+}
+
+static void take_inputs(Slave *slave) {
+    memcpy(slave->now.at, slave->values + component.inputs_at,
+           (size_t)component.inputs * sizeof(double));
+    for (int i = 0; i < component.inputs; i++)
+        slave->given_inputs.at[i] = slave->given[component.inputs_at + i];
+}
+
+static void keep_inputs(Slave *slave) {
+    memcpy(slave->before.at, slave->now.at, (size_t)component.inputs * sizeof(double));
+}
+
+static void show_outputs(Slave *slave) {
+    memcpy(slave->values + component.outputs_at, slave->outputs.at,
+           (size_t)component.outputs * sizeof(double));
+}
+
+static int inputs_are_finite(const Slave *slave) {
+    for (int i = 0; i < component.inputs; i++)
+        if (!isfinite(slave->values[component.inputs_at + i])) return 0;
+    return 1;
+}
+
+static int outputs_are_finite(const Slave *slave, Text *wrong) {
+    const double *outputs = slave->values + component.outputs_at;
+    double sum = 0.0;
+    for (int i = 0; i < component.outputs; i++) sum += outputs[i];
+    if (isfinite(sum)) return 1;
+    const char *between = "not finite: ";
+    for (int i = 0; i < component.outputs; i++) {
+        if (isfinite(outputs[i])) continue;
+        text_add(wrong, between);
+        text_add(wrong, component.variables[component.outputs_at + i].name);
+        between = ", ";
+    }
+    if (*between != ',') text_add(wrong, "not finite: the sum of the outputs");
+    text_add(wrong, ".");
+    return 0;
+}
+
+/* Compute the outputs from inputs and state, without moving the model. */
+static int refresh(Slave *slave, Text *wrong) {
+    int64_t code;
+    if (slave->fresh) {
+        slave->fresh = 0;
+        return 1;
+    }
+    int call = slave->mode == STEPPING ? SHOW : START;
+    take_inputs(slave);
+    if (call == START) keep_inputs(slave); /* until the first step the state follows them */
+    int called = slave_call(slave, call, slave->time, 0.0, slave->new_state, slave->work, &code);
+    if (!slave_answer(slave, called, code, 0.0, wrong)) return 0;
+    show_outputs(slave);
+    return 1;
+}
+
+/* Bring the outputs up to date with inputs, parameters and state. */
+void slave_follow(Slave *slave, int final) {
+    Text wrong;
+    int right = 1;
+    slave->stale = 0;
+    if (slave->values[component.fault] != 0.0 || slave->mode == TERMINATED) return;
+    text_clear(&wrong);
+    hold_outputs(slave);
+    if (slave->unbuilt) {
+        right = slave_configure(slave, &wrong);
+        slave->unbuilt = !right;
+    }
+    if (right && inputs_are_finite(slave)) right = refresh(slave, &wrong);
+    if (right) right = outputs_are_finite(slave, &wrong);
+    if (right) return;
+    for (int i = 0; i < component.outputs; i++)
+        slave->values[component.outputs_at + i] = final ? 0.0 : slave->held[i];
+    if (final) slave_stop(slave, BAD_PARAMETER, wrong.at);
+}
+
+/* Move the model over one step. */
+static int advance(Slave *slave, double time, double dt, Text *wrong) {
+    int64_t code;
+    take_inputs(slave);
+    Row after = component.in_place ? slave->state : slave->new_state;
+    int called = slave_call(slave, STEP, time, dt, after, slave->work, &code);
+    if (!called || code < 0) text_add(wrong, "ValueError: "); /* as Python calls it */
+    if (!slave_answer(slave, called, code, dt, wrong)) return 0;
+    if (!component.in_place) {
+        slave->new_state = slave->state;
+        slave->state = after;
+    }
+    keep_inputs(slave);
+    show_outputs(slave);
+    return 1;
+}
+
+Status slave_step(Slave *slave, double time, double dt) {
+    Text wrong;
+    text_clear(&wrong);
+    if (slave->values[component.fault] != 0.0) return FAILED;
+    if (slave->mode != STEPPING)
+        return slave_stop(slave, WRONG_MODE,
+                          "doStep belongs between initialisation and terminate.");
+    if (!(dt > 0.0 && isfinite(dt) && isfinite(time))) {
+        text_add(&wrong, "time ");
+        text_repr(&wrong, time);
+        text_add(&wrong, " s, step ");
+        text_repr(&wrong, dt);
+        text_add(&wrong, " s.");
+        return slave_stop(slave, BAD_STEP, wrong.at);
+    }
+    for (int i = component.inputs_at; i < component.inputs_at + component.inputs; i++) {
+        if (isfinite(slave->values[i])) continue;
+        text_add(&wrong, component.variables[i].name);
+        text_add(&wrong, " = ");
+        text_repr(&wrong, slave->values[i]);
+        text_add(&wrong, ".");
+        return slave_stop(slave, NOT_FINITE_INPUT, wrong.at);
+    }
+    hold_outputs(slave);
+    double before = slave->time;
+    slave->time = time + dt;
+    slave->fresh = 0;
+    if (!advance(slave, time, dt, &wrong) || !outputs_are_finite(slave, &wrong)) {
+        memcpy(slave->values + component.outputs_at, slave->held,
+               (size_t)component.outputs * sizeof(double));
+        slave->time = before;
+        return slave_stop(slave, BAD_STATE, wrong.at);
+    }
+    slave->stale = 0;
+    return DONE;
+}

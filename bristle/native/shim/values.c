@@ -1,0 +1,101 @@
+/* Values of variables, in and out. */
+
+#include <stdlib.h>
+#include <string.h>
+
+#include "slave.h"
+
+static const char *const TYPES[] = {"float", "int", "bool", "str"};
+
+/* Return whether there is such a variable, of such a type; warn where not. */
+static int known(Slave *slave, unsigned reference, int kind) {
+    Text text;
+    if (reference < (unsigned)component.count &&
+        component.variables[reference].kind == kind)
+        return 1;
+    text_clear(&text);
+    if (reference >= (unsigned)component.count) {
+        text_add(&text, "no variable has the value reference ");
+        text_whole(&text, reference);
+    } else {
+        text_add(&text, component.variables[reference].name);
+        text_add(&text, " is not of type ");
+        text_add(&text, TYPES[kind]);
+    }
+    text_add(&text, ".");
+    slave_warn(slave, text.at);
+    return 0;
+}
+
+Status slave_get(Slave *slave, unsigned reference, int kind, double *value) {
+    if (slave->stale && kind != BOOLEAN) slave_follow(slave, 0);
+    if (!known(slave, reference, kind)) return FAILED;
+    *value = slave->values[reference];
+    return DONE;
+}
+
+Status slave_get_text(Slave *slave, unsigned reference, const char **value) {
+    if (!known(slave, reference, STRING)) return FAILED;
+    *value = slave->texts[reference];
+    return DONE;
+}
+
+/* Return whether a variable takes a value now, and what the host is answered. */
+static int may_be_set(Slave *slave, unsigned reference, int changes, Status *answer) {
+    const Variable *v = &component.variables[reference];
+    Text text;
+    text_clear(&text);
+    text_add(&text, v->name);
+    *answer = DONE;
+    if (v->causality == INPUT) return 1;
+    if (v->causality == OUTPUT) {
+        text_add(&text, " cannot be set.");
+        slave_warn(slave, text.at);
+        *answer = WARNED;
+        return 0;
+    }
+    if (slave->mode != STEPPING && slave->mode != TERMINATED) {
+        slave->unbuilt = 1;
+        return 1;
+    }
+    if (!changes) return 0;
+    text_add(&text, " keeps ");
+    if (v->kind == STRING)
+        text_quoted(&text, slave->texts[reference]);
+    else if (v->kind == REAL)
+        text_repr(&text, slave->values[reference]);
+    else if (v->kind == INTEGER)
+        text_whole(&text, (long long)slave->values[reference]);
+    else
+        text_add(&text, slave->values[reference] != 0.0 ? "True" : "False");
+    text_add(&text, ": it is fixed after initialisation.");
+    slave_warn(slave, text.at);
+    *answer = WARNED;
+    return 0;
+}
+
+Status slave_set(Slave *slave, unsigned reference, int kind, double value) {
+    if (!known(slave, reference, kind)) return FAILED;
+    Status answer;
+    if (!may_be_set(slave, reference, value != slave->values[reference], &answer)) return answer;
+    slave->values[reference] = value;
+    slave->given[reference] = 1;
+    slave->stale = 1;
+    return DONE;
+}
+
+Status slave_set_text(Slave *slave, unsigned reference, const char *value) {
+    if (!known(slave, reference, STRING)) return FAILED;
+    Status answer;
+    int changes = strcmp(value, slave->texts[reference]) != 0;
+    if (!may_be_set(slave, reference, changes, &answer)) return answer;
+    size_t size = strlen(value) + 1;
+    char *copy = malloc(size);
+    if (!copy) return FAILED;
+    memcpy(copy, value, size);
+    free(slave->texts[reference]);
+    slave->texts[reference] = copy;
+    slave->given[reference] = 1;
+    slave->stale = 1;
+    return DONE;
+}

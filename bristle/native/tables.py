@@ -1,0 +1,164 @@
+"""What a component declares, as the C data that the shim reads: see shim/component.h."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from math import inf, isfinite
+from string import Formatter
+
+from ..errors import BuildError
+from ..fmu.component import ComponentSlave
+from ..fmu.controller import SampledSlave
+
+_KINDS = {"Real": "REAL", "Integer": "INTEGER", "Boolean": "BOOLEAN", "String": "STRING"}
+_CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER"}
+_FORMATS = {("", None): "r", ("", "r"): "r", ("", "s"): "s", ("g", None): "g"}
+_STEP_LENGTH = "step_length"
+"""What a text calls the length of the step."""
+
+_TABLES = """\
+#include "component.h"
+
+{words}static const Variable variables[] = {{
+{variables}
+}};
+
+{pieces}static const Meaning meanings[] = {{
+{meanings}    {{0, 0}},
+}};
+
+static const double baked[] = {{
+{baked}
+}};
+
+const Component component = {{
+    .name = {name},
+    .guid = {guid},
+    .variables = variables,
+    .count = {count},
+    .fault = {fault},
+    .inputs_at = {inputs_at},
+    .inputs = {inputs},
+    .outputs_at = {outputs_at},
+    .outputs = {outputs},
+    .meanings = meanings,
+    .baked = baked,
+    .baked_size = {baked_size},
+    .in_place = {in_place},
+}};
+"""
+
+
+def tables(slave: ComponentSlave, guid: str) -> str:
+    """Return the C source of a component's tables.
+
+    Parameters
+    ----------
+    slave : ComponentSlave
+        The component as a Python object, its parameters at their start values.
+    guid : str
+        Of the FMU.
+
+    Raises
+    ------
+    BuildError
+        If its ports do not lie as the shim takes them, or a text shows a value as C cannot.
+    """
+    baked = slave.bake()
+    names = {variable.name: index for index, variable in slave.vars.items()}
+    words, variables = [], []
+    for index in slave.vars:
+        listed = _words(slave, index)
+        if listed:
+            words.append(f"static const char *const words_{index}[] = {{{listed}, 0}};\n")
+        variables.append(_variable(slave, index, bool(listed)))
+    pieces, meanings = [], []
+    for k, (code, text) in enumerate(sorted(slave.texts.items())):
+        pieces.append(f"static const Piece pieces_{k}[] = {{\n{_pieces(text, names)}\n}};\n\n")
+        meanings.append(f"    {{{code}, pieces_{k}}},\n")
+    inputs_at, inputs = _span(slave, slave._inputs)
+    outputs_at, outputs = _span(slave, slave._outputs)
+    return _TABLES.format(
+        words="".join(words) + "\n" if words else "",
+        variables="\n".join(variables),
+        pieces="".join(pieces),
+        meanings="".join(meanings),
+        baked="\n".join(f"    {number(value)}," for value in [*baked, 0.0]),
+        name=quoted(str(slave.modelName)),
+        guid=quoted(guid),
+        count=len(slave.vars),
+        fault=names["fault"],
+        inputs_at=inputs_at,
+        inputs=inputs,
+        outputs_at=outputs_at,
+        outputs=outputs,
+        baked_size=len(baked),
+        in_place=int(isinstance(slave, SampledSlave)),
+    )
+
+
+def _variable(slave: ComponentSlave, index: int, has_words: bool) -> str:
+    variable, value = slave.vars[index], slave._values[index]
+    kind = _KINDS[type(variable).__name__]
+    low, high, _ = slave._bounds.get(variable.name, (None, None, None))
+    if variable.causality.name != "parameter" or isinstance(value, bool):
+        low = high = None
+    fields = [
+        quoted(variable.name), kind, _CAUSALITIES[variable.causality.name],
+        "0.0" if kind == "STRING" else number(float(value)),
+        quoted(value) if kind == "STRING" else "0",
+        number(-inf if low is None else low), number(inf if high is None else high),
+        quoted(f"[{low!r}, {high!r}]"),
+        f"words_{index}" if has_words else "0",
+    ]  # fmt: skip
+    return f"    {{{', '.join(fields)}}},"
+
+
+def _words(slave: ComponentSlave, index: int) -> str:
+    """Return the words that a String chooses from, as C has them; "" where it is any text."""
+    return ", ".join(quoted(word) for word in ())
+
+
+def _pieces(text: str, names: dict[str, int]) -> str:
+    """Return a text with values in braces as pieces of words, each with the value behind it."""
+    lines = []
+    for before, name, form, conversion in Formatter().parse(text):
+        place, letter = "NO_VALUE", "r"
+        if name is not None:
+            if name != _STEP_LENGTH and name not in names:
+                raise BuildError(f"the text {text!r} names {name!r}, which is no variable.")
+            if (form, conversion) not in _FORMATS:
+                raise BuildError(f"the text {text!r} shows {name!r} in a way that C cannot.")
+            place = "STEP_LENGTH" if name == _STEP_LENGTH else str(names[name])
+            letter = _FORMATS[form or "", conversion]
+        lines.append(f"    {{{quoted(before)}, {place}, '{letter}'}},")
+    return "\n".join([*lines, "    {0, NO_VALUE, 0},"])
+
+
+def _span(slave: ComponentSlave, indices: list[int]) -> tuple[int, int]:
+    """Return begin and number of variables, which must be neighbours."""
+    if indices and indices != list(range(indices[0], indices[0] + len(indices))):
+        raise BuildError(f"{slave.modelName}: inputs, and Real outputs, must follow each other.")
+    return (indices[0] if indices else 0), len(indices)
+
+
+def number(value: float) -> str:
+    """Return a number as C reads it, to the last bit."""
+    if not isfinite(value):
+        return "-__builtin_inf()" if value < 0 else "__builtin_inf()"
+    return float(value).hex()
+
+
+def quoted(text: str) -> str:
+    """Return a text as C reads it, in UTF-8."""
+    return f'"{"".join(map(_byte, text.encode("utf-8")))}"'
+
+
+def _byte(byte: int) -> str:
+    plain = 32 <= byte < 127 and chr(byte) not in '"\\?'
+    return chr(byte) if plain else f"\\{byte:03o}"
+
+
+def listed(texts: Iterable[str]) -> str:
+    """Return texts as the fields of a C array that ends with a null pointer."""
+    return ", ".join([*map(quoted, texts), "0"])
