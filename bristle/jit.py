@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from threading import Lock
 from types import CodeType, FunctionType
@@ -105,6 +105,25 @@ def closed(function: Callable[..., Any], inline: tuple[str, ...] = ()) -> Any:
         As in `compiled`.
     """
     return numba.njit(**_CALLEE)(_closed(function, {}, inline))
+
+
+def llvm_text(
+    function: Callable[..., Any], examples: Sequence[Any], inline: tuple[str, ...] = ()
+) -> tuple[str, str]:
+    """Return LLVM's text of a function with all that it calls, and its name there.
+
+    Parameters
+    ----------
+    function, inline
+        As in `compiled`.
+    examples : sequence
+        Arguments of the types that it is compiled for.
+    """
+    dispatcher = closed(function, inline)
+    kinds = tuple(numba.typeof(one) for one in examples)
+    dispatcher.compile(kinds)
+    found = dispatcher.overloads[kinds]
+    return found.library.get_llvm_str(), found.fndesc.llvm_func_name
 
 
 def kept(function: Callable[..., Any]) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 import textwrap
 from functools import cache
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +34,13 @@ if TYPE_CHECKING:
     from bristle.fmu.description import Description, Variable
 
 SECTIONS = ("components", "effects", "laws")
+
+LIVE = "el_centro_lugre_passive"
+"""The scenario that a reader of docs/web.md moves."""
+SLIDERS = {
+    "ground.factor": (0.0, 1.0), "voltage.level": (0.0, 8.0), "damper.sigma_a": (100.0, 2000.0),
+    "damper.sigma_2": (0.0, 300.0), "damper.v_n": (0.005, 0.08),
+}  # fmt: skip
 
 
 def pages() -> dict[str, str]:
@@ -287,6 +295,21 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Fill the sections of the generated pages in the navigation (a hook of mkdocs)."""
     _fill(config.nav or [], list(pages()))
     return config
+
+
+def on_post_build(config: MkDocsConfig) -> None:
+    """Put the page of a scenario beside the others (a hook of mkdocs)."""
+    from bristle.draw.html import page
+    from bristle.errors import BuildError
+    from bristle.web.export import export_web
+
+    folder = Path(config.site_dir) / "live"
+    try:
+        export_web(LIVE, folder, SLIDERS)
+    except BuildError as error:
+        folder.mkdir(parents=True, exist_ok=True)
+        text = f"<p>Not made with this copy of the documentation: {escape(str(error))}</p>"
+        (folder / "index.html").write_text(page("Not made", [text], ""), encoding="utf-8")
 
 
 def _fill(entries: list[dict[str, Any]], made: list[str]) -> None:

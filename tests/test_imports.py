@@ -25,7 +25,14 @@ BASE = (
     {"component"},
     {"draw", "check"},
 )
-SIMULATE = ({"fmu"}, {"ssp"}, {"scenario", "conformance", "design"}, {"simulate"}, {"batch"})
+SIMULATE = (
+    {"fmu"},
+    {"native"},
+    {"ssp"},
+    {"scenario", "conformance", "design"},
+    {"simulate"},
+    {"batch", "web"},
+)
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
 ROOF = ({"study"}, {"bridge"}, {"plan"}, {"example"}, {"report"}, {"paper"}, {"cli"})
 STOREYS: tuple[tuple[tuple[set[str], ...], ...], ...] = ((BASE,), (SIMULATE, MEASURE), (ROOF,))

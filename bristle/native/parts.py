@@ -25,7 +25,7 @@ from .platforms import Platform
 SHIM = Path(__file__).resolve().parent / "shim"
 """Folder with the C that all native FMUs share."""
 
-_COMPILER = {
+COMPILER = {
     "PYTHONHASHSEED": "0",  # numba numbers functions in the order in which it meets them
     "NUMBA_CPU_NAME": "generic",
     "NUMBA_CPU_FEATURES": "",
@@ -96,7 +96,7 @@ def functions_text(what: Plan, slave: ComponentSlave) -> Path:
         child = subprocess.run(
             [sys.executable, "-c", "from bristle.native.parts import serve; serve()"],
             input=json.dumps({"order": order, "target": str(part)}), capture_output=True,
-            text=True, check=False, env={**os.environ, **_COMPILER, "PYTHONPATH": path},
+            text=True, check=False, env={**os.environ, **COMPILER, "PYTHONPATH": path},
         )  # fmt: skip
         if child.returncode != 0:
             raise BuildError(f"{what.name}: {child.stderr.strip()[-800:]}")

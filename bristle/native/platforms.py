@@ -46,6 +46,9 @@ PLATFORMS = {
 }
 """The platforms by name."""
 
+WEB = Platform("web", "wasm32-wasi", "", ".wasm")
+"""What a page of the web runs; no FMU is made for it."""
+
 
 def chosen(names: Iterable[str]) -> tuple[Platform, ...]:
     """Return the platforms of these names, all of them if there are none.

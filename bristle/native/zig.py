@@ -13,7 +13,7 @@ from pathlib import Path
 
 from ..errors import BuildError
 from ..resources import cache_folder
-from .platforms import Platform
+from .platforms import WEB, Platform
 
 _OPTIONS = (
     "-O2", "-std=c11", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-Wall", "-Wextra",
@@ -101,6 +101,26 @@ def link(sources: Sequence[Path], headers: Path, target: Path, platform: Platfor
     name = ["-Wl,-install_name,@rpath/" + target.name] if platform.suffix == ".dylib" else []
     given = ["-shared", "-s", *name, f"-I{headers}", *map(str, sources), *libraries]
     _run([*given, "-o", str(target)], platform)
+
+
+def link_web(sources: Sequence[Path], macros: Sequence[str], target: Path) -> None:
+    """Compile and link sources into a WebAssembly module that a page calls as it likes.
+
+    Parameters
+    ----------
+    sources : sequence of Path
+        C and LLVM's text.
+    macros : sequence of str
+        Options of the compiler that define what the C asks for.
+    target : Path
+
+    Raises
+    ------
+    BuildError
+        With what the compiler says.
+    """
+    own = ["-Os", "-mexec-model=reactor", "-s", "-Wl,--export=__heap_base"]
+    _run([*own, *macros, *map(str, sources), "-o", str(target)], WEB)
 
 
 def _run(arguments: Sequence[str], platform: Platform) -> None:

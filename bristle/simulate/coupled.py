@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from math import ceil, isfinite
 from typing import Any
@@ -61,7 +62,7 @@ def simulate(scenario: Scenario, longest: float = LONGEST_SUBSTEP) -> dict[str, 
         component and the time, `columns` holds the rows before.
     """
     system = System(scenario)
-    rows, substeps = scenario.steps, _substeps(scenario.step, system.periods(), longest)
+    rows, substeps = scenario.steps, substeps_of(scenario, system, longest)
     h = scenario.step / substeps
     table = np.zeros((rows + 1, len(system.outputs)))
     slots = np.array(list(system.outputs.values()), dtype=np.int64)
@@ -96,8 +97,15 @@ def _columns(system: System, table: Array, step: float) -> dict[str, Array]:
     return columns
 
 
-def _substeps(step: float, periods: list[float], longest: float) -> int:
-    """Return into how many substeps a step is cut: at best so that instants fall on their ends."""
+def substeps_of(scenario: Scenario, system: System, longest: float = LONGEST_SUBSTEP) -> int:
+    """Return into how many substeps a step is cut: at best so that instants fall on their ends.
+
+    Parameters
+    ----------
+    scenario, system : what runs, and its numbers
+    longest : longest substep [s]
+    """
+    step, periods = scenario.step, system.periods()
     least = max(1, ceil(step / longest - 1e-9))
     return next((n for n in range(least, 4 * least) if are_whole(periods, step / n)), least)
 
@@ -111,6 +119,16 @@ def compiled_loop(clocked: bool = False) -> Callable[..., tuple[int, int, int]]:
     global _has_clocks
     _has_clocks = _has_clocks or clocked
     return _compiled(damper.evaluate, structure.effect_forces, _has_clocks)
+
+
+@contextmanager
+def whole_loop() -> Iterator[tuple[Any, tuple[str, ...]]]:
+    """Give the time loop with sampled components, and which of its callees become part of it."""
+    before, time_loop.sample = time_loop.sample, _sample
+    try:
+        yield time_loop.integrate, time_loop.INLINE
+    finally:
+        time_loop.sample = before
 
 
 @cache

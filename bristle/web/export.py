@@ -1,0 +1,167 @@
+"""Writes a scenario as files that a page of the web runs."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from ..data.files import write_whole
+from ..draw.html import escape, page
+from ..errors import BuildError, ScenarioError
+from ..fmu.variables import Variable
+from ..scenario.scenario import Component, Scenario
+from .module import module
+from .numbers import Numbers, Slider
+
+_FOLDER = Path(__file__).parent
+LOADER = ("bristle.mjs", "bristle.d.mts")
+"""What runs the module, and its types for editors and TypeScript."""
+
+MOST_SLIDERS = 12
+"""Sliders that a page has unless its own are named."""
+
+Range = tuple[float | None, float | None]
+_ANY: Range = (None, None)
+
+
+def export_web(
+    file: str | Path,
+    folder: Path,
+    sliders: Mapping[str, Range] | None = None,
+    overrides: Mapping[str, object] | None = None,
+) -> list[Path]:
+    """Write a scenario as a WebAssembly module, its numbers, a loader and a page; return the files.
+
+    Parameters
+    ----------
+    file : path
+        The scenario, or the name of a stock one: of built-in components alone.
+    folder : path
+        Where to write, made if missing.
+    sliders : mapping, optional
+        `component.parameter` to the values between which it moves, None for half and one and a half
+        of its own; else the numbers that the scenario sets and those of the dampers' laws.
+    overrides : mapping, optional
+        As for `scenario.load_scenario`.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario is wrong or has parts that are not compiled; if a slider cannot be.
+    BuildError
+        If zig is not installed, or the folder cannot be written.
+    """
+    numbers = Numbers(file, overrides)
+    found = chosen(numbers, sliders)
+    wasm = module()
+    description = described(numbers, found)
+    texts = {
+        "scenario.json": json.dumps(description, indent=1) + "\n",
+        "index.html": page_of(wasm, description),
+        **{name: (_FOLDER / name).read_text(encoding="utf-8") for name in LOADER},
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, text in texts.items():
+            write_whole(folder / name, text)
+        part = folder / "scenario.wasm.part"
+        part.write_bytes(wasm)
+        part.replace(folder / "scenario.wasm")
+    except OSError as error:
+        raise BuildError(f"{folder}: cannot be written ({error.strerror or error}).") from None
+    return [folder / name for name in ("index.html", "scenario.wasm", "scenario.json", *LOADER)]
+
+
+def chosen(numbers: Numbers, sliders: Mapping[str, Range] | None) -> list[Slider]:
+    """Return the sliders that are named, or those that a scenario has by itself.
+
+    Raises
+    ------
+    ScenarioError
+        If one that is named cannot be, or moves what another one moves.
+    """
+    found: list[Slider] = []
+    for name, (low, high) in (sliders or dict.fromkeys(_offered(numbers.scenario), _ANY)).items():
+        try:
+            one = numbers.slider(name, low, high)
+            _check_apart(one, found)
+        except ScenarioError:
+            if sliders:
+                raise
+            continue  # not every number can be moved; whoever names one is told
+        found.append(one)
+        if not sliders and len(found) == MOST_SLIDERS:
+            break
+    return found
+
+
+def _check_apart(one: Slider, others: Sequence[Slider]) -> None:
+    """Refuse a slider that moves a number of another one: the page could not tell them apart."""
+    places = {moved.at for moved in one.moved}
+    for other in others:
+        if places & {moved.at for moved in other.moved}:
+            raise ScenarioError(f"{one.name} and {other.name} move the same: take one of them.")
+
+
+def _offered(scenario: Scenario) -> list[str]:
+    """Return the numbers that a reader would move first: what is set, then the laws' own."""
+    names = [name for component in scenario.components for name in _set(component)]
+    for component in scenario.components:
+        if component.made_of().endswith("Damper"):
+            names += [f"{component.name}.{one.name}" for one in _own_numbers(component)]
+    return list(dict.fromkeys(names))
+
+
+def _set(component: Component) -> list[str]:
+    known = component.description.variables
+    return [f"{component.name}.{n}" for n in component.parameters if known[n].kind == "Real"]
+
+
+def _own_numbers(component: Component) -> list[Variable]:
+    """Return the parameters of a damper's law: those before the stroke, effects come behind."""
+    found: list[Variable] = []
+    for variable in component.description.of("parameter"):
+        if variable.name == "stroke":
+            break
+        found.append(variable)
+    return found
+
+
+def described(numbers: Numbers, sliders: Sequence[Slider]) -> dict[str, Any]:
+    """Return what the loader reads, as plain data: see bristle.d.mts."""
+    outputs = zip(numbers.names, numbers.units, strict=True)
+    return {
+        "title": numbers.scenario.title,
+        "rows": numbers.rows,
+        "substeps": numbers.substeps,
+        "h": numbers.h,
+        "outputs": [{"name": name, "unit": unit} for name, unit in outputs],
+        "sliders": [
+            {
+                "name": one.name, "unit": one.unit, "text": one.text, "value": one.value,
+                "low": one.low, "high": one.high, "moved": [list(moved) for moved in one.moved],
+            }
+            for one in sliders
+        ],
+        "places": {name: list(place) for name, place in numbers.places.items()},
+        "numbers": base64.b64encode(numbers.data).decode(),
+    }  # fmt: skip
+
+
+def page_of(wasm: bytes, description: Mapping[str, Any]) -> str:
+    """Return the page as one file that needs no other, and no server."""
+    loader, own = ((_FOLDER / name).read_text(encoding="utf-8") for name in (LOADER[0], "page.mjs"))
+    script = re.sub(r"^export ", "", loader, flags=re.MULTILINE)
+    script += re.sub(r"^import .*\n", "", own, flags=re.MULTILINE)
+    body = Template((_FOLDER / "page.html").read_text(encoding="utf-8")).substitute(
+        title=escape(description["title"]),
+        scenario=json.dumps(description).replace("</", "<\\/"),
+        module=base64.b64encode(wasm).decode(),
+        script=script,
+    )
+    return page(description["title"], [body], "Made by bristle.")

@@ -1,0 +1,175 @@
+"""Scenarios as web pages: the numbers that sliders move, the module, the loader and the page."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bristle.cli import main
+from bristle.errors import BuildError, ScenarioError
+from bristle.native import zig
+from bristle.scenario.scenario import load_scenario, stock_scenarios
+from bristle.simulate.coupled import simulate
+from bristle.web.export import chosen, described, export_web, page_of
+from bristle.web.numbers import Numbers, Slider
+
+PASSIVE = "el_centro_lugre_passive"
+AGREE = 1e-12
+"""Difference of a module's rows from the compiled engine's, over the peak."""
+PEAKS = 0.03
+"""The same of peaks, where a controller switches and one decision differs."""
+
+needs_tools = pytest.mark.skipif(
+    importlib.util.find_spec("ziglang") is None or shutil.which("node") is None,
+    reason="needs ziglang (bristle[native]) and Node",
+)
+
+
+@pytest.fixture(scope="module")
+def numbers() -> Numbers:
+    return Numbers(PASSIVE)
+
+
+def moved(numbers: Numbers, slider: Slider, value: float) -> bytes:
+    """Return the numbers as the loader moves them."""
+    data = bytearray(numbers.data)
+    for at, offset, slope in slider.moved:
+        data[at : at + 8] = np.float64(offset + slope * value).tobytes()
+    return bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("voltage.level", 6.5),
+        ("damper.sigma_a", 700.0),
+        ("ground.factor", 0.3),
+        ("ground.peak", 4.0),
+    ],
+)
+def test_a_slider_gives_the_numbers_of_the_scenario_with_that_value(
+    numbers: Numbers, name: str, value: float
+) -> None:
+    slider = numbers.slider(name, 0.5 * value, 1.2 * value)
+    other = Numbers(PASSIVE, {name: value})
+    found = np.frombuffer(moved(numbers, slider, value), dtype=np.uint8)
+    right = np.frombuffer(other.data, dtype=np.uint8)
+    at = [one.at for one in slider.moved]
+    for k in at:
+        pair = [np.frombuffer(one[k : k + 8].tobytes())[0] for one in (found, right)]
+        assert pair[0] == pytest.approx(pair[1], rel=1e-14)
+    same = np.ones(found.size, dtype=bool)
+    for k in at:
+        same[k : k + 8] = False
+    assert np.array_equal(found[same], right[same])
+
+
+def test_a_mass_is_refused_for_the_matrices_follow_it_otherwise(numbers: Numbers) -> None:
+    with pytest.raises(ScenarioError, match=r"structure\.attached_mass: .* in proportion"):
+        numbers.slider("structure.attached_mass", 0.0, 5.0)
+
+
+@pytest.mark.parametrize("name", ["damper.nosuch", "nobody.level", "damper.force", "ground.record"])
+def test_what_is_no_number_of_a_component_is_refused(numbers: Numbers, name: str) -> None:
+    with pytest.raises(ScenarioError, match="no component has a number"):
+        numbers.slider(name)
+
+
+def test_a_slider_without_room_is_refused(numbers: Numbers) -> None:
+    with pytest.raises(ScenarioError, match=r"from 3 to 3 moves nothing"):
+        numbers.slider("voltage.level", 3.0, 3.0)
+
+
+def test_two_sliders_that_move_one_number_are_refused(numbers: Numbers) -> None:
+    with pytest.raises(ScenarioError, match=r"ground\.factor and ground\.peak move the same"):
+        chosen(numbers, {"ground.peak": (None, None), "ground.factor": (None, None)})
+
+
+def test_by_itself_a_page_moves_what_is_set_and_the_law(numbers: Numbers) -> None:
+    names = [slider.name for slider in chosen(numbers, None)]
+    assert names[:2] == ["ground.peak", "voltage.level"]
+    assert {"damper.sigma_a", "damper.sigma_2"} < set(names)
+
+
+def test_a_scenario_that_is_not_there_is_refused_and_nothing_written(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match="there is no scenario file"):
+        export_web("nosuch", tmp_path / "web")
+    assert not (tmp_path / "web").exists()
+
+
+def test_without_zig_the_command_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    zig.version.cache_clear()
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    try:
+        code = main(["export", "half_sine_pulse", "--web", str(tmp_path / "web")])
+    finally:
+        zig.version.cache_clear()
+    assert code == BuildError.exit_code
+    assert "pip install bristle[native]" in capsys.readouterr().err
+    assert not (tmp_path / "web").exists()
+
+
+@pytest.mark.parametrize("ends", ["1", "a..b", "1..2..3"])
+def test_ends_that_are_no_numbers_are_refused(
+    ends: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ["export", PASSIVE, "--web", str(tmp_path), "--slider", f"voltage.level={ends}"]
+    assert main(given) == ScenarioError.exit_code
+    assert "NAME=LOW..HIGH is right" in capsys.readouterr().err
+
+
+def test_the_page_needs_no_other_file(numbers: Numbers) -> None:
+    page = page_of(b"\0asm", described(numbers, chosen(numbers, {"voltage.level": (0.0, 8.0)})))
+    script = page.partition('<script type="module">')[2]
+    assert not re.search(r"^(import|export) ", script, re.MULTILINE)
+    assert "http" not in page
+    assert len(page) < 8e6
+
+
+def run_in_node(folder: Path, changes: dict[str, float], times: int = 1) -> dict[str, Any]:
+    script = Path(__file__).with_name("rows.mjs")
+    order = ["node", str(script), str(folder), str(times), json.dumps(changes)]
+    said = subprocess.run(order, capture_output=True, text=True, check=True)
+    found: dict[str, Any] = json.loads(said.stdout)
+    outputs = json.loads((folder / "scenario.json").read_text())["outputs"]
+    table = np.fromfile(folder / "rows.bin").reshape(len(outputs), found["rows"])
+    return found | {"columns": dict(zip([o["name"] for o in outputs], table, strict=True))}
+
+
+@pytest.mark.slow
+@needs_tools
+@pytest.mark.parametrize("name", [file.stem for file in stock_scenarios()])
+def test_rows_are_those_of_the_compiled_engine(name: str, tmp_path: Path) -> None:
+    export_web(name, tmp_path)
+    found = run_in_node(tmp_path, {})
+    right = simulate(load_scenario(name))
+    assert found["complete"]
+    for port, column in found["columns"].items():
+        peak = np.max(np.abs(right[port]))
+        same = np.abs(column - right[port]) <= AGREE * peak
+        if not same.all():  # one decision of a switch differs: from there on only peaks agree
+            assert abs(np.max(np.abs(column)) - peak) <= PEAKS * peak, port
+
+
+@pytest.mark.slow
+@needs_tools
+def test_a_moved_slider_gives_the_run_with_that_value(tmp_path: Path) -> None:
+    files = export_web(PASSIVE, tmp_path, {"voltage.level": (0.0, 8.0)})
+    found = run_in_node(tmp_path, {"voltage.level": 7.0})
+    right = simulate(load_scenario(PASSIVE, {"voltage.level": 7.0}))
+    for port, column in found["columns"].items():
+        assert np.max(np.abs(column - right[port])) <= AGREE * np.max(np.abs(right[port])), port
+    wasm = next(file for file in files if file.suffix == ".wasm")
+    assert wasm.stat().st_size <= 150e3
+    with pytest.raises(subprocess.CalledProcessError):
+        run_in_node(tmp_path, {"voltage.level": 9.0})
