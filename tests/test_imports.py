@@ -25,7 +25,14 @@ BASE = (
     {"component"},
     {"draw", "check"},
 )
-SIMULATE = ({"fmu"}, {"ssp"}, {"scenario", "conformance", "design"}, {"simulate"}, {"batch"})
+SIMULATE = (
+    {"fmu"},
+    {"native"},
+    {"ssp"},
+    {"scenario", "conformance", "design"},
+    {"simulate"},
+    {"batch"},
+)
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
 ROOF = ({"study"}, {"bridge"}, {"plan"}, {"example"}, {"report"}, {"paper"}, {"cli"})
 STOREYS: tuple[tuple[tuple[set[str], ...], ...], ...] = ((BASE,), (SIMULATE, MEASURE), (ROOF,))
@@ -146,6 +153,11 @@ def test_columns_do_not_see_each_other() -> None:
     assert not may_import(place["batch"], place["identify"])
     assert may_import(place["study"], place["batch"])
     assert may_import(place["fmu"], place["physics"])
+
+
+def test_commands_alone_ask_for_native_fmus() -> None:
+    asking = {part for part, others in graph().items() if "native" in others}
+    assert asking <= {"cli", "bridge"}
 
 
 def test_no_modules_import_each_other() -> None:

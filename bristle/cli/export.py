@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..findings import command
 from ._consent import add_trust
+from ._native import add_native, builder
 
 HELP = "write a study's model as an FMU and a scenario that uses it"
 
@@ -17,6 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="where to write; else export/ in the study"
     )
+    add_native(parser)
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
@@ -26,7 +28,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..bridge.export import export_study
     from ..study.study import Study
 
-    found = export_study(Study(arguments.folder), arguments.out)
+    found = export_study(Study(arguments.folder), arguments.out, builder(arguments))
     if arguments.json:
         import json
 

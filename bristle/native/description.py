@@ -6,6 +6,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, indent, tostring
 
 from ..fmu.component import ComponentSlave
+from ..fmu.description import NATIVE
 
 _CAPABILITIES = {
     "needsExecutionTool": False,
@@ -15,9 +16,6 @@ _CAPABILITIES = {
     "canGetAndSetFMUstate": True,
     "canSerializeFMUstate": True,
 }
-
-TOOL = "bristle native"
-"""How the generation tool of native FMUs begins."""
 
 
 def description(slave: ComponentSlave, guid: str) -> bytes:
@@ -33,7 +31,7 @@ def description(slave: ComponentSlave, guid: str) -> bytes:
     options: dict[str, Any] = dict(_CAPABILITIES)
     root: Element = slave.to_xml(options)
     root.set("guid", guid)
-    root.set("generationTool", TOOL)
+    root.set("generationTool", NATIVE)
     indent(root)
     text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
     return text

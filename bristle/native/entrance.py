@@ -15,7 +15,7 @@ from ..errors import BuildError
 
 NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
 """Functions that a component must have, see `bristle.component`."""
-OPTIONAL = ("bind", "follow")
+OPTIONAL = ("bind", "follow", "discretise")
 """Functions that it may have."""
 
 INLINE = ("rows.row",)
@@ -33,6 +33,7 @@ def entrance(call, time, dt, {rows}):
         return sizes(values, baked, work)
     if call == 1:
         return setup(values, given, baked, store, state)
+    {discretise}
     {bind}
     c = constants(store)
     {follow}
@@ -43,10 +44,15 @@ def entrance(call, time, dt, {rows}):
     return output(time, now, c, state, outputs, work)
 """
 
-_OUTSIDE = frozenset(
+_DISCRETISE = """if call == 5:
+        discretise(dt, store, work)
+        return 0
+"""
+
+_OUTSIDE = (
     "acos asin atan atan2 cbrt ceil cos cosh erf erfc exp exp2 expm1 fabs floor fmax fmin fmod "
     "hypot ldexp lgamma log log10 log1p log2 memcpy memmove memset pow round sin sinh sqrt tan "
-    "tanh tgamma trunc".split()
+    "tanh tgamma trunc"
 )
 """What compiled functions may ask of the C library."""
 
@@ -71,6 +77,7 @@ def entrance_of(functions: Any) -> FunctionType:
     found = {one: _part(functions, one) for one in (*NEEDED, *OPTIONAL)}
     text = _SOURCE.format(
         rows=", ".join(ROWS),
+        discretise=_DISCRETISE if found["discretise"] else "pass",
         bind="bind(given, store)" if found["bind"] else "pass",
         follow="follow(now, c)" if found["follow"] else "pass",
     )
@@ -138,12 +145,13 @@ def plain_text(text: str, root: str) -> str:
     ]
     text = "\n".join(lines) + "\n"
     text = re.sub(r"^(@\S+ = )common ", r"\1internal ", text, flags=re.MULTILINE)
-    text = re.sub(r"^define (?:linkonce_odr |internal |hidden )*", "define internal ", text, flags=re.MULTILINE)
+    linkage = r"^define (?:linkonce_odr |internal |hidden )*"
+    text = re.sub(linkage, "define internal ", text, flags=re.MULTILINE)
     quoted = re.escape(root)
     text = re.sub(rf'@"?{quoted}"?(?![\w.$])', f"@{NAME}", text)
     text = re.sub(rf"^define internal (.*@{NAME}\()", r"define hidden \1", text, flags=re.MULTILINE)
     outside = re.findall(r'^declare [^@]*@"?([^"(\s]+)"?\(', text, flags=re.MULTILINE)
-    strange = sorted(n for n in outside if not n.startswith("llvm.") and n not in _OUTSIDE)
+    strange = sorted(n for n in outside if not n.startswith("llvm.") and n not in _OUTSIDE.split())
     if strange:
         raise BuildError(f"the compiled functions call {', '.join(strange)}, which no host has.")
     return text

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from math import inf, isfinite
 from string import Formatter
 
@@ -45,6 +44,7 @@ const Component component = {{
     .baked = baked,
     .baked_size = {baked_size},
     .in_place = {in_place},
+    .discretises = {discretises},
 }};
 """
 
@@ -93,6 +93,7 @@ def tables(slave: ComponentSlave, guid: str) -> str:
         outputs_at=outputs_at,
         outputs=outputs,
         baked_size=len(baked),
+        discretises=int(hasattr(slave.functions, "discretise")),
         in_place=int(isinstance(slave, SampledSlave)),
     )
 
@@ -157,8 +158,3 @@ def quoted(text: str) -> str:
 def _byte(byte: int) -> str:
     plain = 32 <= byte < 127 and chr(byte) not in '"\\?'
     return chr(byte) if plain else f"\\{byte:03o}"
-
-
-def listed(texts: Iterable[str]) -> str:
-    """Return texts as the fields of a C array that ends with a null pointer."""
-    return ", ".join([*map(quoted, texts), "0"])

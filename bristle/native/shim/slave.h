@@ -34,6 +34,7 @@ typedef struct Slave {
     int mode, stale, unbuilt;
     int fresh; /* outputs are as the step has left them */
     double time;
+    double discretised; /* length of the step that `store` is prepared for, 0: none */
     uint64_t warned[MOST_WARNINGS]; /* digests of the warnings that were said */
     int warnings;
 
@@ -81,7 +82,7 @@ Status slave_save(Slave *slave, State *state);
 Status slave_restore(Slave *slave, const State *state);
 Status slave_check(Slave *slave, const unsigned char *bytes, size_t size);
 
-/* samples.c: the files and texts that signals are read from */
+/* signal.c: the files and texts that signals are read from */
 int read_samples(Slave *slave, Text *wrong); /* 0: `wrong` says what is wrong with them */
 
 #endif
