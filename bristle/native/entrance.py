@@ -8,6 +8,7 @@ processor than every other has.
 from __future__ import annotations
 
 import re
+from inspect import signature
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -15,7 +16,7 @@ from ..errors import BuildError
 
 NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
 """Functions that a component must have, see `bristle.component`."""
-OPTIONAL = ("bind", "follow", "discretise")
+OPTIONAL = ("bind", "follow", "discretise", "scale_samples")
 """Functions that it may have."""
 
 INLINE = ("rows.row",)
@@ -32,10 +33,12 @@ def entrance(call, time, dt, {rows}):
     if call == 0:
         return sizes(values, baked, work)
     if call == 1:
-        return setup(values, given, baked, store, state)
+        code = setup(values, given, baked, store, state)
+        {begin}
+        return code
     {discretise}
     {bind}
-    c = constants(store)
+    c = constants({constants})
     {follow}
     if call == 2:
         return start(time, now, c, state, outputs, work)
@@ -44,6 +47,9 @@ def entrance(call, time, dt, {rows}):
     return output(time, now, c, state, outputs, work)
 """
 
+_BEGIN_CLOCK = "state[-2] = time"
+"""Until the first sample is taken, the clock of a sampled component begins with the instance."""
+_SCALE = "code = code if code < 0 else scale_samples(times, samples, store)"
 _DISCRETISE = """if call == 5:
         discretise(dt, store, work)
         return 0
@@ -57,13 +63,15 @@ _OUTSIDE = (
 """What compiled functions may ask of the C library."""
 
 
-def entrance_of(functions: Any) -> FunctionType:
+def entrance_of(functions: Any, sampled: bool = False) -> FunctionType:
     """Return the function that leads to a component's functions.
 
     Parameters
     ----------
     functions : module or class
         The component's, see `bristle.component`.
+    sampled : bool
+        Whether it has a clock of its own.
 
     Raises
     ------
@@ -77,6 +85,8 @@ def entrance_of(functions: Any) -> FunctionType:
     found = {one: _part(functions, one) for one in (*NEEDED, *OPTIONAL)}
     text = _SOURCE.format(
         rows=", ".join(ROWS),
+        begin=_BEGIN_CLOCK if sampled else _SCALE if found["scale_samples"] else "pass",
+        constants=", ".join(signature(found["constants"]).parameters),
         discretise=_DISCRETISE if found["discretise"] else "pass",
         bind="bind(given, store)" if found["bind"] else "pass",
         follow="follow(now, c)" if found["follow"] else "pass",
@@ -92,8 +102,13 @@ def _part(functions: Any, name: str) -> Any:
     return getattr(functions, name, None)
 
 
-def llvm_text(functions: Any) -> str:
+def llvm_text(functions: Any, sampled: bool = False) -> str:
     """Return LLVM's text of a component's functions behind one entrance.
+
+    Parameters
+    ----------
+    functions, sampled
+        As in `entrance_of`.
 
     Raises
     ------
@@ -108,7 +123,7 @@ def llvm_text(functions: Any) -> str:
     row = types.Array(types.float64, 1, "C")
     kinds = (types.int64, types.float64, types.float64, *[row] * len(ROWS))
     try:
-        dispatcher = closed(entrance_of(functions), INLINE)
+        dispatcher = closed(entrance_of(functions, sampled), INLINE)
         dispatcher.compile(types.int64(*kinds))
     except NumbaError as error:
         raise BuildError(_refusal(str(error))) from error

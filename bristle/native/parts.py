@@ -15,6 +15,7 @@ from typing import Any
 from ..errors import BristleError, BuildError
 from ..fmu import catalogue
 from ..fmu.component import ComponentSlave
+from ..fmu.controller import SampledSlave
 from ..fmu.plan import PACKAGE, Plan
 from ..jit import digest
 from ..progress import tell
@@ -57,9 +58,14 @@ def component_of(what: Plan) -> ComponentSlave:
     return slave
 
 
+def is_sampled(slave: ComponentSlave) -> bool:
+    """Return whether a component has a clock of its own: its steps move the state on in place."""
+    return isinstance(slave, SampledSlave)
+
+
 def functions_digest(slave: ComponentSlave) -> str:
     """Return the digest of a component's functions and of what compiles them."""
-    return digest(entrance_of(slave.functions))
+    return digest(entrance_of(slave.functions, is_sampled(slave)))
 
 
 def shim_digest() -> str:
@@ -109,7 +115,7 @@ def serve() -> None:
     given = json.load(sys.stdin)
     try:
         slave = component_of(plan_of(given["order"]))
-        text = llvm_text(slave.functions)
+        text = llvm_text(slave.functions, is_sampled(slave))
     except BristleError as error:
         sys.exit(str(error))
     Path(given["target"]).write_text(text, encoding="utf-8")

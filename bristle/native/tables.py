@@ -26,6 +26,8 @@ _TABLES = """\
 {meanings}    {{0, 0}},
 }};
 
+static const char *const bundled[] = {{{bundled}0}};
+
 static const double baked[] = {{
 {baked}
 }};
@@ -45,6 +47,10 @@ const Component component = {{
     .baked_size = {baked_size},
     .in_place = {in_place},
     .discretises = {discretises},
+    .file = {file},
+    .pairs = {pairs},
+    .bundled = bundled,
+    .header = {header},
 }};
 """
 
@@ -93,6 +99,10 @@ def tables(slave: ComponentSlave, guid: str) -> str:
         outputs_at=outputs_at,
         outputs=outputs,
         baked_size=len(baked),
+        file=_choice(getattr(slave, "file_of", None), names),
+        pairs=_choice(getattr(slave, "pairs_of", None), names),
+        bundled="".join(f"{quoted(one)}, " for one in getattr(slave, "bundled", list)()),
+        header=quoted(header) if (header := getattr(slave, "header", None)) else "0",
         discretises=int(hasattr(slave.functions, "discretise")),
         in_place=int(isinstance(slave, SampledSlave)),
     )
@@ -117,7 +127,15 @@ def _variable(slave: ComponentSlave, index: int, has_words: bool) -> str:
 
 def _words(slave: ComponentSlave, index: int) -> str:
     """Return the words that a String chooses from, as C has them; "" where it is any text."""
-    return ", ".join(quoted(word) for word in ())
+    return ", ".join(quoted(word) for word in slave._words.get(index, ()))
+
+
+def _choice(reading: Reading | None, names: dict[str, int]) -> str:
+    """Return from which String a signal is read, and where another one has which word."""
+    if reading is None:
+        return '{-1, -1, ""}'
+    chooser = names[reading.chooser] if reading.chooser else -1
+    return f"{{{names[reading.parameter]}, {chooser}, {quoted(reading.word)}}}"
 
 
 def _pieces(text: str, names: dict[str, int]) -> str:

@@ -1,5 +1,7 @@
 /* The bytes of a file, and the texts about what is wrong with it. */
 
+#define _POSIX_C_SOURCE 200809L
+
 #include "files.h"
 
 #include <errno.h>
@@ -25,7 +27,7 @@ static FILE *open_file(const char *path, unsigned *mode) {
     wchar_t *name = wide(path);
     if (name && _wstat64(name, &status) == 0) {
         *mode = status.st_mode;
-        file = *mode & S_IFREG ? _wfopen(name, L"rb") : 0;
+        file = S_ISREG(*mode) ? _wfopen(name, L"rb") : 0;
     }
     free(name);
     return file;
@@ -35,7 +37,7 @@ static FILE *open_file(const char *path, unsigned *mode) {
     struct stat status;
     if (stat(path, &status) != 0) return 0;
     *mode = status.st_mode;
-    return (*mode & S_IFMT) == S_IFREG ? fopen(path, "rb") : 0;
+    return S_ISREG(*mode) ? fopen(path, "rb") : 0;
 }
 #endif
 
@@ -94,8 +96,8 @@ char *read_text_file(const char *path, size_t *size, Text *wrong) {
     unsigned mode = 0;
     errno = 0;
     FILE *file = open_file(path, &mode);
-    if (!file && mode && (mode & S_IFMT) != S_IFREG) {
-        const char *kind = (mode & S_IFMT) == S_IFDIR ? "a folder" : "no regular file";
+    if (!file && mode && !S_ISREG(mode)) {
+        const char *kind = S_ISDIR(mode) ? "a folder" : "no regular file";
         return refuse(wrong, path, ": this is ", kind, ". A record is one text file.");
     }
     if (!file && (errno == ENOENT || !*path)) /* as Python names a file without a name */

@@ -77,8 +77,10 @@ int read_samples(Slave *slave, Text *wrong) {
         right = read_file(slave, slave->texts[component.file.parameter], &samples, wrong);
     else if (is_chosen(slave, &component.pairs))
         right = read_pairs(slave->texts[component.pairs.parameter], &samples, wrong);
+    else
+        right = samples_keep(&samples, 0.0, 0.0, 0); /* a signal without samples */
     double *memory = right ? calloc(2 * (samples.count + 1), sizeof *memory) : 0;
-    if (right && !memory) text_add(wrong, "out of memory.");
+    if (!memory && wrong->used == 0) text_add(wrong, "out of memory.");
     if (memory) {
         size_t size = samples.count * sizeof *memory;
         free(slave->sampled);
