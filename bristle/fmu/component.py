@@ -74,17 +74,30 @@ class ComponentSlave(EffectSlave):
         """Return what the build fixes, as the component's `setup` takes it."""
         raise NotImplementedError
 
+    def parameter_names(self) -> list[str]:
+        """Return the names of the parameters in their order."""
+        return [self.vars[index].name for index in sorted(self._parameters)]
+
     def flat_values(self) -> list[float]:
-        """Return the parameters in their order, as numbers: of a text 0."""
-        values = self._values
-        return [
-            0.0 if isinstance(values[index], str) else float(values[index])
-            for index in sorted(self._parameters)
-        ]
+        """Return the parameters in their order as numbers, as `bristle.component` takes them."""
+        return [self._number(index) for index in sorted(self._parameters)]
+
+    def _number(self, index: int) -> float:
+        value = self._values[index]
+        if not isinstance(value, str):
+            return float(value)
+        words = self._words.get(index)
+        if words is None:
+            return 0.0
+        return float(words.index(value)) if value in words else -1.0
 
     def given(self) -> list[float]:
         """Return 1 for each input that the host has set, else 0."""
         return [1.0 if index in self._set else 0.0 for index in self._inputs]
+
+    def samples(self) -> tuple[list[float], list[float]]:
+        """Return times [s] and values of what the component plays, from its parameters."""
+        return [], []
 
     def setup(self) -> tuple[Any, list[float], int]:
         """Return constants, state and size of work; raise what is wrong with the parameters."""
@@ -95,7 +108,11 @@ class ComponentSlave(EffectSlave):
         code = functions.setup(values, self.given(), baked, self._store, state)
         if code:
             self.tell(code, self.time, 0.0)
-        return functions.constants(self._store), state, int(counts[3])
+        return self.made_constants(), state, int(counts[3])
+
+    def made_constants(self) -> Any:
+        """Return the record of constants from what `setup` has filled in."""
+        return self.functions.constants(self._store)
 
     def configure(self) -> None:
         self.constants, self.state, work = self.setup()

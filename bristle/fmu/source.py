@@ -17,6 +17,12 @@ class SourceSlave(ComponentSlave):
 
     functions: ClassVar[Any] = source
 
+    def made_constants(self) -> Any:
+        times, samples = self.samples()
+        if code := source.scale_samples(times, samples, self._store):
+            self.tell(code, self.time, 0.0)
+        return source.constants(self._store, times, samples)
+
     def advance(self, time: float, step: float) -> None:
         """Keep nothing: what a step would show, `refresh` does."""
 
@@ -38,10 +44,15 @@ class SignalSlave(SourceSlave):
     """Parameters of a test signal, and what follows from them."""
 
     rated = False
+    texts: ClassVar[dict[int, str]] = {
+        source.NO_KIND: f"kind {{kind!r}} is none of {', '.join(KINDS)}.",
+        source.JUMPS: ("kind 'steps' jumps: no velocity fits it. Take csv with ramps instead."),
+    }
 
     def declare_signal(self, unit: str) -> None:
         """Declare the parameters of a signal in this unit, "" for that of whatever it feeds."""
-        self.add_parameter("kind", "constant", None, "one of " + ", ".join(KINDS))
+        text = "one of " + ", ".join(KINDS)
+        self.add_parameter("kind", "constant", None, text, words=KINDS)
         for name, parameter in PARAMETERS.items():
             own = parameter.unit or unit
             text = parameter.text if own else parameter.text + ", in the unit of the input"
@@ -50,16 +61,15 @@ class SignalSlave(SourceSlave):
         text = "two-column CSV of the kind csv, its header `time [s],NAME [UNIT]`"
         self.add_parameter("file", self.baked.get("samples", ""), None, text)
 
-    def setup(self) -> tuple[Any, list[float], int]:
-        if self["kind"] not in KINDS:
-            raise ValueError("kind {!r} is none of {}.".format(self["kind"], ", ".join(KINDS)))
-        code = KINDS[self["kind"]]
-        times, samples = [0.0], [0.0]
+    def bake(self) -> list[float]:
+        return source.bake_signal(self.parameter_names(), self.rated)
+
+    def samples(self) -> tuple[list[float], list[float]]:
+        code = KINDS.get(self["kind"])
         if code == STEPS:
-            times, samples = read_steps(self["steps"])
-        elif code == CSV:
+            return read_steps(self["steps"])
+        if code == CSV:
             baked = self["file"] and self["file"] == self.baked.get("samples")
             file = self.resource(f"{self['file']}.csv") if baked else self["file"]
-            times, samples = read_two_column(file, header=None)
-        numbers: list[float] = [self[name] for name in PARAMETERS]
-        return source.Constants(code, numbers, times, samples, rated=self.rated), [], 0
+            return read_two_column(file, header=None)
+        return [0.0], [0.0]
