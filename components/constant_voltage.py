@@ -15,6 +15,3 @@ class ConstantVoltage(SourceSlave):
 
     def bake(self):
         return source.bake_constant(self.parameter_names())
-
-    def samples(self):
-        return [0.0], [0.0]

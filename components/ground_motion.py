@@ -1,8 +1,8 @@
 """FMU: the ground shakes as recorded."""
 
 from bristle.component import source
-from bristle.fmu.source import SourceSlave
-from bristle.physics.record import read_two_column
+from bristle.fmu.source import Reading, SourceSlave
+from bristle.physics.record import HEADER
 
 BUILT_IN = ("el_centro_1940_ns",)
 
@@ -10,6 +10,8 @@ BUILT_IN = ("el_centro_1940_ns",)
 class GroundMotion(SourceSlave):
     """Ground acceleration from a record, scaled to a peak and by a factor."""
 
+    file_of = Reading("record")
+    header = HEADER
     files = ("data/ground_motions/el_centro_1940_ns.csv",)
 
     def declare(self):
@@ -31,8 +33,5 @@ class GroundMotion(SourceSlave):
     def bake(self):
         return source.bake_record(self.parameter_names())
 
-    def samples(self):
-        baked = (*BUILT_IN, self.baked.get("record"))
-        return read_two_column(
-            self.resource(self.record + ".csv") if self.record in baked else self.record
-        )
+    def bundled(self):
+        return [*BUILT_IN, *filter(None, [self.baked.get("record")])]

@@ -58,16 +58,31 @@ class EffectSlave(Slave):
         }
 
 
+STEP_LENGTH = "step_length"
+"""What a text calls the length of the step [s]."""
+
+
+class _Told:
+    """The values that texts name."""
+
+    def __init__(self, slave: Slave, step: float) -> None:
+        self.slave, self.step = slave, step
+
+    def __getitem__(self, name: str) -> Any:
+        return self.step if name == STEP_LENGTH else self.slave[name]
+
+
 class ComponentSlave(EffectSlave):
     """A component made of ports, functions and texts.
 
     A component fills `bake`; `functions` has `sizes`, `setup`, `constants`, `start`, `step` and
-    `output`; `texts` tells what a code means, with parameters in braces. `hidden` outputs have no
-    port.
+    `output`; `texts` tells what a code means, with parameters in braces, `warns_first` which
+    warning comes before that of a code. `hidden` outputs have no port.
     """
 
     functions: ClassVar[Any]
     texts: ClassVar[dict[int, str]] = {}
+    warns_first: ClassVar[dict[int, int]] = {}
     hidden: ClassVar[int] = 0
 
     def bake(self) -> list[float]:
@@ -155,8 +170,10 @@ class ComponentSlave(EffectSlave):
         self._values[self._shown_first : self._shown_after] = self._given[: self._count]
 
     def tell(self, code: int, time: float, step: float) -> None:
-        """Warn of what a code says, or raise it."""
-        text = self.texts[code].format_map(self)
+        """Warn of what a code says, or raise it; texts may name the `STEP_LENGTH` [s] as well."""
+        if code in self.warns_first:
+            self.tell(self.warns_first[code], time, step)
+        text = self.texts[code].format_map(_Told(self, step))
         if code < 0:
             raise ValueError(text)
         self.warn_once(text)

@@ -32,16 +32,23 @@ MEASURED = {
 SAMPLE_PERIOD = 0.002
 """Sample period [s] where no design fixes it."""
 
-_LONG = (
-    "stepped by {:g} s, longer than its sample period of {:g} s: samples in between take the "
-    "inputs as linear, and what they answer shows late."
-)
+_CLOCK_TEXTS = {
+    clock.LONG_STEP: (
+        "stepped by {step_length:g} s, longer than its sample period of {sample_period:g} s: "
+        "samples in between take the inputs as linear, and what they answer shows late."
+    ),
+    clock.TOO_MANY_SAMPLES: (
+        "a step of {step_length:g} s holds too many samples of {sample_period:g} s."
+    ),
+}
 
 
 class SampledSlave(ComponentSlave):
     """A component that samples `MEASURED` at t = 0, h, 2h ... and holds its outputs in between."""
 
     changes = "discrete"
+    texts: ClassVar[dict[int, str]] = _CLOCK_TEXTS
+    warns_first: ClassVar[dict[int, int]] = {clock.TOO_MANY_SAMPLES: clock.LONG_STEP}
 
     def configure(self) -> None:
         super().configure()
@@ -58,15 +65,6 @@ class SampledSlave(ComponentSlave):
         text = "sample period, whatever the communication step"
         low, high = (1e-6, 10.0) if fixed is None else (fixed, fixed)
         self.add_parameter("sample_period", fixed or SAMPLE_PERIOD, "s", text, (low, high))
-
-    def tell(self, code: int, time: float, step: float) -> None:
-        """Warn of a step that is longer than the sample period, and refuse one of a lifetime."""
-        if code in self.texts:
-            super().tell(code, time, step)
-        if step > self["sample_period"]:
-            self.warn_once(_LONG.format(step, self["sample_period"]))
-        if code == clock.TOO_MANY_SAMPLES:
-            raise ValueError(f"{step / self['sample_period']:.0f} samples in a step of {step:g} s.")
 
     def _structure(self, structure: Element) -> None:
         """Say that the first sample follows motion; the damper's force it takes as it is given."""
@@ -101,7 +99,7 @@ class ControllerSlave(SampledSlave):
         words = ("direct", "filtered")
         self.add_parameter("velocity", "direct", None, text, words=words)
         said = "velocity {velocity!r} is neither direct nor filtered."
-        self.texts = {controller.NO_VELOCITY: said}  # type: ignore[misc]
+        self.texts = {**self.texts, controller.NO_VELOCITY: said}  # type: ignore[misc]
         text = "corner frequency of that low-pass"
         self.add_parameter("velocity_corner", 18.0, "Hz", text, (1e-3, 1e5))
         self.declare_law()

@@ -12,6 +12,7 @@ from inspect import signature
 from types import FunctionType, ModuleType
 from typing import Any
 
+from ..component.clock import ORIGIN
 from ..errors import BuildError
 
 NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
@@ -47,7 +48,7 @@ def entrance(call, time, dt, {rows}):
     return output(time, now, c, state, outputs, work)
 """
 
-_BEGIN_CLOCK = "state[-2] = time"
+_BEGIN_CLOCK = f"state[{ORIGIN}] = time"
 """Until the first sample is taken, the clock of a sampled component begins with the instance."""
 _SCALE = "code = code if code < 0 else scale_samples(times, samples, store)"
 _DISCRETISE = """if call == 5:

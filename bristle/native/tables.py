@@ -6,14 +6,13 @@ from math import inf, isfinite
 from string import Formatter
 
 from ..errors import BuildError
-from ..fmu.component import ComponentSlave
+from ..fmu.component import STEP_LENGTH, ComponentSlave
 from ..fmu.controller import SampledSlave
+from ..fmu.source import Reading
 
 _KINDS = {"Real": "REAL", "Integer": "INTEGER", "Boolean": "BOOLEAN", "String": "STRING"}
 _CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER"}
 _FORMATS = {("", None): "r", ("", "r"): "r", ("", "s"): "s", ("g", None): "g"}
-_STEP_LENGTH = "step_length"
-"""What a text calls the length of the step."""
 
 _TABLES = """\
 #include "component.h"
@@ -23,7 +22,7 @@ _TABLES = """\
 }};
 
 {pieces}static const Meaning meanings[] = {{
-{meanings}    {{0, 0}},
+{meanings}    {{0, 0, 0}},
 }};
 
 static const char *const bundled[] = {{{bundled}0}};
@@ -81,7 +80,8 @@ def tables(slave: ComponentSlave, guid: str) -> str:
     pieces, meanings = [], []
     for k, (code, text) in enumerate(sorted(slave.texts.items())):
         pieces.append(f"static const Piece pieces_{k}[] = {{\n{_pieces(text, names)}\n}};\n\n")
-        meanings.append(f"    {{{code}, pieces_{k}}},\n")
+        first = slave.warns_first.get(code, 0)
+        meanings.append(f"    {{{code}, {first}, pieces_{k}}},\n")
     inputs_at, inputs = _span(slave, slave._inputs)
     outputs_at, outputs = _span(slave, slave._outputs)
     return _TABLES.format(
@@ -144,11 +144,11 @@ def _pieces(text: str, names: dict[str, int]) -> str:
     for before, name, form, conversion in Formatter().parse(text):
         place, letter = "NO_VALUE", "r"
         if name is not None:
-            if name != _STEP_LENGTH and name not in names:
+            if name != STEP_LENGTH and name not in names:
                 raise BuildError(f"the text {text!r} names {name!r}, which is no variable.")
             if (form, conversion) not in _FORMATS:
                 raise BuildError(f"the text {text!r} shows {name!r} in a way that C cannot.")
-            place = "STEP_LENGTH" if name == _STEP_LENGTH else str(names[name])
+            place = "STEP_LENGTH" if name == STEP_LENGTH else str(names[name])
             letter = _FORMATS[form or "", conversion]
         lines.append(f"    {{{quoted(before)}, {place}, '{letter}'}},")
     return "\n".join([*lines, "    {0, NO_VALUE, 0},"])

@@ -30,6 +30,7 @@ enum { NO_VALUE = -1, STEP_LENGTH = -2 };
 
 typedef struct {
     int64_t code;
+    int64_t first; /* code of a warning that comes before, 0: none */
     const Piece *pieces;
 } Meaning;
 
