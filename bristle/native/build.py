@@ -12,10 +12,9 @@ from ..errors import BuildError
 from ..fmu.build import built_guid, planned
 from ..fmu.plan import Plan
 from . import zig
-from .description import description
-from .parts import component_of, functions_digest, functions_text, libraries, shim_digest
+from .parts import functions_text, libraries, shim_digest
 from .platforms import Platform, here
-from .tables import tables
+from .prepare import GUID, prepare
 
 _NAMESPACE = UUID("0d7a6c1c-5f0e-5f3b-8a54-6e6174697665")
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
@@ -38,21 +37,20 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
         If a compiler is missing or refuses something, or a folder cannot be written; no FMU is
         written then.
     """
-    slave = component_of(what)
+    prepared = prepare(what)
     members = {f"resources/{name}": path.read_bytes() for name, path in what.files.items()}
-    content = hashlib.sha256()
-    for part in (tables(slave, ""), functions_digest(slave), shim_digest()):
-        content.update(part.encode())
-    for name, data in sorted({**members, "": description(slave, "")}.items()):
+    content = hashlib.sha256("".join([*prepared, shim_digest()]).encode())
+    for name, data in sorted(members.items()):
         content.update(name.encode() + data)
     guid = str(uuid5(_NAMESPACE, content.hexdigest()))
     target = folder / f"{what.name}.fmu"
     places = {one: f"binaries/{one.folder}/{what.name}{one.suffix}" for one in platforms}
     if built_guid(target) == guid and _libraries_in(target) == set(places.values()):
         return target
-    text = functions_text(what, slave)
-    members["modelDescription.xml"] = description(slave, guid)
-    for one, data in libraries(what.name, text, tables(slave, guid), platforms).items():
+    text = functions_text(what, prepared.functions)
+    members["modelDescription.xml"] = prepared.description.replace(GUID, guid).encode()
+    table = prepared.tables.replace(GUID, guid)
+    for one, data in libraries(what.name, text, table, platforms).items():
         members[places[one]] = data
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -18,7 +18,7 @@ _CAPABILITIES = {
 }
 
 
-def description(slave: ComponentSlave, guid: str) -> bytes:
+def description(slave: ComponentSlave, guid: str) -> str:
     """Return the model description of a component that runs without Python.
 
     Parameters
@@ -34,4 +34,4 @@ def description(slave: ComponentSlave, guid: str) -> bytes:
     root.set("generationTool", NATIVE)
     indent(root)
     text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
-    return text
+    return text.decode()

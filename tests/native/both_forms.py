@@ -20,8 +20,8 @@ from bristle.fmu.description import read_description
 from bristle.fmu.plan import plan
 from bristle.fmu.slave import Slave
 from bristle.native.build import build
-from bristle.native.parts import component_of
 from bristle.native.platforms import here
+from bristle.native.prepare import component_of
 
 KINDS = {float: "Real", int: "Integer", bool: "Boolean", str: "String"}
 SIZES = {"m": 0.01, "m/s": 0.2, "m/s2": 3.0, "N": 8.0, "V": 5.0}
