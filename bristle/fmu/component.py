@@ -89,6 +89,10 @@ class ComponentSlave(EffectSlave):
         """Return what the build fixes, as the component's `setup` takes it."""
         raise NotImplementedError
 
+    def flat_functions(self) -> Any:
+        """Return the component's functions in the form that compiled code is made of."""
+        return self.functions
+
     def parameter_names(self) -> list[str]:
         """Return the names of the parameters in their order."""
         return [self.vars[index].name for index in sorted(self._parameters)]
