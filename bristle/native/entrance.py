@@ -8,8 +8,10 @@ processor than every other has.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from inspect import signature
-from types import FunctionType, ModuleType
+from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 from ..component.clock import ORIGIN
@@ -69,8 +71,8 @@ def entrance_of(functions: Any, sampled: bool = False) -> FunctionType:
 
     Parameters
     ----------
-    functions : module or class
-        The component's, see `bristle.component`.
+    functions : module or namespace
+        The component's, as its `flat_functions` gives them.
     sampled : bool
         Whether it has a clock of its own.
 
@@ -80,7 +82,7 @@ def entrance_of(functions: Any, sampled: bool = False) -> FunctionType:
         If it is not of flat functions throughout.
     """
     missing = [name for name in NEEDED if not isinstance(_part(functions, name), FunctionType)]
-    name = functions.__name__ if isinstance(functions, ModuleType) else functions.__qualname__
+    name = functions.setup.__module__ if hasattr(functions, "setup") else str(functions)
     if missing:
         raise BuildError(f"{name} has no flat {', '.join(missing)}: it runs in Python alone.")
     found = {one: _part(functions, one) for one in (*NEEDED, *OPTIONAL)}
@@ -103,13 +105,15 @@ def _part(functions: Any, name: str) -> Any:
     return getattr(functions, name, None)
 
 
-def llvm_text(functions: Any, sampled: bool = False) -> str:
+def llvm_text(functions: Any, sampled: bool = False, files: Sequence[Path] = ()) -> str:
     """Return LLVM's text of a component's functions behind one entrance.
 
     Parameters
     ----------
     functions, sampled
         As in `entrance_of`.
+    files : sequence of Path
+        Where its source is, for the message.
 
     Raises
     ------
@@ -127,18 +131,21 @@ def llvm_text(functions: Any, sampled: bool = False) -> str:
         dispatcher = closed(entrance_of(functions, sampled), INLINE)
         dispatcher.compile(types.int64(*kinds))
     except NumbaError as error:
-        raise BuildError(_refusal(str(error))) from error
+        raise BuildError(_refusal(str(error), [path.resolve() for path in files])) from error
     found = dispatcher.overloads[kinds]
     return plain_text(found.library.get_llvm_str(), found.fndesc.llvm_func_name)
 
 
-def _refusal(text: str) -> str:
-    """Return what numba says in one paragraph: the innermost place and why."""
-    places = re.findall(r'File "([^"]*)", line (\d+)', text)
-    why = re.sub(r"\x1b\[[0-9;]*m", "", text)
-    reasons = [line.strip() for line in why.splitlines() if line.strip()]
-    where = f"{places[-1][0]}, line {places[-1][1]}: " if places else ""
-    return f"{where}{' '.join(reasons)[:600]}"
+def _refusal(text: str, files: Sequence[Path]) -> str:
+    """Return where, in files of the user's own, numba refuses something, and why."""
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", text)
+    lines = [line.strip() for line in plain.splitlines()]
+    whys = [line for line in lines if line and not line.startswith("Failed in nopython mode")]
+    places = re.findall(r'File "([^"\n]+)", line (\d+)| at (\S+\.py) \((\d+)\)', plain)
+    named = [(Path(one or two), line or other) for one, line, two, other in places]
+    own = [f"{path}, line {line}" for path, line in named if path.resolve() in files]
+    where = own[0] if own else str(files[0]) if files else "a component"
+    return f"{where}: the compiler refuses this: {whys[0] if whys else 'it does not say why'}."
 
 
 def plain_text(text: str, root: str) -> str:

@@ -10,7 +10,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from ..errors import BristleError, BuildError
 from ..fmu import catalogue
 from ..fmu.component import ComponentSlave
 from ..fmu.controller import SampledSlave
+from ..fmu.own_controller import COMPILED_MAY_USE, OwnController
 from ..fmu.plan import PACKAGE, Plan
 from ..jit import digest
 from ..physics.user import own_effects, own_laws
@@ -105,7 +106,7 @@ def component_of(what: Plan) -> ComponentSlave:
 def _prepare_here(what: Plan) -> Prepared:
     slave = component_of(what)
     sampled = isinstance(slave, SampledSlave)
-    functions = digest(entrance_of(slave.functions, sampled))
+    functions = digest(entrance_of(slave.flat_functions(), sampled))
     return Prepared(description(slave, GUID), tables(slave, GUID), functions)
 
 
@@ -132,6 +133,15 @@ def _in_fresh_process(what: Plan, given: Mapping[str, str]) -> str:
     return child.stdout
 
 
+def _text(slave: ComponentSlave, sampled: bool, files: Sequence[Path]) -> str:
+    """Return LLVM's text; what a controller of a user's own may use is told where it is refused."""
+    try:
+        return llvm_text(slave.flat_functions(), sampled, files)
+    except BuildError as error:
+        told = f"{COMPILED_MAY_USE} " if isinstance(slave, OwnController) else ""
+        raise BuildError(f"{error} {told}Without --native it builds as it is.") from error
+
+
 def serve() -> None:
     """Do what stands on the standard input; the other end of `_in_fresh_process`."""
     order: dict[str, Any] = json.load(sys.stdin)
@@ -144,9 +154,9 @@ def serve() -> None:
             return
         slave = component_of(what)
         sampled = isinstance(slave, SampledSlave)
-        if digest(entrance_of(slave.functions, sampled)) != order["functions"]:
+        if digest(entrance_of(slave.flat_functions(), sampled)) != order["functions"]:
             raise BuildError("its functions have changed meanwhile; build it again.")
-        text = llvm_text(slave.functions, sampled)
+        text = _text(slave, sampled, (what.component, *effects, *laws))
     except BristleError as error:
         sys.exit(str(error))
     Path(order["target"]).write_text(text, encoding="utf-8")

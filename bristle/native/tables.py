@@ -103,7 +103,7 @@ def tables(slave: ComponentSlave, guid: str) -> str:
         pairs=_choice(getattr(slave, "pairs_of", None), names),
         bundled="".join(f"{quoted(one)}, " for one in getattr(slave, "bundled", list)()),
         header=quoted(header) if (header := getattr(slave, "header", None)) else "0",
-        discretises=int(hasattr(slave.functions, "discretise")),
+        discretises=int(hasattr(slave.flat_functions(), "discretise")),
         in_place=int(isinstance(slave, SampledSlave)),
     )
 
