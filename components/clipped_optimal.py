@@ -14,6 +14,3 @@ class ClippedOptimal(LinearSlave):
     def declare_law(self):
         super().declare_law()
         declare_force_threshold(self)
-
-    def law_constants(self):
-        return {**super().law_constants(), "f_min": self.f_min}

@@ -2,7 +2,6 @@
 
 from bristle.component import source
 from bristle.fmu.source import SourceSlave
-from bristle.physics.signals import CONSTANT
 
 
 class ConstantVoltage(SourceSlave):
@@ -14,5 +13,5 @@ class ConstantVoltage(SourceSlave):
         self.add_parameter("level", 4.0, "V", "the voltage", (-1e3, 1e3))
         self.add_output("voltage", "V", "voltage for the damper")
 
-    def setup(self):
-        return source.Constants(CONSTANT, [self.level], [0.0], [0.0]), [], 0
+    def bake(self):
+        return source.bake_constant(self.parameter_names())

@@ -1,9 +1,8 @@
 """FMU: the ground shakes as recorded."""
 
 from bristle.component import source
-from bristle.fmu.source import SourceSlave
-from bristle.physics.record import read_two_column
-from bristle.physics.signals import CSV
+from bristle.fmu.source import Reading, SourceSlave
+from bristle.physics.record import HEADER
 
 BUILT_IN = ("el_centro_1940_ns",)
 
@@ -11,9 +10,13 @@ BUILT_IN = ("el_centro_1940_ns",)
 class GroundMotion(SourceSlave):
     """Ground acceleration from a record, scaled to a peak and by a factor."""
 
+    file_of = Reading("record")
+    header = HEADER
     files = ("data/ground_motions/el_centro_1940_ns.csv",)
 
     def declare(self):
+        text = "record {record!r} is zero all along and has no peak to scale."
+        self.texts = {source.NO_PEAK: text}
         record = self.baked.get("record", "el_centro_1940_ns")
         text = "a name baked in, or the path of a CSV `time [s],acceleration [m/s2]`"
         self.add_parameter("record", record, None, text)
@@ -27,14 +30,8 @@ class GroundMotion(SourceSlave):
             "ground_acceleration", "m/s2", "acceleration of the ground, positive along +x"
         )
 
-    def setup(self):
-        record = self.record
-        baked = (*BUILT_IN, self.baked.get("record"))
-        times, values = read_two_column(
-            self.resource(record + ".csv") if record in baked else record
-        )
-        peak = max(map(abs, values))
-        if self.peak > 0.0 and peak == 0.0:
-            raise ValueError(f"record {record!r} is zero all along and has no peak to scale.")
-        scale = self.factor * (self.peak / peak if self.peak > 0.0 else 1.0)
-        return source.Constants(CSV, [], times, values, scale, self.start), [], 0
+    def bake(self):
+        return source.bake_record(self.parameter_names())
+
+    def bundled(self):
+        return [*BUILT_IN, *filter(None, [self.baked.get("record")])]

@@ -1,7 +1,7 @@
 """FMU: an H-infinity command through a damper law's inverse."""
 
 from bristle.component.controller import INVERSE
-from bristle.fmu.controller import LinearSlave, declare_anti_windup, declare_inverse, inverse_law
+from bristle.fmu.controller import LinearSlave, declare_anti_windup, declare_inverse
 
 
 class HinfInverse(LinearSlave):
@@ -15,6 +15,3 @@ class HinfInverse(LinearSlave):
         super().declare_law()
         declare_anti_windup(self, 0.0)
         declare_inverse(self)
-
-    def law_constants(self):
-        return {**super().law_constants(), **inverse_law(self), "anti_windup": self.anti_windup}

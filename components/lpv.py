@@ -15,6 +15,3 @@ class Lpv(LinearSlave):
     def declare_law(self):
         super().declare_law()
         declare_anti_windup(self, 200.0)
-
-    def law_constants(self):
-        return {**super().law_constants(), "anti_windup": self.anti_windup}

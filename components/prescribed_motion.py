@@ -1,7 +1,6 @@
 """FMU: a test bench that moves a damper's rod."""
 
 from bristle.fmu.source import SignalSlave
-from bristle.physics.signals import STEPS
 
 
 class PrescribedMotion(SignalSlave):
@@ -13,11 +12,3 @@ class PrescribedMotion(SignalSlave):
         self.declare_signal("m")
         self.add_output("displacement", "m", "displacement of the rod")
         self.add_output("velocity", "m/s", "velocity of the rod")
-
-    def setup(self):
-        found = super().setup()
-        if found[0].kind == STEPS:
-            raise ValueError(
-                "kind 'steps' jumps: no velocity fits it. Take csv with ramps instead."
-            )
-        return found

@@ -1,7 +1,6 @@
 """FMU: what instruments make of the signals that a controller gets."""
 
 from bristle.component import sensors
-from bristle.component.sensors import Channel
 from bristle.fmu.controller import MEASURED, SampledSlave
 
 
@@ -27,8 +26,5 @@ class Sensors(SampledSlave):
             text = "corner of a first-order low-pass before sampling; 0: none"
             self.add_parameter(name + ".cut_off", 0.0, "Hz", text, (0.0, 1e6))
 
-    def setup(self):
-        channels = [
-            Channel(*(self[f"{name}.{key}"] for key in Channel._fields)) for name in MEASURED
-        ]
-        return sensors.setup(self.time, self.sample_period, self.seed, channels)
+    def bake(self):
+        return sensors.bake(self.parameter_names(), list(MEASURED))

@@ -2,8 +2,8 @@
 
 from bristle.component import HELD, LINEAR, structure
 from bristle.fmu.component import ComponentSlave
+from bristle.physics import structure as laws
 from bristle.physics.building import from_data, paper_building
-from bristle.physics.structure import SLOTS, matrices
 
 
 def moves(coupled, device, level):
@@ -32,7 +32,7 @@ class Structure(ComponentSlave):
             text = f"force of the device {device.name}, positive against its displacement"
             self.add_input(device.ports[0], "N", text, over_step=HELD)
         levels = self.building.levels()
-        coupled = matrices(self.building).M_inverse
+        coupled = laws.matrices(self.building).M_inverse
         for i, level in enumerate(levels):
             self.add_output(level + "_displacement", "m", "relative to the ground", nominal=0.01)
             self.add_output(level + "_velocity", "m/s", "relative to the ground", nominal=0.1)
@@ -73,8 +73,7 @@ class Structure(ComponentSlave):
         self.add_output(holding, "N", text, depends=depends)
 
     def bake(self):
-        names = [self.vars[index].name for index in sorted(self._parameters)]
-        return structure.bake(self.building, names, SLOTS)
+        return structure.bake(self.building, self.parameter_names(), laws.SLOTS)
 
     def setup(self):
         self._steps = {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
@@ -15,7 +16,7 @@ from ..data.files import write_whole
 from ..data.measurement import Measurement
 from ..data.model import StudyModel
 from ..errors import StudyError
-from ..fmu.build import build, plan
+from ..fmu.build import Plan, build, plan
 from ..fmu.catalogue import component_of_law
 from ..fmu.damper import input_of
 from ..identify.fit import Problem, Run
@@ -33,6 +34,7 @@ from .in_building import House, Parameters, loads, shaking_of, write_scenario
 from .scenario_files import part_text, scenario_text, signal_file
 
 Array = NDArray[np.float64]
+Build = Callable[[Plan, Path], Path]
 
 STEP = 5e-4
 """Longest step [s] of a bench scenario: an FMU holds its inputs over a step, a prediction does not.
@@ -54,13 +56,14 @@ class Exported:
     notes: tuple[str, ...] = ()
 
 
-def export_study(study: Study, out: Path | None = None) -> Exported:
+def export_study(study: Study, out: Path | None = None, build: Build = build) -> Exported:
     """Write a study's present model as an FMU and a scenario into a folder.
 
     Parameters
     ----------
     study : the folder, opened, with a model
     out : the folder, made if it is not there; None takes export/ in the study
+    build : what builds a planned FMU into a folder and returns its path
 
     Raises
     ------
@@ -75,7 +78,8 @@ def export_study(study: Study, out: Path | None = None) -> Exported:
     notes: list[str] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        fmu = _damper(study, model, measurement, folder, notes)
+        what = _damper(study, model, measurement, notes)
+        fmu = build(what, folder)
         write = _structure if study.settings.has_building else _bench
         scenario, files = write(study, model, measurement, fmu, folder, notes)
     except OSError as error:
@@ -91,10 +95,8 @@ def _one_run(study: Study) -> Measurement:
     return (runs.holdout or runs.train)[0]
 
 
-def _damper(
-    study: Study, model: StudyModel, measurement: Measurement, folder: Path, notes: list[str]
-) -> Path:
-    """Build the damper with the model's values as its defaults."""
+def _damper(study: Study, model: StudyModel, measurement: Measurement, notes: list[str]) -> Plan:
+    """Plan the damper with the model's values as its defaults."""
     bench = not study.settings.has_building
     sensors = model.at("sensor", bench).effects
     model = model.at("damper", bench)
@@ -114,14 +116,13 @@ def _damper(
     starts |= {f"{effect}.on": True for effect in effects}
     starts |= _range(measurement, notes)
     own = own_effects()
-    what = plan(
+    return plan(
         component_of_law(model.base_law),
         name=_model_name(study.name),
         starts=starts,
         effects=[own[name] for name in effects if EFFECTS[name].own],
         drive=drive_named(measurement.drive).name,
     )
-    return build(what, folder)
 
 
 def _range(measurement: Measurement, notes: list[str]) -> dict[str, float]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..findings import command
 from ._consent import add_trust
+from ._native import add_native, builder
 
 if TYPE_CHECKING:
     from ..fmu.build import Plan
@@ -57,6 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="where NAME.fmu goes, in place of an older one; else the current folder",
     )
+    add_native(parser)
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
@@ -75,9 +78,10 @@ def main(arguments: argparse.Namespace) -> int:
         effects=arguments.effects,
     )
     target = arguments.out / f"{what.name}.fmu"
-    fresh = built_guid(target) == what.guid()
+    fresh = not arguments.native and built_guid(target) == what.guid()
+    make = builder(arguments)
     if not fresh:
-        _build(what, target)
+        _build(make, what, target)
     description = read_description(target, any_platform=True)
     if arguments.json:
         import json
@@ -89,17 +93,16 @@ def main(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _build(what: Plan, target: Path) -> None:
+def _build(make: Callable[[Plan, Path], Path], what: Plan, target: Path) -> None:
     """Build beside the target and rename into place, so that nothing else is left there."""
     from ..errors import BuildError
-    from ..fmu.build import build
 
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         if target.is_dir():
             raise BuildError(f"{target}: is a folder; --name or --out elsewhere is right.")
         with tempfile.TemporaryDirectory(prefix=".bristle_", dir=target.parent) as folder:
-            build(what, Path(folder)).replace(target)
+            make(what, Path(folder)).replace(target)
     except (FileExistsError, NotADirectoryError):
         raise BuildError(f"{target.parent}: is a file; an FMU goes into a folder.") from None
     except OSError as error:

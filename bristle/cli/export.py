@@ -13,6 +13,7 @@ from ..errors import ScenarioError, StudyError
 from ..findings import command
 from ._common import add_overrides
 from ._consent import add_trust
+from ._native import add_native, builder
 
 HELP = "write a study's model as an FMU, or a scenario as a web page"
 
@@ -29,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     text = "a number that the page moves, with --web: --slider voltage.level=0..8"
     parser.add_argument("--slider", action="append", default=[], metavar="NAME[=A..B]", help=text)
     add_overrides(parser)
+    add_native(parser)
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
@@ -42,7 +44,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..bridge.export import export_study
     from ..study.study import Study
 
-    found = export_study(Study(Path(arguments.what)), arguments.out)
+    found = export_study(Study(Path(arguments.what)), arguments.out, builder(arguments))
     if arguments.json:
         import json
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 from ._common import add_overrides
 from ._consent import add_trust
+from ._native import add_native, builder
 
 if TYPE_CHECKING:
     from ..scenario.export_ssp import ExportedPackage
@@ -32,6 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_overrides(parser)
     text = "run nothing: do not estimate the coupling error in other tools"
     parser.add_argument("--no-coupling-error", action="store_true", help=text)
+    add_native(parser)
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
@@ -46,7 +48,7 @@ def main(arguments: argparse.Namespace) -> int:
     file = resolve_scenario(arguments.scenario)
     scenario = load_scenario(file, overrides)
     target = arguments.out or Path(f"{run_name(file, overrides)}.ssp")
-    exported = export_ssp(scenario, target, arguments.osp)
+    exported = export_ssp(scenario, target, arguments.osp, builder(arguments))
     expected: tuple[Expected, ...] = ()
     if not arguments.no_coupling_error:
         from ..simulate.elsewhere import expect

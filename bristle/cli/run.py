@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,6 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="fmu",
         help="step FMUs (fmu), or solve built-in components together (compiled)",
     )
+    text = "what is stepped: FMUs that run in Python, or native ones, which a compiler makes"
+    parser.add_argument("--fmus", choices=("python", "native"), default="python", help=text)
     parser.add_argument(
         "--format", choices=("csv", "parquet"), default="csv", help="of the results"
     )
@@ -72,6 +75,7 @@ def main(arguments: argparse.Namespace) -> int:
         frame = execute(
             file, overrides, arguments.engine, output, True, end_process=True,
             coupling_error=arguments.coupling_error or arguments.tolerance is not None,
+            ensure=_ensure(arguments),
         )  # fmt: skip
     except (IncompleteRunError, RunInterrupted) as error:
         if arguments.debug and isinstance(error, IncompleteRunError):
@@ -95,6 +99,19 @@ def main(arguments: argparse.Namespace) -> int:
         kind = "RunError: " if code == 1 else ""
         print(f"{kind}{trouble}", file=sys.stderr)
     return code
+
+
+def _ensure(arguments: argparse.Namespace) -> Callable[..., Path] | None:
+    """Return what gives the FMUs of built-in components, None for those in Python."""
+    if arguments.fmus == "python":
+        return None
+    if arguments.engine != "fmu":
+        from ..errors import not_usable
+
+        raise not_usable('--fmus native: engine "compiled" steps no FMUs; "fmu" does.')
+    from ..native.build import ensure
+
+    return ensure
 
 
 def _step_for(

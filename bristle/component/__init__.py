@@ -2,6 +2,13 @@
 
 A module per component has
 
+    sizes(values, baked, counts)
+        Fill in how many floats constants, state, outputs (hidden ones too) and work take.
+    setup(values, given, baked, store, state)
+        Fill in what parameters imply, and the state at the begin.
+    constants(store)
+        Return the record that the functions below take; its rows are slices of `store`, in compiled
+        code views.
     start(time, inputs, c, state, outputs, work)
         Put the state to where it is before the first step; it follows the inputs until then.
     step(clock, before, now, c, state, new_state, outputs, work)
@@ -11,10 +18,24 @@ A module per component has
     output(time, inputs, c, state, outputs, work)
         Give the outputs of a state at inputs that may have changed since the step.
 
+and where there is a need for it
+
+    bind(given, store)
+        Take over which inputs a host has set: whenever that has changed, before `constants`.
+    follow(inputs, c)
+        Let parameters follow inputs: before each start, step and output.
+    discretise(dt, store, work)
+        Fill in what the length of the step [s] implies: before `constants`, and before a step whose
+        length differs from that of the last one.
+
+`values` are the parameters in their order: a whole number or a switch as a float, a text that is
+one of its `words` as the index of the word, -1 where it is none of them, any other text as 0;
+`given` holds 1 for each input that a host has set, else 0; `baked` is what a build fixes, as the
+module's `bake` lays it down in plain Python; `store`, `state` and work come with zeros in them.
+
 Each returns a code: 0; above 0 what the component warns of; below 0 why it cannot go on. The text
-belongs to the component's class. `c` is a record of what parameters and step imply, made once by
-`setup` (and `discretise`, where the step's length counts); `state` and `new_state`, `before` and
-`now`, `outputs` and `work` are sequences of floats: lists inside FMUs, arrays in compiled code.
+belongs to the component's class. `state` and `new_state`, `before` and `now`, `outputs` and `work`
+are sequences of floats: lists inside FMUs, arrays in compiled code.
 What `work` holds lasts over the sweeps of one step. What is sampled is not swept: its `new_state`
 is `state` itself. Inputs and outputs lie in the order of the
 ports, hidden outputs behind them. No function here makes a list, raises, or knows a text.

@@ -6,8 +6,6 @@ signed voltage turns it into a voltage, which stands until the next sample.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
 from ..control.inverse import estimate_states, force_of_law, voltage_of_law
 from ..control.linear import advance, command, table_row
 from ..control.sensing import (
@@ -18,66 +16,38 @@ from ..control.sensing import (
     skyhook_switch,
 )
 from ..control.switching import applied_signed, clipped_voltage, signed_voltage
-from ..physics import damper
 from ..physics.linear import Row
 from .clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
+from .controller_setup import (
+    CLIPPED,
+    CLIPPED_LQG,
+    INVERSE,
+    NO_INVERSE,
+    NO_KIND,
+    NO_VELOCITY,
+    REMEMBERED,
+    SIGNED,
+    SKYHOOK_INVERSE,
+    SKYHOOK_SWITCH,
+    Constants,
+    bake,
+    constants,
+    setup,
+    sizes,
+)
+
+__all__ = [
+    "CLIPPED", "CLIPPED_LQG", "COMMAND_RAW", "INVERSE", "NO_INVERSE", "NO_KIND", "NO_VELOCITY",
+    "SCHEDULING", "SIGNED", "SKYHOOK_INVERSE", "SKYHOOK_SWITCH", "VOLTAGE", "Constants", "bake",
+    "constants", "output", "setup", "sizes", "start", "step",
+]  # fmt: skip
 
 FLOOR_ACCELERATION, BASE_DISPLACEMENT, BASE_VELOCITY, DAMPER_FORCE = range(4)
 VOLTAGE, COMMAND_RAW, SCHEDULING = range(3)
 
-CLIPPED, INVERSE, SIGNED, CLIPPED_LQG, SKYHOOK_SWITCH, SKYHOOK_INVERSE = range(6)
-"""Kinds of controllers."""
-
-REMEMBERED = 6
 LOW, X_BEFORE, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, -2)
 """What the state holds behind that of the state-space law and the states of the damper's law that
 is inverted, as the controller estimates them; before `ORIGIN` and `COMING`."""
-
-
-class Constants(NamedTuple):
-    """What a controller computes with; what its kind does not need is 0.
-
-    `n`, `rows`, `v_top`, `A`, `B`, `W`, `C` are those of `control.controller.Controller`;
-    `velocity_corner` [rad/s] is that of the low-passed displacement whose rate is the velocity, 0:
-    the velocity is measured; `law` and `p` say which damper's law is inverted, `still` and
-    `least_slope` how; `gain` and `integral_corner` [rad/s] belong to skyhook.
-    """
-
-    kind: int
-    period: float
-    v_max: float
-    velocity_corner: float
-    n: int
-    rows: int
-    v_top: float
-    A: Row
-    B: Row
-    W: Row
-    C: Row
-    f_min: float
-    anti_windup: float
-    law: int
-    p: Row
-    still: float
-    least_slope: float
-    gain: float
-    integral_corner: float
-
-
-NOTHING: dict[str, Any] = {
-    "velocity_corner": 0.0, "n": 0, "rows": 1, "v_top": 0.0, "A": [], "B": [], "W": [], "C": [],
-    "f_min": 0.0, "anti_windup": 0.0, "law": 0, "p": [], "still": 0.0, "least_slope": 1.0,
-    "gain": 0.0, "integral_corner": 0.0,
-}  # fmt: skip
-"""What a kind does not need."""
-
-
-def setup(time: float, **values: Any) -> tuple[Constants, list[float], int]:
-    """Return constants, state and size of work, given what differs from `NOTHING`."""
-    c = Constants(**{**NOTHING, **values})
-    state = [0.0] * (c.n + damper.SLOTS.law_states + REMEMBERED)
-    state[ORIGIN] = time
-    return c, state, c.n + 4
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:

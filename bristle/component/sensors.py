@@ -3,33 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import floor, pi
+from math import floor, pi, sqrt
 from typing import NamedTuple
 
 from ..control.noise import standard_normal
 from ..control.sensing import low_passed
 from ..physics.linear import Row
+from ..physics.rows import open_row, packed, row
 from .clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
 
 FINEST = 1e15
 """Readings of more steps than this are not quantised: floats are no finer there."""
 
 
-class Channel(NamedTuple):
-    """What an instrument makes of one signal.
+KEYS = ("gain", "bias", "noise_density", "quantisation", "delay", "cut_off")
+"""Parameters of each channel, in the order in which `bake` asks for them.
 
-    Reading = gain signal + bias; the root of the one-sided spectral density of white noise, whose
-    deviation in samples is noise_density sqrt(1 / (2 period)); the step between two readings (0:
-    none); the lag [s], the signal linear between two samples; the corner of a first-order low-pass
-    [Hz] (0: none).
-    """
+Reading = gain signal + bias; the root of the one-sided spectral density of white noise, whose
+deviation in samples is noise_density sqrt(1 / (2 period)); the step between two readings (0: none);
+the lag [s], the signal linear between two samples; the corner of a first-order low-pass [Hz] (0:
+none).
+"""
 
-    gain: float = 1.0
-    bias: float = 0.0
-    noise_density: float = 0.0
-    quantisation: float = 0.0
-    delay: float = 0.0
-    cut_off: float = 0.0
+_NUMBERS, _GAINS, _BIASES, _DEVIATION, _QUANTISATION, _CORNER, _SHARE, _LENGTH, _RING = range(9)
+_PERIOD, _SEED, _SIZE = range(3)
+_GAIN, _BIAS, _NOISE, _STEP, _DELAY, _CUT_OFF = range(len(KEYS))
 
 
 class Constants(NamedTuple):
@@ -54,35 +52,101 @@ class Constants(NamedTuple):
     ring: Row
 
 
-def setup(
-    time: float, period: float, seed: int, channels: Sequence[Channel]
-) -> tuple[Constants, list[float], int]:
-    """Return constants, state and size of work.
-
-    The state holds the rings, then the low-passed signal of every channel, then the signals before.
+def bake(names: Sequence[str], channels: Sequence[str]) -> list[float]:
+    """Return what a build fixes of sensors: where the values of each channel are.
 
     Parameters
     ----------
-    time : time of sample 0 [s]
-    period : time between two samples [s]
-    seed : int, chooses the noise
-    channels : (m,) sequence of Channel
+    names : of the values in their order: "sample_period", "seed", and CHANNEL.KEY for all of `KEYS`
+    channels : (m,) names of the channels
     """
-    lags = [channel.delay / period for channel in channels]
-    lengths = [floor(lag) + 2 for lag in lags]  # a ring holds both neighbours of the instant
-    c = Constants(
-        period, seed, sum(lengths),
-        gains=[channel.gain for channel in channels],
-        biases=[channel.bias for channel in channels],
-        deviation=[channel.noise_density * (0.5 / period) ** 0.5 for channel in channels],
-        quantisation=[channel.quantisation for channel in channels],
-        corner=[2.0 * pi * channel.cut_off for channel in channels],
-        share=[lag - floor(lag) for lag in lags],
-        length=lengths,
-        ring=[sum(lengths[:j]) for j in range(len(channels))],
+    own = [names.index(f"{channel}.{key}") for channel in channels for key in KEYS]
+    return packed([names.index("sample_period"), names.index("seed")], own)
+
+
+def sizes(values: Row, baked: Row, counts: Row) -> int:
+    """Fill in how many floats constants, state, outputs and work take; delays decide the state's.
+
+    Parameters
+    ----------
+    values, baked : as in `setup`
+    counts : (4,) filled
+
+    Returns
+    -------
+    int
+        0.
+    """
+    period, own = values[int(row(baked, 0)[_PERIOD])], row(baked, 1)
+    m, rings = len(own) // len(KEYS), 0
+    for j in range(m):
+        rings += ring_length(values[int(own[len(KEYS) * j + _DELAY])], period)
+    counts[0], counts[1] = _RING + 1 + _SIZE + 1 + _RING * m, rings + 2 * m + 2
+    counts[2], counts[3] = m, m
+    return 0
+
+
+def ring_length(delay: float, period: float) -> int:
+    """Return how many samples a ring holds: both neighbours of the delayed instant.
+
+    Parameters
+    ----------
+    delay, period : the lag and the time between two samples [s]
+    """
+    return floor(delay / period) + 2
+
+
+def setup(values: Row, given: Row, baked: Row, store: Row, state: Row) -> int:
+    """Fill in what parameters imply.
+
+    The state holds the rings, then the low-passed signal of every channel, then the signals before,
+    then what `clock` keeps.
+
+    Parameters
+    ----------
+    values : of the parameters, in the order of the names that were baked
+    given : (m,) not used
+    baked : as `bake` returns it
+    store, state : of the sizes of `sizes`, zero; the store is filled
+
+    Returns
+    -------
+    int
+        0.
+    """
+    clocked, own = row(baked, 0), row(baked, 1)
+    period, m = values[int(clocked[_PERIOD])], len(own) // len(KEYS)
+    at = open_row(store, _NUMBERS, _SIZE + 1)
+    gains, biases = open_row(store, _GAINS, m), open_row(store, _BIASES, m)
+    deviation, steps = open_row(store, _DEVIATION, m), open_row(store, _QUANTISATION, m)
+    corner, share = open_row(store, _CORNER, m), open_row(store, _SHARE, m)
+    length, ring = open_row(store, _LENGTH, m), open_row(store, _RING, m)
+    size = 0
+    for j in range(m):
+        first = len(KEYS) * j
+        lag = values[int(own[first + _DELAY])] / period
+        store[gains + j] = values[int(own[first + _GAIN])]
+        store[biases + j] = values[int(own[first + _BIAS])]
+        store[deviation + j] = values[int(own[first + _NOISE])] * sqrt(0.5 / period)
+        store[steps + j] = values[int(own[first + _STEP])]
+        store[corner + j] = 2.0 * pi * values[int(own[first + _CUT_OFF])]
+        store[share + j] = lag - floor(lag)
+        store[length + j] = float(floor(lag) + 2)
+        store[ring + j] = float(size)
+        size += floor(lag) + 2
+    store[at + _PERIOD], store[at + _SIZE] = period, float(size)
+    store[at + _SEED] = values[int(clocked[_SEED])]
+    return 0
+
+
+def constants(store: Row) -> Constants:
+    """Return what `start`, `step` and `output` take; in compiled code its rows are views."""
+    c = row(store, _NUMBERS)
+    return Constants(
+        c[_PERIOD], int(c[_SEED]), int(c[_SIZE]), row(store, _GAINS), row(store, _BIASES),
+        row(store, _DEVIATION), row(store, _QUANTISATION), row(store, _CORNER),
+        row(store, _SHARE), row(store, _LENGTH), row(store, _RING),
     )  # fmt: skip
-    m = len(channels)
-    return c, [0.0] * (c.size + 2 * m) + [time, 0.0], m
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
@@ -93,7 +157,7 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     time : time of sample 0 [s]
     inputs : (m,) signals, each in its own unit
     c : Constants
-    state : as `setup` returns it, filled
+    state : as `setup` lays it out, filled
     outputs : (m,) readings, filled
     work : (m,) not used
 
@@ -120,7 +184,7 @@ def step(
         Time at the begin [s], dt [s], sweep (not used).
     before, now : (m,) signals at begin and end, each in its own unit
     c : Constants
-    state, new_state : one and the same sequence, as `setup` returns it, moved on in place
+    state, new_state : one and the same sequence, as `setup` lays it out, moved on in place
     outputs : (m,) readings, filled where a sample is taken
     work : (m,) room to work
 
@@ -162,9 +226,9 @@ def reading(j: int, k: int, value: float, c: Constants, state: Row) -> float:
     j, k : number of the channel; number of the sample, 0 the first
     value : the signal at the sample's instant
     c : Constants
-    state : as `setup` returns it; the channel's part is moved on in place
+    state : as `setup` lays it out; the channel's part is moved on in place
     """
-    begin, length = c.ring[j], c.length[j]
+    begin, length = int(c.ring[j]), int(c.length[j])
     low, before = c.size + j, c.size + len(c.gains) + j
     if k == 0:
         state[low] = state[before] = value

@@ -14,7 +14,7 @@ from typing import Any
 
 from ..errors import BristleError, FmuError
 from ..fmu.archive import extract
-from ..fmu.description import describe, read_description, read_root
+from ..fmu.description import NATIVE, describe, read_description, read_root
 from ._probe import BOX, FINDING, PLAN
 from .native import BlackBox
 from .plan import Plan
@@ -103,7 +103,7 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
         plan.description = describe(root)
     except FmuError:
         return plan  # "modelDescription.xml" will say why
-    plan.ours = _ours(plan)
+    plan.ours = _ours(plan, root.get("generationTool", ""))
     plan.categories = [c.get("name", "") for c in root.iterfind("LogCategories/Category")]
     experiment = root.find("DefaultExperiment")
     times = {} if experiment is None else experiment.attrib
@@ -122,11 +122,13 @@ def _time(text: str | None, above: float) -> float | None:
     return value if above < value < math.inf else None
 
 
-def _ours(plan: Plan) -> bool:
-    """Return whether an FMU carries bristle's slave, and with it bristle's rule for faults."""
+def _ours(plan: Plan, tool: str) -> bool:
+    """Return whether an FMU follows bristle's rule for faults: it carries its slave or its shim."""
     fault = plan.about.variables.get("fault")
     if fault is None or (fault.kind, fault.causality) != ("Integer", "output"):
         return False
+    if tool.startswith(NATIVE):
+        return True
     resources = Path(plan.folder) / "resources"
     names = [p.name for p in resources.iterdir()] if resources.is_dir() else []
     return any(_BUNDLE.fullmatch(name) for name in names)

@@ -218,10 +218,26 @@ def ensure(
     BuildError, DesignError, PhysicsError
         If a name or a file is wrong, or the FMU cannot be built.
     """
+    return build(planned(component, building, controller, effects), fmus_folder())
+
+
+def planned(
+    component: str,
+    building: Path | None = None,
+    controller: Path | None = None,
+    effects: Iterable[Path] = (),
+) -> Plan:
+    """Return the plan of what `ensure` builds.
+
+    Parameters
+    ----------
+    component, building, controller, effects
+        As in `ensure`, and what is raised too.
+    """
     effects = tuple(effects)
     what = plan(component, building=building, controller=controller, effects=effects)
     if building is None and controller is None and not effects and not what.laws:
-        return build(what, fmus_folder())
+        return what
     named = hashlib.sha256()
     if building is not None:
         named.update(json.dumps(catalogue.read_building_data(building), sort_keys=True).encode())
@@ -229,7 +245,7 @@ def ensure(
         named.update(controller.read_bytes())
     for path in (*effects, *what.laws):
         named.update(path.name.encode() + path.read_bytes())
-    return build(replace(what, **_named(what, named.hexdigest()[:8])), fmus_folder())
+    return replace(what, **_named(what, named.hexdigest()[:8]))
 
 
 def _named(what: Plan, ending: str) -> dict[str, Any]:

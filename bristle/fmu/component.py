@@ -58,33 +58,65 @@ class EffectSlave(Slave):
         }
 
 
+STEP_LENGTH = "step_length"
+"""What a text calls the length of the step [s]."""
+
+
+class _Told:
+    """The values that texts name."""
+
+    def __init__(self, slave: Slave, step: float) -> None:
+        self.slave, self.step = slave, step
+
+    def __getitem__(self, name: str) -> Any:
+        return self.step if name == STEP_LENGTH else self.slave[name]
+
+
 class ComponentSlave(EffectSlave):
     """A component made of ports, functions and texts.
 
     A component fills `bake`; `functions` has `sizes`, `setup`, `constants`, `start`, `step` and
-    `output`; `texts` tells what a code means, with parameters in braces. `hidden` outputs have no
-    port.
+    `output`; `texts` tells what a code means, with parameters in braces, `warns_first` which
+    warning comes before that of a code. `hidden` outputs have no port.
     """
 
     functions: ClassVar[Any]
     texts: ClassVar[dict[int, str]] = {}
+    warns_first: ClassVar[dict[int, int]] = {}
     hidden: ClassVar[int] = 0
 
     def bake(self) -> list[float]:
         """Return what the build fixes, as the component's `setup` takes it."""
         raise NotImplementedError
 
+    def flat_functions(self) -> Any:
+        """Return the component's functions in the form that compiled code is made of."""
+        return self.functions
+
+    def parameter_names(self) -> list[str]:
+        """Return the names of the parameters in their order."""
+        return [self.vars[index].name for index in sorted(self._parameters)]
+
     def flat_values(self) -> list[float]:
-        """Return the parameters in their order, as numbers: of a text 0."""
-        values = self._values
-        return [
-            0.0 if isinstance(values[index], str) else float(values[index])
-            for index in sorted(self._parameters)
-        ]
+        """Return the parameters in their order as numbers, as `bristle.component` takes them."""
+        return [self._number(index) for index in sorted(self._parameters)]
+
+    def _number(self, index: int) -> float:
+        value = self._values[index]
+        if not isinstance(value, str):
+            return float(value)
+        words = self._words.get(index)
+        if words is None:
+            return 0.0
+        return float(words.index(value)) if value in words else -1.0
 
     def given(self) -> list[float]:
         """Return 1 for each input that the host has set, else 0."""
         return [1.0 if index in self._set else 0.0 for index in self._inputs]
+
+    def samples(self) -> tuple[list[float], list[float]]:
+        """Return times [s] and values of what the component plays, from its parameters."""
+        return [], []
 
     def setup(self) -> tuple[Any, list[float], int]:
         """Return constants, state and size of work; raise what is wrong with the parameters."""
@@ -95,7 +127,11 @@ class ComponentSlave(EffectSlave):
         code = functions.setup(values, self.given(), baked, self._store, state)
         if code:
             self.tell(code, self.time, 0.0)
-        return functions.constants(self._store), state, int(counts[3])
+        return self.made_constants(), state, int(counts[3])
+
+    def made_constants(self) -> Any:
+        """Return the record of constants from what `setup` has filled in."""
+        return self.functions.constants(self._store)
 
     def configure(self) -> None:
         self.constants, self.state, work = self.setup()
@@ -138,8 +174,10 @@ class ComponentSlave(EffectSlave):
         self._values[self._shown_first : self._shown_after] = self._given[: self._count]
 
     def tell(self, code: int, time: float, step: float) -> None:
-        """Warn of what a code says, or raise it."""
-        text = self.texts[code].format_map(self)
+        """Warn of what a code says, or raise it; texts may name the `STEP_LENGTH` [s] as well."""
+        if code in self.warns_first:
+            self.tell(self.warns_first[code], time, step)
+        text = self.texts[code].format_map(_Told(self, step))
         if code < 0:
             raise ValueError(text)
         self.warn_once(text)

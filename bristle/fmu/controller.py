@@ -9,7 +9,6 @@ damper, whose force follows the voltage at once.
 
 from __future__ import annotations
 
-from math import pi
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
@@ -17,7 +16,8 @@ from ..component import SAMPLED, clock, controller
 from ..control import inverse
 from ..control.controller import Controller, read_controller
 from ..errors import BristleError
-from ..physics.laws import DEFAULT, LAWS, Law, law_code, laws_of
+from ..physics import damper as damper_laws
+from ..physics.laws import DEFAULT, Law, law_code, laws_of
 from .component import ComponentSlave
 from .slave import Slave
 
@@ -32,19 +32,27 @@ MEASURED = {
 SAMPLE_PERIOD = 0.002
 """Sample period [s] where no design fixes it."""
 
-_LONG = (
-    "stepped by {:g} s, longer than its sample period of {:g} s: samples in between take the "
-    "inputs as linear, and what they answer shows late."
-)
+_CLOCK_TEXTS = {
+    clock.LONG_STEP: (
+        "stepped by {step_length:g} s, longer than its sample period of {sample_period:g} s: "
+        "samples in between take the inputs as linear, and what they answer shows late."
+    ),
+    clock.TOO_MANY_SAMPLES: (
+        "a step of {step_length:g} s holds too many samples of {sample_period:g} s."
+    ),
+}
 
 
 class SampledSlave(ComponentSlave):
     """A component that samples `MEASURED` at t = 0, h, 2h ... and holds its outputs in between."""
 
     changes = "discrete"
+    texts: ClassVar[dict[int, str]] = _CLOCK_TEXTS
+    warns_first: ClassVar[dict[int, int]] = {clock.TOO_MANY_SAMPLES: clock.LONG_STEP}
 
     def configure(self) -> None:
         super().configure()
+        self.state[clock.ORIGIN] = self.time
         self._new_state = self.state  # no step is made twice
 
     def declare_measured(self) -> None:
@@ -57,13 +65,6 @@ class SampledSlave(ComponentSlave):
         text = "sample period, whatever the communication step"
         low, high = (1e-6, 10.0) if fixed is None else (fixed, fixed)
         self.add_parameter("sample_period", fixed or SAMPLE_PERIOD, "s", text, (low, high))
-
-    def tell(self, code: int, time: float, step: float) -> None:
-        """Warn of a step that is longer than the sample period, and refuse one of a lifetime."""
-        if step > self["sample_period"]:
-            self.warn_once(_LONG.format(step, self["sample_period"]))
-        if code == clock.TOO_MANY_SAMPLES:
-            raise ValueError(f"{step / self['sample_period']:.0f} samples in a step of {step:g} s.")
 
     def _structure(self, structure: Element) -> None:
         """Say that the first sample follows motion; the damper's force it takes as it is given."""
@@ -79,12 +80,12 @@ class SampledSlave(ComponentSlave):
 class ControllerSlave(SampledSlave):
     """A controller: the ports that all share, limits, and the velocity it works with.
 
-    A component says by its `kind` which law `component.controller` runs, and gives its numbers in
-    `law_constants`.
+    `law_kind` says which law `component.controller` runs, None where a parameter does. The values
+    that it needs are found among the parameters by their names.
     """
 
     functions: ClassVar[Any] = controller
-    law_kind: ClassVar[int]
+    law_kind: ClassVar[int | None] = None
     command_unit: ClassVar[str] = "N"
 
     def declare(self) -> None:
@@ -95,7 +96,10 @@ class ControllerSlave(SampledSlave):
         self.add_output("scheduling", "m/s", "velocity that the law works with")
         self.add_parameter("v_max", 8.0, "V", "largest voltage", (1e-3, 1e4))
         text = "one of direct, filtered: the rate of the low-passed base_displacement"
-        self.add_parameter("velocity", "direct", None, text)
+        words = ("direct", "filtered")
+        self.add_parameter("velocity", "direct", None, text, words=words)
+        said = "velocity {velocity!r} is neither direct nor filtered."
+        self.texts = {**self.texts, controller.NO_VELOCITY: said}  # type: ignore[misc]
         text = "corner frequency of that low-pass"
         self.add_parameter("velocity_corner", 18.0, "Hz", text, (1e-3, 1e5))
         self.declare_law()
@@ -104,23 +108,16 @@ class ControllerSlave(SampledSlave):
         """Declare the sample period and the law's own parameters."""
         self.declare_period()
 
-    def law_constants(self) -> dict[str, Any]:
-        """Return what the law needs of `component.controller.Constants`."""
-        return {"kind": self.law_kind}
+    def designed(self) -> Controller | None:
+        """Return the design of the state-space law, None where there is none."""
+        return None
 
-    def setup(self) -> tuple[Any, list[float], int]:
-        if self["velocity"] not in ("direct", "filtered"):
-            raise ValueError(
-                "velocity {!r} is neither direct nor filtered.".format(self["velocity"])
-            )
-        filtered = self["velocity"] == "filtered"
-        return controller.setup(
-            self.time,
-            period=self["sample_period"],
-            v_max=self["v_max"],
-            velocity_corner=2.0 * pi * self["velocity_corner"] if filtered else 0.0,
-            **self.law_constants(),
-        )
+    def bake(self) -> list[float]:
+        names = self.parameter_names()
+        known = {law.name: (law_code(law.name), names_of(law)) for law in invertible()}
+        laws = known if "inverse" in names else {}
+        kind, states = self.law_kind, damper_laws.SLOTS.law_states
+        return controller.bake(names, kind, self.designed(), laws, states)
 
 
 class LinearSlave(ControllerSlave):
@@ -142,11 +139,10 @@ class LinearSlave(ControllerSlave):
             self.wrong = str(error)
         self.declare_period(self.controller.sample_period if self.controller else SAMPLE_PERIOD)
 
-    def law_constants(self) -> dict[str, Any]:
-        if self.wrong or self.controller is None:
+    def designed(self) -> Controller | None:
+        if self.wrong:
             raise ValueError(self.wrong)
-        own = ("n", "rows", "v_top", "A", "B", "W", "C")
-        return {**super().law_constants(), **{name: getattr(self.controller, name) for name in own}}
+        return self.controller
 
 
 def declare_force_threshold(slave: Slave) -> None:
@@ -168,29 +164,23 @@ def invertible() -> list[type[Law]]:
     return sorted(found, key=lambda law: law.name != DEFAULT)
 
 
-def declare_inverse(slave: Slave) -> None:
+def names_of(law: type[Law]) -> list[str]:
+    """Return what a controller calls the parameters of a law that it inverts: `lugre.sigma_a`."""
+    return [f"{law.name}.{name}" for name in law.parameters]
+
+
+def declare_inverse(slave: ControllerSlave) -> None:
     """Declare the law that is inverted and its parameters: `lugre.sigma_a`, `bingham.f_c` ..."""
     laws = invertible()
-    text = f"the law that is inverted, one of {', '.join(law.name for law in laws)}"
-    slave.add_parameter("inverse", DEFAULT, None, text)
+    words = [law.name for law in laws]
+    text = f"the law that is inverted, one of {', '.join(words)}"
+    slave.add_parameter("inverse", DEFAULT, None, text, words=words)
+    said = f"inverse {{inverse!r}} is neither {' nor '.join(words)}."
+    slave.texts = {**slave.texts, controller.NO_INVERSE: said}  # type: ignore[misc]
     for law in laws:
-        for name, p in law.parameters.items():
-            slave.add_parameter(f"{law.name}.{name}", p.value, p.unit, p.text, p.bounds)
+        for name, p in zip(names_of(law), law.parameters.values()):
+            slave.add_parameter(name, p.value, p.unit, p.text, p.bounds)
     text = "no voltage below this speed"
     slave.add_parameter("still", inverse.STILL, "m/s", text, (0.0, 10.0))
     text = "least force per volt that is divided by"
     slave.add_parameter("least_slope", inverse.LEAST_SLOPE, "N/V", text, (1e-9, 1e9))
-
-
-def inverse_law(slave: Slave) -> dict[str, Any]:
-    """Return what an inverse needs of `component.controller.Constants`; ValueError if unknown."""
-    chosen = slave["inverse"]
-    names = [law.name for law in invertible()]
-    if chosen not in names:
-        raise ValueError(f"inverse {chosen!r} is neither {' nor '.join(names)}.")
-    return {
-        "law": law_code(chosen),
-        "p": [slave[f"{chosen}.{name}"] for name in LAWS[chosen].parameters],
-        "still": slave["still"],
-        "least_slope": slave["least_slope"],
-    }

@@ -105,8 +105,10 @@ class DamperSlave(ComponentSlave):
     def known_names(self) -> list[str]:
         """Return the names of all parameters in their order, as law and effects know them."""
         limit = self.drive.limit  # what the functions call v_max, whatever the command
-        names = [self.vars[index].name for index in sorted(self._parameters)]
-        return ["v_max" if name == limit else self._called.get(name, name) for name in names]
+        return [
+            "v_max" if name == limit else self._called.get(name, name)
+            for name in self.parameter_names()
+        ]
 
     def _bind(self) -> None:
         """Take the acceleration for measured from the moment on at which a host sets it."""

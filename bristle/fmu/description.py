@@ -28,6 +28,8 @@ __all__ = ["Description", "Value", "Variable", "extract", "read_description"]
 
 VERSIONS = ("2.0", "3.0")
 """Versions of FMI that are read."""
+NATIVE = "bristle native"
+"""Generation tool of bristle's FMUs that need no Python."""
 _OTHER_KINDS = {"ModelExchange": "model exchange", "ScheduledExecution": "scheduled execution"}
 _KINDS = ("Real", "Integer", "Boolean", "String", "Enumeration")
 _IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")

@@ -8,10 +8,21 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Callable
+from types import FunctionType, SimpleNamespace
 from typing import Any, ClassVar, NamedTuple
 
 from ..component.clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
-from .controller import MEASURED, SampledSlave
+from ..physics.linear import copy
+from ..physics.rows import open_row, packed, row
+from ..physics.tuples import made, record
+from .controller import SampledSlave
+
+COMPILED_MAY_USE = (
+    "Where it is compiled, `command` may use its parameters that are numbers or switches as "
+    "self.NAME, the fields of measured and memory, arithmetic, if, for, tuples, `math`, and plain "
+    "functions of its file that do the same; no text, list, dict, or anything else of self."
+)
+"""What a user reads whose controller the compiler refuses."""
 
 
 class Measured(NamedTuple):
@@ -29,6 +40,9 @@ class Measured(NamedTuple):
 
 VOLTAGE, COMMAND_RAW, SCHEDULING = range(3)
 
+_VALUES, _INDICES = range(2)
+_PERIOD, _V_MAX, _KEPT = range(3)
+
 
 class Constants(NamedTuple):
     """What a controller of one's own computes with: `answer` is its `command` of one sample."""
@@ -40,8 +54,49 @@ class Constants(NamedTuple):
     kept: int
 
 
+class Numbers(NamedTuple):
+    """The same in compiled code: the record `parameters` is what `command` gets as `self`."""
+
+    period: float
+    v_max: float
+    parameters: Any
+
+
 class Functions:
-    """The functions of `bristle.component`, for a law that is a method; see `component.clock`."""
+    """The functions of `bristle.component`, for a law that is a method; see `component.clock`.
+
+    `compiled_form` has them as compiled code takes them, with `constants` too.
+    """
+
+    @staticmethod
+    def sizes(values: Any, baked: Any, counts: Any) -> int:
+        """Fill in how many floats constants, state, outputs and work take.
+
+        Parameters
+        ----------
+        values, baked : as in `setup`
+        counts : (4,) filled
+        """
+        counts[0] = 2 + len(values) + _KEPT + 1
+        counts[1], counts[2], counts[3] = row(baked, 0)[_KEPT] + 2, 3, 4
+        return 0
+
+    @staticmethod
+    def setup(values: Any, given: Any, baked: Any, store: Any, state: Any) -> int:
+        """Fill in the parameters.
+
+        Parameters
+        ----------
+        values : of all parameters, in their order
+        given : (4,) not used
+        baked : indices of the sample period and of the largest voltage among the values, and how
+            many numbers are remembered; packed
+        store, state : of the sizes of `sizes`, zero; the store is filled
+        """
+        copy(values, 0, store, open_row(store, _VALUES, len(values)), len(values))
+        indices = row(baked, 0)
+        copy(indices, 0, store, open_row(store, _INDICES, len(indices)), len(indices))
+        return 0
 
     @staticmethod
     def start(time: float, inputs: Any, c: Constants, state: Any, outputs: Any, work: Any) -> int:
@@ -56,7 +111,9 @@ class Functions:
         outputs : (3,) voltage [V], command before limits [V], velocity [m/s]; filled
         work : (4,) room to work
         """
-        state[:] = [0.0] * c.kept + [time, 1.0]
+        for i in range(len(state)):
+            state[i] = 0.0
+        state[ORIGIN], state[COMING] = time, 1.0
         _sample(inputs, c, state, outputs)
         return 0
 
@@ -110,9 +167,76 @@ def _sample(inputs: Any, c: Constants, state: Any, outputs: Any) -> None:
             f"command returned {len(kept)} numbers to remember; memory names {c.kept}."
         )
     state[: c.kept] = kept
-    wanted = float(wanted)
-    outputs[VOLTAGE] = min(max(wanted, 0.0), c.v_max)
+    _show(float(wanted), measured, c.v_max, outputs)
+
+
+def _show(wanted: float, measured: Measured, v_max: float, outputs: Any) -> None:
+    """Limit the voltage."""
+    outputs[VOLTAGE] = min(max(wanted, 0.0), v_max)
     outputs[COMMAND_RAW], outputs[SCHEDULING] = wanted, measured.base_velocity
+
+
+_COMPILED = """
+def sample(inputs, c, state, outputs):
+    measured = record(Measured, (inputs[0], inputs[1], inputs[2], inputs[3]))
+    wanted, kept = command(c.parameters, measured, {memory})
+    {remember}
+    show(float(wanted), measured, c.v_max, outputs)
+
+
+def constants(store):
+    values, indices = row(store, {values}), row(store, {indices})
+    period, v_max = values[int(indices[{period}])], values[int(indices[{v_max}])]
+    return record(Numbers, (period, v_max, {record}))
+"""
+
+
+def compiled_form(
+    command: Any, memory: tuple[str, ...], kinds: dict[str, type | None]
+) -> SimpleNamespace:
+    """Return the functions of a controller of one's own in the form that compiled code is made of.
+
+    Parameters
+    ----------
+    command : function
+        The law's `command`; the compiler looks into it only later.
+    memory : tuple of str
+        What is remembered.
+    kinds : dict
+        Name of each parameter, in their order, to its type: float, int, bool, or None where it is
+        of no use in compiled code.
+    """
+    sources = {float: "values[{}]", int: "int(values[{}])", bool: "values[{}] != 0.0"}
+    known = {
+        name: sources[kind].format(index)
+        for index, (name, kind) in enumerate(kinds.items())
+        if kind is not None and name.isidentifier()
+    }
+    text = _COMPILED.format(
+        memory=made("Memory", [f"state[{k}]" for k in range(len(memory))]),
+        remember="".join(f"state[{k}], " for k in range(len(memory))) + "= kept" if memory else "",
+        values=_VALUES, indices=_INDICES, period=_PERIOD, v_max=_V_MAX,
+        record=made("Parameters", list(known.values())),
+    )  # fmt: skip
+    namespace: dict[str, Any] = {
+        "Measured": Measured, "Numbers": Numbers, "Memory": namedtuple("Memory", memory),
+        "Parameters": namedtuple("Parameters", list(known)), "command": command, "show": _show,
+        "record": record, "row": row, "__name__": __name__,
+    }  # fmt: skip
+    exec(compile(text, "<compiled own controller>", "exec"), namespace)
+    sampled = {"_sample": namespace["sample"]}
+    return SimpleNamespace(
+        sizes=Functions.sizes, setup=Functions.setup, constants=namespace["constants"],
+        start=_with(Functions.start, sampled), step=_with(Functions.step, sampled),
+        output=Functions.output,
+    )  # fmt: skip
+
+
+def _with(function: Any, others: dict[str, Any]) -> FunctionType:
+    """Return a copy of a function that finds other globals."""
+    copied = FunctionType(function.__code__, {**function.__globals__, **others}, function.__name__)
+    copied.__module__ = function.__module__
+    return copied
 
 
 class OwnController(SampledSlave):
@@ -149,8 +273,19 @@ class OwnController(SampledSlave):
         """
         raise NotImplementedError
 
-    def setup(self) -> tuple[Any, list[float], int]:
+    def bake(self) -> list[float]:
+        names = self.parameter_names()
+        return packed([names.index("sample_period"), names.index("v_max"), len(self.memory)])
+
+    def made_constants(self) -> Constants:
         named = namedtuple("Memory", self.memory)  # type: ignore[misc]
-        count = len(self.memory)
-        c = Constants(self["sample_period"], self["v_max"], self.command, named, count)
-        return c, [0.0] * count + [self.time, 0.0], len(MEASURED)
+        values, indices = row(self._store, _VALUES), row(self._store, _INDICES)
+        period, v_max = (values[int(indices[k])] for k in (_PERIOD, _V_MAX))
+        return Constants(period, v_max, self.command, named, len(self.memory))
+
+    def flat_functions(self) -> SimpleNamespace:
+        kinds = {
+            name: None if isinstance(self[name], str) else type(self[name])
+            for name in self.parameter_names()
+        }
+        return compiled_form(type(self).command, self.memory, kinds)

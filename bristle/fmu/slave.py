@@ -114,6 +114,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         self._inputs: list[int] = []
         self._outputs: list[int] = []
         self._parameters: set[int] = set()
+        self._words: dict[int, tuple[str, ...]] = {}
         self._set: set[int] = set()
         self._mode = _INSTANTIATED
         self._stale = True
@@ -249,6 +250,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         unit: str | None,
         text: str,
         bounds: tuple[float | None, float | None] = (None, None),
+        words: Iterable[str] = (),
     ) -> None:
         """Declare a fixed parameter, of the type of its value.
 
@@ -258,6 +260,7 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         value : start value in its unit: a float, int, bool or str
         unit : None: it has none
         bounds : lowest and highest value in its unit, None: no bound; not for a bool or str
+        words : among which a str chooses, none: it is any text
         """
         common = {
             "causality": Fmi2Causality.parameter,
@@ -267,7 +270,10 @@ class Slave(Fmi2Slave):  # type: ignore[misc]
         kind = {bool: Boolean, int: Integer, str: String}.get(type(value), Real)
         if kind in (Real, Integer):
             self._bounds[name] = (bounds[0], bounds[1], None)
-        self._parameters.add(self._add(kind(name, **common), value, unit))
+        index = self._add(kind(name, **common), value, unit)
+        self._parameters.add(index)
+        if words:
+            self._words[index] = tuple(words)
 
     def _add(self, variable: Any, value: Any, unit: str | None) -> int:
         name = variable.name

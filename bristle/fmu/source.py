@@ -2,20 +2,60 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple, Optional
 
 from ..component import source
 from ..physics.record import read_two_column
-from ..physics.signals import CSV, KINDS, PARAMETERS, STEPS, read_steps
+from ..physics.signals import KINDS, PARAMETERS, read_steps
 from .component import ComponentSlave
 
 _output = source.output
 
 
+class Reading(NamedTuple):
+    """A parameter, a text, that samples are read from where another one is a certain word.
+
+    Without a `chooser` it always is.
+    """
+
+    parameter: str
+    chooser: str = ""
+    word: str = ""
+
+
 class SourceSlave(ComponentSlave):
-    """A component whose outputs depend on time alone."""
+    """A component whose outputs depend on time alone.
+
+    Its samples come from a CSV that `file_of` names, whose header is `header` (None: `time [s]` and
+    any other), or from TIME:VALUE pairs in `pairs_of`.
+    """
 
     functions: ClassVar[Any] = source
+    file_of: ClassVar[Optional[Reading]] = None  # noqa: UP045 (read by Python 3.9)
+    pairs_of: ClassVar[Optional[Reading]] = None  # noqa: UP045
+    header: ClassVar[Optional[str]] = None  # noqa: UP045
+
+    def bundled(self) -> list[str]:
+        """Return the names of files that came with the component; others are paths."""
+        return []
+
+    def samples(self) -> tuple[list[float], list[float]]:
+        if self.file_of and self._is_read(self.file_of):
+            name = self[self.file_of.parameter]
+            file = self.resource(f"{name}.csv") if name in self.bundled() else name
+            return read_two_column(file, header=self.header)
+        if self.pairs_of and self._is_read(self.pairs_of):
+            return read_steps(self[self.pairs_of.parameter])
+        return [0.0], [0.0]
+
+    def _is_read(self, reading: Reading) -> bool:
+        return not reading.chooser or self[reading.chooser] == reading.word
+
+    def made_constants(self) -> Any:
+        times, samples = self.samples()
+        if code := source.scale_samples(times, samples, self._store):
+            self.tell(code, self.time, 0.0)
+        return source.constants(self._store, times, samples)
 
     def advance(self, time: float, step: float) -> None:
         """Keep nothing: what a step would show, `refresh` does."""
@@ -38,10 +78,17 @@ class SignalSlave(SourceSlave):
     """Parameters of a test signal, and what follows from them."""
 
     rated = False
+    file_of = Reading("file", "kind", "csv")
+    pairs_of = Reading("steps", "kind", "steps")
+    texts: ClassVar[dict[int, str]] = {
+        source.NO_KIND: f"kind {{kind!r}} is none of {', '.join(KINDS)}.",
+        source.JUMPS: ("kind 'steps' jumps: no velocity fits it. Take csv with ramps instead."),
+    }
 
     def declare_signal(self, unit: str) -> None:
         """Declare the parameters of a signal in this unit, "" for that of whatever it feeds."""
-        self.add_parameter("kind", "constant", None, "one of " + ", ".join(KINDS))
+        text = "one of " + ", ".join(KINDS)
+        self.add_parameter("kind", "constant", None, text, words=KINDS)
         for name, parameter in PARAMETERS.items():
             own = parameter.unit or unit
             text = parameter.text if own else parameter.text + ", in the unit of the input"
@@ -50,16 +97,9 @@ class SignalSlave(SourceSlave):
         text = "two-column CSV of the kind csv, its header `time [s],NAME [UNIT]`"
         self.add_parameter("file", self.baked.get("samples", ""), None, text)
 
-    def setup(self) -> tuple[Any, list[float], int]:
-        if self["kind"] not in KINDS:
-            raise ValueError("kind {!r} is none of {}.".format(self["kind"], ", ".join(KINDS)))
-        code = KINDS[self["kind"]]
-        times, samples = [0.0], [0.0]
-        if code == STEPS:
-            times, samples = read_steps(self["steps"])
-        elif code == CSV:
-            baked = self["file"] and self["file"] == self.baked.get("samples")
-            file = self.resource(f"{self['file']}.csv") if baked else self["file"]
-            times, samples = read_two_column(file, header=None)
-        numbers: list[float] = [self[name] for name in PARAMETERS]
-        return source.Constants(code, numbers, times, samples, rated=self.rated), [], 0
+    def bake(self) -> list[float]:
+        return source.bake_signal(self.parameter_names(), self.rated)
+
+    def bundled(self) -> list[str]:
+        name = self.baked.get("samples")
+        return [name] if name else []

@@ -9,19 +9,19 @@ from pathlib import Path
 from uuid import UUID, uuid5
 
 from ..errors import BuildError
-from ..fmu import catalogue
-from ..fmu.plan import Plan, plan
-from .description import description
-from .parts import component_of, functions_digest, functions_text, libraries, shim_digest
-from .platforms import Platform
-from .tables import tables
+from ..fmu.build import built_guid, planned
+from ..fmu.plan import Plan
+from . import zig
+from .parts import functions_text, libraries, shim_digest
+from .platforms import Platform, here
+from .prepare import GUID, prepare
 
 _NAMESPACE = UUID("0d7a6c1c-5f0e-5f3b-8a54-6e6174697665")
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
 
 
 def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
-    """Build a native FMU into a folder, in place of an older one; return its path.
+    """Build a native FMU into a folder, unless the same one stands there; return its path.
 
     Parameters
     ----------
@@ -34,29 +34,57 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
     Raises
     ------
     BuildError
-        If a compiler is missing or refuses something, or a folder cannot be written; nothing is
-        left then.
+        If a compiler is missing or refuses something, or a folder cannot be written; no FMU is
+        written then.
     """
-    slave = component_of(what)
-    content = hashlib.sha256()
-    for part in (tables(slave, ""), functions_digest(slave), shim_digest()):
-        content.update(part.encode())
+    prepared = prepare(what)
     members = {f"resources/{name}": path.read_bytes() for name, path in what.files.items()}
-    for part in (description(slave, ""), *(b for one in sorted(members.items()) for b in
-                 (one[0].encode(), one[1]))):
-        content.update(part)
+    content = hashlib.sha256("".join([*prepared, shim_digest()]).encode())
+    for name, data in sorted(members.items()):
+        content.update(name.encode() + data)
     guid = str(uuid5(_NAMESPACE, content.hexdigest()))
-    members["modelDescription.xml"] = description(slave, guid)
-    text = functions_text(what, slave)
-    for one, data in libraries(what.name, text, tables(slave, guid), platforms).items():
-        members[f"binaries/{one.folder}/{what.name}{one.suffix}"] = data
     target = folder / f"{what.name}.fmu"
+    places = {one: f"binaries/{one.folder}/{what.name}{one.suffix}" for one in platforms}
+    if built_guid(target) == guid and _libraries_in(target) == set(places.values()):
+        return target
+    text = functions_text(what, prepared.functions)
+    members["modelDescription.xml"] = prepared.description.replace(GUID, guid).encode()
+    table = prepared.tables.replace(GUID, guid)
+    for one, data in libraries(what.name, text, table, platforms).items():
+        members[places[one]] = data
     try:
         folder.mkdir(parents=True, exist_ok=True)
         _pack(members, target)
     except OSError as error:
         raise BuildError(f"{target}: cannot be written ({error.strerror or error}).") from error
     return target
+
+
+def ensure(
+    component: str,
+    building: Path | None = None,
+    controller: Path | None = None,
+    effects: Iterable[Path] = (),
+) -> Path:
+    """Return a built-in component's native FMU for this machine, built on first use.
+
+    Parameters
+    ----------
+    component, building, controller, effects
+        As in `fmu.build.ensure`.
+
+    Raises
+    ------
+    BuildError, DesignError, PhysicsError
+        If a name or a file is wrong, or the FMU cannot be built.
+    """
+    what = planned(component, building, controller, effects)
+    return build(what, zig.folder() / "fmus", [here()])
+
+
+def _libraries_in(path: Path) -> set[str]:
+    with zipfile.ZipFile(path) as archive:
+        return {name for name in archive.namelist() if name.startswith("binaries/")}
 
 
 def _pack(members: Mapping[str, bytes], target: Path) -> None:
@@ -73,11 +101,3 @@ def _pack(members: Mapping[str, bytes], target: Path) -> None:
     except OSError:
         part.unlink(missing_ok=True)
         raise
-
-
-def build_all(
-    folder: Path, platforms: Sequence[Platform], only: Iterable[str] = ()
-) -> list[Path]:
-    """Build the built-in components, or those of `only`, into a folder; return their paths."""
-    names = list(only) or catalogue.component_names()
-    return [build(plan(name), folder, platforms) for name in names]

@@ -6,6 +6,7 @@ from typing import Any
 from xml.etree.ElementTree import Element, indent, tostring
 
 from ..fmu.component import ComponentSlave
+from ..fmu.description import NATIVE
 
 _CAPABILITIES = {
     "needsExecutionTool": False,
@@ -16,11 +17,8 @@ _CAPABILITIES = {
     "canSerializeFMUstate": True,
 }
 
-TOOL = "bristle native"
-"""How the generation tool of native FMUs begins."""
 
-
-def description(slave: ComponentSlave, guid: str) -> bytes:
+def description(slave: ComponentSlave, guid: str) -> str:
     """Return the model description of a component that runs without Python.
 
     Parameters
@@ -33,7 +31,7 @@ def description(slave: ComponentSlave, guid: str) -> bytes:
     options: dict[str, Any] = dict(_CAPABILITIES)
     root: Element = slave.to_xml(options)
     root.set("guid", guid)
-    root.set("generationTool", TOOL)
+    root.set("generationTool", NATIVE)
     indent(root)
     text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
-    return text
+    return text.decode()

@@ -8,14 +8,21 @@ processor than every other has.
 from __future__ import annotations
 
 import re
-from types import FunctionType, ModuleType
+from collections.abc import Sequence
+from inspect import signature
+from pathlib import Path
+from types import FunctionType
 from typing import Any
 
+import numpy as np
+
+from ..component.clock import ORIGIN
 from ..errors import BuildError
+from ..jit import llvm_text as llvm_text_of
 
 NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
 """Functions that a component must have, see `bristle.component`."""
-OPTIONAL = ("bind", "follow")
+OPTIONAL = ("bind", "follow", "discretise", "scale_samples")
 """Functions that it may have."""
 
 INLINE = ("rows.row",)
@@ -32,9 +39,12 @@ def entrance(call, time, dt, {rows}):
     if call == 0:
         return sizes(values, baked, work)
     if call == 1:
-        return setup(values, given, baked, store, state)
+        code = setup(values, given, baked, store, state)
+        {begin}
+        return code
+    {discretise}
     {bind}
-    c = constants(store)
+    c = constants({constants})
     {follow}
     if call == 2:
         return start(time, now, c, state, outputs, work)
@@ -43,21 +53,31 @@ def entrance(call, time, dt, {rows}):
     return output(time, now, c, state, outputs, work)
 """
 
-_OUTSIDE = frozenset(
+_BEGIN_CLOCK = f"state[{ORIGIN}] = time"
+"""Until the first sample is taken, the clock of a sampled component begins with the instance."""
+_SCALE = "code = code if code < 0 else scale_samples(times, samples, store)"
+_DISCRETISE = """if call == 5:
+        discretise(dt, store, work)
+        return 0
+"""
+
+_OUTSIDE = (
     "acos asin atan atan2 cbrt ceil cos cosh erf erfc exp exp2 expm1 fabs floor fmax fmin fmod "
     "hypot ldexp lgamma log log10 log1p log2 memcpy memmove memset pow round sin sinh sqrt tan "
-    "tanh tgamma trunc".split()
+    "tanh tgamma trunc"
 )
 """What compiled functions may ask of the C library."""
 
 
-def entrance_of(functions: Any) -> FunctionType:
+def entrance_of(functions: Any, sampled: bool = False) -> FunctionType:
     """Return the function that leads to a component's functions.
 
     Parameters
     ----------
-    functions : module or class
-        The component's, see `bristle.component`.
+    functions : module or namespace
+        The component's, as its `flat_functions` gives them.
+    sampled : bool
+        Whether it has a clock of its own.
 
     Raises
     ------
@@ -65,12 +85,15 @@ def entrance_of(functions: Any) -> FunctionType:
         If it is not of flat functions throughout.
     """
     missing = [name for name in NEEDED if not isinstance(_part(functions, name), FunctionType)]
-    name = functions.__name__ if isinstance(functions, ModuleType) else functions.__qualname__
+    name = functions.setup.__module__ if hasattr(functions, "setup") else str(functions)
     if missing:
         raise BuildError(f"{name} has no flat {', '.join(missing)}: it runs in Python alone.")
     found = {one: _part(functions, one) for one in (*NEEDED, *OPTIONAL)}
     text = _SOURCE.format(
         rows=", ".join(ROWS),
+        begin=_BEGIN_CLOCK if sampled else _SCALE if found["scale_samples"] else "pass",
+        constants=", ".join(signature(found["constants"]).parameters),
+        discretise=_DISCRETISE if found["discretise"] else "pass",
         bind="bind(given, store)" if found["bind"] else "pass",
         follow="follow(now, c)" if found["follow"] else "pass",
     )
@@ -85,37 +108,40 @@ def _part(functions: Any, name: str) -> Any:
     return getattr(functions, name, None)
 
 
-def llvm_text(functions: Any) -> str:
+def llvm_text(functions: Any, sampled: bool = False, files: Sequence[Path] = ()) -> str:
     """Return LLVM's text of a component's functions behind one entrance.
+
+    Parameters
+    ----------
+    functions, sampled
+        As in `entrance_of`.
+    files : sequence of Path
+        Where its source is, for the message.
 
     Raises
     ------
     BuildError
         If the compiler refuses a function, with file and line, or it needs what no C library has.
     """
-    from numba.core import types
     from numba.core.errors import NumbaError
 
-    from ..jit import closed
-
-    row = types.Array(types.float64, 1, "C")
-    kinds = (types.int64, types.float64, types.float64, *[row] * len(ROWS))
+    examples = (0, 0.0, 0.0, *[np.zeros(0)] * len(ROWS))
     try:
-        dispatcher = closed(entrance_of(functions), INLINE)
-        dispatcher.compile(types.int64(*kinds))
+        return plain_text(*llvm_text_of(entrance_of(functions, sampled), examples, INLINE))
     except NumbaError as error:
-        raise BuildError(_refusal(str(error))) from error
-    found = dispatcher.overloads[kinds]
-    return plain_text(found.library.get_llvm_str(), found.fndesc.llvm_func_name)
+        raise BuildError(refusal(str(error), [path.resolve() for path in files])) from error
 
 
-def _refusal(text: str) -> str:
-    """Return what numba says in one paragraph: the innermost place and why."""
-    places = re.findall(r'File "([^"]*)", line (\d+)', text)
-    why = re.sub(r"\x1b\[[0-9;]*m", "", text)
-    reasons = [line.strip() for line in why.splitlines() if line.strip()]
-    where = f"{places[-1][0]}, line {places[-1][1]}: " if places else ""
-    return f"{where}{' '.join(reasons)[:600]}"
+def refusal(text: str, files: Sequence[Path]) -> str:
+    """Return where, in files of the user's own, numba refuses something, and why."""
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", text)
+    lines = [line.strip() for line in plain.splitlines()]
+    whys = [line for line in lines if line and not line.startswith("Failed in nopython mode")]
+    places = re.findall(r'File "([^"\n]+)", line (\d+)| at (\S+\.py) \((\d+)\)', plain)
+    named = [(Path(one or two), line or other) for one, line, two, other in places]
+    own = [f"{path}, line {line}" for path, line in named if path.resolve() in files]
+    where = own[0] if own else str(files[0]) if files else "a component"
+    return f"{where}: the compiler refuses this: {whys[0] if whys else 'it does not say why'}."
 
 
 def plain_text(text: str, root: str) -> str:
@@ -138,12 +164,13 @@ def plain_text(text: str, root: str) -> str:
     ]
     text = "\n".join(lines) + "\n"
     text = re.sub(r"^(@\S+ = )common ", r"\1internal ", text, flags=re.MULTILINE)
-    text = re.sub(r"^define (?:linkonce_odr |internal |hidden )*", "define internal ", text, flags=re.MULTILINE)
+    linkage = r"^define (?:linkonce_odr |internal |hidden )*"
+    text = re.sub(linkage, "define internal ", text, flags=re.MULTILINE)
     quoted = re.escape(root)
     text = re.sub(rf'@"?{quoted}"?(?![\w.$])', f"@{NAME}", text)
     text = re.sub(rf"^define internal (.*@{NAME}\()", r"define hidden \1", text, flags=re.MULTILINE)
     outside = re.findall(r'^declare [^@]*@"?([^"(\s]+)"?\(', text, flags=re.MULTILINE)
-    strange = sorted(n for n in outside if not n.startswith("llvm.") and n not in _OUTSIDE)
+    strange = sorted(n for n in outside if not n.startswith("llvm.") and n not in _OUTSIDE.split())
     if strange:
         raise BuildError(f"the compiled functions call {', '.join(strange)}, which no host has.")
     return text

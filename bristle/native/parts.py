@@ -3,63 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
-import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
-from ..errors import BristleError, BuildError
-from ..fmu import catalogue
-from ..fmu.component import ComponentSlave
-from ..fmu.plan import PACKAGE, Plan
-from ..jit import digest
+from ..fmu.plan import Plan
 from ..progress import tell
 from . import zig
-from .entrance import entrance_of, llvm_text
 from .platforms import Platform
+from .prepare import compile_functions
 
 SHIM = Path(__file__).resolve().parent / "shim"
 """Folder with the C that all native FMUs share."""
-
-COMPILER = {
-    "PYTHONHASHSEED": "0",  # numba numbers functions in the order in which it meets them
-    "NUMBA_CPU_NAME": "generic",
-    "NUMBA_CPU_FEATURES": "",
-    "NUMBA_LOOP_VECTORIZE": "0",
-    "NUMBA_SLP_VECTORIZE": "0",
-    "NUMBA_COLOR_SCHEME": "no_color",
-}
-"""Environment of the process that compiles: its text is the same on every machine."""
-
-
-def component_of(what: Plan) -> ComponentSlave:
-    """Return a planned component as a Python object.
-
-    Raises
-    ------
-    BuildError
-        If it is not made of flat functions.
-    """
-    from ..trust import load_file
-
-    kind = catalogue.component_class(what.component)
-    own = [load_file(path).name for path in what.effects]
-    files = {name: str(path) for name, path in what.files.items()}
-    baked = {**what.baked, "files": files, **({"own": own} if own else {})}
-    slave = kind(baked=baked, instance_name=what.name)
-    if not isinstance(slave, ComponentSlave) or not hasattr(slave, "bake"):
-        raise BuildError(f"{what.name} is not made of flat functions: it runs in Python alone.")
-    entrance_of(slave.functions)
-    return slave
-
-
-def functions_digest(slave: ComponentSlave) -> str:
-    """Return the digest of a component's functions and of what compiles them."""
-    return digest(entrance_of(slave.functions))
 
 
 def shim_digest() -> str:
@@ -70,56 +27,32 @@ def shim_digest() -> str:
     return content.hexdigest()
 
 
-def functions_text(what: Plan, slave: ComponentSlave) -> Path:
+def functions_text(what: Plan, functions: str) -> Path:
     """Return the file with LLVM's text of a component's functions, compiled if need be.
+
+    Parameters
+    ----------
+    what : Plan
+    functions : str
+        Their digest.
 
     Raises
     ------
     BuildError
         If the compiler refuses a function; if the cache cannot be written.
     """
-    kept = zig.folder() / f"{functions_digest(slave)}.ll"
+    from filelock import FileLock
+
+    kept = zig.folder() / f"{functions}.ll"
     if kept.is_file():
         return kept
-    tell(f"compiling the functions of {what.name}, once")
-    order = {
-        "name": what.name,
-        "component": str(what.component),
-        "baked": dict(what.baked),
-        "files": {name: str(path) for name, path in what.files.items()},
-        "effects": [str(path) for path in what.effects],
-        "laws": [str(path) for path in what.laws],
-    }
-    path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
-    with tempfile.TemporaryDirectory(dir=zig.folder()) as temporary:
-        part = Path(temporary) / "functions.ll"
-        child = subprocess.run(
-            [sys.executable, "-c", "from bristle.native.parts import serve; serve()"],
-            input=json.dumps({"order": order, "target": str(part)}), capture_output=True,
-            text=True, check=False, env={**os.environ, **COMPILER, "PYTHONPATH": path},
-        )  # fmt: skip
-        if child.returncode != 0:
-            raise BuildError(f"{what.name}: {child.stderr.strip()[-800:]}")
-        part.replace(kept)
-    return kept
+    with FileLock(kept.with_suffix(".lock")):  # two who need it do not both compile it
 
+        def compile_text(path: Path) -> None:
+            tell(f"compiling the functions of {what.name}, once")
+            compile_functions(what, functions, path)
 
-def serve() -> None:
-    """Compile what stands on the standard input; the other end of `functions_text`."""
-    given = json.load(sys.stdin)
-    try:
-        slave = component_of(plan_of(given["order"]))
-        text = llvm_text(slave.functions)
-    except BristleError as error:
-        sys.exit(str(error))
-    Path(given["target"]).write_text(text, encoding="utf-8")
-
-
-def plan_of(order: dict[str, Any]) -> Plan:
-    """Return the plan that an order in JSON stands for."""
-    files = {name: Path(path) for name, path in order["files"].items()}
-    effects, laws = (tuple(Path(path) for path in order[key]) for key in ("effects", "laws"))
-    return Plan(order["name"], Path(order["component"]), order["baked"], files, effects, laws)
+        return _kept(kept, compile_text)
 
 
 def library(name: str, text: Path, table: str, platform: Platform) -> bytes:
@@ -186,8 +119,6 @@ def libraries(
     BuildError
         What is wrong with the first platform that fails, once all are done.
     """
-    from concurrent.futures import ThreadPoolExecutor
-
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         runs = [pool.submit(library, name, text, table, one) for one in platforms]
     return {one: run.result() for one, run in zip(platforms, runs, strict=True)}

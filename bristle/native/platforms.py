@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import platform
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -35,8 +37,8 @@ class Platform:
 
 
 PLATFORMS = {
-    platform.name: platform
-    for platform in (
+    one.name: one
+    for one in (
         Platform("linux64", "x86_64-linux-gnu.2.17", "linux64", ".so", ("m",)),
         Platform("win64", "x86_64-windows-gnu", "win64", ".dll"),
         Platform("darwin64", "x86_64-macos", "darwin64", ".dylib"),
@@ -45,6 +47,33 @@ PLATFORMS = {
     )
 }
 """The platforms by name."""
+_HERE = {
+    ("linux", "x86_64"): "linux64",
+    ("linux", "aarch64"): "aarch64-linux",
+    ("win32", "x86_64"): "win64",
+    ("darwin", "x86_64"): "darwin64",
+    ("darwin", "aarch64"): "aarch64-darwin",
+}
+
+
+def here() -> Platform:
+    """Return the platform that this process runs on.
+
+    Raises
+    ------
+    BuildError
+        If there are no native FMUs for it.
+    """
+    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(
+        platform.machine().lower(), platform.machine().lower()
+    )
+    name = _HERE.get((sys.platform, machine))
+    if name is None:
+        raise BuildError(
+            f"native FMUs do not run on {machine} under {sys.platform}; Python FMUs may."
+        )
+    return PLATFORMS[name]
+
 
 WEB = Platform("web", "wasm32-wasi", "", ".wasm")
 """What a page of the web runs; no FMU is made for it."""

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from math import inf, isfinite
 from string import Formatter
 
 from ..errors import BuildError
-from ..fmu.component import ComponentSlave
+from ..fmu.component import STEP_LENGTH, ComponentSlave
 from ..fmu.controller import SampledSlave
+from ..fmu.source import Reading
 
 _KINDS = {"Real": "REAL", "Integer": "INTEGER", "Boolean": "BOOLEAN", "String": "STRING"}
 _CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER"}
 _FORMATS = {("", None): "r", ("", "r"): "r", ("", "s"): "s", ("g", None): "g"}
-_STEP_LENGTH = "step_length"
-"""What a text calls the length of the step."""
 
 _TABLES = """\
 #include "component.h"
@@ -24,8 +22,10 @@ _TABLES = """\
 }};
 
 {pieces}static const Meaning meanings[] = {{
-{meanings}    {{0, 0}},
+{meanings}    {{0, 0, 0}},
 }};
+
+static const char *const bundled[] = {{{bundled}0}};
 
 static const double baked[] = {{
 {baked}
@@ -45,6 +45,11 @@ const Component component = {{
     .baked = baked,
     .baked_size = {baked_size},
     .in_place = {in_place},
+    .discretises = {discretises},
+    .file = {file},
+    .pairs = {pairs},
+    .bundled = bundled,
+    .header = {header},
 }};
 """
 
@@ -75,7 +80,8 @@ def tables(slave: ComponentSlave, guid: str) -> str:
     pieces, meanings = [], []
     for k, (code, text) in enumerate(sorted(slave.texts.items())):
         pieces.append(f"static const Piece pieces_{k}[] = {{\n{_pieces(text, names)}\n}};\n\n")
-        meanings.append(f"    {{{code}, pieces_{k}}},\n")
+        first = slave.warns_first.get(code, 0)
+        meanings.append(f"    {{{code}, {first}, pieces_{k}}},\n")
     inputs_at, inputs = _span(slave, slave._inputs)
     outputs_at, outputs = _span(slave, slave._outputs)
     return _TABLES.format(
@@ -93,6 +99,11 @@ def tables(slave: ComponentSlave, guid: str) -> str:
         outputs_at=outputs_at,
         outputs=outputs,
         baked_size=len(baked),
+        file=_choice(getattr(slave, "file_of", None), names),
+        pairs=_choice(getattr(slave, "pairs_of", None), names),
+        bundled="".join(f"{quoted(one)}, " for one in getattr(slave, "bundled", list)()),
+        header=quoted(header) if (header := getattr(slave, "header", None)) else "0",
+        discretises=int(hasattr(slave.flat_functions(), "discretise")),
         in_place=int(isinstance(slave, SampledSlave)),
     )
 
@@ -116,7 +127,15 @@ def _variable(slave: ComponentSlave, index: int, has_words: bool) -> str:
 
 def _words(slave: ComponentSlave, index: int) -> str:
     """Return the words that a String chooses from, as C has them; "" where it is any text."""
-    return ", ".join(quoted(word) for word in ())
+    return ", ".join(quoted(word) for word in slave._words.get(index, ()))
+
+
+def _choice(reading: Reading | None, names: dict[str, int]) -> str:
+    """Return from which String a signal is read, and where another one has which word."""
+    if reading is None:
+        return '{-1, -1, ""}'
+    chooser = names[reading.chooser] if reading.chooser else -1
+    return f"{{{names[reading.parameter]}, {chooser}, {quoted(reading.word)}}}"
 
 
 def _pieces(text: str, names: dict[str, int]) -> str:
@@ -125,11 +144,11 @@ def _pieces(text: str, names: dict[str, int]) -> str:
     for before, name, form, conversion in Formatter().parse(text):
         place, letter = "NO_VALUE", "r"
         if name is not None:
-            if name != _STEP_LENGTH and name not in names:
+            if name != STEP_LENGTH and name not in names:
                 raise BuildError(f"the text {text!r} names {name!r}, which is no variable.")
             if (form, conversion) not in _FORMATS:
                 raise BuildError(f"the text {text!r} shows {name!r} in a way that C cannot.")
-            place = "STEP_LENGTH" if name == _STEP_LENGTH else str(names[name])
+            place = "STEP_LENGTH" if name == STEP_LENGTH else str(names[name])
             letter = _FORMATS[form or "", conversion]
         lines.append(f"    {{{quoted(before)}, {place}, '{letter}'}},")
     return "\n".join([*lines, "    {0, NO_VALUE, 0},"])
@@ -157,8 +176,3 @@ def quoted(text: str) -> str:
 def _byte(byte: int) -> str:
     plain = 32 <= byte < 127 and chr(byte) not in '"\\?'
     return chr(byte) if plain else f"\\{byte:03o}"
-
-
-def listed(texts: Iterable[str]) -> str:
-    """Return texts as the fields of a C array that ends with a null pointer."""
-    return ", ".join([*map(quoted, texts), "0"])

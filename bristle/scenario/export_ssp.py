@@ -10,13 +10,13 @@ import os
 import re
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from ..errors import ScenarioError
-from ..fmu.build import build, plan
+from ..fmu.build import Plan, build, plan
 from ..fmu.description import Value
 from ..ssp.names import STRUCTURE
 from ..ssp.write import (
@@ -30,6 +30,7 @@ from .document import FILE_PARAMETERS
 from .scenario import Component, Scenario, fmu_parameters
 
 RESOURCES = "resources"
+Build = Callable[[Plan, Path], Path]
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
 
 
@@ -41,7 +42,9 @@ class ExportedPackage:
     notes: tuple[str, ...]
 
 
-def export_ssp(scenario: Scenario, file: Path, osp: Path | None = None) -> ExportedPackage:
+def export_ssp(
+    scenario: Scenario, file: Path, osp: Path | None = None, build: Build = build
+) -> ExportedPackage:
     """Write a scenario as an SSP package, and its parts into a folder for OSP.
 
     Parameters
@@ -52,6 +55,8 @@ def export_ssp(scenario: Scenario, file: Path, osp: Path | None = None) -> Expor
         FILE.ssp, in place of an older one.
     osp : Path, optional
         Folder that takes OspSystemStructure.xml with the FMUs beside it.
+    build : callable
+        Builds a planned FMU into a folder and returns its path.
 
     Raises
     ------
@@ -63,7 +68,7 @@ def export_ssp(scenario: Scenario, file: Path, osp: Path | None = None) -> Expor
     if file.suffix.lower() != ".ssp":
         raise ScenarioError(f"{file}: the name of an SSP package ends with .ssp.")
     with tempfile.TemporaryDirectory(prefix="bristle_ssp_") as temporary:
-        fmus = _fmus(scenario, Path(temporary))
+        fmus = _fmus(scenario, Path(temporary), build)
         system = _system(scenario, fmus)
         with _writing(file):
             _pack(file, ssd_text(system), list(fmus.values()))
@@ -74,7 +79,7 @@ def export_ssp(scenario: Scenario, file: Path, osp: Path | None = None) -> Expor
     return ExportedPackage(tuple(written), tuple(_notes(scenario)))
 
 
-def _fmus(scenario: Scenario, folder: Path) -> dict[str, Path]:
+def _fmus(scenario: Scenario, folder: Path, build: Build) -> dict[str, Path]:
     """Return the FMU of each component, built with its values or copied, each of a name its own."""
     found: dict[str, Path] = {}
     taken: set[str] = set()
@@ -84,11 +89,11 @@ def _fmus(scenario: Scenario, folder: Path) -> dict[str, Path]:
         while stem.lower() in taken:
             stem += "_"
         taken.add(stem.lower())
-        found[component.name] = _fmu(component, scenario.file.parent, folder, stem)
+        found[component.name] = _fmu(component, scenario.file.parent, folder, stem, build)
     return found
 
 
-def _fmu(component: Component, home: Path, folder: Path, name: str) -> Path:
+def _fmu(component: Component, home: Path, folder: Path, name: str, build: Build) -> Path:
     if component.path is not None:
         target = folder / f"{name}.fmu"
         target.write_bytes(component.path.read_bytes())

@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -137,6 +137,7 @@ def execute(
     end_process: bool = False,
     coupling_error: bool = False,
     reference: bool = False,
+    ensure: Callable[..., Path] | None = None,
 ) -> Results:
     """Run a scenario as `run` does, into an output that is closed afterwards.
 
@@ -152,6 +153,8 @@ def execute(
         Whether to estimate the coupling error as well.
     reference : bool
         Whether the coupled engine takes the substeps of one that tells the errors of other runs.
+    ensure : callable, optional
+        Returns the FMU of a built-in component, in place of `fmu.build.ensure`.
     """
     try:
         if engine not in ENGINES:
@@ -162,7 +165,7 @@ def execute(
             scenario = load_scenario(scenario, overrides)
         for line in scenario.remarks():
             output.show(line)
-        job = _Job(scenario, dict(overrides or {}), engine, output)
+        job = _Job(scenario, dict(overrides or {}), engine, output, ensure)
         if engine == "compiled":
             if coupling_error:
                 raise not_usable('engine "compiled" makes no coupling error; "fmu" does.')
@@ -214,9 +217,15 @@ class _Job:
     """One run on its way: what it is made of, what it has so far, how it ends."""
 
     def __init__(
-        self, scenario: Scenario, overrides: dict[str, object], engine: str, output: Output
+        self,
+        scenario: Scenario,
+        overrides: dict[str, object],
+        engine: str,
+        output: Output,
+        ensure: Callable[..., Path] | None = None,
     ) -> None:
         self.scenario = scenario
+        self.ensure = ensure
         self.output = output
         self.began = time.perf_counter()
         self.made: dict[str, Any] = {
@@ -343,8 +352,9 @@ class _Job:
 
     def _fmus(self) -> tuple[dict[str, Path], dict[str, Description]]:
         """Return each component's FMU file, built where needed, and what it says of itself."""
-        from ..fmu.build import ensure
+        from ..fmu import build
 
+        ensure = self.ensure or build.ensure
         paths, descriptions = {}, {}
         for component in self.scenario.components:
             path = component.path or ensure(

@@ -21,8 +21,8 @@ from ..errors import BristleError, BuildError
 from ..fmu.plan import PACKAGE
 from ..jit import digest, llvm_text
 from ..native import zig
-from ..native.entrance import plain_text
-from ..native.parts import COMPILER
+from ..native.entrance import plain_text, refusal
+from ..native.prepare import COMPILER
 from ..physics.user import own_effects, own_laws
 from ..progress import tell
 from ..simulate import records
@@ -100,11 +100,17 @@ def serve() -> None:
 
 
 def _text() -> str:
+    from numba.core.errors import NumbaError
+
     row, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
     sources, dampers, structures, sampled = (np.zeros(0, make()) for make in RECORDS.values())
     examples = (
         (0, 0, 0.0), (sources, row, row), (dampers, structures), (sampled, row, row), row, whole,
         np.zeros((0, 0)),
     )  # fmt: skip
+    own = [file.resolve() for files in _own().values() for file in files]
     with whole_loop() as (loop, inline):
-        return plain_text(*llvm_text(loop, examples, inline))
+        try:
+            return plain_text(*llvm_text(loop, examples, inline))
+        except NumbaError as error:
+            raise BuildError(refusal(str(error), own)) from error

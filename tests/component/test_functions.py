@@ -1,32 +1,20 @@
-"""Components as pure functions: compiled as in plain Python, pure, and the rules written once."""
+"""Components as pure functions: they keep what they are given, and the rules are written once."""
 
 from __future__ import annotations
 
-from math import inf, sin
+from math import inf
 from typing import Any
 
-import numpy as np
 import pytest
 
 from bristle.component import damper
 from bristle.fmu import catalogue
-from bristle.jit import compiled
 
 STEP = 0.0005
 SETTINGS: dict[str, dict[str, Any]] = {
     "LuGreDamper": {"gas_spring.on": True, "moving_mass": 2.0},
-    "BinghamDamper": {"coil_lag.on": True, "moving_mass": 2.0},
     "Structure": {"storey_softening.on": True, "base_friction.on": True},
-    "SignalSource": {"kind": "chirp"},
-    "PrescribedMotion": {"kind": "sine"},
-    "Skyhook": {"kind": "inverse", "velocity": "filtered"},
-    "HinfInverse": {"anti_windup": 50.0, "inverse": "bingham"},
-    "Sensors": {
-        "floor_acceleration.noise_density": 0.01, "base_velocity.delay": 0.0051,
-        "base_displacement.cut_off": 20.0, "damper_force.quantisation": 0.01,
-    },
-}  # fmt: skip
-CASES = [(name, {}) for name in catalogue.component_names()] + list(SETTINGS.items())
+}
 
 
 def set_up(name: str, given: dict[str, Any]) -> Any:
@@ -38,62 +26,6 @@ def set_up(name: str, given: dict[str, Any]) -> Any:
     if name == "Structure":
         slave.constants = slave.constants_of(STEP)
     return slave
-
-
-def all_to(value: Any, to: Any) -> Any:
-    """Return constants with every sequence in them made by `to`; a record stays one."""
-    if hasattr(value, "_fields"):
-        return type(value)(*(all_to(inner, to) for inner in value))
-    return to(value) if isinstance(value, (list, tuple)) else value
-
-
-def driven(slave: Any, start: Any, step: Any, output: Any, to: Any) -> np.ndarray:
-    """Return the outputs of a run of 200 steps, each stepped and then shown again."""
-    c = all_to(slave.constants, to)
-    state, new, work = to(slave.state), to(slave.state), to([0.0, *slave._work])
-    shown = to(slave._given)
-    sampled = slave._new_state is slave.state
-
-    def inputs(k: int) -> Any:
-        return to([0.1 * (j + 1) * sin(0.03 * (j + 1) * k + j) for j in range(len(slave._inputs))])
-
-    rows, before = [], inputs(0)
-    start(0.0, before, c, state, shown, work)
-    for k in range(200):
-        now = inputs(k + 1)
-        assert (
-            step((k * STEP, STEP, 0), before, now, c, state, state if sampled else new, shown, work)
-            >= 0
-        )
-        if not sampled:
-            state, new = new, state
-        rows.append(list(shown))
-        before = inputs(k + 2)
-        output((k + 1) * STEP, before, c, state, shown, work)
-        rows.append(list(shown))
-        before = now
-    return np.array(rows)
-
-
-def array(values: Any) -> np.ndarray:
-    """Return an array, never an empty one; flags and whole numbers stay such.
-
-    What is empty counts as numbers, as it is where it is filled: one compilation serves both.
-    """
-    return np.array(values) if len(values) else np.zeros(1)
-
-
-@pytest.mark.parametrize(("name", "given"), CASES, ids=[f"{n}-{len(g)}" for n, g in CASES])
-def test_compiled_functions_compute_what_plain_python_does(
-    name: str, given: dict[str, Any]
-) -> None:
-    functions = catalogue.instantiate(name).functions
-    hooks = functions.start, functions.step, functions.output
-    plain = driven(set_up(name, given), *hooks, to=list)
-    fast = driven(set_up(name, given), *(compiled(hook) for hook in hooks), to=array)
-    scale = np.abs(plain).max(axis=0)
-    assert np.isfinite(plain).all()
-    assert (np.abs(fast - plain).max(axis=0) <= 1e-12 * scale).all()
 
 
 def test_a_step_may_be_made_again_from_the_same_state() -> None:

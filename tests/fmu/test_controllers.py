@@ -15,7 +15,7 @@ from fmpy.fmi2 import FMU2Slave
 
 from bristle.cli import main
 from bristle.component.clock import COMING
-from bristle.component.sensors import Channel, reading, setup
+from bristle.component.sensors import reading
 from bristle.control import inverse, linear, switching
 from bristle.control.controller import Controller, building_digest, read_controller
 from bristle.errors import BuildError, DesignError
@@ -335,34 +335,48 @@ def test_gain_bias_quantisation_and_delay_of_one_channel() -> None:
         assert rows[k][:3] == motion((k + 1) * H)[:3]
 
 
-def readings(signal: list[float], channel: Channel, place: int = 0, seed: int = 1) -> list[float]:
+def sensors(seed: int, **values: float) -> Any:
+    """Return sensors of which every channel has the same values."""
+    slave: Any = catalogue.instantiate("Sensors")
+    slave.set_integer([slave._index["seed"]], [seed])
+    slave.set_real([slave._index["sample_period"]], [H])
+    for key, value in values.items():
+        slave.set_real([slave._index[f"{name}.{key}"] for name in MEASURED], [value] * 4)
+    slave.configure()
+    return slave
+
+
+def readings(signal: list[float], place: int = 0, seed: int = 1, **values: float) -> list[float]:
     """Return what a channel in a place among four shows of a signal, sample by sample."""
-    c, state, _ = setup(0.0, H, seed, [channel] * 4)
-    return [reading(place, k, value, c, state) for k, value in enumerate(signal)]
+    slave = sensors(seed, **values)
+    return [
+        reading(place, k, value, slave.constants, slave.state) for k, value in enumerate(signal)
+    ]
 
 
 def test_a_delay_between_two_samples_is_exact_for_a_ramp() -> None:
-    found = readings([10.0 * k for k in range(20)], Channel(delay=2.5 * H))
+    found = readings([10.0 * k for k in range(20)], delay=2.5 * H)
     assert found[0] == 0.0
     assert found[4:] == pytest.approx([10.0 * (k - 2.5) for k in range(4, 20)])
 
 
 def test_cut_off_halves_the_power_at_its_corner() -> None:
-    found = readings([sin(2 * pi * 5.0 * k * H) for k in range(2000)], Channel(cut_off=5.0))
+    found = readings([sin(2 * pi * 5.0 * k * H) for k in range(2000)], cut_off=5.0)
     assert max(found[1000:]) == pytest.approx(sqrt(0.5), rel=2e-3)
 
 
 def test_noise_has_its_density_its_seed_and_no_memory() -> None:
     density, n = 0.01, 20000
-    channel = Channel(noise_density=density)
-    found = np.array(readings([0.0] * n, channel, 2, 7))
+    found = np.array(readings([0.0] * n, 2, 7, noise_density=density))
     deviation = density * sqrt(0.5 / H)
     assert found.std() == pytest.approx(deviation, rel=4.0 / sqrt(2 * n))
     assert abs(found.mean()) < 4.0 * deviation / sqrt(n)
     assert abs(np.mean(found[1:] * found[:-1])) < 4.0 * deviation**2 / sqrt(n)
-    c, state, _ = setup(0.0, H, 7, [channel] * 4)
-    assert reading(2, n - 1, 0.0, c, state) == found[-1]
-    other, seed = (readings([0.0] * 6, channel, *choice) for choice in ((3, 7), (2, 8)))
+    alone = sensors(7, noise_density=density)
+    assert reading(2, n - 1, 0.0, alone.constants, alone.state) == found[-1]
+    other, seed = (
+        readings([0.0] * 6, *choice, noise_density=density) for choice in ((3, 7), (2, 8))
+    )
     assert other[5] != found[5] != seed[5]
 
 

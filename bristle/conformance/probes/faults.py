@@ -1,7 +1,8 @@
-"""bristle's own rule for faults, on FMUs that follow it: Discard and the output `fault`.
+"""bristle's own rule for faults, on FMUs that follow it: a refusal and the output `fault`.
 
 A fault is logged in one line; outputs hold their last finite values; `fault` says which it is;
-every further step answers Discard, until reset or until an earlier state is set back.
+every further step is refused, until reset or until an earlier state is set back. The answer is
+Discard from FMUs that run in Python, which can give no other, and Error from native ones.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from ctypes import c_void_p
 
 from ...fmu.description import Variable
 from ..bench import GOOD, Bench, good, not_finite, status_name
-from ..native import DISCARD, Instance
+from ..native import DISCARD, ERROR, Instance
 from ..registry import Finding, UnexpectedError, failed, passed, probe
 
 INPUT, STEP, ORDER, PARAMETER = 1, 2, 3, 5
+_REFUSED = (DISCARD, ERROR)
 _RULE = (
-    "bristle's rule, since this is a bristle FMU (FMI leaves it open): one line of log, Discard, "
+    "bristle's rule, since this is a bristle FMU (FMI leaves it open): one line of log, a refusal, "
     "fault = {}, outputs finite, until reset or an earlier state"
 )
 
@@ -33,18 +35,18 @@ def _check(bench: Bench, instance: Instance, code: int, what: str) -> None:
 
 
 def _faulted(bench: Bench, act: Callable[[Instance], int], code: int, what: str) -> Instance:
-    """Return an instance after two steps, a fault and a step that must be discarded."""
+    """Return an instance after two steps, a fault and a step that must be refused."""
     instance = bench.instance(logging=True)
     bench.ready(instance)
     bench.run(instance, 0, 2)
     before = len(bench.library.messages)
     status = act(instance)
-    if status != DISCARD:
+    if status not in _REFUSED:
         raise UnexpectedError(f"{what}: answered {status_name(status)}")
     _check(bench, instance, code, what)
     bench.move(instance, 3)
     status = instance.step(bench.time(3), bench.plan.step)
-    if status != DISCARD:
+    if status not in _REFUSED:
         raise UnexpectedError(f"the step after {what}: answered {status_name(status)}")
     _check(bench, instance, code, f"the step after {what}")
     lines = len(bench.library.messages) - before
@@ -122,7 +124,7 @@ def fault_order(bench: Bench) -> Finding:
             good(instance.setup(plan.start, None), "SetupExperiment")
             good(instance.enter(), "EnterInitializationMode")
         status = instance.step(plan.start, plan.step)
-        if status != DISCARD:
+        if status not in _REFUSED:
             raise UnexpectedError(f"a step {when}: answered {status_name(status)}")
         _check(bench, instance, ORDER, f"a step {when}")
         _mended(bench, instance, f"a step {when}")
@@ -148,7 +150,7 @@ def fault_parameter(bench: Bench) -> Finding:
         if any(bench.read(instance, reals)):
             return failed(f"{what}: real outputs are not 0")
         status = instance.step(bench.time(0), bench.plan.step)
-        if status != DISCARD:
+        if status not in _REFUSED:
             return failed(f"the first step with {what}: answered {status_name(status)}")
         _mended(bench, instance, what)
     return passed(f"{len(parameters)} parameters")
@@ -168,7 +170,7 @@ def fault_earlier_state(bench: Bench) -> Finding:
     state = c_void_p()
     good(instance.save(state), "GetFMUstate")
     status = instance.step(bench.time(half), math.nan)
-    if status != DISCARD:
+    if status not in _REFUSED:
         return failed(f"a step of NaN: answered {status_name(status)}")
     good(instance.restore(state), "SetFMUstate")
     rows += bench.run(instance, half)

@@ -30,8 +30,16 @@ enum { NO_VALUE = -1, STEP_LENGTH = -2 };
 
 typedef struct {
     int64_t code;
+    int64_t first; /* code of a warning that comes before, 0: none */
     const Piece *pieces;
 } Meaning;
+
+/* A String that is read where another one is a certain word. */
+typedef struct {
+    int parameter;    /* below 0: none */
+    int chooser;      /* below 0: it is always read */
+    const char *word;
+} Choice;
 
 typedef struct {
     const char *name, *guid;
@@ -43,12 +51,11 @@ typedef struct {
     const Meaning *meanings;       /* code 0 ends them */
     const double *baked;           /* what the build fixes */
     int64_t baked_size;
+    int discretises;               /* what the step's length implies is computed once for it */
     int in_place;                  /* a step moves the state on where it lies */
-    int file, file_if, file_word;  /* String parameter with the file that is read, -1: none; where
-                                      the String `file_if` (-1: always) has the word `file_word` */
-    int steps, steps_word;         /* likewise a String of TIME:VALUE pairs */
-    const char *const *bundled;    /* names of files among the resources, NULL behind the last */
-    const char *header;            /* which such a file must have; NULL: any for a signal */
+    Choice file, pairs;            /* what a signal is read from */
+    const char *const *bundled;    /* files among the resources, NULL behind the last */
+    const char *header;            /* which such a file must have; NULL: `time [s]` and another */
 } Component;
 
 extern const Component component;
@@ -62,7 +69,7 @@ typedef struct {
 #define ROW_WORDS void *, void *, int64_t, int64_t, double *, int64_t, int64_t
 #define AS_ROW(row) 0, 0, (row).size, 8, (row).at, (row).size, 8
 
-enum { SIZES, SETUP, START, STEP, SHOW };
+enum { SIZES, SETUP, START, STEP, SHOW, DISCRETISE };
 
 /* The component's functions, compiled from Python, behind one entrance. Returns 0; what the
    function returns goes to `code`. `thrown` is not used: none of them raises. */

@@ -167,6 +167,11 @@ static int advance(Slave *slave, double time, double dt, Text *wrong) {
     int64_t code;
     take_inputs(slave);
     Row after = component.in_place ? slave->state : slave->new_state;
+    if (component.discretises && slave->discretised != dt) {
+        int done = slave_call(slave, DISCRETISE, time, dt, after, slave->work, &code);
+        if (!slave_answer(slave, done, code, dt, wrong)) return 0;
+        slave->discretised = dt;
+    }
     int called = slave_call(slave, STEP, time, dt, after, slave->work, &code);
     if (!called || code < 0) text_add(wrong, "ValueError: "); /* as Python calls it */
     if (!slave_answer(slave, called, code, dt, wrong)) return 0;

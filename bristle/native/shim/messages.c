@@ -51,9 +51,9 @@ void slave_warn(Slave *slave, const char *warning) {
     slave->say(slave, WARNED, text.at);
 }
 
-const Piece *slave_meaning(int64_t code) {
+static const Meaning *meaning_of(int64_t code) {
     for (const Meaning *one = component.meanings; one->code; one++)
-        if (one->code == code) return one->pieces;
+        if (one->code == code) return one;
     return 0;
 }
 
@@ -82,16 +82,34 @@ static void add_value(const Slave *slave, const Piece *piece, double dt, Text *t
         text_add(text, value != 0.0 ? "True" : "False");
 }
 
-void slave_explain(const Slave *slave, int64_t code, double dt, Text *text) {
-    const Piece *piece = slave_meaning(code);
-    if (!piece) {
-        text_add(text, "the component answered with the code ");
-        text_whole(text, (long long)code);
-        text_add(text, ".");
-        return;
-    }
-    for (; piece->before; piece++) {
+static void explain(const Slave *slave, const Meaning *meaning, double dt, Text *text) {
+    for (const Piece *piece = meaning->pieces; piece->before; piece++) {
         text_add(text, piece->before);
         if (piece->variable != NO_VALUE) add_value(slave, piece, dt, text);
     }
+}
+
+static void warn_of(Slave *slave, const Meaning *meaning, double dt) {
+    Text warning;
+    text_clear(&warning);
+    explain(slave, meaning, dt, &warning);
+    slave_warn(slave, warning.at);
+}
+
+int slave_answer(Slave *slave, int called, int64_t code, double dt, Text *wrong) {
+    if (called && code == 0) return 1;
+    const Meaning *meaning = called ? meaning_of(code) : 0;
+    if (!meaning) {
+        text_add(wrong, "the component answered with the code ");
+        text_whole(wrong, (long long)code);
+        text_add(wrong, ".");
+        return 0;
+    }
+    const Meaning *first = meaning->first ? meaning_of(meaning->first) : 0;
+    if (first) warn_of(slave, first, dt);
+    if (code > 0)
+        warn_of(slave, meaning, dt);
+    else
+        explain(slave, meaning, dt, wrong);
+    return code > 0;
 }

@@ -99,19 +99,6 @@ int slave_call(Slave *slave, int call, double time, double dt, Row new_state, Ro
                AS_ROW(slave->outputs), AS_ROW(work)) == 0;
 }
 
-int slave_answer(Slave *slave, int called, int64_t code, double dt, Text *wrong) {
-    if (called && code == 0) return 1;
-    if (!called || code < 0) {
-        slave_explain(slave, called ? code : 0, dt, wrong);
-        return 0;
-    }
-    Text warning;
-    text_clear(&warning);
-    slave_explain(slave, code, dt, &warning);
-    slave_warn(slave, warning.at);
-    return 1;
-}
-
 /* Ask how large store, state, outputs and work are. */
 static int ask_sizes(Slave *slave, int64_t sizes[4], Text *wrong) {
     const int64_t none[4] = {0, 0, 0, 0};
@@ -141,5 +128,6 @@ int slave_configure(Slave *slave, Text *wrong) {
     memcpy(slave->before.at, slave->values + component.inputs_at,
            (size_t)component.inputs * sizeof(double));
     slave->fresh = 0;
+    slave->discretised = 0.0;
     return 1;
 }

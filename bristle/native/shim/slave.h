@@ -34,6 +34,7 @@ typedef struct Slave {
     int mode, stale, unbuilt;
     int fresh; /* outputs are as the step has left them */
     double time;
+    double discretised; /* length of the step that `store` is prepared for, 0: none */
     uint64_t warned[MOST_WARNINGS]; /* digests of the warnings that were said */
     int warnings;
 
@@ -63,13 +64,13 @@ Status slave_set_text(Slave *slave, unsigned reference, const char *value);
 int slave_configure(Slave *slave, Text *wrong); /* 0: `wrong` says why it cannot be */
 int slave_call(Slave *slave, int call, double time, double dt, Row new_state, Row work,
                int64_t *code);
-int slave_answer(Slave *slave, int called, int64_t code, double dt, Text *wrong); /* likewise */
 
 /* messages.c: faults and warnings */
 Status slave_stop(Slave *slave, int fault, const char *why);
 void slave_warn(Slave *slave, const char *text);
-const Piece *slave_meaning(int64_t code);
-void slave_explain(const Slave *slave, int64_t code, double dt, Text *text);
+
+/* Warn of what a function's code says; 0: it is an error, which `wrong` says. */
+int slave_answer(Slave *slave, int called, int64_t code, double dt, Text *wrong);
 
 /* state.c: the whole state as bytes, the same on every platform */
 typedef struct {
@@ -81,7 +82,7 @@ Status slave_save(Slave *slave, State *state);
 Status slave_restore(Slave *slave, const State *state);
 Status slave_check(Slave *slave, const unsigned char *bytes, size_t size);
 
-/* samples.c: the files and texts that signals are read from */
+/* signal.c: the files and texts that signals are read from */
 int read_samples(Slave *slave, Text *wrong); /* 0: `wrong` says what is wrong with them */
 
 #endif

@@ -90,6 +90,7 @@ static void put_all(const Slave *slave, Bytes *to) {
         put_bytes(to, slave->texts[i], size);
     }
     if (slave->unbuilt) return;
+    put_number(to, slave->discretised);
     put_row(to, slave->store);
     put_row(to, slave->state);
     put_row(to, slave->before);
@@ -196,6 +197,7 @@ Status slave_restore(Slave *slave, const State *state) {
     } else if (unbuilt || changes) { /* of another instance, or from before a reset */
         if (slave_configure(slave, &wrong)) changes = 0;
     }
+    if (changes == 0) slave->discretised = take_number(&from);
     if (changes == 0 && !(take_row(slave->store, &from) && take_row(slave->state, &from) &&
                           take_row(slave->before, &from) && take_row(slave->outputs, &from))) {
         text_add(&wrong, "its size is another.");

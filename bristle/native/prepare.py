@@ -1,0 +1,162 @@
+"""What Python knows of a component that is to run without it: its tables, its functions.
+
+Slots of laws and effects follow from all that are registered. So a process that has loaded effects
+or laws of a user's own which a plan does not name leaves the work to a fresh one.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from ..errors import BristleError, BuildError
+from ..fmu import catalogue
+from ..fmu.component import ComponentSlave
+from ..fmu.controller import SampledSlave
+from ..fmu.own_controller import COMPILED_MAY_USE, OwnController
+from ..fmu.plan import PACKAGE, Plan
+from ..jit import digest
+from ..physics.user import own_effects, own_laws
+from .description import description
+from .entrance import entrance_of, llvm_text
+from .tables import tables
+
+GUID = "00000000-0000-0000-0000-000000000000"
+"""Stands for the guid until that is known."""
+
+COMPILER = {
+    "PYTHONHASHSEED": "0",  # numba numbers functions in the order in which it meets them
+    "NUMBA_CPU_NAME": "generic",
+    "NUMBA_CPU_FEATURES": "",
+    "NUMBA_LOOP_VECTORIZE": "0",
+    "NUMBA_SLP_VECTORIZE": "0",
+    "NUMBA_COLOR_SCHEME": "no_color",
+}
+"""Environment of the process that compiles: its text is the same on every machine."""
+
+
+class Prepared(NamedTuple):
+    """A component's model description and C tables, `GUID` in both; the digest of its functions."""
+
+    description: str
+    tables: str
+    functions: str
+
+
+def prepare(what: Plan) -> Prepared:
+    """Return what Python knows of a planned component.
+
+    Raises
+    ------
+    BuildError
+        If it is not made of flat functions, or its tables cannot be.
+    """
+    named = {path.resolve() for path in (*what.effects, *what.laws)}
+    loaded = {path.resolve() for path in (*own_effects().values(), *own_laws().values())}
+    if loaded <= named:
+        return _prepare_here(what)
+    return Prepared(*json.loads(_in_fresh_process(what, {"do": "prepare"})))
+
+
+def compile_functions(what: Plan, functions: str, target: Path) -> None:
+    """Write LLVM's text of a planned component's functions.
+
+    Parameters
+    ----------
+    what : Plan
+    functions : str
+        Their digest.
+    target : Path
+
+    Raises
+    ------
+    BuildError
+        If the compiler refuses a function.
+    """
+    _in_fresh_process(what, {"do": "compile", "functions": functions, "target": str(target)})
+
+
+def component_of(what: Plan) -> ComponentSlave:
+    """Return a planned component as a Python object.
+
+    Raises
+    ------
+    BuildError
+        If it is not made of flat functions.
+    """
+    from ..trust import load_file
+
+    own = [load_file(path).name for path in what.effects]
+    for path in what.laws:
+        load_file(path)
+    kind = catalogue.component_class(what.component)
+    files = {name: str(path) for name, path in what.files.items()}
+    baked = {**what.baked, "files": files, **({"own": own} if own else {})}
+    slave = kind(baked=baked, instance_name=what.name)
+    if not isinstance(slave, ComponentSlave):
+        raise BuildError(f"{what.name} is not made of flat functions: it runs in Python alone.")
+    return slave
+
+
+def _prepare_here(what: Plan) -> Prepared:
+    slave = component_of(what)
+    sampled = isinstance(slave, SampledSlave)
+    functions = digest(entrance_of(slave.flat_functions(), sampled))
+    return Prepared(description(slave, GUID), tables(slave, GUID), functions)
+
+
+def _in_fresh_process(what: Plan, given: Mapping[str, str]) -> str:
+    """Return what `serve` answers in a process of its own."""
+    order = {
+        **given,
+        "name": what.name,
+        "component": str(what.component),
+        "baked": dict(what.baked),
+        "files": {name: str(path) for name, path in what.files.items()},
+        "effects": [str(path) for path in what.effects],
+        "laws": [str(path) for path in what.laws],
+    }
+    path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
+    child = subprocess.run(
+        [sys.executable, "-c", "from bristle.native.prepare import serve; serve()"],
+        input=json.dumps(order), env={**os.environ, **COMPILER, "PYTHONPATH": path},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    if child.returncode != 0:
+        said = child.stderr.strip() or f"its process ended with {child.returncode}"
+        raise BuildError(f"{what.name}: {said[-1000:]}")
+    return child.stdout
+
+
+def _text(slave: ComponentSlave, sampled: bool, files: Sequence[Path]) -> str:
+    """Return LLVM's text; what a controller of a user's own may use is told where it is refused."""
+    try:
+        return llvm_text(slave.flat_functions(), sampled, files)
+    except BuildError as error:
+        told = f"{COMPILED_MAY_USE} " if isinstance(slave, OwnController) else ""
+        raise BuildError(f"{error} {told}Without --native it builds as it is.") from error
+
+
+def serve() -> None:
+    """Do what stands on the standard input; the other end of `_in_fresh_process`."""
+    order: dict[str, Any] = json.load(sys.stdin)
+    files = {name: Path(path) for name, path in order["files"].items()}
+    effects, laws = (tuple(Path(path) for path in order[key]) for key in ("effects", "laws"))
+    what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects, laws)
+    try:
+        if order["do"] == "prepare":
+            json.dump(_prepare_here(what), sys.stdout)
+            return
+        slave = component_of(what)
+        sampled = isinstance(slave, SampledSlave)
+        if digest(entrance_of(slave.flat_functions(), sampled)) != order["functions"]:
+            raise BuildError("its functions have changed meanwhile; build it again.")
+        text = _text(slave, sampled, (what.component, *effects, *laws))
+    except BristleError as error:
+        sys.exit(str(error))
+    Path(order["target"]).write_text(text, encoding="utf-8")
