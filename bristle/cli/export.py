@@ -20,7 +20,7 @@ HELP = "write a study's model as an FMU, or a scenario as a web page"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle export`."""
-    text = "the study; with --web a scenario file, or the name of a stock scenario"
+    text = "the study; with --web a scenario file, or the name of a scenario or component"
     parser.add_argument("what", metavar="FOLDER", help=text)
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="where to write; else export/ in the study"
@@ -66,14 +66,23 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _web(arguments: argparse.Namespace) -> int:
-    """Write a scenario as a web page; print the files."""
+    """Write a scenario as a web page, or a component as a module; print the files."""
+    from ..fmu.catalogue import component_names
     from ..scenario.scenario import parse_overrides
+    from ..web.component import export_component
     from ..web.export import export_web
 
     if arguments.out is not None:
         raise ScenarioError("--out is for a study; --web DIR says where the page goes.")
     sliders = dict(_slider(text) for text in arguments.slider)
-    files = export_web(arguments.what, arguments.web, sliders, parse_overrides(arguments.overrides))
+    if arguments.what in component_names():
+        if sliders or arguments.overrides:
+            raise ScenarioError("--slider and --set are for a scenario; a component has no page.")
+        files = export_component(arguments.what, arguments.web)
+    else:
+        files = export_web(
+            arguments.what, arguments.web, sliders, parse_overrides(arguments.overrides)
+        )
     if arguments.json:
         import json
 
@@ -81,7 +90,8 @@ def _web(arguments: argparse.Namespace) -> int:
         return 0
     for file in files:
         print(f"{file}  {file.stat().st_size / 1e3:.0f} kB")
-    print(f"Open {files[0]} in a browser.")
+    if files[0].suffix == ".html":
+        print(f"Open {files[0]} in a browser.")
     return 0
 
 

@@ -15,9 +15,11 @@ import pytest
 
 from bristle.cli import main
 from bristle.errors import BuildError, ScenarioError
+from bristle.fmu import catalogue
 from bristle.native import zig
 from bristle.scenario.scenario import load_scenario, stock_scenarios
 from bristle.simulate.coupled import simulate
+from bristle.web.component import export_component
 from bristle.web.export import chosen, described, export_web, page_of
 from bristle.web.numbers import Numbers, Slider
 
@@ -173,3 +175,80 @@ def test_a_moved_slider_gives_the_run_with_that_value(tmp_path: Path) -> None:
     assert wasm.stat().st_size <= 150e3
     with pytest.raises(subprocess.CalledProcessError):
         run_in_node(tmp_path, {"voltage.level": 9.0})
+
+
+def stepped_in_node(
+    folder: Path, rows: list[dict[str, float]], parameters: dict[str, Any], output: str
+) -> dict[str, Any]:
+    (folder / "steps.json").write_text(json.dumps(rows))
+    script = Path(__file__).with_name("steps.mjs")
+    order = ["node", str(script), str(folder), json.dumps(parameters), output]
+    said = subprocess.run(order, capture_output=True, text=True, check=True)
+    found: dict[str, Any] = json.loads(said.stdout)
+    return found
+
+
+def stepped_in_python(
+    name: str, rows: list[dict[str, float]], parameters: dict[str, Any], output: str
+) -> list[float]:
+    slave = catalogue.component_class(catalogue.source(name))(instance_name="one")
+    for key, value in parameters.items():
+        slave._set_any([slave._index[key]], [value], type(value))
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    slave.exit_initialization_mode()
+    time, found = 0.0, []
+    for row in rows:
+        inputs = {key: value for key, value in row.items() if key != "dt"}
+        slave.set_real([slave._index[key] for key in inputs], list(inputs.values()))
+        assert slave.do_step(time, row["dt"])
+        time += row["dt"]
+        found.append(slave.get_real([slave._index[output]])[0])
+    return found
+
+
+def motion(count: int) -> list[dict[str, float]]:
+    t = 1e-3 * np.arange(1, count + 1)
+    x, v = 0.01 * np.sin(9.0 * t), 0.09 * np.cos(9.0 * t)
+    volts = 4.0 + 4.0 * np.sign(np.sin(3.0 * t))
+    rows = zip(x.tolist(), v.tolist(), volts.tolist(), strict=True)
+    return [{"dt": 1e-3, "displacement": a, "velocity": b, "voltage": c} for a, b, c in rows]
+
+
+@pytest.mark.slow
+@needs_tools
+@pytest.mark.parametrize(
+    "parameters", [{}, {"stribeck.on": True, "coil_lag.on": True, "coil_lag.tau": 0.02}]
+)
+def test_a_component_steps_as_its_python_form(parameters: dict[str, Any], tmp_path: Path) -> None:
+    export_component("LuGreDamper", tmp_path)
+    rows = motion(2000)
+    found = stepped_in_node(tmp_path, rows, parameters, "force")
+    right = stepped_in_python("LuGreDamper", rows, parameters, "force")
+    assert found["error"] == ""
+    assert np.max(np.abs(np.subtract(found["values"], right))) <= AGREE * np.max(np.abs(right))
+
+
+@pytest.mark.slow
+@needs_tools
+@pytest.mark.parametrize(
+    ("row", "parameters", "said"),
+    [
+        ({"dt": 0.0}, {}, "fault 2"),
+        ({"dt": 1e-3, "nosuch": 1.0}, {}, "no variable is named nosuch"),
+        ({"dt": 1e-3}, {"sigma_a": -5.0}, "sigma_a = -5.0 lies outside"),
+    ],
+)
+def test_what_a_component_refuses_is_said(
+    row: dict[str, float], parameters: dict[str, Any], said: str, tmp_path: Path
+) -> None:
+    export_component("LuGreDamper", tmp_path)
+    assert said in stepped_in_node(tmp_path, [row], parameters, "force")["error"]
+
+
+def test_a_component_that_plays_a_file_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["export", "GroundMotion", "--web", str(tmp_path / "web")]) == BuildError.exit_code
+    assert "which a page cannot open" in capsys.readouterr().err
+    assert not (tmp_path / "web").exists()
