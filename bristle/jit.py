@@ -20,6 +20,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import event, types
+from numba.core.errors import NumbaError
 from numba.extending import intrinsic
 
 from .progress import tell
@@ -94,17 +95,37 @@ def compiled(
             numba.config.CACHE_DIR = before
 
 
-def closed(function: Callable[..., Any], inline: tuple[str, ...] = ()) -> Any:
-    """Return a function with all that it calls as numba takes it, for a library without Python.
+class RefusedError(Exception):
+    """A function that numba cannot compile; the text is numba's."""
 
-    Nothing is compiled yet, and nothing kept: `compile` with a signature does.
+
+def library_text(
+    function: Callable[..., Any], kinds: str, inline: tuple[str, ...] = ()
+) -> tuple[str, str]:
+    """Return LLVM's text of a function with all that it calls, and the function's name there.
 
     Parameters
     ----------
     function, inline
         As in `compiled`.
+    kinds : str
+        A letter for each argument: "i" a whole number of 64 bits, "f" a float, "r" a row of floats.
+        The function returns a whole number.
+
+    Raises
+    ------
+    RefusedError
+        If numba cannot compile it.
     """
-    return numba.njit(**_CALLEE)(_closed(function, {}, inline))
+    known = {"i": types.int64, "f": types.float64, "r": types.Array(types.float64, 1, "C")}
+    arguments = tuple(known[kind] for kind in kinds)
+    try:
+        dispatcher = numba.njit(**_CALLEE)(_closed(function, {}, inline))
+        dispatcher.compile(types.int64(*arguments))
+    except NumbaError as error:
+        raise RefusedError(str(error)) from error
+    found = dispatcher.overloads[arguments]
+    return found.library.get_llvm_str(), found.fndesc.llvm_func_name
 
 
 def kept(function: Callable[..., Any]) -> bool:

@@ -16,6 +16,7 @@ from typing import Any
 
 from ..component.clock import ORIGIN
 from ..errors import BuildError
+from ..jit import RefusedError, library_text
 
 NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
 """Functions that a component must have, see `bristle.component`."""
@@ -120,20 +121,12 @@ def llvm_text(functions: Any, sampled: bool = False, files: Sequence[Path] = ())
     BuildError
         If the compiler refuses a function, with file and line, or it needs what no C library has.
     """
-    from numba.core import types
-    from numba.core.errors import NumbaError
-
-    from ..jit import closed
-
-    row = types.Array(types.float64, 1, "C")
-    kinds = (types.int64, types.float64, types.float64, *[row] * len(ROWS))
+    kinds = "iff" + len(ROWS) * "r"
     try:
-        dispatcher = closed(entrance_of(functions, sampled), INLINE)
-        dispatcher.compile(types.int64(*kinds))
-    except NumbaError as error:
+        text, root = library_text(entrance_of(functions, sampled), kinds, INLINE)
+    except RefusedError as error:
         raise BuildError(_refusal(str(error), [path.resolve() for path in files])) from error
-    found = dispatcher.overloads[kinds]
-    return plain_text(found.library.get_llvm_str(), found.fndesc.llvm_func_name)
+    return plain_text(text, root)
 
 
 def _refusal(text: str, files: Sequence[Path]) -> str:
