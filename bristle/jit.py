@@ -20,6 +20,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core import event, types
+from numba.core.errors import NumbaError
 from numba.extending import intrinsic
 
 from .progress import tell
@@ -94,23 +95,14 @@ def compiled(
             numba.config.CACHE_DIR = before
 
 
-def closed(function: Callable[..., Any], inline: tuple[str, ...] = ()) -> Any:
-    """Return a function with all that it calls as numba takes it, for a library without Python.
-
-    Nothing is compiled yet, and nothing kept: `compile` with a signature does.
-
-    Parameters
-    ----------
-    function, inline
-        As in `compiled`.
-    """
-    return numba.njit(**_CALLEE)(_closed(function, {}, inline))
+class RefusedError(Exception):
+    """A function that numba cannot compile; the text is numba's."""
 
 
-def llvm_text(
+def library_text(
     function: Callable[..., Any], examples: Sequence[Any], inline: tuple[str, ...] = ()
 ) -> tuple[str, str]:
-    """Return LLVM's text of a function with all that it calls, and its name there.
+    """Return LLVM's text of a function with all that it calls, and the function's name there.
 
     Parameters
     ----------
@@ -118,10 +110,18 @@ def llvm_text(
         As in `compiled`.
     examples : sequence
         Arguments of the types that it is compiled for.
+
+    Raises
+    ------
+    RefusedError
+        If numba cannot compile it.
     """
-    dispatcher = closed(function, inline)
     kinds = tuple(numba.typeof(one) for one in examples)
-    dispatcher.compile(kinds)
+    try:
+        dispatcher = numba.njit(**_CALLEE)(_closed(function, {}, inline))
+        dispatcher.compile(kinds)
+    except NumbaError as error:
+        raise RefusedError(str(error)) from error
     found = dispatcher.overloads[kinds]
     return found.library.get_llvm_str(), found.fndesc.llvm_func_name
 

@@ -25,17 +25,11 @@ from ..errors import BuildError
 from ..resources import fmus_folder
 from ..trust import require
 from . import catalogue
-from .plan import PACKAGE, library_files
+from .plan import CAPABILITIES, PACKAGE, library_files
 from .plan import Plan as Plan
 from .plan import plan as plan
 from .slave import BAKED
 
-_OPTIONS = {
-    "needsExecutionTool": False,
-    "canHandleVariableCommunicationStepSize": True,
-    "canGetAndSetFMUstate": True,
-    "canSerializeFMUstate": True,
-}
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
 
 
@@ -154,7 +148,7 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
     before = list(sys.path)
     try:
         return Path(
-            FmuBuilder.build_FMU(script, dest=out, project_files={package, *extra}, **_OPTIONS)
+            FmuBuilder.build_FMU(script, dest=out, project_files={package, *extra}, **CAPABILITIES)
         )
     except OSError:
         raise

@@ -26,6 +26,13 @@ _BUNDLED = (
     "fmu/slave.py", "fmu/model_description.py", "fmu/binary.py", "fmu/component.py",
     "fmu/source.py", "fmu/damper.py", "fmu/controller.py", "fmu/own_controller.py",
 )  # fmt: skip
+CAPABILITIES = {
+    "needsExecutionTool": True,  # a Python that the host brings
+    "canHandleVariableCommunicationStepSize": True,
+    "canGetAndSetFMUstate": True,
+    "canSerializeFMUstate": True,
+}
+"""What an FMU that runs in Python says of itself, in pythonfmu's words."""
 _NAMESPACE = UUID("7c0b8c8e-3d0f-5d0a-9b55-62726973746c")
 
 
@@ -72,7 +79,8 @@ def library_files() -> tuple[tuple[str, Path], ...]:
 def _library_digest() -> str:
     import pythonfmu
 
-    content = hashlib.sha256(pythonfmu.__version__.encode())
+    made_by = f"{pythonfmu.__version__} {sorted(CAPABILITIES.items())}"
+    content = hashlib.sha256(made_by.encode())
     for name, path in library_files():
         content.update(name.encode())
         content.update(path.read_bytes())

@@ -47,16 +47,17 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
     places = {one: f"binaries/{one.folder}/{what.name}{one.suffix}" for one in platforms}
     if built_guid(target) == guid and _libraries_in(target) == set(places.values()):
         return target
-    text = functions_text(what, prepared.functions)
     members["modelDescription.xml"] = prepared.description.replace(GUID, guid).encode()
     table = prepared.tables.replace(GUID, guid)
-    for one, data in libraries(what.name, text, table, platforms).items():
-        members[places[one]] = data
     try:
+        text = functions_text(what, prepared.functions)
+        for one, data in libraries(what.name, text, table, platforms).items():
+            members[places[one]] = data
         folder.mkdir(parents=True, exist_ok=True)
         _pack(members, target)
     except OSError as error:
-        raise BuildError(f"{target}: cannot be written ({error.strerror or error}).") from error
+        why = error.strerror or error
+        raise BuildError(f"{error.filename or target}: cannot be written ({why}).") from error
     return target
 
 

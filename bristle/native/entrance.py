@@ -18,7 +18,7 @@ import numpy as np
 
 from ..component.clock import ORIGIN
 from ..errors import BuildError
-from ..jit import llvm_text as llvm_text_of
+from ..jit import RefusedError, library_text
 
 NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
 """Functions that a component must have, see `bristle.component`."""
@@ -123,12 +123,10 @@ def llvm_text(functions: Any, sampled: bool = False, files: Sequence[Path] = ())
     BuildError
         If the compiler refuses a function, with file and line, or it needs what no C library has.
     """
-    from numba.core.errors import NumbaError
-
     examples = (0, 0.0, 0.0, *[np.zeros(0)] * len(ROWS))
     try:
-        return plain_text(*llvm_text_of(entrance_of(functions, sampled), examples, INLINE))
-    except NumbaError as error:
+        return plain_text(*library_text(entrance_of(functions, sampled), examples, INLINE))
+    except RefusedError as error:
         raise BuildError(refusal(str(error), [path.resolve() for path in files])) from error
 
 

@@ -39,6 +39,9 @@ COMPILER = {
 }
 """Environment of the process that compiles: its text is the same on every machine."""
 
+COMPILER_FOR_PAGES = {**COMPILER, "NUMBA_OPT": "0"}
+"""The same for a page: once numba's LLVM has optimised a text, addresses of 64 bits are in it."""
+
 
 class Prepared(NamedTuple):
     """A component's model description and C tables, `GUID` in both; the digest of its functions."""
@@ -63,7 +66,9 @@ def prepare(what: Plan) -> Prepared:
     return Prepared(*json.loads(_in_fresh_process(what, {"do": "prepare"})))
 
 
-def compile_functions(what: Plan, functions: str, target: Path) -> None:
+def compile_functions(
+    what: Plan, functions: str, target: Path, compiler: Mapping[str, str] = COMPILER
+) -> None:
     """Write LLVM's text of a planned component's functions.
 
     Parameters
@@ -72,13 +77,16 @@ def compile_functions(what: Plan, functions: str, target: Path) -> None:
     functions : str
         Their digest.
     target : Path
+    compiler : mapping
+        Environment of the process.
 
     Raises
     ------
     BuildError
         If the compiler refuses a function.
     """
-    _in_fresh_process(what, {"do": "compile", "functions": functions, "target": str(target)})
+    order = {"do": "compile", "functions": functions, "target": str(target)}
+    _in_fresh_process(what, order, compiler)
 
 
 def component_of(what: Plan) -> ComponentSlave:
@@ -110,7 +118,9 @@ def _prepare_here(what: Plan) -> Prepared:
     return Prepared(description(slave, GUID), tables(slave, GUID), functions)
 
 
-def _in_fresh_process(what: Plan, given: Mapping[str, str]) -> str:
+def _in_fresh_process(
+    what: Plan, given: Mapping[str, str], compiler: Mapping[str, str] = COMPILER
+) -> str:
     """Return what `serve` answers in a process of its own."""
     order = {
         **given,
@@ -124,7 +134,7 @@ def _in_fresh_process(what: Plan, given: Mapping[str, str]) -> str:
     path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
     child = subprocess.run(
         [sys.executable, "-c", "from bristle.native.prepare import serve; serve()"],
-        input=json.dumps(order), env={**os.environ, **COMPILER, "PYTHONPATH": path},
+        input=json.dumps(order), env={**os.environ, **compiler, "PYTHONPATH": path},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     if child.returncode != 0:

@@ -19,10 +19,10 @@ import numpy as np
 
 from ..errors import BristleError, BuildError
 from ..fmu.plan import PACKAGE
-from ..jit import digest, llvm_text
+from ..jit import RefusedError, digest, library_text
 from ..native import zig
 from ..native.entrance import plain_text, refusal
-from ..native.prepare import COMPILER
+from ..native.prepare import COMPILER_FOR_PAGES
 from ..physics.user import own_effects, own_laws
 from ..progress import tell
 from ..simulate import records
@@ -52,7 +52,7 @@ def module() -> bytes:
         functions = digest(loop)
     sizes = [f"-D{name}_SIZE={make().itemsize}" for name, make in RECORDS.items()]
     content = hashlib.sha256(SOURCE.read_bytes())
-    for one in (functions, zig.tools(), *sizes):
+    for one in (functions, zig.tools(), *COMPILER_FOR_PAGES, *sizes):
         content.update(one.encode())
     kept = zig.folder() / f"{content.hexdigest()[:24]}.wasm"
     if not kept.is_file():
@@ -73,7 +73,7 @@ def _compile(target: Path) -> None:
     child = subprocess.run(
         [sys.executable, "-c", "from bristle.web.module import serve; serve()"],
         input=json.dumps({"own": own, "target": str(target)}), capture_output=True, text=True,
-        check=False, env={**os.environ, **COMPILER, "PYTHONPATH": path},
+        check=False, env={**os.environ, **COMPILER_FOR_PAGES, "PYTHONPATH": path},
     )  # fmt: skip
     if child.returncode != 0:
         raise BuildError(f"the time loop cannot be compiled: {child.stderr.strip()[-800:]}")
@@ -100,8 +100,6 @@ def serve() -> None:
 
 
 def _text() -> str:
-    from numba.core.errors import NumbaError
-
     row, whole = np.zeros(0), np.zeros(0, dtype=np.int64)
     sources, dampers, structures, sampled = (np.zeros(0, make()) for make in RECORDS.values())
     examples = (
@@ -111,6 +109,6 @@ def _text() -> str:
     own = [file.resolve() for files in _own().values() for file in files]
     with whole_loop() as (loop, inline):
         try:
-            return plain_text(*llvm_text(loop, examples, inline))
-        except NumbaError as error:
+            return plain_text(*library_text(loop, examples, inline))
+        except RefusedError as error:
             raise BuildError(refusal(str(error), own)) from error

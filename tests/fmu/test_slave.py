@@ -200,7 +200,7 @@ def test_capabilities_and_guid(component: str) -> None:
     assert able.canGetAndSetFMUstate
     assert able.canSerializeFMUstate
     assert able.canHandleVariableCommunicationStepSize
-    assert not able.needsExecutionTool
+    assert able.needsExecutionTool
     assert not able.canBeInstantiatedOnlyOncePerProcess
     assert description.guid == build.plan(component).guid()
     assert description.variableNamingConvention == "structured"

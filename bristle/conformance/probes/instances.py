@@ -181,7 +181,9 @@ def _beside(bench: Bench, other: Bench, *, companion_first: bool) -> Finding:
     standard="No clause. For FMUs that contain Python code: what they import beyond the standard "
     "library is missing elsewhere, although needsExecutionTool is not claimed.",
     unless=lambda plan: (
-        "needsExecutionTool is claimed" if plan.claims("needsExecutionTool") else None
+        "needsExecutionTool is claimed"
+        if plan.claims("needsExecutionTool") and not plan.ours
+        else None
     ),
     bare=True,
 )
