@@ -145,14 +145,14 @@ def check_run(name: str, parameters: dict[str, Any], late: str = "", **more: Any
     values = give(0)
     slave.exit_initialization_mode()
     arrays = Arrays(slave)
-    arrays.given[:] = slave.given()
+    arrays.given[:] = slave.inputs_set()
     assert (slave.fault, arrays.code) == (0, 0)
     arrays.start(values)
     count, time = len(slave._outputs), 0.0
     assert bits(arrays.outputs[:count]) == bits(slave.get_real(slave._outputs))
     for k in range(120):
         values, dt = give(k + 1), STEPS[k // 4 % len(STEPS)]
-        arrays.given[:] = slave.given()
+        arrays.given[:] = slave.inputs_set()
         shown = slave.get_real(slave._outputs)
         arrays.show(time, values)
         assert bits(arrays.outputs[:count]) == bits(shown), k

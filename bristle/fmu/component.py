@@ -110,7 +110,7 @@ class ComponentSlave(EffectSlave):
             return 0.0
         return float(words.index(value)) if value in words else -1.0
 
-    def given(self) -> list[float]:
+    def inputs_set(self) -> list[float]:
         """Return 1 for each input that the host has set, else 0."""
         return [1.0 if index in self._set else 0.0 for index in self._inputs]
 
@@ -124,7 +124,7 @@ class ComponentSlave(EffectSlave):
         counts = [0.0] * 4
         functions.sizes(values, baked, counts)
         self._store, state = ([0.0] * int(count) for count in counts[:2])
-        code = functions.setup(values, self.given(), baked, self._store, state)
+        code = functions.setup(values, self.inputs_set(), baked, self._store, state)
         if code:
             self.tell(code, self.time, 0.0)
         return self.made_constants(), state, int(counts[3])

@@ -39,7 +39,7 @@ class DamperSlave(ComponentSlave):
     def declare(self) -> None:
         drive = self.drive = drive_named(self.baked.get("drive", ""))
         said = f"the {drive.name} left 0 .. {{{drive.limit}:g}} {drive.unit}; the damper saturates."
-        self.texts = {damper.SATURATED: said}  # type: ignore[misc]
+        self.texts = {damper.SATURATED: said, **refusals(laws.SLOTS)}  # type: ignore[misc]
         self.description = text_for(self.description or "", drive)
         self.add_input("displacement", "m", "displacement of the rod", over_step=HELD)
         self.add_input("velocity", "m/s", "velocity of the rod", over_step=HELD)
@@ -86,8 +86,6 @@ class DamperSlave(ComponentSlave):
         return [*self.following]
 
     def bake(self) -> list[float]:
-        self.texts = {**self.texts, **refusals(laws.SLOTS)}  # type: ignore[misc]
-        self._acceleration = self._index["acceleration"]
         ports = {self.vars[index].name: k for k, index in enumerate(self._inputs)}
         tracks = [
             (parameter, ports[name])
@@ -97,6 +95,7 @@ class DamperSlave(ComponentSlave):
         return damper.bake(self.law, self.known_names(), tracks, laws.SLOTS)
 
     def setup(self) -> tuple[Any, list[float], int]:
+        self._acceleration = self._index["acceleration"]
         on = tuple(f"{name}." for name in self.effects_on())
         tracked = (one for parameters in self.following.values() for one in parameters)
         self._follows = any(one.startswith(on) for one in tracked)
@@ -112,7 +111,7 @@ class DamperSlave(ComponentSlave):
 
     def _bind(self) -> None:
         """Take the acceleration for measured from the moment on at which a host sets it."""
-        damper.bind(self.given(), self._store)
+        damper.bind(self.inputs_set(), self._store)
         self.constants = damper.constants(self._store)
 
     def _update(self) -> None:

@@ -271,7 +271,7 @@ def two_builds(paths: list[str], values: list[dict[str, Any]], port: str) -> lis
 def test_an_edited_component_lives_beside_the_other(write: Any, tmp_path: Path) -> None:
     first = plan("ConstantVoltage")
     source = first.component.read_text(encoding="utf-8")
-    edited = write(source.replace("[self.level]", "[2.0 * self.level]"), "constant_voltage.py")
+    edited = write(source.replace('"level", 4.0', '"level", 8.0'), "constant_voltage.py")
     assert edited.read_text(encoding="utf-8") != source
     second = build(Plan("ConstantVoltage", edited, {"name": "ConstantVoltage"}), tmp_path / "b")
     assert two_builds([str(built("ConstantVoltage")), str(second)], [{}, {}], "voltage") == [4, 8]
