@@ -117,6 +117,12 @@ def libraries(
 ) -> dict[Platform, bytes]:
     """Return the libraries of a component for several platforms, compiled side by side.
 
+    Parameters
+    ----------
+    name, text, table
+        As in `library`.
+    platforms : sequence of Platform
+
     Raises
     ------
     BuildError

@@ -101,7 +101,7 @@ def component_of(what: Plan) -> ComponentSlave:
 
     own = [load_file(path).name for path in what.effects]
     for path in what.laws:
-        load_file(path)
+        load_file(path, "law")
     kind = catalogue.component_class(what.component)
     files = {name: str(path) for name, path in what.files.items()}
     baked = {**what.baked, "files": files, **({"own": own} if own else {})}

@@ -1,0 +1,57 @@
+"""Scenarios give the same rows with native FMUs as with those in Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from both_forms import needs_zig
+
+from bristle.cli import main
+from bristle.native.build import ensure
+from bristle.scenario.scenario import stock_scenarios
+from bristle.simulate.output import Output
+from bristle.simulate.run import execute, run
+
+pytestmark = needs_zig
+
+LONGEST = 4.0
+"""Simulated time [s] that each scenario is run for at most."""
+
+
+def difference(one: pd.DataFrame, other: pd.DataFrame) -> float:
+    """Return the largest difference of a column, as a share of its peak."""
+    assert list(one.columns) == list(other.columns)
+    peaks = one.abs().max().replace(0.0, 1.0)
+    return float(((one - other).abs().max() / peaks).max())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", sorted(stock_scenarios()), ids=lambda path: path.stem)
+def test_every_stock_scenario_gives_the_same_rows(scenario: Path) -> None:
+    stop = {"run.stop": LONGEST} if "el_centro" in scenario.stem else {}
+    native = execute(scenario, stop, "fmu", Output(None), False, ensure=ensure)
+    assert difference(run(scenario, stop), native) <= 1e-12
+    assert np.isfinite(native.to_numpy()).all()
+
+
+def test_the_command_steps_native_fmus(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two.toml").write_text(
+        'schema = 1\ntitle = "two sources"\n[run]\nstop = 0.1\nstep = 0.01\n'
+        '[components.ground]\nfmu = "GroundMotion"\nparameters = { peak = 2.0 }\n'
+        '[components.level]\nfmu = "ConstantVoltage"\nparameters = { level = 3.0 }\n'
+    )
+    assert main(["run", "two.toml", "--fmus", "native", "--no-figure", "--out", "native"]) == 0
+    assert main(["run", "two.toml", "--no-figure", "--out", "python"]) == 0
+    texts = [Path(name, "results.csv").read_text().splitlines() for name in ("native", "python")]
+    rows = [[line for line in text if not line.startswith("#")] for text in texts]
+    assert rows[0] == rows[1]
+    assert texts[0] != texts[1]  # they say which FMUs made them
+    capsys.readouterr()
+    assert main(["run", "two.toml", "--fmus", "native", "--engine", "compiled"]) == 2
+    assert "steps no FMUs" in capsys.readouterr().err
