@@ -208,7 +208,8 @@ def by_c_host(program: Path, path: Path) -> list[float]:
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV"))}
     kept["PATH"] = f"{sys.base_prefix}/bin:{kept.get('PATH', '')}"  # its standard library is there
     with tempfile.TemporaryDirectory(prefix="bristle-host-") as folder:
-        command: list[object] = [program, libpython(), about.guid]
+        interpreted = about.capabilities.get("needsExecutionTool") == "true"
+        command: list[object] = [program, libpython() if interpreted else "-", about.guid]
         for copy in ("one", "two"):
             unpacked = extract(path, Path(folder, copy))
             command += [unpacked / library_member(about.identifier)]

@@ -1,6 +1,7 @@
 """Every FMU of the project in other tools: which run it, and whether their rows are the same.
 
     python -m benchmarks compatibility                          # prints what was seen
+    python -m benchmarks compatibility --native                 # FMUs that need no Python
     python -m benchmarks compatibility --docs                   # and writes docs/compatibility.md
     python -m benchmarks compatibility --cross-check FOLDER     # files for the FMI cross-check
 
@@ -33,7 +34,8 @@ from . import _cross_check, _hosts
 from ._rows import Row
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "compatibility.md"
-BEGIN, END = "<!-- compatibility: begin -->", "<!-- compatibility: end -->"
+BLOCKS = {False: "compatibility", True: "native"}
+"""Marks of the page around the tables of FMUs in Python, and of native ones."""
 STEPS, STEP = 200, 0.002
 NEAR = 1e-9
 """Largest difference of equal rows, as a share of the largest value of an output."""
@@ -90,9 +92,15 @@ def parameters(component: str) -> dict[str, Any]:
     return {**MOVING.get(component, {}), **{f"{name}.on": True for name in on}}
 
 
-def built(component: str, folder: Path) -> Path:
+def built(component: str, folder: Path, native: bool = False) -> Path:
     """Return a component's FMU with these parameters as its start values."""
-    return build.build(build.plan(component, starts=parameters(component)), folder)
+    what = build.plan(component, starts=parameters(component))
+    if native:
+        from bristle.native.build import build as build_native
+        from bristle.native.platforms import here
+
+        return build_native(what, folder, [here()])
+    return build.build(what, folder)
 
 
 def held(about: Description) -> dict[str, float]:
@@ -181,12 +189,12 @@ def version(package: str) -> str | None:
         return None
 
 
-def try_all(names: Sequence[str], folder: Path) -> list[Result]:
-    """Step the FMUs in every tool that is installed."""
+def try_all(names: Sequence[str], folder: Path, native: bool = False) -> list[Result]:
+    """Step the FMUs, in Python or native, in every tool that is installed."""
     program = _hosts.c_host(folder)
     results = []
     for name in names:
-        path = built(name, folder)
+        path = built(name, folder, native)
         for tool in _hosts.HOSTS:
             if version(PACKAGES[tool]):
                 results.append(try_host(tool, name, path))
@@ -195,14 +203,14 @@ def try_all(names: Sequence[str], folder: Path) -> list[Result]:
     return results
 
 
-def tables(results: Sequence[Result], today: date) -> str:
+def tables(results: Sequence[Result], today: date, native: bool = False) -> str:
     """Return the page's two tables: the tools, and every FMU in every tool."""
     system = f"{platform.system()} {platform.machine()}"
     lines = ["| tool | version | platform | steps | result | date |", "|---|---|---|---|---|---|"]
     tools = dict.fromkeys(result.tool for result in results)
     for tool in (*PACKAGES, C_HOST):
         own = [result for result in results if result.tool == tool]
-        python = f"libpython {platform.python_version()}"
+        python = "without Python" if native else f"libpython {platform.python_version()}"
         number = python if tool == C_HOST else version(PACKAGES[tool])
         if own:
             said = f"{sum(one.good for one in own)} of {len(own)} FMUs give equal rows"
@@ -246,6 +254,7 @@ def main(given: list[str]) -> int:
     """Try all components in all tools; write the page or the cross-check files where asked."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks compatibility", description=__doc__)
     parser.add_argument("--docs", action="store_true", help=f"write the tables of {PAGE.name}")
+    parser.add_argument("--native", action="store_true", help="FMUs that need no Python")
     parser.add_argument("--only", nargs="+", metavar="FMU", default=catalogue.component_names())
     parser.add_argument(
         "--cross-check", type=Path, metavar="FOLDER",
@@ -257,13 +266,14 @@ def main(given: list[str]) -> int:
             print(cross_check(name, chosen.cross_check))
         return 0
     with tempfile.TemporaryDirectory(prefix="bristle-hosts-") as folder:
-        results = try_all(chosen.only, Path(folder))
+        results = try_all(chosen.only, Path(folder), chosen.native)
     for row in rows(results):
         print(f"{row.name}: {row.measured}" + (f" ({row.note})" if row.note else ""))
     if chosen.docs:
         text = PAGE.read_text(encoding="utf-8")
-        before, after = text.split(BEGIN)[0], text.split(END)[1]
-        made = f"{BEGIN}\n\n{tables(results, date.today())}\n\n{END}"
+        begin, end = (f"<!-- {BLOCKS[chosen.native]}: {mark} -->" for mark in ("begin", "end"))
+        before, after = text.split(begin)[0], text.split(end)[1]
+        made = f"{begin}\n\n{tables(results, date.today(), chosen.native)}\n\n{end}"
         PAGE.write_text(before + made + after, encoding="utf-8")
     return int(not all(result.good for result in results))
 

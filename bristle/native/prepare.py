@@ -6,6 +6,7 @@ or laws of a user's own which a plan does not name leaves the work to a fresh on
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import subprocess
@@ -22,6 +23,7 @@ from ..fmu.own_controller import COMPILED_MAY_USE, OwnController
 from ..fmu.plan import PACKAGE, Plan
 from ..jit import digest
 from ..physics.user import own_effects, own_laws
+from . import entrance
 from .description import description
 from .entrance import entrance_of, llvm_text
 from .tables import tables
@@ -33,8 +35,9 @@ COMPILER = {
     "PYTHONHASHSEED": "0",  # numba numbers functions in the order in which it meets them
     "NUMBA_CPU_NAME": "generic",
     "NUMBA_CPU_FEATURES": "",
-    "NUMBA_LOOP_VECTORIZE": "0",
-    "NUMBA_SLP_VECTORIZE": "0",
+    # What is optimised for this machine has its sizes of pointers in it: WebAssembly would compute
+    # nonsense. zig optimises for each platform.
+    "NUMBA_OPT": "0",
     "NUMBA_COLOR_SCHEME": "no_color",
 }
 """Environment of the process that compiles: its text is the same on every machine."""
@@ -113,9 +116,14 @@ def component_of(what: Plan) -> ComponentSlave:
 
 def _prepare_here(what: Plan) -> Prepared:
     slave = component_of(what)
-    sampled = isinstance(slave, SampledSlave)
-    functions = digest(entrance_of(slave.flat_functions(), sampled))
-    return Prepared(description(slave, GUID), tables(slave, GUID), functions)
+    return Prepared(description(slave, GUID), tables(slave, GUID), _digest_of(slave))
+
+
+def _digest_of(slave: ComponentSlave) -> str:
+    """Return the digest of a component's functions and of how they become text."""
+    made = digest(entrance_of(slave.flat_functions(), isinstance(slave, SampledSlave)))
+    how = Path(entrance.__file__).read_bytes() + repr(_COMPILER).encode()
+    return hashlib.sha256(made.encode() + how).hexdigest()[:16]
 
 
 def _in_fresh_process(
@@ -143,10 +151,10 @@ def _in_fresh_process(
     return child.stdout
 
 
-def _text(slave: ComponentSlave, sampled: bool, files: Sequence[Path]) -> str:
+def _text(slave: ComponentSlave, files: Sequence[Path]) -> str:
     """Return LLVM's text; what a controller of a user's own may use is told where it is refused."""
     try:
-        return llvm_text(slave.flat_functions(), sampled, files)
+        return llvm_text(slave.flat_functions(), isinstance(slave, SampledSlave), files)
     except BuildError as error:
         told = f"{COMPILED_MAY_USE} " if isinstance(slave, OwnController) else ""
         raise BuildError(f"{error} {told}Without --native it builds as it is.") from error
@@ -163,10 +171,9 @@ def serve() -> None:
             json.dump(_prepare_here(what), sys.stdout)
             return
         slave = component_of(what)
-        sampled = isinstance(slave, SampledSlave)
-        if digest(entrance_of(slave.flat_functions(), sampled)) != order["functions"]:
+        if _digest_of(slave) != order["functions"]:
             raise BuildError("its functions have changed meanwhile; build it again.")
-        text = _text(slave, sampled, (what.component, *effects, *laws))
+        text = _text(slave, (what.component, *effects, *laws))
     except BristleError as error:
         sys.exit(str(error))
     Path(order["target"]).write_text(text, encoding="utf-8")

@@ -39,6 +39,15 @@ def built(component: str) -> Path:
     return build.build(build.plan(component), folder())
 
 
+@cache
+def built_native(component: str) -> Path:
+    """Return a built-in component's FMU that needs no Python, for this machine."""
+    from bristle.native.build import build as build_native
+    from bristle.native.platforms import here
+
+    return build_native(build.plan(component), folder() / "native", [here()])
+
+
 def lively(component: str) -> dict[str, Any]:
     """Return parameters with every effect of the component on that the ones before it allow."""
     effects = effects_of(*SITES[component]) if component in SITES else ()

@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import importlib.util
 import sys
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from built import built
+from built import built, built_native
 from fresh import fresh
 
 H, STEPS = 0.002, 1500  # 3 s: the strongest part of El Centro begins within them
@@ -44,9 +45,28 @@ WATCHED = (
 )
 
 
-def job() -> dict[str, Any]:
+each_form = pytest.mark.parametrize(
+    "form",
+    [
+        built,
+        pytest.param(
+            built_native,
+            marks=[
+                pytest.mark.slow,
+                pytest.mark.skipif(
+                    importlib.util.find_spec("ziglang") is None,
+                    reason="ziglang compiles native FMUs, not there",
+                ),
+            ],
+        ),
+    ],
+)
+"""What gives the FMUs: those that run in Python, or native ones. Both have the same rows."""
+
+
+def job(form: Callable[[str], Path] = built) -> dict[str, Any]:
     return {
-        "paths": {name: str(built(component)) for name, component in FMUS.items()},
+        "paths": {name: str(form(component)) for name, component in FMUS.items()},
         "parameters": PARAMETERS,
         "connections": CONNECTIONS,
         "watched": WATCHED,
@@ -121,9 +141,10 @@ def by_libcosim(job: dict[str, Any]) -> list[list[float]]:
     return rows
 
 
-def test_libcosim() -> None:
+@each_form
+def test_libcosim(form: Callable[[str], Path]) -> None:
     need("libcosimpy")
-    found = np.array(by_libcosim(job()))
+    found = np.array(by_libcosim(job(form)))
     expected = reference(True)[1:]  # it has no row at t = 0
     scale = np.abs(expected).max(axis=0)
     assert (np.abs(found - expected).max(axis=0) <= 1e-12 * scale).all()
@@ -162,12 +183,13 @@ def by_ecos(job: dict[str, Any], result: str) -> None:
             simulation.terminate()
 
 
-def test_ecos(tmp_path: Path) -> None:
+@each_form
+def test_ecos(form: Callable[[str], Path], tmp_path: Path) -> None:
     need("ecospy")
     if sys.platform != "linux":
         pytest.skip("ecospy's library is loaded as on Linux")
     result = tmp_path / "result.csv"
-    by_ecos(job(), str(result))
+    by_ecos(job(form), str(result))
     with result.open(encoding="utf-8", newline="") as file:
         rows = [[cell.strip() for cell in row] for row in csv.reader(file)]
     columns = {name.split("[")[0].replace("::", "."): i for i, name in enumerate(rows[0])}
