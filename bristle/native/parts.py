@@ -13,7 +13,7 @@ from ..fmu.plan import Plan
 from ..progress import tell
 from . import zig
 from .platforms import Platform
-from .prepare import COMPILER, COMPILER_FOR_PAGES, compile_functions
+from .prepare import compile_functions
 
 SHIM = Path(__file__).resolve().parent / "shim"
 """Folder with the C that all native FMUs share."""
@@ -27,7 +27,7 @@ def shim_digest() -> str:
     return content.hexdigest()
 
 
-def functions_text(what: Plan, functions: str, *, for_pages: bool = False) -> Path:
+def functions_text(what: Plan, functions: str) -> Path:
     """Return the file with LLVM's text of a component's functions, compiled if need be.
 
     Parameters
@@ -35,8 +35,6 @@ def functions_text(what: Plan, functions: str, *, for_pages: bool = False) -> Pa
     what : Plan
     functions : str
         Their digest.
-    for_pages : bool
-        Whether pages of the web run them, whose addresses have 32 bits.
 
     Raises
     ------
@@ -45,15 +43,14 @@ def functions_text(what: Plan, functions: str, *, for_pages: bool = False) -> Pa
     """
     from filelock import FileLock
 
-    kept = zig.folder() / f"{functions}{'.web' if for_pages else ''}.ll"
-    compiler = COMPILER_FOR_PAGES if for_pages else COMPILER
+    kept = zig.folder() / f"{functions}.ll"
     if kept.is_file():
         return kept
     with FileLock(kept.with_suffix(".lock")):  # two who need it do not both compile it
 
         def compile_text(path: Path) -> None:
             tell(f"compiling the functions of {what.name}, once")
-            compile_functions(what, functions, path, compiler)
+            compile_functions(what, functions, path)
 
         return _kept(kept, compile_text)
 

@@ -42,9 +42,6 @@ COMPILER = {
 }
 """Environment of the process that compiles: its text is the same on every machine."""
 
-COMPILER_FOR_PAGES = {**COMPILER, "NUMBA_OPT": "0"}
-"""The same for a page: once numba's LLVM has optimised a text, addresses of 64 bits are in it."""
-
 
 class Prepared(NamedTuple):
     """A component's model description and C tables, `GUID` in both; the digest of its functions."""
@@ -69,9 +66,7 @@ def prepare(what: Plan) -> Prepared:
     return Prepared(*json.loads(_in_fresh_process(what, {"do": "prepare"})))
 
 
-def compile_functions(
-    what: Plan, functions: str, target: Path, compiler: Mapping[str, str] = COMPILER
-) -> None:
+def compile_functions(what: Plan, functions: str, target: Path) -> None:
     """Write LLVM's text of a planned component's functions.
 
     Parameters
@@ -80,8 +75,6 @@ def compile_functions(
     functions : str
         Their digest.
     target : Path
-    compiler : mapping
-        Environment of the process.
 
     Raises
     ------
@@ -89,7 +82,7 @@ def compile_functions(
         If the compiler refuses a function.
     """
     order = {"do": "compile", "functions": functions, "target": str(target)}
-    _in_fresh_process(what, order, compiler)
+    _in_fresh_process(what, order)
 
 
 def component_of(what: Plan) -> ComponentSlave:
@@ -126,9 +119,7 @@ def _digest_of(slave: ComponentSlave) -> str:
     return hashlib.sha256(made.encode() + how).hexdigest()[:16]
 
 
-def _in_fresh_process(
-    what: Plan, given: Mapping[str, str], compiler: Mapping[str, str] = COMPILER
-) -> str:
+def _in_fresh_process(what: Plan, given: Mapping[str, str]) -> str:
     """Return what `serve` answers in a process of its own."""
     order = {
         **given,
@@ -142,7 +133,7 @@ def _in_fresh_process(
     path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
     child = subprocess.run(
         [sys.executable, "-c", "from bristle.native.prepare import serve; serve()"],
-        input=json.dumps(order), env={**os.environ, **compiler, "PYTHONPATH": path},
+        input=json.dumps(order), env={**os.environ, **COMPILER, "PYTHONPATH": path},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     if child.returncode != 0:

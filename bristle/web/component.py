@@ -61,7 +61,7 @@ def export_component(name: str, folder: Path) -> list[Path]:
     prepared = prepare(what)
     content = "".join([*prepared, shim_digest(), _SOURCE.read_text(encoding="utf-8")])
     guid = str(uuid5(_NAMESPACE, content))
-    wasm = _module(prepared, guid, functions_text(what, prepared.functions, for_pages=True))
+    wasm = _module(prepared, guid, functions_text(what, prepared.functions))
     text = json.dumps(_described(what.name, guid, name), indent=1) + "\n"
     try:
         folder.mkdir(parents=True, exist_ok=True)

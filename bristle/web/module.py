@@ -22,7 +22,7 @@ from ..fmu.plan import PACKAGE
 from ..jit import RefusedError, digest, library_text
 from ..native import zig
 from ..native.entrance import plain_text, refusal
-from ..native.prepare import COMPILER_FOR_PAGES
+from ..native.prepare import COMPILER
 from ..physics.user import own_effects, own_laws
 from ..progress import tell
 from ..simulate import records
@@ -52,7 +52,7 @@ def module() -> bytes:
         functions = digest(loop)
     sizes = [f"-D{name}_SIZE={make().itemsize}" for name, make in RECORDS.items()]
     content = hashlib.sha256(SOURCE.read_bytes())
-    for one in (functions, zig.tools(), *COMPILER_FOR_PAGES, *sizes):
+    for one in (functions, zig.tools(), *sizes):
         content.update(one.encode())
     kept = zig.folder() / f"{content.hexdigest()[:24]}.wasm"
     if not kept.is_file():
@@ -73,7 +73,7 @@ def _compile(target: Path) -> None:
     child = subprocess.run(
         [sys.executable, "-c", "from bristle.web.module import serve; serve()"],
         input=json.dumps({"own": own, "target": str(target)}), capture_output=True, text=True,
-        check=False, env={**os.environ, **COMPILER_FOR_PAGES, "PYTHONPATH": path},
+        check=False, env={**os.environ, **COMPILER, "PYTHONPATH": path},
     )  # fmt: skip
     if child.returncode != 0:
         raise BuildError(f"the time loop cannot be compiled: {child.stderr.strip()[-800:]}")
