@@ -115,7 +115,7 @@ def _prepare_here(what: Plan) -> Prepared:
 def _digest_of(slave: ComponentSlave) -> str:
     """Return the digest of a component's functions and of how they become text."""
     made = digest(entrance_of(slave.flat_functions(), isinstance(slave, SampledSlave)))
-    how = Path(entrance.__file__).read_bytes() + repr(_COMPILER).encode()
+    how = Path(entrance.__file__).read_bytes() + repr(COMPILER).encode()
     return hashlib.sha256(made.encode() + how).hexdigest()[:16]
 
 
