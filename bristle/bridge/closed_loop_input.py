@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..data.motion import read_ground_motion
 from ..errors import StudyError
 from ..findings import command
-from ..physics.building import read_building, with_one_damper
+from ..physics.building import read_building, with_damper
 from ..study.inputs import measurements
 from .closed_loop_runs import Trial, begins_in_motion, trial_of
 from .in_building import House, Shaking
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 def house_of(file: Path) -> House:
     """Return the building of a file; PhysicsError for what is wrong with it."""
-    return House(with_one_damper(read_building(file)), file)
+    return House(with_damper(read_building(file)), file)
 
 
 def trials_in(

@@ -22,7 +22,7 @@ from ..identify.fit import Problem, Run
 from ..identify.instruments import true_motion
 from ..identify.prepare import prepare
 from ..identify.run_labels import following, values_of_labels
-from ..physics.building import paper_building, read_building, with_one_damper
+from ..physics.building import paper_building, read_building, with_damper
 from ..physics.drive import drive_named, state_for
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
@@ -249,7 +249,7 @@ def _structure(
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of the study's building with the damper, under a run's ground motion."""
     file = study.folder / model.building if model.building else None
-    building = paper_building() if file is None else with_one_damper(read_building(file))
+    building = paper_building() if file is None else with_damper(read_building(file))
     house = House(building, file)
     own = loads(model, house.building)
     notes += own.notes

@@ -93,6 +93,11 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         help="the structure's data file, with --rig structure",
     )
     parser.add_argument(
+        "--device",
+        metavar="NAME",
+        help="of a building with several devices the one that is identified",
+    )
+    parser.add_argument(
         "--channel",
         action="append",
         default=[],
@@ -163,6 +168,7 @@ def _new(arguments: argparse.Namespace) -> int:
         title=arguments.title,
         law=law,
         runs=choices,
+        device=arguments.device,
     )
     if arguments.json:
         _print_json(created)

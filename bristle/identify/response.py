@@ -13,18 +13,21 @@ jump together; their noise is white and known.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from ..data.channels import device_channel, no_device
 from ..data.extra import Extra
 from ..data.labels import Labels
 from ..data.measurement import Measurement
 from ..errors import RecordError
-from ..physics.building import Building, frequencies, with_one_damper
+from ..physics.building import Building, frequencies, with_damper
+from ..physics.device import GROUND, Device
+from .device_motion import DeviceMotion, measured_across
 from .drive import smooth_steps
 from .level import corrected, level_draws, smoothed_level
 from .prepare import SHORTEST
@@ -36,18 +39,32 @@ SLOW = 0.3
 from equilibrium: storeys hardly deflect there, so that it needs their stiffness only roughly."""
 
 
+class Load(NamedTuple):
+    """A device beside the one that is identified: its `force` (n,) [N] as measured, its `noise`."""
+
+    device: Device
+    force: Array
+    noise: float
+
+
+FIRST_LEVEL = Device("", GROUND, 0)
+"""Where the damper of a building without devices of its own sits."""
+
+
 @dataclass(frozen=True)
 class Response:
     """A run of a building, its motion smoothed.
 
     `x`, `v`, `a` (levels, n): displacement, velocity [m, m/s] relative to the table, smoothed, and
     absolute acceleration [m/s2] as measured (or, for a level without an accelerometer, smoothed:
-    `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper,
-    None where it was not measured; `V` (n,) [V]. `noise_a` (levels,), `noise_force`, `noise_ground`
-    standard deviations; `std` (levels, 3) what the smoother leaves uncertain of x, v and relative
-    acceleration; `draws` (levels, d, n, 3) draws of that error; `V_left` the noise left on V;
-    `drive` the channel that V holds, in its own unit, "" where none was measured; `labels` what is
-    known of the whole run; `extra` its channels besides those that bristle knows.
+    `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper at
+    its place `device`, None where it was not measured; `others` what other devices carry; `across`
+    the motion of a damper between two levels, where it is smoothed by itself; `V` (n,) [V].
+    `noise_a` (levels,), `noise_force`, `noise_ground` standard deviations; `std` (levels, 3) what
+    the smoother leaves uncertain of x, v and relative acceleration; `draws` (levels, d, n, 3) draws
+    of that error; `V_left` the noise left on V; `drive` the channel that V holds, in its own unit,
+    "" where none was measured; `labels` what is known of the whole run; `extra` its channels
+    besides those that bristle knows.
     """
 
     name: str
@@ -68,6 +85,21 @@ class Response:
     drive: str = ""
     labels: Labels = field(default_factory=dict)
     extra: Mapping[str, Extra] = field(default_factory=dict)
+    device: Device = FIRST_LEVEL
+    others: tuple[Load, ...] = ()
+    across: DeviceMotion | None = None
+
+    @property
+    def damped(self) -> bool:
+        """Whether there is a damper: one with a place, or one whose force or command is known."""
+        return bool(self.device.name) or self.driven or self.force is not None
+
+    @property
+    def loads(self) -> list[Load]:
+        """All devices whose force is known."""
+        if self.force is None:
+            return list(self.others)
+        return [Load(self.device, self.force, self.noise_force), *self.others]
 
     @property
     def driven(self) -> bool:
@@ -79,9 +111,14 @@ def check_channels(measurement: Measurement, building: Building) -> None:
     """Raise a RecordError that names every channel that is missing.
 
     A building's response needs the ground acceleration and, of each level, the displacement or
-    velocity: what an accelerometer shows drifts away when it is integrated twice.
+    velocity: what an accelerometer shows drifts away when it is integrated twice. Of devices beside
+    the one that is identified the force is needed.
     """
     levels = building.levels()
+    names = [device.name for device in building.devices]
+    for channel in measurement.channels:
+        if wrong := no_device(channel, names):
+            raise RecordError(f"{measurement.name}: {wrong}.")
     missing = [] if measurement.has("ground_acceleration") else ["ground_acceleration"]
     for level in levels:
         able = (f"{level}_displacement", f"{level}_velocity")
@@ -99,6 +136,7 @@ def check_channels(measurement: Measurement, building: Building) -> None:
         channel
         for channel in measurement.channels
         if channel.startswith(("base_", "floor"))
+        and not device_channel(channel)
         and not any(channel.startswith(level) for level in known)
     )
     if beyond:
@@ -106,10 +144,30 @@ def check_channels(measurement: Measurement, building: Building) -> None:
             f"{measurement.name}: {', '.join(beyond)} measured, but {building.name!r} has the "
             f"levels {', '.join(levels)}. Give the building.toml of the structure that was tested."
         )
+    _refuse_unmeasured(measurement, building)
     if len(measurement.time) < SHORTEST:
         raise RecordError(
             f"{measurement.name}: {len(measurement.time)} samples; a fit needs {SHORTEST} or more."
         )
+
+
+def _refuse_unmeasured(measurement: Measurement, building: Building) -> None:
+    """Refuse devices beside the one that is identified whose force was not measured."""
+    missing = [
+        device
+        for device in building.devices
+        if device.name != building.studied and not measurement.has(f"{device.name}_force")
+    ]
+    if not missing:
+        return
+    levels = building.levels()
+    where = ", ".join(f"{device.name}_force ({device.place(levels)})" for device in missing)
+    raise RecordError(
+        f"{measurement.name}: missing {where}. The device that is identified is "
+        f"{building.studied!r}; the forces of all others must be measured, for equilibrium needs "
+        "them. Measure them, or for runs in which a device does not act, take it out of the "
+        "building's file."
+    )
 
 
 def respond(measurement: Measurement, building: Building, draws: int = 12) -> Response:
@@ -142,7 +200,8 @@ def responses(
     RecordError
         If a channel is missing, or the building has other levels than were measured.
     """
-    with_one_damper(building)
+    building = with_damper(building)
+    device = building.device(building.studied)
     for measurement in measurements:
         check_channels(measurement, building)
     smoothed = [
@@ -154,20 +213,31 @@ def responses(
     for i in range(building.size):
         for have in dict.fromkeys(_instruments(run[i]) for run in smoothed):
             alike = [run[i] for run in smoothed if _instruments(run[i]) == have]
-            if not _is_smooth(i, have):
+            if not _is_smooth(i, have, building):
                 made[i, have] = level_draws(longest, alike, measurements[0].step, draws, seed + i)
+    across = measured_across(measurements, building, device, draws, seed + building.size, looser)
     out = []
-    for m, levels in zip(measurements, smoothed, strict=True):
+    for m, levels, own in zip(measurements, smoothed, across, strict=True):
         errors = []
+        others = [
+            Load(one, m[f"{one.name}_force"], m.noise.get(f"{one.name}_force", 0.0))
+            for one in building.devices
+            if one is not device
+        ]
         for i, one in enumerate(levels):
-            if _is_smooth(i, _instruments(one)):
+            if _is_smooth(i, _instruments(one), building):
                 levels[i], error = corrected(one, m.step, draws, seed + i)
                 errors.append(error)
             else:
                 errors.append(made[i, _instruments(one)])
         a, noise_a = _accelerations(m, building, levels)
-        levels, errors = _anchored(levels, errors, _deflected(building, a), m.step, corner)
-        out.append(_response(m, levels, errors, (a, noise_a)))
+        made_of = _response(m, levels, errors, (a, noise_a))
+        made_of = replace(made_of, device=device, others=tuple(others), across=own)
+        levels, errors = _anchored(
+            levels, errors, _deflected(building, made_of), m.step, corner,
+            _apart(made_of, building),
+        )  # fmt: skip
+        out.append(_with_motion(made_of, levels, errors))
     return out
 
 
@@ -176,12 +246,14 @@ def _instruments(level: dict[str, Any]) -> tuple[bool, ...]:
     return tuple(bool(one) for one in level["have"])
 
 
-def _is_smooth(level: int, have: tuple[bool, ...]) -> bool:
+def _is_smooth(level: int, have: tuple[bool, ...], building: Building) -> bool:
     """Return whether a level's acceleration is smoothed, and does not jump.
 
-    Dry friction and end stops act on the first level; those above have a storey between.
+    Dry friction and end stops act on the first level and at the ends of devices; others have a
+    storey between.
     """
-    return level > 0 and not have[2]
+    ends = {0}.union(*(device.levels for device in building.devices))
+    return level not in ends and not have[2]
 
 
 def _accelerations(
@@ -204,13 +276,35 @@ def _accelerations(
     return np.array(a), np.array(noise)
 
 
-def _deflected(building: Building, a: Array) -> Array:
-    """Return how far springs alone deflect under accelerations (levels, n) [m/s2], (levels, n) m.
+def _deflected(building: Building, response: Response) -> Array:
+    """Return how far springs alone deflect under accelerations and known forces, (levels, n) m.
 
-    Differences of levels count: what is below the first one has the damper beside it.
+    Differences of levels count: what is below the first one may have a damper beside it.
     """
-    below = np.cumsum((np.array(building.M) @ a)[::-1], axis=0)[::-1]
+    below = np.cumsum((np.array(building.M) @ response.a)[::-1], axis=0)[::-1]
+    for load in response.loads:
+        for i in range(1, building.size):
+            below[i] += load.force * load.device.crosses(i)
     return np.asarray(np.cumsum(-below / np.array(building.stiffnesses)[:, None], axis=0))
+
+
+def _apart(response: Response, building: Building) -> set[int]:
+    """Return the levels between which and the one below a device acts whose force is unknown."""
+    if response.force is not None or not response.damped:
+        return set()
+    return {i for i in range(1, building.size) if response.device.crosses(i)}
+
+
+def _with_motion(response: Response, levels: list[dict[str, Any]], errors: list[Array]) -> Response:
+    """Return a response with the motion of its levels."""
+    n = response.a.shape[1]
+    return replace(
+        response,
+        x=np.array([level["state"][:, 0] for level in levels]),
+        v=np.array([level["state"][:, 1] for level in levels]),
+        std=np.array([level["std"] for level in levels]),
+        draws=np.array([error[:, :n] for error in errors]),
+    )
 
 
 def _response(
@@ -236,7 +330,12 @@ def _response(
 
 
 def _anchored(
-    levels: list[dict[str, Any]], errors: list[Array], deflected: Array, dt: float, corner: float
+    levels: list[dict[str, Any]],
+    errors: list[Array],
+    deflected: Array,
+    dt: float,
+    corner: float,
+    apart: set[int],
 ) -> tuple[list[dict[str, Any]], list[Array]]:
     """Return levels and draws of their errors, with slow displacements from those measured.
 
@@ -245,6 +344,12 @@ def _anchored(
     levels, errors : per level what `smoothed_level` and `level_draws` return
     deflected : (levels, n) how far the springs deflect [m]; see `_deflected`
     dt, corner : sampling step [s]; frequency below which a displacement is not the level's own [Hz]
+    apart : levels whose storey below has a device of unknown force beside its spring
+
+    Raises
+    ------
+    RecordError
+        If a displacement was not measured that only levels beyond such a storey could give.
     """
     able = [i for i, level in enumerate(levels) if level["have"][0]]
     levels, errors = list(levels), list(errors)
@@ -259,7 +364,14 @@ def _anchored(
     for i, level in enumerate(levels):
         if level["have"][0]:
             continue
-        near = min(able, key=lambda k: abs(k - i))
+        beside = [k for k in able if not apart & set(range(min(i, k) + 1, max(i, k) + 1))]
+        if not beside:
+            raise RecordError(
+                f"the displacement of level {i + 1} from below was not measured, and what other "
+                "levels show does not give it: the force of the damper between was not measured. "
+                "Measure that displacement, or the force."
+            )
+        near = min(beside, key=lambda k: abs(k - i))
         state, std, error = level["state"].copy(), level["std"].copy(), errors[i].copy()
         there = levels[near]["state"][:, 0] + deflected[i] - deflected[near]
         state[:, 0] = joined(state[:, 0], there)
@@ -277,7 +389,8 @@ def shear(response: Response, building: Building, level: int) -> tuple[Array, fl
 
     The inertia, damping and (for matrices that are no chain) elastic forces of this level and all
     above it, as M, C and K of the building have them, without the linear spring below the level
-    itself: -sum_j>=level (M a + C v + K x)_j + k x_rel, in N, positive against +x.
+    itself: -sum_j>=level (M a + C v + K x)_j + k x_rel, in N, positive against +x. What devices
+    beside the one that is identified carry there is taken off.
 
     Returns
     -------
@@ -290,18 +403,7 @@ def shear(response: Response, building: Building, level: int) -> tuple[Array, fl
     below = response.x[level] - (response.x[level - 1] if level else 0.0)
     total = -(rows_m @ response.a + rows_c @ response.v + rows_k @ response.x)
     noise = float(np.sqrt(np.sum((rows_m * response.noise_a) ** 2)))
+    for other in response.others:
+        if other.device.crosses(level):
+            total, noise = total - other.force, float(np.hypot(noise, other.noise))
     return total + building.stiffnesses[level] * below, noise
-
-
-def base_equilibrium(response: Response, building: Building) -> tuple[Array, float]:
-    """Return the force on the first level by its own equilibrium alone, and its noise.
-
-    As `shear` at level 0, from one accelerometer instead of all, but from the storey above it as
-    the building has it.
-    """
-    M, C, K = (np.array(matrix)[0] for matrix in (building.M, building.C, building.K))
-    total = -(M @ response.a + C @ response.v + K @ response.x)
-    white = np.sum((M * response.noise_a) ** 2)
-    smooth = np.sum((K * response.std[:, 0]) ** 2) + np.sum((C * response.std[:, 1]) ** 2)
-    own = building.stiffnesses[0] * response.x[0]
-    return total + own, float(np.sqrt(white + smooth))
