@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def house_of(file: Path) -> House:
-    """Return the building of a file; PhysicsError for what is wrong with it."""
+    """Return the building of a file; PhysicsError for what is wrong, or for several devices."""
     return House(with_damper(read_building(file)), file)
 
 

@@ -2,10 +2,6 @@
 
 Every level's motion is smoothed by itself.
 
-A level whose displacement was not measured integrates its velocity, and drifts. What is slow is
-therefore taken from the nearest level that has a displacement, and the storeys between by their
-equilibrium: far below the first mode they hardly deflect.
-
 Equilibrium is taken sample by sample from the accelerations as measured, for they and the forces
 jump together; their noise is white and known.
 """
@@ -14,11 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 from ..data.channels import device_channel, no_device
 from ..data.extra import Extra
@@ -27,25 +22,13 @@ from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building, frequencies, with_damper
 from ..physics.device import GROUND, Device
+from .anchored import SLOW, Load, anchored, deflected
 from .device_motion import DeviceMotion, measured_across
 from .drive import smooth_steps
 from .level import corrected, level_draws, smoothed_level
 from .prepare import SHORTEST
 
 Array = NDArray[np.float64]
-
-SLOW = 0.3
-"""Share of the first natural frequency below which a displacement that was not measured is taken
-from equilibrium: storeys hardly deflect there, so that it needs their stiffness only roughly."""
-
-
-class Load(NamedTuple):
-    """A device beside the one that is identified: its `force` (n,) [N] as measured, its `noise`."""
-
-    device: Device
-    force: Array
-    noise: float
-
 
 FIRST_LEVEL = Device("", GROUND, 0)
 """Where the damper of a building without devices of its own sits."""
@@ -100,6 +83,10 @@ class Response:
         if self.force is None:
             return list(self.others)
         return [Load(self.device, self.force, self.noise_force), *self.others]
+
+    def hides(self, level: int) -> bool:
+        """Return whether a damper of unknown force acts across the storey below a level."""
+        return self.damped and self.force is None and self.device.crosses(level)
 
     @property
     def driven(self) -> bool:
@@ -233,9 +220,9 @@ def responses(
         a, noise_a = _accelerations(m, building, levels)
         made_of = _response(m, levels, errors, (a, noise_a))
         made_of = replace(made_of, device=device, others=tuple(others), across=own)
-        levels, errors = _anchored(
-            levels, errors, _deflected(building, made_of), m.step, corner,
-            _apart(made_of, building),
+        levels, errors = anchored(
+            levels, errors, deflected(building, a, made_of.loads), m.step, corner,
+            {i for i in range(1, building.size) if made_of.hides(i)},
         )  # fmt: skip
         out.append(_with_motion(made_of, levels, errors))
     return out
@@ -276,25 +263,6 @@ def _accelerations(
     return np.array(a), np.array(noise)
 
 
-def _deflected(building: Building, response: Response) -> Array:
-    """Return how far springs alone deflect under accelerations and known forces, (levels, n) m.
-
-    Differences of levels count: what is below the first one may have a damper beside it.
-    """
-    below = np.cumsum((np.array(building.M) @ response.a)[::-1], axis=0)[::-1]
-    for load in response.loads:
-        for i in range(1, building.size):
-            below[i] += load.force * load.device.crosses(i)
-    return np.asarray(np.cumsum(-below / np.array(building.stiffnesses)[:, None], axis=0))
-
-
-def _apart(response: Response, building: Building) -> set[int]:
-    """Return the levels between which and the one below a device acts whose force is unknown."""
-    if response.force is not None or not response.damped:
-        return set()
-    return {i for i in range(1, building.size) if response.device.crosses(i)}
-
-
 def _with_motion(response: Response, levels: list[dict[str, Any]], errors: list[Array]) -> Response:
     """Return a response with the motion of its levels."""
     n = response.a.shape[1]
@@ -327,61 +295,6 @@ def _response(
         np.array([level["std"] for level in levels]),
         np.array([error[:, :n] for error in errors]), left, drive, m.labels, m.extra,
     )  # fmt: skip
-
-
-def _anchored(
-    levels: list[dict[str, Any]],
-    errors: list[Array],
-    deflected: Array,
-    dt: float,
-    corner: float,
-    apart: set[int],
-) -> tuple[list[dict[str, Any]], list[Array]]:
-    """Return levels and draws of their errors, with slow displacements from those measured.
-
-    Parameters
-    ----------
-    levels, errors : per level what `smoothed_level` and `level_draws` return
-    deflected : (levels, n) how far the springs deflect [m]; see `_deflected`
-    dt, corner : sampling step [s]; frequency below which a displacement is not the level's own [Hz]
-    apart : levels whose storey below has a device of unknown force beside its spring
-
-    Raises
-    ------
-    RecordError
-        If a displacement was not measured that only levels beyond such a storey could give.
-    """
-    able = [i for i, level in enumerate(levels) if level["have"][0]]
-    levels, errors = list(levels), list(errors)
-    if not able or len(able) == len(levels):
-        return levels, errors
-    low = butter(2, min(2.0 * corner * dt, 0.5), output="sos")
-
-    def joined(own: Array, other: Array) -> Array:
-        """Return (..., n) the fast part of one displacement and the slow one of another."""
-        return np.asarray(own + sosfiltfilt(low, other - own, axis=-1))
-
-    for i, level in enumerate(levels):
-        if level["have"][0]:
-            continue
-        beside = [k for k in able if not apart & set(range(min(i, k) + 1, max(i, k) + 1))]
-        if not beside:
-            raise RecordError(
-                f"the displacement of level {i + 1} from below was not measured, and what other "
-                "levels show does not give it: the force of the damper between was not measured. "
-                "Measure that displacement, or the force."
-            )
-        near = min(beside, key=lambda k: abs(k - i))
-        state, std, error = level["state"].copy(), level["std"].copy(), errors[i].copy()
-        there = levels[near]["state"][:, 0] + deflected[i] - deflected[near]
-        state[:, 0] = joined(state[:, 0], there)
-        if len(error):
-            error[:, :, 0] = joined(error[:, :, 0], errors[near][:, :, 0])
-        # White noise of a velocity, integrated: its power above a corner f is r dt/(2 pi^2 f).
-        drift = np.sqrt(level["r"][1] * dt / (2.0 * np.pi**2 * corner))
-        std[0] = np.hypot(min(std[0], drift), levels[near]["std"][0])
-        levels[i], errors[i] = {**level, "state": state, "std": std}, error
-    return levels, errors
 
 
 def shear(response: Response, building: Building, level: int) -> tuple[Array, float]:

@@ -26,8 +26,8 @@ from .structure import StructureProblem, blind_at_rest, problems_of
 ROLES = ("train", "holdout")
 DAMPER = "damper"
 _NOT_TOLD = (
-    "Springs and damping of the storeys beside it are those of the building's file: equilibrium does "
-    "not tell them from the damper's own."
+    "Springs and damping of the storeys beside it are those of the building's file: equilibrium "
+    "does not tell them from the damper's own."
 )
 
 

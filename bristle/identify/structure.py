@@ -28,6 +28,7 @@ from ..physics.inputs import Inputs
 from ..physics.laws import DEFAULT, base_and_variant
 from .along import Along
 from .model import Model, Problem, Run, absorbed, of_one_site
+from .reconstructed import reconstructed
 from .response import Response, responses, shear
 
 Array = NDArray[np.float64]
@@ -335,73 +336,6 @@ def blind_at_rest(law: str) -> bool:
     return law == ANY_LAW or base_and_variant(law)[0].has("sign")
 
 
-class Reconstructed(NamedTuple):
-    """A damper's force by equilibrium.
-
-    `force` (n,) [N]; `noise` its standard deviation [N], and `white` that of the part that is white
-    noise of accelerometers and load cells; `error` (d, n) [N] draws of the other part, the motion's.
-    """
-
-    force: Array
-    noise: float
-    white: float
-    error: Array
-
-
-def reconstructed(
-    response: Response, building: Building, linear_storeys: bool = True
-) -> Reconstructed:
-    """Return the damper's force by equilibrium.
-
-    Of the equilibrium of all masses above a storey that the damper acts across, and the two ends'
-    own, the one with the least noise is taken: that of the accelerometers, and what the smoother
-    leaves uncertain of the motion, times the building's masses, springs and damping.
-
-    Parameters
-    ----------
-    response : the run, its motion smoothed
-    building : whose equilibrium gives the force
-    linear_storeys : whether storeys are linear, as a level's own equilibrium needs
-    """
-    device, n = response.device, building.size
-    able = [np.arange(n) >= i for i in range(device.lower + 1, device.upper + 1)]
-    weights = [one.astype(np.float64) for one in able]
-    if linear_storeys:
-        ends = ((device.upper, 1.0), (device.lower, -1.0))
-        weights += [sign * np.eye(n)[level] for level, sign in ends if level != GROUND]
-    found = [_weighted(response, building, one) for one in weights]
-    return min(found, key=lambda one: one.noise)
-
-
-def _weighted(response: Response, building: Building, weights: Array) -> Reconstructed:
-    """Return the damper's force by a sum of the levels' equilibria in which it counts once.
-
-    Parameters
-    ----------
-    response, building : as in `reconstructed`
-    weights : (n,) how often each level's equilibrium counts
-    """
-    M, C, K = (weights @ np.array(part) for part in (building.M, building.C, building.K))
-    K[np.abs(K) < 1e-12 * np.abs(np.array(building.K)).max()] = 0.0  # rounding of springs above
-    x, error = response.x, response.draws
-    lower, upper = response.device.levels
-    if response.across is not None and np.flatnonzero(K).tolist() == [lower, upper]:
-        # The spring beside the damper takes its displacement, which is known better.
-        x, error = x.copy(), error.copy()
-        x[upper] = x[lower] + response.across.x
-        error[upper, :, :, 0] = error[lower, :, :, 0] + response.across.draws[:, :, 0]
-    force = -(M @ response.a + C @ response.v + K @ x)
-    white = float(np.sum((M * response.noise_a) ** 2))
-    for other in response.others:
-        share = float(weights @ np.array(other.device.incidence(building.size)))
-        force, white = force - share * other.force, white + (share * other.noise) ** 2
-    smooth = float(np.sum((K * response.std[:, 0]) ** 2) + np.sum((C * response.std[:, 1]) ** 2))
-    drawn = np.einsum("i,idn->dn", K, error[..., 0]) + np.einsum("i,idn->dn", C, error[..., 1])
-    if len(drawn) > 1:  # in the mean nothing is known of it
-        drawn = (drawn - drawn.mean(axis=0)) * np.sqrt(len(drawn) / (len(drawn) - 1))
-    return Reconstructed(force, float(np.sqrt(white + smooth)), float(np.sqrt(white)), drawn)
-
-
 def _error(response: Response, level: int) -> Array:
     """Return draws (d, n, 4) of the error of x, v, a and V of a level."""
     count, n = response.draws.shape[1:3]
@@ -464,10 +398,7 @@ def problems_of(
         storey = level if building.isolated else level + 1
         if storey == 0 or (device.crosses(level) and damped and not measured):
             continue
-        parts = [[storey_run(r, building, level) for r in part] for part in both]
-        problems[f"storey{storey}"] = tuple(
-            StructureProblem(p, storey, damped=damping_below(building, level)) for p in parts
-        )
+        problems[f"storey{storey}"] = tuple(line_problem(part, building, level) for part in both)
     if building.isolated and (measured or not damped or not device.crosses(0)):
         parts = [_moving([layer_run(_unloaded(r), building) for r in part]) for part in both]
         if all(moving or not part for moving, part in zip(parts, both, strict=True)):
@@ -497,6 +428,22 @@ def _moving(runs: list[StructureRun], needed: str = "") -> list[StructureRun]:
 def layer_problem(runs: Sequence[Run], building: Building) -> StructureProblem:
     """Return runs of the isolation layer as a problem."""
     return StructureProblem(runs, damped=damping_below(building, 0))
+
+
+def line_problem(responses: Sequence[Response], building: Building, level: int) -> StructureProblem:
+    """Return what a building carries below a level beside its devices, as a problem.
+
+    Parameters
+    ----------
+    responses : the runs, their motion smoothed
+    building : its masses and damping
+    level : 0 for the isolation layer of an isolated building, or the level above a storey
+    """
+    if building.isolated and not level:
+        return layer_problem([layer_run(one, building) for one in responses], building)
+    runs = [storey_run(one, building, level) for one in responses]
+    storey = level if building.isolated else level + 1
+    return StructureProblem(runs, storey, damped=damping_below(building, level))
 
 
 def damping_below(building: Building, level: int) -> float:

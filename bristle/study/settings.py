@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..data.channels import DRIVE, ChannelSpec, at_device, device_channel
+from ..data.channels import DRIVE, ChannelSpec, at_device
 from ..data.corrections import Correction
 from ..data.files import Toml, write_whole
 from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
+from ..errors import PhysicsError
 from ..findings import written
 from ..physics.building import read_building
 from .channel_file import channel_as_toml, is_right_channel, read_channel, read_extra
@@ -135,7 +136,7 @@ def read_settings(path: Path) -> Settings:
         for name, table in toml.table((), data, "channels").items()
         if is_right_channel(toml, name, table, of_devices=rig != RIGS[0])
     }
-    if rig != RIGS[0] and not device and any(map(device_channel, channels)):
+    if rig != RIGS[0] and not device:
         device = only_device(path.parent)
     channels = _at_device(toml, channels, device)
     extra = {
@@ -156,16 +157,13 @@ def only_device(folder: Path) -> str:
 
     Parameters
     ----------
-    folder : the study's; a model.toml that cannot be read is told where the model is asked for
+    folder : the study's; what is wrong with its model or building is told where they are asked for
     """
-    file = folder / "model.toml"
     try:
-        named = tomllib.loads(file.read_text(encoding="utf-8-sig")).get("building")
-    except (OSError, ValueError):
+        model = tomllib.loads((folder / "model.toml").read_text(encoding="utf-8-sig"))
+        devices = read_building(folder / str(model.get("building"))).devices
+    except (OSError, ValueError, PhysicsError):
         return ""
-    if not isinstance(named, str) or not named or not (folder / named).is_file():
-        return ""
-    devices = read_building(folder / named).devices
     return devices[0].name if len(devices) == 1 else ""
 
 

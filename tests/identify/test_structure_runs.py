@@ -15,6 +15,7 @@ from bristle.errors import RecordError
 from bristle.identify.level import jumps
 from bristle.identify.line import at_bound, fit_line
 from bristle.identify.model import Model
+from bristle.identify.reconstructed import reconstructed
 from bristle.identify.response import respond, responses, shear
 from bristle.identify.rig import Site
 from bristle.identify.rig_fit import RigFit
@@ -24,7 +25,6 @@ from bristle.identify.structure import (
     damping_below,
     layer_run,
     problems_of,
-    reconstructed,
     sliding,
     storey_run,
     structure_problems,
