@@ -50,14 +50,16 @@ def tie(x, v, V):
     return 6.0 * v + 0.5 * np.arctan(v / 0.01) + 20.0 * x
 
 
-def shake(building, seed, laws, samples=6000, peak=4.0):
+def shake(building, seed, laws, samples=6000, peak=4.0, step=DT):
     """Return the clean channels of a run, with forces and voltages of devices by name.
 
     laws: device to (force of x, v, V; whether it is commanded).
     """
     random = np.random.default_rng(seed)
-    ground = lfilter(*butter(2, [0.5 * 2 * DT, 12.0 * 2 * DT], "band"), random.normal(size=samples))
-    ground *= np.minimum(1.0, np.arange(samples) * DT)
+    ground = lfilter(
+        *butter(2, [0.5 * 2 * step, 12.0 * 2 * step], "band"), random.normal(size=samples)
+    )
+    ground *= np.minimum(1.0, np.arange(samples) * step)
     ground *= peak / np.abs(ground).max()
     M, C, K = (np.array(part) for part in (building.M, building.C, building.K))
     n = building.size
@@ -73,8 +75,9 @@ def shake(building, seed, laws, samples=6000, peak=4.0):
     whole = np.zeros((2 * n + 2 * m, 2 * n + 2 * m))
     whole[: 2 * n, : 2 * n], whole[: 2 * n, 2 * n : 2 * n + m] = A, B
     whole[2 * n : 2 * n + m, 2 * n + m :] = np.eye(m)
-    step = expm(whole * DT)[: 2 * n]
-    switched = np.repeat(random.choice([0.0, 1.5, 3.0], samples // 500 + 1), 500)[:samples]
+    advance = expm(whole * step)[: 2 * n]
+    held = round(1.0 / step)
+    switched = np.repeat(random.choice([0.0, 1.5, 3.0], samples // held + 1), held)[:samples]
     volts = {name: switched * commanded for name, (_, commanded) in laws.items()}
     state, rows = np.zeros(2 * n), np.zeros((samples, 2 * n))
     forces, a = np.zeros((samples, len(laws))), np.zeros((samples, n))
@@ -83,10 +86,10 @@ def shake(building, seed, laws, samples=6000, peak=4.0):
         for j, (name, (law, _)) in enumerate(laws.items()):
             forces[k, j] = law(ends[name] @ x, ends[name] @ v, volts[name][k])
         u = np.append(forces[k], ground[k])
-        rise = np.append(np.zeros(len(laws)), ground[min(k + 1, samples - 1)] - ground[k]) / DT
+        rise = np.append(np.zeros(len(laws)), ground[min(k + 1, samples - 1)] - ground[k]) / step
         rows[k], a[k] = state, (A @ state + B @ u)[n:] + ground[k]
-        state = step @ np.concatenate([state, u, rise])
-    out = {"time": np.arange(samples) * DT, "ground_acceleration": ground}
+        state = advance @ np.concatenate([state, u, rise])
+    out = {"time": np.arange(samples) * step, "ground_acceleration": ground}
     for i, level in enumerate(building.levels()):
         out[f"{level}_displacement"], out[f"{level}_velocity"] = rows[:, i], rows[:, n + i]
         out[f"{level}_acceleration_absolute"] = a[:, i]

@@ -18,7 +18,7 @@ from ..data.measurement import Measurement
 from ..data.model import StudyModel
 from ..errors import StudyError
 from ..physics.building import Building
-from ..physics.device import GROUND, driven_mass
+from ..physics.device import driven_mass
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
@@ -30,8 +30,6 @@ Parameters = dict[str, float | bool]
 
 STEP = 2e-3
 """Longest step [s] of a building's scenario."""
-FINER = 5e-4
-"""Longest step [s] where forces of other devices are played: they are felt up to a step early."""
 GROUND, COMMAND = "ground.csv", "drive.csv"
 
 
@@ -64,8 +62,7 @@ class Shaking:
     @property
     def fine(self) -> int:
         """Into how many steps the samples' spacing is cut."""
-        longest = FINER if self.others else STEP
-        return max(1, ceil(self.spacing / longest - 1e-9))
+        return max(1, ceil(self.spacing / STEP - 1e-9))
 
     @property
     def spacing(self) -> float:
@@ -131,7 +128,7 @@ def loads(model: StudyModel, building: Building, bench: bool = False) -> Loads:
     mass, notes = driven_mass(building.M, device), []
     for name in masses(model.at("damper", bench)):
         moved = values.get(name, 0.0)
-        if moved > 0.0 and device.levels != (GROUND, 0):
+        if moved > 0.0 and not device.on_first:
             notes.append(
                 f"{name} = {moved:g} kg stays in the damper, which takes it from differences of "
                 f"velocity: keep it well below the {mass:.3g} kg that the damper moves."

@@ -20,7 +20,6 @@ from ..identify.search_context import refine
 from ..identify.site_fit import fit_damper
 from ..identify.structure import ANY_LAW, StructureProblem, problems_of
 from ..physics.building import Building, with_damper
-from ..physics.device import GROUND
 from .building_prior import moved_numbers, within_prior
 from .building_sensors import blurred, faults_in_building, without_faults
 from .candidates import SHOWN, Trial, judge
@@ -237,7 +236,7 @@ class BuildingRuns:
         """Return what the verdict tells beside the findings of the sites."""
         reconstructed = DAMPER in self._problems and self._problems[DAMPER][0].reconstructed
         force = "reconstructed" if reconstructed else "measured"
-        beside = self._device.levels == (GROUND, 0)
+        beside = self._device.on_first
         notes = (*self._masses, *self._notes)
         if reconstructed and not beside:
             notes = (*notes, OF_STOREY)

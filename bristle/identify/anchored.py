@@ -58,6 +58,7 @@ def anchored(
     dt: float,
     corner: float,
     apart: set[int],
+    names: Sequence[str],
 ) -> tuple[list[dict[str, Any]], list[Array]]:
     """Return levels and draws of their errors, with slow displacements from those measured.
 
@@ -67,6 +68,7 @@ def anchored(
     springs : (levels, n) how far the springs deflect [m]; see `deflected`
     dt, corner : sampling step [s]; frequency below which a displacement is not the level's own [Hz]
     apart : levels whose storey below has a device of unknown force beside its spring
+    names : of each level's displacement, with the run, for messages
 
     Raises
     ------
@@ -89,9 +91,8 @@ def anchored(
         beside = [k for k in able if not apart & set(range(min(i, k) + 1, max(i, k) + 1))]
         if not beside:
             raise RecordError(
-                f"the displacement of level {i + 1} from below was not measured, and what other "
-                "levels show does not give it: the force of the damper between was not measured. "
-                "Measure that displacement, or the force."
+                f"{names[i]} was not measured, and no other level gives it: the force of a damper "
+                "between was not measured. Measure that displacement, or the force."
             )
         near = min(beside, key=lambda k: abs(k - i))
         state, std, error = level["state"].copy(), level["std"].copy(), errors[i].copy()

@@ -223,6 +223,7 @@ def responses(
         levels, errors = anchored(
             levels, errors, deflected(building, a, made_of.loads), m.step, corner,
             {i for i in range(1, building.size) if made_of.hides(i)},
+            [f"{m.name}: {level}_displacement" for level in building.levels()],
         )  # fmt: skip
         out.append(_with_motion(made_of, levels, errors))
     return out

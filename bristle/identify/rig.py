@@ -15,7 +15,6 @@ from ..data.channels import DRIVE
 from ..data.measurement import Measurement
 from ..errors import StudyError
 from ..physics.building import Building, with_damper
-from ..physics.device import GROUND
 from ..physics.effect import AT, EFFECTS, effects_of, plain_name
 from .assigned import corrected_for_delay, lateness, linear_storeys, unassigned
 from .model import Model, Problem
@@ -136,7 +135,7 @@ class Rig:
         building = self.building
         if building is None or "layer" in found:
             return []
-        if building.device(building.studied).levels == (GROUND, 0):
+        if building.device(building.studied).on_first:
             return []
         effects = [EFFECTS[name] for name in model.effects if EFFECTS[name].site == "structure"]
         return [one.name for one in effects if "force" in one.hooks()]
@@ -218,7 +217,7 @@ def building_rig(
         device = found[0].device
         place = f" ({device.name}, {device.place(building.levels())})" if device.name else ""
         notes = (f"The damper's force{place} was not measured: it is computed from equilibrium.",)
-        if device.levels != (GROUND, 0):
+        if not device.on_first:
             notes = (*notes, _NOT_TOLD)
     return Rig(_BuildingSites(found, len(train), building), building, notes)
 

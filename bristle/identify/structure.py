@@ -405,9 +405,9 @@ def problems_of(
             problems["layer"] = tuple(layer_problem(p, building) for p in parts)
     if damped:
         made = [[damper_run(r, building, law, linear_storeys) for r in part] for part in both]
-        end = "base" if device.levels == (GROUND, 0) else "damper"
+        end = "base" if device.on_first else "damper"
         parts = [_moving(part, needed=end) for part in made]
-        beside = device.levels == (GROUND, 0)
+        beside = device.on_first
         problems["damper"] = tuple(
             StructureProblem(p, 0, not measured, beside=beside) for p in parts
         )

@@ -40,6 +40,11 @@ class Device(NamedTuple):
         """The levels that it connects, lower first."""
         return self.lower, self.upper
 
+    @property
+    def on_first(self) -> bool:
+        """Whether it is between the ground and the first level, as a building's one damper is."""
+        return self.levels == (GROUND, 0)
+
     def crosses(self, level: int) -> bool:
         """Return whether it acts across the storey below a level, or the isolation for level 0."""
         return self.lower < level <= self.upper
@@ -67,7 +72,7 @@ def driven_mass(M: Sequence[Sequence[float]], device: Device) -> float:
     M : (n, n) mass matrix [kg]
     device : its levels count
     """
-    if (device.lower, device.upper) == (GROUND, 0):
+    if device.on_first:
         return M[0][0]
     n = len(M)
     M_inverse = inverse([value for row in M for value in row], n)

@@ -16,6 +16,7 @@ from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.opening import Opening, median_noise
 from ..errors import StudyError
 from ..identify.rig import DAMPER
+from ..physics.building import Building
 from ..physics.effect import plain_name
 from ..progress import tell
 from ..study.identification import as_model
@@ -81,6 +82,7 @@ def plan_building(
     model, runs = study.model(), study.runs()
     building = building_of(study, model)
     assert building is not None
+    _refuse_other_devices(building)
     measured = [*runs.train, *runs.holdout]
     motions = records_at_hand(measured, records, Path.cwd())
     house = House(building, study.folder / model.building if model.building else None)
@@ -124,6 +126,17 @@ def _within(done: RigLimits, given: Mapping[str, Any]) -> RigLimits:
             "second, and so have planned ones."
         )
     return replace(rig, rate=done.rate)
+
+
+def _refuse_other_devices(building: Building) -> None:
+    """Refuse devices beside the damper: their force under another ground motion is not known."""
+    others = [device.name for device in building.devices if device.name != building.studied]
+    if others:
+        raise StudyError(
+            f"building {building.name!r}: no test can be planned beside {', '.join(others)}, whose "
+            "force under another ground motion no model here tells. A plan needs a building whose "
+            f"only device is {building.studied!r}."
+        )
 
 
 def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:

@@ -222,7 +222,7 @@ def place_of_damper(study: Study, runs: Sequence[Measurement]) -> Place:
     levels, device = building.levels(), building.device(building.studied)
     lower, upper = ("" if i == GROUND else levels[i] for i in device.levels)
     text = f"{device.name} ({device.place(levels)})"
-    return Place(ACROSS, (lower, upper), text, device.levels == (GROUND, 0))
+    return Place(ACROSS, (lower, upper), text, device.on_first)
 
 
 def _check_run(run: Measurement, at_damper: Place) -> list[Finding]:
