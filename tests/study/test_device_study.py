@@ -143,7 +143,7 @@ def test_what_is_wrong_with_a_device_is_named(tmp_path):
         given = {"rig": "structure", "building": house} | choices
         return Study.create(tmp_path / name, files, **given)
 
-    with pytest.raises(PhysicsError, match="has 2 devices.*'brace' or 'tie'.*--device"):
+    with pytest.raises(PhysicsError, match=r"has 2 devices.*'brace' or 'tie'.*--device"):
         new("a")
     with pytest.raises(PhysicsError, match="has no device 'roof'; there are brace, tie"):
         new("b", device="roof")
