@@ -87,15 +87,11 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         help="motion prescribed and force measured, or ground motion in and response out",
     )
     parser.add_argument(
-        "--building",
-        type=Path,
-        metavar="FILE",
+        "--building", type=Path, metavar="FILE",
         help="the structure's data file, with --rig structure",
-    )
+    )  # fmt: skip
     parser.add_argument(
-        "--device",
-        metavar="NAME",
-        help="of a building with several devices the one that is identified",
+        "--device", metavar="NAME", help="of a building's several devices the one to identify"
     )
     parser.add_argument(
         "--channel",

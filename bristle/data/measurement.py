@@ -3,6 +3,8 @@
 Units are converted here, once. What was done to the samples is in `notes`; no sample is filtered.
 """
 
+# Longer than 300 lines: a measurement is one class, and every way to make one is here.
+
 from __future__ import annotations
 
 import hashlib

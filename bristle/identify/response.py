@@ -6,6 +6,8 @@ Equilibrium is taken sample by sample from the accelerations as measured, for th
 jump together; their noise is white and known.
 """
 
+# Longer than 300 lines: a docstring says of every field and argument which shape and unit it has.
+
 from __future__ import annotations
 
 from collections.abc import Mapping
