@@ -198,7 +198,7 @@ def write_scenario(
     else:
         parts.append(_signal("drive", COMMAND))
         wires[f"damper.{shaking.drive.name}"] = "drive.value"
-    for name in _others(house.building, shaking):
+    for name in others_of(house.building, shaking):
         file = folder / f"{name}_force.csv"
         files.append(signal_file(shaking.time, shaking.others[name], "force", "N", file))
         parts.append(_signal(f"{name}_measured", file.name))
@@ -233,8 +233,19 @@ def ports_of(building: Building) -> Ports:
     return Ports("damper_force", f"{level}_displacement", f"{level}_velocity", "holding_force")
 
 
-def _others(building: Building, shaking: Shaking) -> list[str]:
-    """Return the devices of a building beside the damper, whose forces must be known."""
+def others_of(building: Building, shaking: Shaking) -> list[str]:
+    """Return the devices of a building beside the damper, whose forces must be known.
+
+    Parameters
+    ----------
+    building : which knows the damper that is identified
+    shaking : what drives it
+
+    Raises
+    ------
+    StudyError
+        If the force of one is not known.
+    """
     names = [device.name for device in building.devices if device.name != building.studied]
     unknown = [name for name in names if name not in shaking.others]
     if unknown:

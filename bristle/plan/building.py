@@ -82,7 +82,7 @@ def plan_building(
     model, runs = study.model(), study.runs()
     building = building_of(study, model)
     assert building is not None
-    _refuse_other_devices(building)
+    _refuse_devices(building)
     measured = [*runs.train, *runs.holdout]
     motions = records_at_hand(measured, records, Path.cwd())
     house = House(building, study.folder / model.building if model.building else None)
@@ -128,14 +128,20 @@ def _within(done: RigLimits, given: Mapping[str, Any]) -> RigLimits:
     return replace(rig, rate=done.rate)
 
 
-def _refuse_other_devices(building: Building) -> None:
-    """Refuse devices beside the damper: their force under another ground motion is not known."""
-    others = [device.name for device in building.devices if device.name != building.studied]
-    if others:
+def _refuse_devices(building: Building) -> None:
+    """Refuse dampers that a plan does not know: several, and one that is not on the first level.
+
+    The limits of a plan are the stroke of a damper that moves with the first level, and drifts; the
+    force of other devices under another ground motion is told by no model here.
+    """
+    device = building.device(building.studied)
+    others = [one.name for one in building.devices if one.name != building.studied]
+    if others or not device.on_first:
+        where = device.place(building.levels())
+        what = f"beside {', '.join(others)}" if others else f"for {device.name} ({where})"
         raise StudyError(
-            f"building {building.name!r}: no test can be planned beside {', '.join(others)}, whose "
-            "force under another ground motion no model here tells. A plan needs a building whose "
-            f"only device is {building.studied!r}."
+            f"building {building.name!r}: no test can be planned {what}. A plan is for a building "
+            "with one damper, between the ground and the first level."
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 from braced import BRACE, DT, brace, noisy, shake, tie, tower
 
 import bristle
+from bristle.bridge.closed_loop_input import house_of
+from bristle.bridge.in_building import others_of, shaking_of
 from bristle.cli import main
 from bristle.data.channels import channel_unit
 from bristle.errors import PhysicsError, StudyError
@@ -81,10 +84,8 @@ def test_a_study_is_about_the_device_that_is_named(two):
         assert values[name] == pytest.approx(value, rel=0.05)
 
 
-def test_its_error_is_noise_and_nothing_is_missing(two, capsys):
+def test_its_error_is_noise_and_its_force_resists_the_motion_across_it(two):
     assert bristle.compare(two).z == pytest.approx(1.0, abs=0.15)
-    assert main(["compare", str(two.folder)]) == 0
-    capsys.readouterr()
     checked = check_data(two)
     assert checked.ok
     assert not [one for one in checked.findings if "resists" in one.text or "sign" in one.text]
@@ -117,6 +118,16 @@ def test_building_and_model_predict_the_responses_in_closed_loop(two, capsys):
     for row in rows:
         assert row["predicted"] == pytest.approx(row["measured"], rel=0.02)
     assert any("the force of tie is the measured one" in note for note in found["notes"])
+
+
+def test_a_plan_and_a_building_for_several_dampers_are_refused(two, tmp_path):
+    with pytest.raises(StudyError, match=r"no test can be planned beside tie\. A plan is for"):
+        bristle.plan(two)
+    with pytest.raises(StudyError, match=r"places for 2 dampers \(brace, tie\), and a study is of"):
+        house_of(two.folder / "tower.toml")
+    shaking = replace(shaking_of(two.read()[0]), others={})
+    with pytest.raises(StudyError, match="the force of tie is not known"):
+        others_of(building_of(two, two.model()), shaking)
 
 
 def test_a_study_without_the_key_is_about_the_only_device(tmp_path):
