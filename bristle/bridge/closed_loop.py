@@ -72,6 +72,12 @@ def closed_loop(
     house = House(building, study.folder / model.building if model.building else None)
     found = _predicted(study, model, (house, False), trials, draws, effects)
     notes += more
+    others = [device.name for device in building.devices if device.name != building.studied]
+    if others:
+        notes.append(
+            f"the force of {', '.join(others)} is the measured one, for the model is that of "
+            f"{building.studied} alone"
+        )
     if role == TEST:
         count_opening(study)
         notes.append(opened_text(len(openings(study))))

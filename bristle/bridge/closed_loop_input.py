@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..data.motion import read_ground_motion
 from ..errors import StudyError
 from ..findings import command
-from ..physics.building import read_building, with_one_damper
+from ..physics.building import read_building, with_damper
 from ..study.inputs import measurements
 from .closed_loop_runs import Trial, begins_in_motion, trial_of
 from .in_building import House, Shaking
@@ -20,8 +20,23 @@ Array = NDArray[np.float64]
 
 
 def house_of(file: Path) -> House:
-    """Return the building of a file; PhysicsError for what is wrong with it."""
-    return House(with_one_damper(read_building(file)), file)
+    """Return the building of a file, for a damper in it.
+
+    Raises
+    ------
+    PhysicsError
+        For what is wrong with the file.
+    StudyError
+        If it has places for several dampers.
+    """
+    building = read_building(file)
+    if len(building.devices) > 1:
+        names = ", ".join(device.name for device in building.devices)
+        raise StudyError(
+            f"{file}: places for {len(building.devices)} dampers ({names}), and a study is of one. "
+            "Leave one [[devices]] in it, or none for the damper on the first level."
+        )
+    return House(with_damper(building), file)
 
 
 def trials_in(

@@ -12,6 +12,7 @@ from shutil import copyfile
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.checks.motion import ACROSS, with_motion_across
 from ..data.files import write_whole
 from ..data.measurement import Measurement
 from ..data.model import StudyModel
@@ -23,12 +24,13 @@ from ..identify.fit import Problem, Run
 from ..identify.instruments import true_motion
 from ..identify.prepare import prepare
 from ..identify.run_labels import following, values_of_labels
-from ..physics.building import paper_building, read_building, with_one_damper
+from ..physics.device import GROUND
 from ..physics.drive import drive_named, state_for
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..physics.user import own_effects
 from ..study.identification import as_model
+from ..study.rig import building_of
 from ..study.study import Study
 from .in_building import House, Parameters, loads, shaking_of, write_scenario
 from .scenario_files import part_text, scenario_text, signal_file
@@ -114,7 +116,7 @@ def _damper(study: Study, model: StudyModel, measurement: Measurement, notes: li
         and name not in following(model.effects)
     }
     starts |= {f"{effect}.on": True for effect in effects}
-    starts |= _range(measurement, notes)
+    starts |= _range(_with_stroke(study, model, measurement), notes)
     own = own_effects()
     return plan(
         component_of_law(model.base_law),
@@ -122,6 +124,23 @@ def _damper(study: Study, model: StudyModel, measurement: Measurement, notes: li
         starts=starts,
         effects=[own[name] for name in effects if EFFECTS[name].own],
         drive=drive_named(measurement.drive).name,
+    )
+
+
+def _with_stroke(study: Study, model: StudyModel, measurement: Measurement) -> Measurement:
+    """Return a run with the displacement across the damper, where it is a building's device."""
+    building = building_of(study, model)
+    if building is None or not building.studied:
+        return measurement
+    levels = building.levels()
+    lower, upper = (
+        "" if i == GROUND else levels[i] for i in building.device(building.studied).levels
+    )
+    seen = with_motion_across(measurement, lower, upper)
+    channels = {n: v for n, v in seen.channels.items() if not n.endswith("_displacement")}
+    stroke = seen.channels.get(f"{ACROSS}_displacement")
+    return replace(
+        seen, channels=channels if stroke is None else {**channels, "displacement": stroke}
     )
 
 
@@ -250,7 +269,8 @@ def _structure(
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of the study's building with the damper, under a run's ground motion."""
     file = study.folder / model.building if model.building else None
-    building = paper_building() if file is None else with_one_damper(read_building(file))
+    building = building_of(study, model)
+    assert building is not None  # `export_study` asked
     house = House(building, file)
     own = loads(model, house.building)
     notes += own.notes

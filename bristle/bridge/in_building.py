@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data.channels import device_channel
 from ..data.files import write_whole
 from ..data.measurement import Measurement
 from ..data.model import StudyModel
 from ..errors import StudyError
 from ..physics.building import Building
+from ..physics.device import driven_mass
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
@@ -45,7 +47,7 @@ class Shaking:
 
     `time` (n,) s from 0 and the `ground`'s acceleration (n,) m/s2; the `command` (n,) in the unit
     of the `drive`, None where it stays at `level`; the measured `force` (n,) N, None where there is
-    none.
+    none; `others` the measured forces (n,) N of other devices of the building, by name.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Shaking:
     level: float = 0.0
     force: Array | None = None
     drive: Drive = VOLTAGE
+    others: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def fine(self) -> int:
@@ -85,8 +88,14 @@ def shaking_of(measurement: Measurement) -> Shaking:
         measurement.name, measurement.time - measurement.time[0],
         measurement["ground_acceleration"], measurement[drive] if drive else None,
         force=measurement["force"] if measurement.has("force") else None,
-        drive=drive_named(drive),
+        drive=drive_named(drive), others=_forces_of_devices(measurement),
     )  # fmt: skip
+
+
+def _forces_of_devices(measurement: Measurement) -> dict[str, Array]:
+    """Return the measured forces (n,) [N] of devices by name."""
+    found = {name: device_channel(name) for name in measurement.channels}
+    return {one[0]: measurement[name] for name, one in found.items() if one and one[1] == "force"}
 
 
 class Loads(NamedTuple):
@@ -113,12 +122,18 @@ def loads(model: StudyModel, building: Building, bench: bool = False) -> Loads:
     """
     values, layer = model.values(), model.at("structure", bench)
     own = {f"{name}.on": True for name in layer.effects}
+    device = building.device(building.studied)
     structure: Parameters = {**own, **{n: v for n, v in layer.values().items() if "." in n}}
     damper: Parameters = {}
-    mass, notes = building.M[0][0], []
+    mass, notes = driven_mass(building.M, device), []
     for name in masses(model.at("damper", bench)):
         moved = values.get(name, 0.0)
-        if moved > 0.0:
+        if moved > 0.0 and not device.on_first:
+            notes.append(
+                f"{name} = {moved:g} kg stays in the damper, which takes it from differences of "
+                f"velocity: keep it well below the {mass:.3g} kg that the damper moves."
+            )
+        elif moved > 0.0:
             structure["attached_mass"] = float(structure.get("attached_mass", 0.0)) + moved
             damper[name] = 0.0
             mass += moved
@@ -164,15 +179,15 @@ def write_scenario(
     if own.effects:
         source["effects"] = list(own.effects)
     files += write_signals(folder, shaking)
-    level = house.building.levels()[0]
+    ports = ports_of(house.building)
     wires = {
         "structure.ground_acceleration": "ground.ground_acceleration",
-        "structure.damper_force": "damper.force",
-        "damper.displacement": f"structure.{level}_displacement",
-        "damper.velocity": f"structure.{level}_velocity",
+        f"structure.{ports.force}": "damper.force",
+        "damper.displacement": f"structure.{ports.displacement}",
+        "damper.velocity": f"structure.{ports.velocity}",
     }
     if "moving_mass" in own.damper:
-        wires["damper.holding_force"] = "structure.holding_force"
+        wires["damper.holding_force"] = f"structure.{ports.holding_force}"
     parts = [
         part_text("ground", {"fmu": "GroundMotion"}, {"record": GROUND}),
         part_text("structure", source, own.structure),
@@ -183,6 +198,11 @@ def write_scenario(
     else:
         parts.append(_signal("drive", COMMAND))
         wires[f"damper.{shaking.drive.name}"] = "drive.value"
+    for name in others_of(house.building, shaking):
+        file = folder / f"{name}_force.csv"
+        files.append(signal_file(shaking.time, shaking.others[name], "force", "N", file))
+        parts.append(_signal(f"{name}_measured", file.name))
+        wires[f"structure.{name}_force"] = f"{name}_measured.value"
     if shaking.force is not None:
         files.append(
             signal_file(shaking.time, shaking.force, "force", "N", folder / "measured.csv")
@@ -194,6 +214,47 @@ def write_scenario(
     scenario = folder / "structure.toml"
     write_whole(scenario, scenario_text(head, (stop, step), parts, wires))
     return scenario, files
+
+
+class Ports(NamedTuple):
+    """The names of a structure's ports at the damper of a study."""
+
+    force: str
+    displacement: str
+    velocity: str
+    holding_force: str
+
+
+def ports_of(building: Building) -> Ports:
+    """Return the ports of a structure at the damper that is identified."""
+    if building.studied:
+        return Ports(*building.device(building.studied).ports)
+    level = building.levels()[0]
+    return Ports("damper_force", f"{level}_displacement", f"{level}_velocity", "holding_force")
+
+
+def others_of(building: Building, shaking: Shaking) -> list[str]:
+    """Return the devices of a building beside the damper, whose forces must be known.
+
+    Parameters
+    ----------
+    building : which knows the damper that is identified
+    shaking : what drives it
+
+    Raises
+    ------
+    StudyError
+        If the force of one is not known.
+    """
+    names = [device.name for device in building.devices if device.name != building.studied]
+    unknown = [name for name in names if name not in shaking.others]
+    if unknown:
+        raise StudyError(
+            f"{shaking.name}: the force of {', '.join(unknown)} is not known, and a study's model "
+            f"is that of one damper. A measurement with {unknown[0]}_force is right; in a scenario "
+            "of your own each device can have its damper."
+        )
+    return names
 
 
 def write_signals(folder: Path, shaking: Shaking) -> list[Path]:

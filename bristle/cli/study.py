@@ -87,10 +87,11 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         help="motion prescribed and force measured, or ground motion in and response out",
     )
     parser.add_argument(
-        "--building",
-        type=Path,
-        metavar="FILE",
+        "--building", type=Path, metavar="FILE",
         help="the structure's data file, with --rig structure",
+    )  # fmt: skip
+    parser.add_argument(
+        "--device", metavar="NAME", help="of a building's several devices the one to identify"
     )
     parser.add_argument(
         "--channel",
@@ -163,6 +164,7 @@ def _new(arguments: argparse.Namespace) -> int:
         title=arguments.title,
         law=law,
         runs=choices,
+        device=arguments.device,
     )
     if arguments.json:
         _print_json(created)
@@ -216,7 +218,7 @@ def _print_new(created: Created) -> None:
 def _check(arguments: argparse.Namespace) -> int:
     from ..draw.data_check import data_check_png
     from ..progress import Progress
-    from ..study.data_check import check_data, damper_level
+    from ..study.data_check import Place, check_data, place_of_damper
     from ..study.study import Study
 
     if arguments.action == _OLD:
@@ -238,8 +240,9 @@ def _check(arguments: argparse.Namespace) -> int:
         if not arguments.json:
             _print_corrections(found)
         found = check_data(study)
-    level = damper_level(list(found.runs)) if study.settings.has_building else ""
-    picture = study.write_report("data_check.png", data_check_png(list(found.runs), level))
+    place = place_of_damper(study, found.runs) if study.settings.has_building else Place()
+    seen = [place.seen(run) for run in found.runs]
+    picture = study.write_report("data_check.png", data_check_png(seen, place.level))
     if arguments.json:
         import json
 

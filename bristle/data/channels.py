@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import NamedTuple
@@ -26,17 +27,59 @@ PLAIN = {
 }
 """Channels with their SI units; those of the levels of a structure come on top."""
 
+DRIVE = tuple(DRIVES)
+"""Channels that command a damper, each with its unit in `physics.drive`."""
+
+OF_DEVICE = ("force", *DRIVE)
+"""What is measured at a device of a building, each after its name: brace_force, brace_voltage."""
+
+_DEVICE = re.compile(rf"([a-z][a-z0-9_]*)_({'|'.join(OF_DEVICE)})")
 _LEVEL = re.compile(r"(base|floor[1-9]\d?)_(displacement|velocity|acceleration_absolute)")
 _DRIFT = re.compile(r"drift[1-9]\d?")
 
 MOTION = ("displacement", "velocity", "acceleration")
-DRIVE = tuple(DRIVES)
-"""Channels that command a damper, each with its unit in `physics.drive`."""
 
 
 def is_channel(name: str) -> bool:
     """Return whether there is a channel of this name."""
     return name in PLAIN or bool(_LEVEL.fullmatch(name) or _DRIFT.fullmatch(name))
+
+
+def device_channel(name: str) -> tuple[str, str] | None:
+    """Return the device and the quantity of a channel such as brace_force; None for others.
+
+    Whether a building has a device of that name is known where there is a building.
+    """
+    match = None if is_channel(name) else _DEVICE.fullmatch(name)
+    return (match[1], match[2]) if match else None
+
+
+def at_device(name: str, device: str) -> str:
+    """Return what a channel of a device is called where the device is the one that is identified.
+
+    Parameters
+    ----------
+    name : of the channel
+    device : the one that is identified; its brace_force is `force`, all others stay as they are
+    """
+    found = device_channel(name)
+    return found[1] if found and found[0] == device else name
+
+
+def no_device(channel: str, devices: Sequence[str]) -> str:
+    """Return why a channel of a device is none, "" where it is one or is of no device.
+
+    Parameters
+    ----------
+    channel : its name
+    devices : names of the devices that the building has
+    """
+    found = device_channel(channel)
+    if found is None or found[0] in devices:
+        return ""
+    if not devices:
+        return f'there is no channel "{channel}", for no building has devices here'
+    return f'{channel}: there is no device "{found[0]}"; there are {", ".join(devices)}'
 
 
 def channel_unit(channel: str) -> str:
@@ -54,6 +97,8 @@ def channel_unit(channel: str) -> str:
         return PLAIN[level[2].removesuffix("_absolute")]
     if _DRIFT.fullmatch(channel):
         return "m"
+    if found := device_channel(channel):
+        return PLAIN[found[1]]
     names = [*PLAIN, *(f"base_{one}" for one in (*MOTION[:2], "acceleration_absolute"))]
     names += ["floor1_displacement", "floor1_velocity", "floor1_acceleration_absolute", "drift1"]
     close = get_close_matches(channel, names, n=1, cutoff=0.5)

@@ -3,20 +3,22 @@
 Units are converted here, once. What was done to the samples is in `notes`; no sample is filtered.
 """
 
+# Longer than 300 lines: a measurement is one class, and every way to make one is here.
+
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError, UnitError
 from ..units import conversion
-from .channels import DRIVE, ChannelSpec, channel_unit
+from .channels import DRIVE, ChannelSpec, at_device, channel_unit
 from .corrections import Correction, set_right
 from .decimate import decimated
 from .extra import Extra, found_in, read_extra
@@ -153,6 +155,38 @@ class Measurement:
             lost={key: flags[start:stop] for key, flags in self.lost.items()},
             extra={key: one.of(slice(start, stop)) for key, one in self.extra.items()},
         )
+
+    def at_device(self, device: str) -> Measurement:
+        """Return the measurement as that of one device: its brace_force is `force`.
+
+        Parameters
+        ----------
+        device : its name; "" for none, and the measurement as it is
+
+        Raises
+        ------
+        RecordError
+            If force or command are there by both names.
+        """
+        names = {name: at_device(name, device) for name in self.channels}
+        if all(name == other for name, other in names.items()):
+            return self
+        for name, other in names.items():
+            if name != other and other in self.channels:
+                raise RecordError(
+                    f"{self.name}: {name} and {other} are both channels of the device {device!r}, "
+                    "which is identified. One of the two is right."
+                )
+
+        def named(values: Mapping[str, Any]) -> dict[str, Any]:
+            return {names.get(name, name): one for name, one in values.items()}
+
+        return replace(
+            self, channels=named(self.channels), units=named(self.units), lost=named(self.lost),
+            noise=named(self.noise), noise_facts=named(self.noise_facts),
+            spikes=tuple(one._replace(channel=names.get(one.channel, one.channel))
+                         for one in self.spikes),
+        )  # fmt: skip
 
     def digest(self) -> str:
         """Return 12 hex digits that two equal measurements share, whatever their files are."""

@@ -27,7 +27,8 @@ class About:
 
     `force` of a damper is "measured" or "reconstructed"; `sensors` the faults that channels show;
     `noise` that of each channel, in SI; `notes` further sentences; `driven` whether voltage or
-    current was recorded, as far as that matters.
+    current was recorded, as far as that matters; `beside_layer` whether a building's damper is
+    beside the isolation layer, so that a reconstructed force is that of both.
     """
 
     force: str = "measured"
@@ -35,6 +36,7 @@ class About:
     noise: Mapping[str, float] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     driven: bool = True
+    beside_layer: bool = True
 
 
 def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
@@ -45,7 +47,7 @@ def conclude(findings: Mapping[str, Finding], about: About) -> Diagnosis:
     findings : by site, the damper's last
     about : what else is known of the runs
     """
-    reconstructed = about.force == "reconstructed"
+    reconstructed = about.force == "reconstructed" and about.beside_layer
     renewed = [fault for found in findings.values() for fault in found.sensors]
     again = {(one.channel, one.fault) for one in renewed}
     first = [one for one in about.sensors if (one.channel, one.fault) not in again]

@@ -19,26 +19,26 @@ from ..identify.rig import DAMPER
 from ..identify.search_context import refine
 from ..identify.site_fit import fit_damper
 from ..identify.structure import ANY_LAW, StructureProblem, problems_of
-from ..physics.building import Building
+from ..physics.building import Building, with_damper
 from .building_prior import moved_numbers, within_prior
+from .building_sensors import blurred, faults_in_building, without_faults
 from .candidates import SHOWN, Trial, judge
 from .conclusion import About
-from .corrected import corrected
 from .damper import excused_by_sensor, left_by_filter
 from .finding import Finding
 from .load_cell import load_cell
 from .masses import Shaken, suited_masses, text_of_masses
 from .opening import IN_BUILDING, Opening, Progress, median_noise
 from .rule import BENCH, INSIDE, SITE, DecisionRule
-from .sensors import SensorFault, sensor_faults
 from .sites import present_at, shortened
 from .verdict import late_values
 
 Pair = tuple[StructureProblem, StructureProblem]
 
-BLURRED = ("lag", "high-pass", "delay", "derived")
-"""Faults for which a building's velocity is left out: displacement and accelerometer say the same
-without them, and what is left of a delay would be held against the law at each reversal."""
+OF_STOREY = (
+    "The damper's force is what a storey carries beside the spring that the building's file has "
+    "there: what is found at the damper may be the storey's own."
+)
 
 SEARCHED = 12.0
 """Seconds of each run, from its begin, on which the damper's effects are searched: the strongest
@@ -65,10 +65,12 @@ class BuildingRuns:
         say: Progress,
         free: bool = False,
     ) -> None:
+        building = with_damper(building)
+        self._device = building.device(building.studied)
         self._building, self._say, self._free = building, say, free
         say("looking for sensor faults")
-        self._sensors = tuple(sensor_faults([_as_bench(m, building) for m in (*train, *holdout)]))
-        right = [_corrected(list(runs), self._sensors, building) for runs in (train, holdout)]
+        self._sensors = tuple(faults_in_building([*train, *holdout], building))
+        right = [without_faults(list(runs), self._sensors, building) for runs in (train, holdout)]
         self._noise = median_noise([*right[0], *right[1]])
         say("smoothing the motion of each level")
         found = responses([*right[0], *right[1]], building)
@@ -97,23 +99,33 @@ class BuildingRuns:
         """Set right what the lines tell of the load cell, and of the building's numbers."""
         if DAMPER not in self._problems:
             return
-        layer = findings.get("layer")
-        if layer is not None and layer.kind != "none":
-            self._correct_load_cell(layer, findings)
+        site = self._beside
+        if site in findings and findings[site].kind != "none":
+            self._correct_load_cell(site, findings)
         if self._problems[DAMPER][0].reconstructed:
             self._correct_building(findings)
 
-    def _correct_load_cell(self, layer: Finding, findings: dict[str, Finding]) -> None:
-        self._say("layer: the load cell")
-        late = load_cell(layer, self._train, self._holdout, self._building)
+    @property
+    def _beside(self) -> str:
+        """The site beside the damper whose equilibrium has its force, "" where there is none."""
+        if not self._building.isolated and not self._device.name:
+            return ""
+        level = self._device.lower + 1
+        storey = level if self._building.isolated else level + 1
+        return f"storey{storey}" if storey else "layer"
+
+    def _correct_load_cell(self, site: str, findings: dict[str, Finding]) -> None:
+        self._say(f"{site}: the load cell")
+        level = self._device.lower + 1
+        late = load_cell(findings[site], self._train, self._holdout, self._building, level=level)
         if late is None:
             return
-        findings["layer"], (self._train, self._holdout) = late
+        findings[site], (self._train, self._holdout) = late
         shown = self._problems[DAMPER]
         self._problems = self._made(self._building)
-        if _rounded(findings["layer"]):
+        if _rounded(findings[site]):
             self._problems[DAMPER] = shown
-            self._present = _late(self._present, findings["layer"])
+            self._present = _late(self._present, findings[site])
 
     def _correct_building(self, findings: Mapping[str, Finding]) -> None:
         self._say("damper: what the building's file leaves open")
@@ -122,7 +134,8 @@ class BuildingRuns:
         self._problems = self._made(self._building)
         known = self._within_prior()
         suited = self._made(known)
-        if _suits(suited[DAMPER], self._problems[DAMPER], self._present):
+        part = self.part(DAMPER)
+        if _suits(suited[DAMPER], self._problems[DAMPER], part):
             self._problems, self._notes = suited, moved_numbers(self._building, known)
 
     def _within_prior(self) -> Building:
@@ -205,11 +218,11 @@ class BuildingRuns:
 
     def excused(self, finding: Finding, findings: Mapping[str, Finding]) -> Finding:
         """Return the damper's finding, not unknown where an instrument explains what is left."""
-        if _blurred(self._sensors):
+        if blurred(self._sensors):
             why = "Without the velocity of the base, its reversals are not located exactly."
             finding = excused_by_sensor(finding, BENCH.blurred, why)
-        layer = findings.get("layer")
-        if layer is not None and _rounded(layer):
+        beside = findings.get(self._beside)
+        if beside is not None and _rounded(beside):
             most = left_by_filter(self._present.law, *self._problems[DAMPER])
             why = "The load cell's filter has a different functional form."
             finding = excused_by_sensor(finding, most, why)
@@ -223,17 +236,21 @@ class BuildingRuns:
         """Return what the verdict tells beside the findings of the sites."""
         reconstructed = DAMPER in self._problems and self._problems[DAMPER][0].reconstructed
         force = "reconstructed" if reconstructed else "measured"
-        return About(force, self._sensors, self._noise, (*self._masses, *self._notes))
+        beside = self._device.on_first
+        notes = (*self._masses, *self._notes)
+        if reconstructed and not beside:
+            notes = (*notes, OF_STOREY)
+        return About(force, self._sensors, self._noise, notes, beside_layer=beside)
 
 
-def _suits(suited: Pair, given: Pair, present: Model, rule: DecisionRule = BENCH) -> bool:
+def _suits(suited: Pair, given: Pair, damper: Model, rule: DecisionRule = BENCH) -> bool:
     """Return whether moved numbers of a building explain what the file's leave, held-out runs too.
 
     What an effect does they may follow in part; then they are the file's still.
     """
 
     def left(pair: Pair) -> float:
-        base = fit_damper(pair[0], at_site(present, "damper", ("damper",)))
+        base = fit_damper(pair[0], damper)
         return rule.excess(judge(base.model, *pair).z)
 
     return left(suited) <= rule.moved * left(given)
@@ -251,36 +268,3 @@ def _late(present: Model, layer: Finding) -> Model:
     """Return the model whose damper's force is shown as late as equilibrium says."""
     effects = (*present.effects, *layer.effects)
     return replace(present, effects=effects, values={**present.values, **late_values(layer)})
-
-
-def _blurred(faults: tuple[SensorFault, ...]) -> bool:
-    return any(f.channel == "velocity" and f.fault in BLURRED for f in faults)
-
-
-def _corrected(
-    runs: list[Measurement], faults: tuple[SensorFault, ...], building: Building
-) -> list[Measurement]:
-    """Return measurements without the faults of the damper's channels.
-
-    Of velocities that are late or rounded the displacement says the same.
-    """
-    first = building.levels()[0]
-    names = {"displacement": f"{first}_displacement", "velocity": f"{first}_velocity"}
-    theirs = [replace(f, channel=names.get(f.channel, f.channel)) for f in faults]
-    late = names["velocity"]
-    out = corrected(runs, [f for f in theirs if not (f.channel == late and f.fault in BLURRED)])
-    if not _blurred(faults):
-        return out
-    return [
-        replace(one, channels={n: v for n, v in one.channels.items() if n != late}) for one in out
-    ]
-
-
-def _as_bench(measurement: Measurement, building: Building) -> Measurement:
-    """Return a measurement whose base channels are named as those of a bench."""
-    first = building.levels()[0]
-    names = {f"{first}_displacement": "displacement", f"{first}_velocity": "velocity"}
-    keep = {k: v for k, v in measurement.channels.items() if k in names or k == "force"}
-    channels = {names.get(k, k): v for k, v in keep.items()}
-    noise = {names.get(k, k): v for k, v in measurement.noise.items() if k in keep}
-    return replace(measurement, channels=channels, noise=noise)

@@ -10,7 +10,7 @@ from scipy.optimize import minimize_scalar
 from ..identify.assigned import corrected
 from ..identify.line import fit_line
 from ..identify.response import Response
-from ..identify.structure import StructureProblem, layer_problem, layer_run
+from ..identify.structure import StructureProblem, line_problem
 from ..physics.building import Building
 from ..physics.effect import instrument_of
 from ..physics.laws import law_of_part
@@ -29,6 +29,7 @@ def load_cell(
     holdout: list[Response],
     building: Building,
     rule: DecisionRule = SITE,
+    level: int = 0,
 ) -> tuple[Finding, tuple[list[Response], list[Response]]] | None:
     """Return the finding that the load cell is late or wrongly scaled, with the forces set right.
 
@@ -36,10 +37,12 @@ def load_cell(
 
     Parameters
     ----------
-    layer : the finding at the isolation layer, with the trials of its effects
+    layer : the finding at the isolation layer, or at a storey that the damper acts across, with
+        the trials of its effects
     train, holdout : responses to fit to, and those that decide
     building : whose masses, damping and stiffnesses equilibrium takes
     rule : the numbers that decide
+    level : the one above that layer or storey
 
     Returns
     -------
@@ -49,7 +52,7 @@ def load_cell(
     """
     best: tuple[float, float, float, Finding] | None = None
     for what in ("delay", "gain"):
-        found = _search_cell(what, train, holdout, building)
+        found = _search_cell(what, train, holdout, building, level)
         if best is None or found[0] < best[0]:
             best = found
     assert best is not None
@@ -72,18 +75,19 @@ def load_cell(
 
 
 def _search_cell(
-    what: str, train: list[Response], holdout: list[Response], building: Building
+    what: str, train: list[Response], holdout: list[Response], building: Building, level: int
 ) -> tuple[float, float, float, Finding]:
     """Return z on held-out runs, delay [s], gain and finding of the best delay or gain."""
 
     def problem(value: float, part: list[Response]) -> StructureProblem:
         delay, gain = (value, 1.0) if what == "delay" else (0.0, value)
-        return layer_problem(
-            [layer_run(corrected(r, delay, gain), building) for r in part], building
-        )
+        right = [corrected(r, delay, gain) for r in part]
+        return line_problem(right, building, level)
+
+    law = law_of_part("layer" if building.isolated and not level else "storey1").name
 
     def cost(value: float) -> float:
-        return fit_line(problem(value, train), law_of_part("layer").name).cost
+        return fit_line(problem(value, train), law).cost
 
     if what == "delay":
         dt = train[0].dt
@@ -97,7 +101,7 @@ def _search_cell(
         minimize_scalar(cost, bounds=(low, high), method="bounded", options={"maxiter": 14}).x
     )
     own, other = problem(value, train), problem(value, holdout)
-    base = fit_line(own, law_of_part("layer").name)
+    base = fit_line(own, law)
     after = judge(base.model, own, other)
     seen = detectable(other, other.expectation(base.model), SITE)
     finding = Finding("force", "none", (), 0.0, after.z, 0.0, seen, "", base.model)

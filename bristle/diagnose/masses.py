@@ -44,6 +44,13 @@ class Shaken:
         """Whether the damper's force was measured in every run."""
         return all(run.force is not None for run in (*self.train, *self.holdout))
 
+    @property
+    def lowest(self) -> int:
+        """The lowest level whose equilibrium with all above has no unknown force."""
+        run = self.train[0]
+        hidden = run.damped and not self.measured and run.device.crosses(0)
+        return run.device.upper + 1 if hidden else 0
+
     def lines(self, building: Building) -> dict[str, Pair]:
         """Return the sites whose model is a line, with a building's masses."""
         found = problems_of(self.train, self.holdout, building, self.law, self.straight)
@@ -117,7 +124,7 @@ def _shift(
     """Return by which share (n,) each mass is to move: least squares, with what the file knows."""
     n = building.size
     unit = rule.mass_doubt / DEVIATIONS
-    able = _determined(n, n - len(lines), shaken.measured)
+    able = _determined(n, shaken.lowest, shaken.measured)
     others = [shaken.lines(with_masses(building, unit * np.eye(n)[j])) for j in range(n)]
     normal, gradient = np.eye(n), np.zeros(n)
     for site, (train, _) in lines.items():

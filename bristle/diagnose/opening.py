@@ -282,7 +282,7 @@ class Trials:
 
 def of_layer(model: Model, problem: Problem) -> list[str]:
     """Return the layer's effects that can join a damper's model: a reconstructed force has them."""
-    if not (isinstance(problem, StructureProblem) and problem.reconstructed):
+    if not (isinstance(problem, StructureProblem) and problem.joined_with_layer):
         return []
     able = [e.key("structure") for e in effects_of("structure") if "force" in e.hooks()]
     return [name for name in able if name not in model.effects]

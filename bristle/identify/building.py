@@ -10,6 +10,7 @@ Methods for System Identification).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,11 +20,19 @@ from numpy.typing import NDArray
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
+from ..physics.device import Device
 from ..quantity import plain
-from .equilibrium_system import SKIP, EquilibriumSystem, cross_products, modes_of, ratios_of
+from .equilibrium_system import (
+    SKIP,
+    EquilibriumSystem,
+    cross_products,
+    equations_of,
+    modes_of,
+    ratios_of,
+)
 from .response import Response, responses
 from .search import z_scale
-from .simulated import stiffness_matrix
+from .simulated import loads_on, stiffness_matrix
 
 Array = NDArray[np.float64]
 
@@ -82,8 +91,9 @@ def identify_structure(
     ----------
     measurements : one or more runs with the ground acceleration and every level's motion
     building : masses and start values; of matrices that are no chain only the storeys' springs move
-    damper : whether a damper acts on the first level; None: if a force, voltage or current was
-        measured. If its force was not, nothing can be said of what is below the first level.
+    damper : whether a damper acts on the first level of a building whose file has no devices;
+        None: if a force, voltage or current was measured. If a damper's force was not, nothing can
+        be said of a storey that it acts across alone: on the first level, of what is below.
 
     Raises
     ------
@@ -92,15 +102,15 @@ def identify_structure(
         comes out negative.
     """
     runs = responses(measurements, building, draws=0, looser=LOOSER)
-    first = _first(runs, damper)
-    if first == building.size:
+    unknown = _unknown(runs, damper)
+    if not equations_of(building.size, unknown).levels:
         raise RecordError(
             f"{measurements[0].name}: force was not measured, and {building.name!r} has no storey "
             "above the damper. Measure the damper's force."
         )
     free = np.ones(building.size, dtype=np.bool_)
     while True:
-        ended = _rounds(runs, building, first, free)
+        ended = _rounds(runs, building, unknown, free)
         lost = _untold(ended, free)
         if not ended.positive and not lost.any() and ended.round > 0:
             lost[np.flatnonzero(free)[-1:]] = True  # the highest mode's ratio tells least
@@ -114,7 +124,7 @@ def identify_structure(
             f"{plain(ended.stiffness[i], 4)} N/m. Check signs and units of its displacement and "
             "acceleration, and the masses of the building."
         )
-    return _finish(runs, building, ended, first, free)
+    return _finish(runs, building, ended, unknown, free)
 
 
 class _Ended(NamedTuple):
@@ -133,20 +143,21 @@ class _Ended(NamedTuple):
 
 
 def _rounds(
-    runs: list[Response], building: Building, first: int, free: NDArray[np.bool_]
+    runs: list[Response], building: Building, unknown: Device | None, free: NDArray[np.bool_]
 ) -> _Ended:
     """Return the stiffnesses and the ratios of the modes in `free`; the others stay as given."""
     stiffness, given = np.array(building.stiffnesses), ratios_of(building)
     zeta = given
     for round_ in range(1 + ROUNDS):
-        sums = cross_products(runs, building, stiffness, zeta, first, plain=round_ == 0)
-        system = EquilibriumSystem(building, runs, stiffness, first)
+        sums = cross_products(runs, building, stiffness, zeta, unknown, plain=round_ == 0)
+        system = EquilibriumSystem(building, runs, stiffness, unknown)
         theta, covariance = system.solve(sums, given, free)
         stiffness, zeta = system.split(theta, stiffness)
         positive = bool(np.all(stiffness > 0.0))
         if not positive:
             break
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))[system.rows : system.rows + system.n]
+    m = len(system.told)
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))[m : m + system.n]
     return _Ended(stiffness, zeta, covariance, std, system, positive, round_)
 
 
@@ -160,14 +171,16 @@ def _untold(ended: _Ended, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 
 def _finish(
-    runs: list[Response], building: Building, ended: _Ended, first: int, free: NDArray[np.bool_]
-) -> StructureFit:
+    runs: list[Response], building: Building, ended: _Ended, unknown: Device | None,
+    free: NDArray[np.bool_],
+) -> StructureFit:  # fmt: skip
     """Return the fit with what is not identified put back and named."""
     stiffness, zeta, system = ended.stiffness.copy(), ended.zeta.copy(), ended.system
-    n, m, covariance = building.size, ended.system.rows, ended.covariance
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    std_k = np.concatenate([np.full(first, np.inf), std[:m]])
-    identifiable = free & (np.arange(n) >= first)
+    n, told, covariance = building.size, system.told, ended.covariance
+    m, std = len(told), np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    std_k = np.full(n, np.inf)
+    std_k[told] = std[:m]
+    identifiable = free & ~_modes_of_springs(building, stiffness, told)
     std_zeta = np.where(identifiable, ended.std_zeta, np.inf)
     given = np.array(building.stiffnesses)
     levels, lost, notes = building.levels(), [], []
@@ -185,14 +198,19 @@ def _finish(
                 f"mode {r + 1} comes out with a damping ratio of {zeta[r]:.4f}; it is given 0"
             )
             zeta[r] = 0.0
-    if first:
-        notes.append(f"the damper's force was not measured: values below {levels[0]} stay as given")
+    hidden = [levels[i] for i in range(n) if i not in told]
+    if hidden:
+        names = " and ".join(hidden)
+        notes.append(
+            f"the damper's force was not measured: values below {names} stay as given, and damping "
+            "ratios hold for them"
+        )
     modes = modes_of(building, stiffness)
     # d(omega^2)/dk_i = (shape_i - shape_{i-1})^2 (Nelson 1976, AIAA J. 14(9)).
     part = np.diff(modes.shapes, axis=0, prepend=np.zeros((1, n))) ** 2
     known = np.isfinite(std_k)
     cov = np.zeros((n, n))
-    cov[first:, first:] = covariance[:m, :m]
+    cov[np.ix_(told, told)] = covariance[:m, :m]
     cov *= np.outer(known, known)
     slope = part.T / (2.0 * modes.omega[:, None])
     std_omega = np.sqrt(np.maximum(np.einsum("ri,ij,rj->r", slope, cov, slope), 0.0))
@@ -227,38 +245,54 @@ def equilibrium(
         If a channel is missing, or the building has other levels than were measured.
     """
     runs = responses(measurements, building, draws=0, looser=LOOSER)
-    first = _first(runs, damper)
+    unknown = _unknown(runs, damper)
     return _left(
-        runs, building, EquilibriumSystem(building, runs, np.array(building.stiffnesses), first)
+        runs, building, EquilibriumSystem(building, runs, np.array(building.stiffnesses), unknown)
     )
 
 
-def _first(runs: list[Response], damper: bool | None) -> int:
-    """Return the first level whose equilibrium is known: 1 under an unknown damper's force."""
-    if damper is None:
-        damper = any(run.driven or run.force is not None for run in runs)
-    return 1 if damper and not all(run.force is not None for run in runs) else 0
+def _unknown(runs: list[Response], damper: bool | None) -> Device | None:
+    """Return the damper whose force was not measured in every run, None where there is none."""
+    device = runs[0].device
+    if damper is None or device.name:
+        damper = any(run.damped for run in runs)
+    return device if damper and not all(run.force is not None for run in runs) else None
+
+
+def _modes_of_springs(
+    building: Building, stiffness: Array, told: Sequence[int]
+) -> NDArray[np.bool_]:
+    """Return the modes (n,) that springs which are not told hold most of, one for each spring.
+
+    Their damping is as much that of the storeys there, which equilibrium does not show.
+    """
+    n = building.size
+    found = np.zeros(n, dtype=np.bool_)
+    modes = modes_of(building, stiffness)
+    energy = np.diff(modes.shapes, axis=0, prepend=np.zeros((1, n))) ** 2 / modes.omega**2
+    for i in (i for i in range(n) if i not in told):
+        found[int(np.argmax(energy[i]))] = True
+    return found
 
 
 def _left(runs: list[Response], found: Building, system: EquilibriumSystem) -> Equilibrium:
     """Return what equilibrium leaves by level, offsets apart."""
+    unknown = system.unknown
     C, K, M = (np.array(matrix) for matrix in (found.C, found.K, found.M))
     rest: list[list[Array]] = [[] for _ in range(found.size)]
     whole: list[list[Array]] = [[] for _ in range(found.size)]
     for run in runs:
-        inertia = M @ run.a
-        if run.force is not None:
-            inertia[0] += run.force
+        inertia = M @ run.a + loads_on(run, unknown)
         above, carried = (
-            np.cumsum(level[::-1], axis=0)[::-1][:, SKIP:]
+            (system.equations.weights @ level)[:, SKIP:]
             for level in (inertia + C @ run.v + K @ run.x, inertia)
         )
-        for i in range(system.first, found.size):
-            rest[i].append(above[i] - np.median(above[i]))
-            whole[i].append(carried[i] - np.median(carried[i]))
+        for row, i in enumerate(system.equations.levels):
+            rest[i].append(above[row] - np.median(above[row]))
+            whole[i].append(carried[row] - np.median(carried[row]))
     z, share = np.full(found.size, np.nan), np.full(found.size, np.nan)
-    for i in range(system.first, found.size):
+    for row, i in enumerate(system.equations.levels):
         left = np.concatenate(rest[i])
-        z[i] = z_scale(left / system.noise[i])
+        z[i] = z_scale(left / system.noise[row])
         share[i] = np.sqrt(np.mean(left**2) / np.mean(np.concatenate(whole[i]) ** 2))
     return Equilibrium(z, share)

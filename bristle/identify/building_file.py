@@ -42,6 +42,10 @@ def building_text(fit: StructureFit, origin: Sequence[str] = ()) -> str:
         ]
         for letter, matrix in (("M", building.M), ("C", building.C), ("K", building.K)):
             lines += ["", f"{letter} = [", *(f"  {_row(row)}," for row in matrix), "]"]
+    for device in building.devices:
+        names = ["ground", *building.levels()]
+        ends = ", ".join(json.dumps(names[i + 1]) for i in device.levels)
+        lines += ["", "[[devices]]", f"name = {json.dumps(device.name)}", f"between = [{ends}]"]
     text = "\n".join([*lines, ""])
     _check(text, building)
     return text
@@ -80,6 +84,7 @@ def _check(text: str, building: Building) -> None:
     import tomllib
 
     read = from_data(tomllib.loads(text))
+    assert read.devices == building.devices, "the file says otherwise"
     for ours, theirs in ((building.M, read.M), (building.C, read.C), (building.K, read.K)):
         size = np.abs(np.array(ours)).max()
         assert np.allclose(ours, theirs, rtol=0.0, atol=1e-6 * size), "the file says otherwise"

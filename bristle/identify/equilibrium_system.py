@@ -1,5 +1,9 @@
 """The equations of equilibrium above each storey, linear in stiffnesses and damping ratios.
 
+The force of a damper that no load cell shows is in those above every storey that it acts across.
+Where it acts across several, those above neighbouring ones are subtracted, which leaves the
+equilibrium of the level between them; the one above the highest is left out.
+
 Their cross products with instruments are summed over blocks of time, whose scatter gives the
 covariance of what is solved for.
 """
@@ -14,8 +18,9 @@ from scipy.linalg import eigh
 
 from ..errors import RecordError
 from ..physics.building import Building
+from ..physics.device import Device
 from .response import Response
-from .simulated import simulated, stiffness_matrix
+from .simulated import loads_on, simulated, stiffness_matrix
 
 Array = NDArray[np.float64]
 
@@ -49,80 +54,125 @@ def modes_of(building: Building, stiffness: Array) -> Modes:
     return Modes(np.sqrt(np.maximum(values, 1e-12)), shapes)
 
 
-class EquilibriumSystem:
-    """The equations t_i = k_i d_i + sum_r zeta_r g_ir + offset_i above each level from `first` on.
+class Equations(NamedTuple):
+    """Which equations of equilibrium have no unknown force.
 
-    Unknowns are ordered: stiffnesses, ratios, offsets.
+    `levels` (m,): the level that each is named by; `weights` (m, n): how the equilibria of the
+    levels are summed in each; `springs` (m, n): how often the spring below each level is in it;
+    `told` the springs that are in any.
+    """
+
+    levels: tuple[int, ...]
+    weights: Array
+    springs: Array
+    told: tuple[int, ...]
+
+
+def equations_of(n: int, unknown: Device | None = None) -> Equations:
+    """Return the equations of a building of n levels that are free of a damper's force.
+
+    Parameters
+    ----------
+    n : how many levels
+    unknown : the damper whose force was not measured, None where there is none
+    """
+    levels, weights = [], []
+    for i in range(n):
+        if unknown is None or not unknown.crosses(i):
+            levels.append(i)
+            weights.append([float(j >= i) for j in range(n)])
+        elif i < unknown.upper:
+            levels.append(i)
+            weights.append([float(j == i) for j in range(n)])
+    W = np.array(weights).reshape(len(levels), n)
+    springs = np.diff(W, axis=1, prepend=0.0)
+    told = np.flatnonzero(np.any(springs != 0.0, axis=0))
+    return Equations(tuple(levels), W, springs, tuple(told.tolist()))
+
+
+class EquilibriumSystem:
+    """The equations t_i = sum_j s_ij k_j d_j + sum_r zeta_r g_ir + offset_i, row by row.
+
+    Unknowns are ordered: the stiffnesses that are told, ratios, offsets.
+
+    Parameters
+    ----------
+    building : its masses and matrices, of n levels
+    runs : its responses
+    stiffness : (n,) N/m below each level, as it stands
+    unknown : the damper whose force was not measured, None where there is none
     """
 
     def __init__(
-        self, building: Building, runs: list[Response], stiffness: Array, first: int
+        self, building: Building, runs: list[Response], stiffness: Array, unknown: Device | None
     ) -> None:
         n = building.size
-        self.n, self.first, self.rows = n, first, n - first
+        self.n, self.unknown, self.equations = n, unknown, equations_of(n, unknown)
+        W, springs = self.equations.weights, self.equations.springs
+        self.told, self.rows = list(self.equations.told), len(W)
         self.M = np.array(building.M)
         modes = modes_of(building, stiffness)
         weighted = self.M @ modes.shapes
-        # Damping force above level i of mode r: above[i, r] times the mode's velocity.
-        self.above = np.cumsum((2.0 * modes.omega * weighted)[::-1], axis=0)[::-1]
+        # Damping force in equation i of mode r: above[i, r] times the mode's velocity.
+        self.above = W @ (2.0 * modes.omega * weighted)
         self.modal = weighted.T
-        total = np.cumsum(self.M[::-1], axis=0)[::-1]
-        chain = np.cumsum(np.array(building.K)[::-1], axis=0)[::-1]
-        drifts = chain @ np.tril(np.ones((n, n)))  # forces above each level by drift
-        self.other = drifts - np.diag(building.stiffnesses)
+        total = W @ self.M
+        drifts = W @ np.array(building.K) @ np.tril(np.ones((n, n)))  # forces by drift
+        self.other = drifts - springs * np.array(building.stiffnesses)
         self.other[np.abs(self.other) < 1e-9 * np.abs(drifts).max()] = 0.0
         self.total = total
         noise = np.median([run.noise_a for run in runs], axis=0)
-        cell = float(np.median([run.noise_force for run in runs]))
         x = np.median([run.std[:, 0] for run in runs], axis=0)
         drift = np.sqrt(x**2 + np.append(0.0, x[:-1]) ** 2)
         white = (total**2) @ noise**2
-        if runs[0].force is not None and first == 0:
-            white[0] += cell**2
+        for k, load in enumerate(runs[0].loads if unknown is None else runs[0].others):
+            cells = [(run.loads if unknown is None else run.others)[k].noise for run in runs]
+            share = W @ np.array(load.device.incidence(n))
+            white += (share * float(np.median(cells))) ** 2
         self.white = np.sqrt(white)
-        self.noise = np.sqrt(white + (stiffness * drift) ** 2)
+        self.noise = np.sqrt(white + springs**2 @ (stiffness * drift) ** 2)
 
     def target(self) -> Array:
-        """Return the signals' shares (n, 3 n + 2) in what each level's springs must carry."""
+        """Return the signals' shares (m, 4 n + 1) in what the springs of each row must carry."""
         n = self.n
-        rows = np.zeros((n, 3 * n + 2))
+        rows = np.zeros((self.rows, 4 * n + 1))
         rows[:, :n] = -self.other
         rows[:, 2 * n : 3 * n] = -self.total
-        rows[0, 3 * n] = -1.0
+        rows[:, 3 * n : 4 * n] = -self.equations.weights
         return rows
 
     def regressors(self, i: int) -> Array:
-        """Return the signals' shares (p, 3 n + 2) in the regressors of level i."""
-        n, m = self.n, self.rows
-        rows = np.zeros((2 * m + n, 3 * n + 2))
-        rows[i - self.first, i] = 1.0
-        rows[m : m + n, n : 2 * n] = self.above[i][:, None] * self.modal
-        rows[m + n + i - self.first, 3 * n + 1] = 1.0
+        """Return the signals' shares (p, 4 n + 1) in the regressors of row i."""
+        n, k = self.n, len(self.told)
+        rows = np.zeros((k + n + self.rows, 4 * n + 1))
+        rows[np.arange(k), self.told] = self.equations.springs[i, self.told]
+        rows[k : k + n, n : 2 * n] = self.above[i][:, None] * self.modal
+        rows[k + n + i, 4 * n] = 1.0
         return rows
 
     def instruments(self, i: int) -> Array:
-        """Return the instruments' shares (p, 2 n + 1) for level i."""
+        """Return the instruments' shares (p, 2 n + 1) for row i."""
         n = self.n
         rows = self.regressors(i)
-        return np.hstack([rows[:, : 2 * n], rows[:, 3 * n + 1 :]])
+        return np.hstack([rows[:, : 2 * n], rows[:, 4 * n :]])
 
     def solve(self, sums: Array, given: Array, free: NDArray[np.bool_]) -> tuple[Array, Array]:
         """Return the unknowns (p,) and their covariance, from blocks taken as independent.
 
         The damping ratios that are not `free` (n,) stay as `given`, with a variance of zero.
         """
-        p = 2 * self.rows + self.n
+        m = len(self.told)
+        p = m + self.n + self.rows
         per_block_A = np.zeros((len(sums), p, p))
         per_block_b = np.zeros((len(sums), p))
         target = self.target()
-        for i in range(self.first, self.n):
+        for i in range(self.rows):
             W, R = self.instruments(i) / self.noise[i] ** 2, self.regressors(i)
             per_block_A += W @ sums @ R.T
             per_block_b += W @ sums @ target[i]
-        m = self.rows
         theta, covariance = np.zeros(p), np.zeros((p, p))
         theta[m : m + self.n] = np.where(free, 0.0, given)
-        kept = np.concatenate([np.ones(m, bool), free, np.ones(m, bool)])
+        kept = np.concatenate([np.ones(m, bool), free, np.ones(self.rows, bool)])
         per_block_b = (per_block_b - per_block_A @ theta)[:, kept]
         per_block_A = per_block_A[:, kept][:, :, kept]
         A, b = per_block_A.sum(axis=0), per_block_b.sum(axis=0)
@@ -137,15 +187,17 @@ class EquilibriumSystem:
         return theta, covariance
 
     def split(self, theta: Array, stiffness: Array) -> tuple[Array, Array]:
-        """Return stiffnesses (those below `first` as given) and damping ratios."""
-        m = self.rows
-        return np.concatenate([stiffness[: self.first], theta[:m]]), theta[m : m + self.n]
+        """Return stiffnesses (those that are not told as given) and damping ratios."""
+        m, found = len(self.told), stiffness.copy()
+        found[self.told] = theta[:m]
+        return found, theta[m : m + self.n]
 
 
 def cross_products(
-    runs: list[Response], building: Building, stiffness: Array, zeta: Array, first: int, plain: bool
-) -> Array:
-    """Return cross products (blocks, 2 n + 1, 3 n + 2) of instruments with signals, all runs.
+    runs: list[Response], building: Building, stiffness: Array, zeta: Array,
+    unknown: Device | None, plain: bool,
+) -> Array:  # fmt: skip
+    """Return cross products (blocks, 2 n + 1, 4 n + 1) of instruments with signals, all runs.
 
     Parameters
     ----------
@@ -153,7 +205,7 @@ def cross_products(
     building : its masses and matrices
     stiffness : (n,) N/m below each level, as it stands
     zeta : (n,) damping ratios of the modes, as they stand
-    first : 1 where the force on the first level is unknown, else 0; see `simulated`
+    unknown : the damper whose force was not measured, None where there is none; see `simulated`
     plain : whether the measured motion is its own instrument, and not the simulated one
 
     Raises
@@ -165,13 +217,12 @@ def cross_products(
     for run in runs:
         n = building.size
         drift = np.diff(run.x, axis=0, prepend=np.zeros((1, run.x.shape[1])))
-        force = run.force if run.force is not None else np.zeros_like(run.ground)
-        one = np.ones((1, len(force)))
-        signals = np.vstack([drift, run.v, run.a, force[None, :], one])
+        one = np.ones((1, run.x.shape[1]))
+        signals = np.vstack([drift, run.v, run.a, loads_on(run, unknown), one])
         if plain:
             shown = np.vstack([drift, run.v, one])
         else:
-            x, v = simulated(run, building, stiffness, zeta, first)
+            x, v = simulated(run, building, stiffness, zeta, unknown)
             shown = np.vstack([np.diff(x, axis=0, prepend=np.zeros((1, x.shape[1]))), v, one])
         slowest = round(2.0 * np.pi / modes_of(building, stiffness).omega[0] / run.dt)
         size = max(10, round(BLOCK / run.dt))
@@ -182,7 +233,7 @@ def cross_products(
                 f"{run.name}: {signals.shape[1]} samples; intervals need {2 * size + SKIP} or more."
             )
         end = SKIP + whole * size
-        s = signals[:, SKIP:end].reshape(3 * n + 2, whole, size).transpose(1, 0, 2)
+        s = signals[:, SKIP:end].reshape(4 * n + 1, whole, size).transpose(1, 0, 2)
         w = shown[:, SKIP:end].reshape(2 * n + 1, whole, size).transpose(1, 0, 2)
         parts.append(w @ s.transpose(0, 2, 1))
     return np.concatenate(parts)

@@ -47,7 +47,8 @@ class Run:
     False where a sample was filled in, None if none was. `drive` is the channel that V holds, in
     its own unit; `labels` what is known of the whole run, such as a temperature; `rest` how many
     samples at its begin the damper rests under load, 0 where it does not; `extra` its channels
-    besides those that bristle knows.
+    besides those that bristle knows; `force_draws` (d, n) [N] draws of the error of a force that
+    was not measured and follows from the motion, beside `noise` and each with its draw of `draws`.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Run:
     labels: Mapping[str, Label] = field(default_factory=dict)
     rest: int = 0
     extra: Mapping[str, Extra] = field(default_factory=dict)
+    force_draws: Array | None = None
 
     def of(self, part: slice) -> Self:
         """Return the run with these of its samples; `dt` and `skip` stay what they were."""
@@ -73,6 +75,7 @@ class Run:
             self, rest=rest, x=self.x[part], v=self.v[part], a=self.a[part], V=self.V[part],
             force=self.force[part], draws=self.draws[:, part],
             measured=None if self.measured is None else self.measured[part],
+            force_draws=None if self.force_draws is None else self.force_draws[:, part],
             extra={name: one.of(part) for name, one in self.extra.items()},
         )  # fmt: skip
 
@@ -286,6 +289,8 @@ class Problem:
         )
         if not len(spread):
             spread = np.zeros((1, len(middle)))
+        if run.force_draws is not None:
+            spread = spread + run.force_draws[: len(spread)]
         bias = spread.mean(axis=0)
         # A jump that no draw put at this sample may still be here if one put it at the next.
         variance = np.mean((spread - bias) ** 2, axis=0)

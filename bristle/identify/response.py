@@ -2,38 +2,38 @@
 
 Every level's motion is smoothed by itself.
 
-A level whose displacement was not measured integrates its velocity, and drifts. What is slow is
-therefore taken from the nearest level that has a displacement, and the storeys between by their
-equilibrium: far below the first mode they hardly deflect.
-
 Equilibrium is taken sample by sample from the accelerations as measured, for they and the forces
 jump together; their noise is white and known.
 """
 
+# Longer than 300 lines: a docstring says of every field and argument which shape and unit it has.
+
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
+from ..data.channels import device_channel, no_device
 from ..data.extra import Extra
 from ..data.labels import Labels
 from ..data.measurement import Measurement
 from ..errors import RecordError
-from ..physics.building import Building, frequencies, with_one_damper
+from ..physics.building import Building, frequencies, with_damper
+from ..physics.device import GROUND, Device
+from .anchored import SLOW, Load, anchored, deflected
+from .device_motion import DeviceMotion, measured_across
 from .drive import smooth_steps
 from .level import corrected, level_draws, smoothed_level
 from .prepare import SHORTEST
 
 Array = NDArray[np.float64]
 
-SLOW = 0.3
-"""Share of the first natural frequency below which a displacement that was not measured is taken
-from equilibrium: storeys hardly deflect there, so that it needs their stiffness only roughly."""
+FIRST_LEVEL = Device("", GROUND, 0)
+"""Where the damper of a building without devices of its own sits."""
 
 
 @dataclass(frozen=True)
@@ -42,12 +42,14 @@ class Response:
 
     `x`, `v`, `a` (levels, n): displacement, velocity [m, m/s] relative to the table, smoothed, and
     absolute acceleration [m/s2] as measured (or, for a level without an accelerometer, smoothed:
-    `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper,
-    None where it was not measured; `V` (n,) [V]. `noise_a` (levels,), `noise_force`, `noise_ground`
-    standard deviations; `std` (levels, 3) what the smoother leaves uncertain of x, v and relative
-    acceleration; `draws` (levels, d, n, 3) draws of that error; `V_left` the noise left on V;
-    `drive` the channel that V holds, in its own unit, "" where none was measured; `labels` what is
-    known of the whole run; `extra` its channels besides those that bristle knows.
+    `accelerometer` (levels,) says which). `ground` (n,) [m/s2]; `force` (n,) [N] of the damper at
+    its place `device`, None where it was not measured; `others` what other devices carry; `across`
+    the motion of a damper between two levels, where it is smoothed by itself; `V` (n,) [V].
+    `noise_a` (levels,), `noise_force`, `noise_ground` standard deviations; `std` (levels, 3) what
+    the smoother leaves uncertain of x, v and relative acceleration; `draws` (levels, d, n, 3) draws
+    of that error; `V_left` the noise left on V; `drive` the channel that V holds, in its own unit,
+    "" where none was measured; `labels` what is known of the whole run; `extra` its channels
+    besides those that bristle knows.
     """
 
     name: str
@@ -68,6 +70,25 @@ class Response:
     drive: str = ""
     labels: Labels = field(default_factory=dict)
     extra: Mapping[str, Extra] = field(default_factory=dict)
+    device: Device = FIRST_LEVEL
+    others: tuple[Load, ...] = ()
+    across: DeviceMotion | None = None
+
+    @property
+    def damped(self) -> bool:
+        """Whether there is a damper: one with a place, or one whose force or command is known."""
+        return bool(self.device.name) or self.driven or self.force is not None
+
+    @property
+    def loads(self) -> list[Load]:
+        """All devices whose force is known."""
+        if self.force is None:
+            return list(self.others)
+        return [Load(self.device, self.force, self.noise_force), *self.others]
+
+    def hides(self, level: int) -> bool:
+        """Return whether a damper of unknown force acts across the storey below a level."""
+        return self.damped and self.force is None and self.device.crosses(level)
 
     @property
     def driven(self) -> bool:
@@ -79,9 +100,14 @@ def check_channels(measurement: Measurement, building: Building) -> None:
     """Raise a RecordError that names every channel that is missing.
 
     A building's response needs the ground acceleration and, of each level, the displacement or
-    velocity: what an accelerometer shows drifts away when it is integrated twice.
+    velocity: what an accelerometer shows drifts away when it is integrated twice. Of devices beside
+    the one that is identified the force is needed.
     """
     levels = building.levels()
+    names = [device.name for device in building.devices]
+    for channel in measurement.channels:
+        if wrong := no_device(channel, names):
+            raise RecordError(f"{measurement.name}: {wrong}.")
     missing = [] if measurement.has("ground_acceleration") else ["ground_acceleration"]
     for level in levels:
         able = (f"{level}_displacement", f"{level}_velocity")
@@ -99,6 +125,7 @@ def check_channels(measurement: Measurement, building: Building) -> None:
         channel
         for channel in measurement.channels
         if channel.startswith(("base_", "floor"))
+        and not device_channel(channel)
         and not any(channel.startswith(level) for level in known)
     )
     if beyond:
@@ -106,10 +133,30 @@ def check_channels(measurement: Measurement, building: Building) -> None:
             f"{measurement.name}: {', '.join(beyond)} measured, but {building.name!r} has the "
             f"levels {', '.join(levels)}. Give the building.toml of the structure that was tested."
         )
+    _refuse_unmeasured(measurement, building)
     if len(measurement.time) < SHORTEST:
         raise RecordError(
             f"{measurement.name}: {len(measurement.time)} samples; a fit needs {SHORTEST} or more."
         )
+
+
+def _refuse_unmeasured(measurement: Measurement, building: Building) -> None:
+    """Refuse devices beside the one that is identified whose force was not measured."""
+    missing = [
+        device
+        for device in building.devices
+        if device.name != building.studied and not measurement.has(f"{device.name}_force")
+    ]
+    if not missing:
+        return
+    levels = building.levels()
+    where = ", ".join(f"{device.name}_force ({device.place(levels)})" for device in missing)
+    raise RecordError(
+        f"{measurement.name}: missing {where}. The device that is identified is "
+        f"{building.studied!r}; the forces of all others must be measured, for equilibrium needs "
+        "them. Measure them, or for runs in which a device does not act, take it out of the "
+        "building's file."
+    )
 
 
 def respond(measurement: Measurement, building: Building, draws: int = 12) -> Response:
@@ -142,7 +189,8 @@ def responses(
     RecordError
         If a channel is missing, or the building has other levels than were measured.
     """
-    with_one_damper(building)
+    building = with_damper(building)
+    device = building.device(building.studied)
     for measurement in measurements:
         check_channels(measurement, building)
     smoothed = [
@@ -154,20 +202,32 @@ def responses(
     for i in range(building.size):
         for have in dict.fromkeys(_instruments(run[i]) for run in smoothed):
             alike = [run[i] for run in smoothed if _instruments(run[i]) == have]
-            if not _is_smooth(i, have):
+            if not _is_smooth(i, have, building):
                 made[i, have] = level_draws(longest, alike, measurements[0].step, draws, seed + i)
+    across = measured_across(measurements, building, device, draws, seed + building.size, looser)
     out = []
-    for m, levels in zip(measurements, smoothed, strict=True):
+    for m, levels, own in zip(measurements, smoothed, across, strict=True):
         errors = []
+        others = [
+            Load(one, m[f"{one.name}_force"], m.noise.get(f"{one.name}_force", 0.0))
+            for one in building.devices
+            if one is not device
+        ]
         for i, one in enumerate(levels):
-            if _is_smooth(i, _instruments(one)):
+            if _is_smooth(i, _instruments(one), building):
                 levels[i], error = corrected(one, m.step, draws, seed + i)
                 errors.append(error)
             else:
                 errors.append(made[i, _instruments(one)])
         a, noise_a = _accelerations(m, building, levels)
-        levels, errors = _anchored(levels, errors, _deflected(building, a), m.step, corner)
-        out.append(_response(m, levels, errors, (a, noise_a)))
+        made_of = _response(m, levels, errors, (a, noise_a))
+        made_of = replace(made_of, device=device, others=tuple(others), across=own)
+        levels, errors = anchored(
+            levels, errors, deflected(building, a, made_of.loads), m.step, corner,
+            {i for i in range(1, building.size) if made_of.hides(i)},
+            [f"{m.name}: {level}_displacement" for level in building.levels()],
+        )  # fmt: skip
+        out.append(_with_motion(made_of, levels, errors))
     return out
 
 
@@ -176,12 +236,14 @@ def _instruments(level: dict[str, Any]) -> tuple[bool, ...]:
     return tuple(bool(one) for one in level["have"])
 
 
-def _is_smooth(level: int, have: tuple[bool, ...]) -> bool:
+def _is_smooth(level: int, have: tuple[bool, ...], building: Building) -> bool:
     """Return whether a level's acceleration is smoothed, and does not jump.
 
-    Dry friction and end stops act on the first level; those above have a storey between.
+    Dry friction and end stops act on the first level and at the ends of devices; others have a
+    storey between.
     """
-    return level > 0 and not have[2]
+    ends = {0}.union(*(device.levels for device in building.devices))
+    return level not in ends and not have[2]
 
 
 def _accelerations(
@@ -204,13 +266,16 @@ def _accelerations(
     return np.array(a), np.array(noise)
 
 
-def _deflected(building: Building, a: Array) -> Array:
-    """Return how far springs alone deflect under accelerations (levels, n) [m/s2], (levels, n) m.
-
-    Differences of levels count: what is below the first one has the damper beside it.
-    """
-    below = np.cumsum((np.array(building.M) @ a)[::-1], axis=0)[::-1]
-    return np.asarray(np.cumsum(-below / np.array(building.stiffnesses)[:, None], axis=0))
+def _with_motion(response: Response, levels: list[dict[str, Any]], errors: list[Array]) -> Response:
+    """Return a response with the motion of its levels."""
+    n = response.a.shape[1]
+    return replace(
+        response,
+        x=np.array([level["state"][:, 0] for level in levels]),
+        v=np.array([level["state"][:, 1] for level in levels]),
+        std=np.array([level["std"] for level in levels]),
+        draws=np.array([error[:, :n] for error in errors]),
+    )
 
 
 def _response(
@@ -235,49 +300,13 @@ def _response(
     )  # fmt: skip
 
 
-def _anchored(
-    levels: list[dict[str, Any]], errors: list[Array], deflected: Array, dt: float, corner: float
-) -> tuple[list[dict[str, Any]], list[Array]]:
-    """Return levels and draws of their errors, with slow displacements from those measured.
-
-    Parameters
-    ----------
-    levels, errors : per level what `smoothed_level` and `level_draws` return
-    deflected : (levels, n) how far the springs deflect [m]; see `_deflected`
-    dt, corner : sampling step [s]; frequency below which a displacement is not the level's own [Hz]
-    """
-    able = [i for i, level in enumerate(levels) if level["have"][0]]
-    levels, errors = list(levels), list(errors)
-    if not able or len(able) == len(levels):
-        return levels, errors
-    low = butter(2, min(2.0 * corner * dt, 0.5), output="sos")
-
-    def joined(own: Array, other: Array) -> Array:
-        """Return (..., n) the fast part of one displacement and the slow one of another."""
-        return np.asarray(own + sosfiltfilt(low, other - own, axis=-1))
-
-    for i, level in enumerate(levels):
-        if level["have"][0]:
-            continue
-        near = min(able, key=lambda k: abs(k - i))
-        state, std, error = level["state"].copy(), level["std"].copy(), errors[i].copy()
-        there = levels[near]["state"][:, 0] + deflected[i] - deflected[near]
-        state[:, 0] = joined(state[:, 0], there)
-        if len(error):
-            error[:, :, 0] = joined(error[:, :, 0], errors[near][:, :, 0])
-        # White noise of a velocity, integrated: its power above a corner f is r dt/(2 pi^2 f).
-        drift = np.sqrt(level["r"][1] * dt / (2.0 * np.pi**2 * corner))
-        std[0] = np.hypot(min(std[0], drift), levels[near]["std"][0])
-        levels[i], errors[i] = {**level, "state": state, "std": std}, error
-    return levels, errors
-
-
 def shear(response: Response, building: Building, level: int) -> tuple[Array, float]:
     """Return what must be carried below a level, and its noise per sample.
 
     The inertia, damping and (for matrices that are no chain) elastic forces of this level and all
     above it, as M, C and K of the building have them, without the linear spring below the level
-    itself: -sum_j>=level (M a + C v + K x)_j + k x_rel, in N, positive against +x.
+    itself: -sum_j>=level (M a + C v + K x)_j + k x_rel, in N, positive against +x. What devices
+    beside the one that is identified carry there is taken off.
 
     Returns
     -------
@@ -290,18 +319,7 @@ def shear(response: Response, building: Building, level: int) -> tuple[Array, fl
     below = response.x[level] - (response.x[level - 1] if level else 0.0)
     total = -(rows_m @ response.a + rows_c @ response.v + rows_k @ response.x)
     noise = float(np.sqrt(np.sum((rows_m * response.noise_a) ** 2)))
+    for other in response.others:
+        if other.device.crosses(level):
+            total, noise = total - other.force, float(np.hypot(noise, other.noise))
     return total + building.stiffnesses[level] * below, noise
-
-
-def base_equilibrium(response: Response, building: Building) -> tuple[Array, float]:
-    """Return the force on the first level by its own equilibrium alone, and its noise.
-
-    As `shear` at level 0, from one accelerometer instead of all, but from the storey above it as
-    the building has it.
-    """
-    M, C, K = (np.array(matrix)[0] for matrix in (building.M, building.C, building.K))
-    total = -(M @ response.a + C @ response.v + K @ response.x)
-    white = np.sum((M * response.noise_a) ** 2)
-    smooth = np.sum((K * response.std[:, 0]) ** 2) + np.sum((C * response.std[:, 1]) ** 2)
-    own = building.stiffnesses[0] * response.x[0]
-    return total + own, float(np.sqrt(white + smooth))

@@ -6,7 +6,7 @@ damper where its force is known, what the isolation layer carries beside it, eac
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -14,7 +14,7 @@ from typing import NamedTuple
 from ..data.channels import DRIVE
 from ..data.measurement import Measurement
 from ..errors import StudyError
-from ..physics.building import Building
+from ..physics.building import Building, with_damper
 from ..physics.effect import AT, EFFECTS, effects_of, plain_name
 from .assigned import corrected_for_delay, lateness, linear_storeys, unassigned
 from .model import Model, Problem
@@ -24,6 +24,10 @@ from .structure import StructureProblem, blind_at_rest, problems_of
 
 ROLES = ("train", "holdout")
 DAMPER = "damper"
+_NOT_TOLD = (
+    "Springs and damping of the storeys beside it are those of the building's file: equilibrium "
+    "does not tell them from the damper's own."
+)
 
 
 class Seeds(NamedTuple):
@@ -118,13 +122,23 @@ class Rig:
         if self.building is None:
             _refuse_on_bench(model)
         found = self.sites_for(model)
-        lost = unassigned(model, list(found))
+        lost = unassigned(model, list(found)) or self._beside_nothing(model, found)
         if lost:
             raise StudyError(
                 f"{', '.join(lost)}: acts at no site that these runs show; they show "
                 f"{', '.join(found)}."
             )
         return found
+
+    def _beside_nothing(self, model: Model, found: Mapping[str, Site]) -> list[str]:
+        """Return the isolation layer's effects where neither it nor a damper beside it is shown."""
+        building = self.building
+        if building is None or "layer" in found:
+            return []
+        if building.device(building.studied).on_first:
+            return []
+        effects = [EFFECTS[name] for name in model.effects if EFFECTS[name].site == "structure"]
+        return [one.name for one in effects if "force" in one.hooks()]
 
     def prepare(self, model: Model) -> None:
         """Prepare all runs now, in place of where they are first asked for; raises as `sites`."""
@@ -196,10 +210,15 @@ def building_rig(
     RecordError
         If a channel is missing, or the building has other levels than were measured.
     """
+    building = with_damper(building)
     found = responses([*train, *holdout], building)
     notes: tuple[str, ...] = ()
-    if any(one.driven for one in found) and any(one.force is None for one in found):
-        notes = ("The damper's force was not measured: it is computed from equilibrium.",)
+    if any(one.damped for one in found) and any(one.force is None for one in found):
+        device = found[0].device
+        place = f" ({device.name}, {device.place(building.levels())})" if device.name else ""
+        notes = (f"The damper's force{place} was not measured: it is computed from equilibrium.",)
+        if not device.on_first:
+            notes = (*notes, _NOT_TOLD)
     return Rig(_BuildingSites(found, len(train), building), building, notes)
 
 

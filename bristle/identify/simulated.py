@@ -8,6 +8,7 @@ from scipy.linalg import eigh
 from scipy.signal import cont2discrete, lfilter, ss2tf
 
 from ..physics.building import Building
+from ..physics.device import GROUND, Device
 from .response import Response
 
 Array = NDArray[np.float64]
@@ -25,8 +26,23 @@ def stiffness_matrix(building: Building, stiffness: Array) -> Array:
     return K
 
 
+def loads_on(run: Response, unknown: Device | None = None) -> Array:
+    """Return the forces (n, samples) [N] of devices on the levels, as far as they are known.
+
+    Parameters
+    ----------
+    run : with the forces that were measured
+    unknown : a damper whose force was not measured in every run, and counts in none
+    """
+    n = len(run.x)
+    loads = np.zeros((n, run.x.shape[1]))
+    for load in run.loads if unknown is None else run.others:
+        loads += np.outer(load.device.incidence(n), load.force)
+    return loads
+
+
 def simulated(
-    run: Response, building: Building, stiffness: Array, zeta: Array, first: int
+    run: Response, building: Building, stiffness: Array, zeta: Array, unknown: Device | None
 ) -> tuple[Array, Array]:
     """Return the displacements and velocities (n, samples) [m, m/s] that a building shows to a run.
 
@@ -36,23 +52,32 @@ def simulated(
     building : its masses and matrices, of n levels
     stiffness : (n,) N/m below each level, in place of the building's
     zeta : (n,) damping ratios of the modes
-    first : 1 where the force on the first level is unknown: that level's measured motion then
-        drives the rest; else 0
+    unknown : the damper whose force was not measured: the measured motion across it then drives
+        the rest, its upper end and all above by that much; None where there is none
     """
     M, K = np.array(building.M), stiffness_matrix(building, stiffness)
-    start_x, start_v = run.x[:, 0], run.v[:, 0]
-    if first == 0:
-        load = -np.outer(M.sum(axis=1), run.ground)
-        if run.force is not None:
-            load[0] -= run.force
-        base_x, base_v = np.zeros_like(run.ground), np.zeros_like(run.ground)
-        ratios = zeta
+    n = building.size
+    load = -np.outer(M.sum(axis=1), run.ground) - loads_on(run, unknown)
+    if unknown is None:
+        free, ratios = np.eye(n), zeta
+        driven_x, driven_v = np.zeros_like(run.x), np.zeros_like(run.v)
+        start_x, start_v = run.x[:, 0], run.v[:, 0]
     else:
-        base_x, base_v = run.x[0], run.v[0]
-        start_x, start_v = run.x[1:, 0] - base_x[0], run.v[1:, 0] - base_v[0]
-        load = -np.outer(M[1:].sum(axis=1), run.a[0])
-        M, K = M[1:, 1:], K[1:, 1:]
-        ratios = zeta[1:]
+        # q = free y + above s: what the damper does to y is its force times b free = 0.
+        kept = np.arange(n) != unknown.upper
+        above = (np.arange(n) >= unknown.upper).astype(float)
+        free, ratios = np.eye(n)[:, kept], zeta[1:]
+        x, v, a = run.x[unknown.upper], run.v[unknown.upper], run.a[unknown.upper]
+        if unknown.lower == GROUND:
+            a = a - run.ground
+        else:
+            free[unknown.upper, unknown.lower] = 1.0
+            x, v = x - run.x[unknown.lower], v - run.v[unknown.lower]
+            a = a - run.a[unknown.lower]
+        driven_x, driven_v = np.outer(above, x), np.outer(above, v)
+        load -= np.outer(M @ above, a) + np.outer(K @ above, x)
+        start_x, start_v = (run.x - driven_x)[kept, 0], (run.v - driven_v)[kept, 0]
+    M, K, load = free.T @ M @ free, free.T @ K @ free, free.T @ load
     values, shapes = eigh(K, M)
     omega = np.sqrt(np.maximum(values, 1e-12))
     forces, x, v = shapes.T @ load, [], []
@@ -62,10 +87,8 @@ def simulated(
         own = _oscillator(float(omega[r]), max(float(ratios[r]), 1e-3), forces[r], run.dt, begin)
         x.append(own[0])
         v.append(own[1])
-    moved_x, moved_v = shapes @ np.array(x) + base_x, shapes @ np.array(v) + base_v
-    if first:
-        moved_x, moved_v = np.vstack([base_x, moved_x]), np.vstack([base_v, moved_v])
-    return moved_x, moved_v
+    shown = free @ shapes
+    return shown @ np.array(x) + driven_x, shown @ np.array(v) + driven_v
 
 
 def _oscillator(

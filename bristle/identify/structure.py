@@ -1,8 +1,9 @@
 """A building's runs as problems that a model can be held against.
 
-The damper's: base motion in, force out, measured or reconstructed from equilibrium. The isolation
-layer's, where the damper's force is known: what else the base carries. Each storey's: its shear
-against its drift. In the last two the model is a line, k x + c v, and effects of the structure add
+The damper's: the motion across it in, force out, measured or reconstructed from equilibrium. The
+isolation layer's, where the force of a damper beside it is known: what else the base carries. Each
+storey's: its shear against its drift, less the forces of the devices that act across it. In the
+last two the model is a line, k x + c v, and effects of the structure add
 to it; so they are judged by the same searches as a damper's effects in a damper's law.
 """
 
@@ -12,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,13 +21,15 @@ from numpy.typing import NDArray
 from ..data.measurement import Measurement
 from ..errors import RecordError
 from ..physics.building import Building
+from ..physics.device import GROUND
 from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS, effects_of
 from ..physics.inputs import Inputs
 from ..physics.laws import DEFAULT, base_and_variant
 from .along import Along
 from .model import Model, Problem, Run, absorbed, of_one_site
-from .response import Response, base_equilibrium, responses, shear
+from .reconstructed import reconstructed
+from .response import Response, responses, shear
 
 Array = NDArray[np.float64]
 
@@ -63,6 +66,8 @@ class StructureProblem(Problem):
         0 for the first level (the isolation layer, the damper), else the storey's number.
     reconstructed : bool
         Whether the damper's force is a result of equilibrium, not measured.
+    beside : bool
+        Whether it then is one unknown with what the isolation layer has beside the damper.
     damped : float
         Damping that the building has there already [N s/m]: a line may take that away and no more.
     """
@@ -73,10 +78,12 @@ class StructureProblem(Problem):
         storey: int = 0,
         reconstructed: bool = False,
         damped: float = float("inf"),
+        beside: bool = True,
     ) -> None:
         super().__init__(list(runs))
         self.storey = storey
         self.reconstructed = reconstructed
+        self.beside = beside
         self.damped = damped
         self._along: dict[tuple[str, ...], Along] = {}
 
@@ -87,7 +94,12 @@ class StructureProblem(Problem):
         return made
 
     def _made_of(self, runs: list[Run]) -> StructureProblem:
-        return StructureProblem(runs, self.storey, self.reconstructed, self.damped)
+        return StructureProblem(runs, self.storey, self.reconstructed, self.damped, self.beside)
+
+    @property
+    def joined_with_layer(self) -> bool:
+        """Whether the force is that of the damper and the isolation layer together."""
+        return self.reconstructed and self.beside
 
     def damper_effects(self, law: str) -> list[str]:
         """Return the effects of the damper, by a model's names, that these runs may tell.
@@ -100,7 +112,7 @@ class StructureProblem(Problem):
             for effect in effects_of("damper", law)
             if not absorbed(effect, law)
             and self.tells(effect)
-            and not (self.reconstructed and "structure" in effect.sites)
+            and not (self.joined_with_layer and "structure" in effect.sites)
         ]
 
     def along(self, effects: tuple[str, ...]) -> Along:
@@ -141,7 +153,7 @@ class StructureProblem(Problem):
 
 def structure_run(
     name: str, dt: float, motion: tuple[Array, Array, Array, Array], force: Array, noise: float,
-    draws: Array, keep: NDArray[np.bool_] | None = None,
+    draws: Array, keep: NDArray[np.bool_] | None = None, drawn: Array | None = None,
 ) -> StructureRun:  # fmt: skip
     """Return a run of the samples that count; the first ones are the smoother's and skipped.
 
@@ -152,16 +164,18 @@ def structure_run(
     force, noise : (n,) N, and its standard deviation [N]
     draws : (d, n, 4) draws of the error of x, v, a, V
     keep : (n,) which samples count; None for all
+    drawn : (d, n) draws of the error of a force that follows from the motion [N]; None for none
     """
-    whole = Run(name, dt, *motion, force, noise, draws)
+    whole = Run(name, dt, *motion, force, noise, draws, force_draws=drawn)
     if keep is None:
         index, skip = np.arange(len(force)), whole.skip
     else:
         index, skip = np.flatnonzero(keep & (np.arange(len(force)) >= whole.skip)), 0
     x, v, a, V = (part[index] for part in motion)
     return StructureRun(
-        name, dt, x, v, a, V, force[index], noise, draws[:, index], skip, whole=whole, keep=index
-    )
+        name, dt, x, v, a, V, force[index], noise, draws[:, index], skip, whole=whole, keep=index,
+        force_draws=None if drawn is None else drawn[:, index],
+    )  # fmt: skip
 
 
 def _of(response: Response, run: StructureRun) -> StructureRun:
@@ -187,7 +201,7 @@ def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
 def storey_run(response: Response, building: Building, level: int) -> StructureRun:
     """Return the shear below a level against the drift there.
 
-    Level 0 of a fixed base carries the damper as well, whose force must be known.
+    Where the damper acts across that storey its force must be known.
     """
     force, noise = shear(response, building, level)
     lower = level - 1
@@ -197,7 +211,7 @@ def storey_run(response: Response, building: Building, level: int) -> StructureR
         x -= response.x[lower]
         v -= response.v[lower]
         error[:, :, :3] -= _error(response, lower)[:, :, :3]
-    elif response.force is not None:
+    if response.force is not None and response.device.crosses(level):
         force = force - response.force
         noise = float(np.hypot(noise, response.noise_force))
     a = response.a[level]
@@ -212,26 +226,38 @@ def layer_run(response: Response, building: Building) -> StructureRun:
 
     Samples at which the base may be held are left out.
     """
-    if response.force is None:
-        raise RecordError(
-            f"{response.name}: force was not measured, so the forces of isolation layer and damper "
-            "cannot be separated."
-        )
     force, noise = shear(response, building, 0)
+    if response.device.crosses(0):
+        if response.force is None:
+            raise RecordError(
+                f"{response.name}: force was not measured, so the forces of isolation layer and "
+                "damper cannot be separated."
+            )
+        force = force - response.force
+        noise = float(np.hypot(noise, response.noise_force))
     x, v, a = response.x[0], response.v[0], response.a[0]
     made = structure_run(
-        response.name, response.dt, (x, v, a, response.V), force - response.force,
-        float(np.hypot(noise, response.noise_force)), _error(response, 0), sliding(response),
+        response.name, response.dt, (x, v, a, response.V), force, noise, _error(response, 0),
+        sliding(response),
     )  # fmt: skip
     return _of(response, made)
 
 
 def sliding(response: Response) -> NDArray[np.bool_]:
-    """Return where the first level surely moves, and so do the samples beside, (n,).
+    """Return where the first level surely moves, and so do the samples beside, (n,)."""
+    return moving(response.v[0], float(response.std[0, 1]))
+
+
+def moving(v: Array, std: float) -> NDArray[np.bool_]:
+    """Return where a velocity (n,) surely is none, and so are the samples beside, (n,).
 
     Beside a stop or a start the velocity is smoothed over a bend, and less certain than elsewhere.
+
+    Parameters
+    ----------
+    v, std : the velocity, and its standard deviation [m/s]
     """
-    moves = np.abs(response.v[0]) > SLIDING * float(response.std[0, 1])
+    moves = np.abs(v) > SLIDING * std
     at_rest = np.convolve(~moves, np.ones(2 * BESIDE + 1), mode="same") > 0.5
     return ~at_rest
 
@@ -241,52 +267,73 @@ def damper_run(
 ) -> StructureRun:
     """Return the damper's motion and force, measured or from equilibrium.
 
-    Of the base's own equilibrium and the sum over all levels the one with less noise is taken.
-    Where a law's friction jumps with direction samples at which the base may be held are left out.
+    Where a law's friction jumps with direction samples at which it may hold its ends together are
+    left out.
 
     Parameters
     ----------
     response : the run, its motion smoothed
     building : whose equilibrium gives the force where it was not measured
     law : name of the damper's law
-    linear_storeys : whether storeys are linear, as the base's own equilibrium needs
+    linear_storeys : whether storeys are linear, as a level's own equilibrium needs
     """
-    motion = (response.x[0], response.v[0], response.a[0] - response.ground, response.V)
+    x, v, a, std, error = motion_across(response)
+    motion = (x, v, a, response.V)
+    drawn = None
     if response.force is not None:
         force, noise = response.force, response.noise_force
     else:
-        force, noise = reconstructed(response, building, linear_storeys)
-    keep = sliding(response) if blind_at_rest(law) else None
-    made = structure_run(
-        response.name, response.dt, motion, force, noise, _error(response, 0), keep
-    )
+        found = reconstructed(response, building, linear_storeys)
+        force, noise = found.force, found.noise
+        if len(found.error):
+            noise, drawn = found.white, found.error
+    keep = moving(v, std) if blind_at_rest(law) else None
+    made = structure_run(response.name, response.dt, motion, force, noise, error, keep, drawn)
     return _of(response, made)
 
 
+class AcrossDamper(NamedTuple):
+    """The motion across a damper.
+
+    `x`, `v`, `a` (n,) of its upper end relative to the lower one [m, m/s, m/s2]; `std` of the
+    velocity [m/s]; `error` (d, n, 4) draws of the error of x, v, a and V.
+    """
+
+    x: Array
+    v: Array
+    a: Array
+    std: float
+    error: Array
+
+
+def motion_across(response: Response) -> AcrossDamper:
+    """Return the motion across a building's damper; see `identify.device_motion`."""
+    lower, upper = response.device.levels
+    x, v, std = response.x[upper], response.v[upper], float(response.std[upper, 1])
+    error = _error(response, upper)
+    if lower == GROUND:
+        return AcrossDamper(x, v, response.a[upper] - response.ground, std, error)
+    a, own = response.a[upper] - response.a[lower], response.across
+    if own is not None:
+        x, v, std = own.x, own.v, float(own.std[1])
+        error[:, :, :3] = own.draws
+    else:
+        x, v = x - response.x[lower], v - response.v[lower]
+        std = float(np.hypot(std, response.std[lower, 1]))
+        error[:, :, :3] = response.draws[upper] - response.draws[lower]
+    if response.accelerometer[upper] and response.accelerometer[lower]:
+        white = float(np.hypot(response.noise_a[upper], response.noise_a[lower]))
+        generator = np.random.default_rng(upper + 100)
+        error[:, :, 2] = white * generator.standard_normal(error.shape[:2])
+    return AcrossDamper(x, v, a, std, error)
+
+
 def blind_at_rest(law: str) -> bool:
-    """Return whether a law tells nothing where the base may be held: it has a sign there.
+    """Return whether a law tells nothing where it may hold its ends together: it has a sign there.
 
     Of laws that are to be compared, ANY_LAW, one may.
     """
     return law == ANY_LAW or base_and_variant(law)[0].has("sign")
-
-
-def reconstructed(
-    response: Response, building: Building, linear_storeys: bool = True
-) -> tuple[Array, float]:
-    """Return the damper's force (n,) [N] by equilibrium and its noise per sample [N].
-
-    The noise is that of the accelerometers and, for the base's own equilibrium, what the smoother
-    leaves uncertain of the displacements, both times the building's masses and stiffnesses.
-    """
-    force, noise = shear(response, building, 0)
-    if linear_storeys:
-        local, local_noise = base_equilibrium(response, building)
-        if local_noise < noise:
-            force, noise = local, local_noise
-    own = float(building.stiffnesses[0])
-    spread = own * float(response.std[0, 0])
-    return force - own * response.x[0], float(np.hypot(noise, spread))
 
 
 def _error(response: Response, level: int) -> Array:
@@ -316,9 +363,9 @@ def structure_problems(
     Returns
     -------
     dict
-        "storey1", "storey2", ...; "layer", where the base is isolated and moves, and the damper's
-        force was measured in every run; "damper", where a voltage, a current or the force was
-        measured.
+        "storey1", "storey2", ...; "layer", where the base is isolated and moves; both where the
+        damper acts across them only if its force was measured in every run; "damper", where a
+        voltage, a current or the force was measured, or the building's file has its place.
 
     Raises
     ------
@@ -344,34 +391,36 @@ def problems_of(
     both = (train, holdout)
     everything = [*train, *holdout]
     measured = all(r.force is not None for r in everything)
-    damped = measured or any(r.driven for r in everything)
+    damped = measured or any(r.damped for r in everything)
+    device = everything[0].device
     problems = {}
     for level in range(building.size):
         storey = level if building.isolated else level + 1
-        if storey == 0 or (level == 0 and damped and not measured):
+        if storey == 0 or (device.crosses(level) and damped and not measured):
             continue
-        parts = [[storey_run(r, building, level) for r in part] for part in both]
-        problems[f"storey{storey}"] = tuple(
-            StructureProblem(p, storey, damped=damping_below(building, level)) for p in parts
-        )
-    if building.isolated and (measured or not damped):
+        problems[f"storey{storey}"] = tuple(line_problem(part, building, level) for part in both)
+    if building.isolated and (measured or not damped or not device.crosses(0)):
         parts = [_moving([layer_run(_unloaded(r), building) for r in part]) for part in both]
         if all(moving or not part for moving, part in zip(parts, both, strict=True)):
             problems["layer"] = tuple(layer_problem(p, building) for p in parts)
     if damped:
         made = [[damper_run(r, building, law, linear_storeys) for r in part] for part in both]
-        parts = [_moving(part, needed=True) for part in made]
-        problems["damper"] = tuple(StructureProblem(p, 0, not measured) for p in parts)
+        end = "base" if device.on_first else "damper"
+        parts = [_moving(part, needed=end) for part in made]
+        beside = device.on_first
+        problems["damper"] = tuple(
+            StructureProblem(p, 0, not measured, beside=beside) for p in parts
+        )
     return problems  # type: ignore[return-value]
 
 
-def _moving(runs: list[StructureRun], needed: bool = False) -> list[StructureRun]:
-    """Return the runs in which the base moves at some time; a RecordError if `needed` and none."""
+def _moving(runs: list[StructureRun], needed: str = "") -> list[StructureRun]:
+    """Return the runs with samples that count: what is `needed` moves; a RecordError if in none."""
     able = [run for run in runs if len(run.force)]
     if needed and runs and not able:
         raise RecordError(
-            f"{', '.join(run.name for run in runs)}: the base does not move beyond the noise of "
-            "its velocity. Add a run with a stronger ground motion."
+            f"{', '.join(run.name for run in runs)}: the {needed} does not move beyond the "
+            "noise of its velocity. Add a run with a stronger ground motion."
         )
     return able
 
@@ -379,6 +428,22 @@ def _moving(runs: list[StructureRun], needed: bool = False) -> list[StructureRun
 def layer_problem(runs: Sequence[Run], building: Building) -> StructureProblem:
     """Return runs of the isolation layer as a problem."""
     return StructureProblem(runs, damped=damping_below(building, 0))
+
+
+def line_problem(responses: Sequence[Response], building: Building, level: int) -> StructureProblem:
+    """Return what a building carries below a level beside its devices, as a problem.
+
+    Parameters
+    ----------
+    responses : the runs, their motion smoothed
+    building : its masses and damping
+    level : 0 for the isolation layer of an isolated building, or the level above a storey
+    """
+    if building.isolated and not level:
+        return layer_problem([layer_run(one, building) for one in responses], building)
+    runs = [storey_run(one, building, level) for one in responses]
+    storey = level if building.isolated else level + 1
+    return StructureProblem(runs, storey, damped=damping_below(building, level))
 
 
 def damping_below(building: Building, level: int) -> float:

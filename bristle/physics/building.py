@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import PhysicsError
-from .device import GROUND, Device, read_devices
+from .device import GROUND, Device, either, read_devices
 from .linear import cholesky
 
 MAX_FLOORS = 20
@@ -22,7 +22,8 @@ class Building(NamedTuple):
 
     `M`, `C`, `K` (n, n) in kg, N s/m, N/m; the base comes first when `isolated`. The damper acts on
     the first mass. `stiffnesses` (n,) N/m are those below each mass (for effects of a storey).
-    `devices` are those that have a place and a name besides the damper.
+    `devices` are those that have a place and a name; `studied` names the one whose law and effects
+    measurements tell, "" for the damper on the first level (`with_damper`).
     """
 
     name: str
@@ -32,6 +33,7 @@ class Building(NamedTuple):
     isolated: bool
     stiffnesses: tuple[float, ...]
     devices: tuple[Device, ...] = ()
+    studied: str = ""
 
     @property
     def size(self) -> int:
@@ -302,22 +304,29 @@ def read_building(path: str | Path) -> Building:
     return from_data(data, str(path))
 
 
-def with_one_damper(building: Building) -> Building:
-    """Return a building whose one damper is on the first level: one without devices of its own.
+def with_damper(building: Building, name: str = "") -> Building:
+    """Return a building of which is known whose law and effects its measurements tell.
+
+    Parameters
+    ----------
+    building : without devices of its own it has the damper on the first level
+    name : of the device; "" for the one that was chosen before, or the only one
 
     Raises
     ------
     PhysicsError
-        If it has some: what is measured on a building knows the one damper.
+        If there is no device of that name, or there are several and none is named.
     """
-    if building.devices:
-        names = ", ".join(device.name for device in building.devices)
+    chosen = name or building.studied
+    if not chosen and len(building.devices) > 1:
+        names = either([repr(device.name) for device in building.devices])
         raise PhysicsError(
-            f"building {building.name!r} has devices of its own ({names}): studies and what comes "
-            "of them know one damper, on the first level. Take [[devices]] out of its file, for "
-            "runs in which none of them acts."
+            f"building {building.name!r} has {len(building.devices)} devices, and which of them is "
+            f"identified is not said: device = {names} (in study.toml, or --device) is right."
         )
-    return building
+    if not chosen and building.devices:
+        chosen = building.devices[0].name
+    return building._replace(studied=building.device(chosen).name)
 
 
 def _number(value: Any, key: str, where: str) -> float:

@@ -40,6 +40,23 @@ class Device(NamedTuple):
         """The levels that it connects, lower first."""
         return self.lower, self.upper
 
+    @property
+    def on_first(self) -> bool:
+        """Whether it is between the ground and the first level, as a building's one damper is."""
+        return self.levels == (GROUND, 0)
+
+    def crosses(self, level: int) -> bool:
+        """Return whether it acts across the storey below a level, or the isolation for level 0."""
+        return self.lower < level <= self.upper
+
+    def place(self, levels: Sequence[str]) -> str:
+        """Return where it sits: "at storey1", or "between the ground and floor2"."""
+        for name, pair in places(levels).items():
+            if pair == self.levels:
+                return f"at {name}"
+        low = "the ground" if self.lower == GROUND else levels[self.lower]
+        return f"between {low} and {levels[self.upper]}"
+
     def incidence(self, n: int) -> list[float]:
         """Return b (n,): the displacement is b q, and a force f acts with -b f on the levels."""
         return [float(i == self.upper) - float(i == self.lower) for i in range(n)]
@@ -55,7 +72,7 @@ def driven_mass(M: Sequence[Sequence[float]], device: Device) -> float:
     M : (n, n) mass matrix [kg]
     device : its levels count
     """
-    if (device.lower, device.upper) == (GROUND, 0):
+    if device.on_first:
         return M[0][0]
     n = len(M)
     M_inverse = inverse([value for row in M for value in row], n)
@@ -137,8 +154,7 @@ def _place(given: dict[str, Any], levels: Sequence[str], where: str) -> tuple[in
         named = places(levels)
         if not isinstance(given["at"], str) or given["at"] not in named:
             raise PhysicsError(
-                f"{where}: at = {given['at']!r}; {_either([repr(name) for name in named])} is "
-                "right."
+                f"{where}: at = {given['at']!r}; {either([repr(name) for name in named])} is right."
             )
         return named[given["at"]]
     ends = given["between"]
@@ -147,7 +163,7 @@ def _place(given: dict[str, Any], levels: Sequence[str], where: str) -> tuple[in
         raise PhysicsError(f"{where}: between = {ends!r}; a list of two levels is right.")
     for end in ends:
         if not isinstance(end, str) or end not in known:
-            names = _either([repr(name) for name in known])
+            names = either([repr(name) for name in known])
             raise PhysicsError(f"{where}: between: there is no level {end!r}; {names} is right.")
     if ends[0] == ends[1]:
         raise PhysicsError(f"{where}: between connects {ends[0]} to itself; give two levels.")
@@ -155,6 +171,6 @@ def _place(given: dict[str, Any], levels: Sequence[str], where: str) -> tuple[in
     return lower, upper
 
 
-def _either(names: list[str]) -> str:
+def either(names: list[str]) -> str:
     """Return names as a choice: "a, b or c"."""
     return " or ".join(filter(None, (", ".join(names[:-1]), names[-1])))

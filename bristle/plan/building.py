@@ -16,6 +16,7 @@ from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.opening import Opening, median_noise
 from ..errors import StudyError
 from ..identify.rig import DAMPER
+from ..physics.building import Building
 from ..physics.effect import plain_name
 from ..progress import tell
 from ..study.identification import as_model
@@ -81,6 +82,7 @@ def plan_building(
     model, runs = study.model(), study.runs()
     building = building_of(study, model)
     assert building is not None
+    _refuse_devices(building)
     measured = [*runs.train, *runs.holdout]
     motions = records_at_hand(measured, records, Path.cwd())
     house = House(building, study.folder / model.building if model.building else None)
@@ -124,6 +126,23 @@ def _within(done: RigLimits, given: Mapping[str, Any]) -> RigLimits:
             "second, and so have planned ones."
         )
     return replace(rig, rate=done.rate)
+
+
+def _refuse_devices(building: Building) -> None:
+    """Refuse dampers that a plan does not know: several, and one that is not on the first level.
+
+    The limits of a plan are the stroke of a damper that moves with the first level, and drifts; the
+    force of other devices under another ground motion is told by no model here.
+    """
+    device = building.device(building.studied)
+    others = [one.name for one in building.devices if one.name != building.studied]
+    if others or not device.on_first:
+        where = device.place(building.levels())
+        what = f"beside {', '.join(others)}" if others else f"for {device.name} ({where})"
+        raise StudyError(
+            f"building {building.name!r}: no test can be planned {what}. A plan is for a building "
+            "with one damper, between the ground and the first level."
+        )
 
 
 def _opened(study: Study, found: BuildingRuns) -> dict[str, Opening]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from ..data.channels import PLAIN, ChannelSpec, channel_unit, is_channel
+from ..data.channels import PLAIN, ChannelSpec, channel_unit, device_channel, is_channel
 from ..data.extra import refused_name
 from ..data.files import Toml
 from ..errors import RecordError, UnitError
@@ -26,10 +26,17 @@ def channel_as_toml(spec: ChannelSpec) -> dict[str, Any]:
     return found
 
 
-def is_right_channel(toml: Toml, name: str, table: Any) -> bool:
-    """Return whether there is a channel of a name and it has a table; else note what is wrong."""
+def is_right_channel(toml: Toml, name: str, table: Any, of_devices: bool = False) -> bool:
+    """Return whether there is a channel of a name and it has a table; else note what is wrong.
+
+    Parameters
+    ----------
+    toml, name, table : the file, the channel, and what stands there
+    of_devices : whether it may be of a device of a building; whether there is one of that name is
+        asked where the building is known
+    """
     keys = ("channels", name)
-    if not is_channel(name):
+    if not (is_channel(name) or (of_devices and device_channel(name))):
         besides = f"Any other channel goes into [extra.{name}]."
         toml.error(keys, f"{unknown('channel', name, PLAIN)} {besides}")
         return False

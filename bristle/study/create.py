@@ -37,6 +37,7 @@ def create_study(
     title: str = "",
     law: str | None = None,
     runs: RunChoices | None = None,
+    device: str | None = None,
 ) -> Created:
     """Make a study's folder from files; it appears when it is whole.
 
@@ -59,16 +60,21 @@ def create_study(
         law together with its effects.
     runs : RunChoices
         What is known of whole runs, and how files hold them.
+    device : str
+        Of a building with several devices the one that the study is about. None: its only one, or
+        the damper on the first level of a building without devices of its own.
 
     Raises
     ------
     StudyError
         If the folder exists, a needed channel or its unit cannot be told, or files differ.
+    PhysicsError
+        If the building's file is wrong, or it is not clear which device is meant.
     RecordError
         If a file cannot be read.
     """
     made = make_folder(
         Path(folder), files, rig=rig, building=building, channels=channels, title=title, law=law,
-        runs=runs,
+        runs=runs, device=device,
     )  # fmt: skip
     return Created(Study(folder), made.guesses, made.extra, made.unused, made.notes)

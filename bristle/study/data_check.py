@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -11,15 +11,23 @@ import numpy as np
 from ..data.checks.channels import check_channels
 from ..data.checks.differing_runs import check_differing_runs
 from ..data.checks.finding import Finding, grouped, sentence
-from ..data.checks.motion import check_force, check_motion, velocity_of_run
+from ..data.checks.motion import (
+    ACROSS,
+    check_force,
+    check_motion,
+    velocity_of_run,
+    with_motion_across,
+)
 from ..data.checks.recording import check_recording
 from ..data.checks.runs import Excitation, check_runs, excitation_of
 from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..data.relation import band
+from ..physics.device import GROUND
 from ..quantity import plain, scale
 from .openings import runs_for_test
 from .reading import read_runs
+from .rig import building_of
 from .run_file import TEST
 from .study import Study
 
@@ -145,15 +153,16 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
     runs = study.runs()
     test = runs_for_test(study, runs) if study.files(TEST) else None
     every = [*runs.all, *(test.holdout if test else [])]
-    level = ""
+    level, at_damper = "", Place()
     if study.settings.has_building:
-        level = damper_level(runs.all)
+        at_damper = place_of_damper(study, runs.all)
+        level = at_damper.level
     left_out = study.settings.excluded_text
     findings = [Finding("split", "warning", note) for note in runs.notes if note != left_out]
     findings += [Finding("left out", "note", left_out)] if left_out else []
     findings += [Finding("split", "warning", note) for note in (test.notes if test else ())]
     for done, run in enumerate(every, 1):
-        findings += _check_run(run, level)
+        findings += _check_run(run, at_damper)
         if show:
             show(done)
     recorded = every
@@ -163,26 +172,64 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
         findings += check_recording(run)
     if not study.settings.has_building:
         findings += check_differing_runs(runs.all)
-    together, excitations = check_runs(runs.train, runs.holdout, level)
+    fitted, judged, test_runs = (
+        [at_damper.seen(run) for run in part]
+        for part in (runs.train, runs.holdout, every[len(runs.all) :])
+    )
+    together, excitations = check_runs(fitted, judged, level)
     findings += together
-    excitations += [excitation_of(run, level) for run in every[len(runs.all) :]]
+    excitations += [excitation_of(run, level) for run in test_runs]
     if study.settings.has_building:
-        findings += _unmeasured(runs.all)
+        findings += _unmeasured(runs.all, at_damper)
     findings = [_milder(finding, runs.all) for finding in findings]
     ordered = [finding for level in _HEADINGS for finding in findings if finding.level == level]
     return DataCheck(tuple(ordered), tuple(excitations), tuple(every))
 
 
-def damper_level(runs: list[Measurement]) -> str:
-    """Return the level that the damper acts on: the base, else floor 1."""
-    based = any(name.startswith("base_") for run in runs for name in run.channels)
-    return "base" if based else "floor1"
+@dataclass(frozen=True)
+class Place:
+    """Where a damper sits.
+
+    `level` is what stands before its displacement and velocity in a run as it is `seen`; `ends` are
+    the levels that a device of the building connects, "" for the ground, () for the damper on the
+    first level and for a bench; `text` says where, in words; `on_first` whether it is between the
+    ground and the first level.
+    """
+
+    level: str = ""
+    ends: tuple[str, str] | tuple[()] = ()
+    text: str = "base"
+    on_first: bool = True
+
+    def seen(self, run: Measurement) -> Measurement:
+        """Return a run with the motion across the damper."""
+        return with_motion_across(run, *self.ends) if self.ends else run
 
 
-def _check_run(run: Measurement, level: str) -> list[Finding]:
-    velocity = velocity_of_run(run, level)
+def place_of_damper(study: Study, runs: Sequence[Measurement]) -> Place:
+    """Return where the damper of a study's building sits: without devices on the base or floor 1.
+
+    Parameters
+    ----------
+    study : with a building
+    runs : its measurements
+    """
+    named = bool(study.settings.device)
+    building = building_of(study, study.model(to_show=True)) if named else None
+    if building is None:
+        based = any(name.startswith("base_") for run in runs for name in run.channels)
+        return Place("base" if based else "floor1")
+    levels, device = building.levels(), building.device(building.studied)
+    lower, upper = ("" if i == GROUND else levels[i] for i in device.levels)
+    text = f"{device.name} ({device.place(levels)})"
+    return Place(ACROSS, (lower, upper), text, device.on_first)
+
+
+def _check_run(run: Measurement, at_damper: Place) -> list[Finding]:
+    level = "" if at_damper.ends else at_damper.level
+    velocity = velocity_of_run(at_damper.seen(run), at_damper.level)
     findings = [*check_channels(run, velocity), *check_motion(run, level)]
-    for other in _other_levels(run, level):
+    for other in _other_levels(run, at_damper.level):
         findings += check_motion(run, other)
     if "force" in run.channels and velocity is not None:
         findings += check_force(run, velocity)
@@ -214,13 +261,14 @@ def _milder(finding: Finding, runs: list[Measurement]) -> Finding:
 
 
 def _other_levels(run: Measurement, level: str) -> list[str]:
+    """Return the levels that are not the one that was looked at; none on a bench."""
     if not level:
         return []
     names = [name.rpartition("_displacement")[0] for name in run.channels]
     return [name for name in names if name and name != level]
 
 
-def _unmeasured(runs: list[Measurement]) -> list[Finding]:
+def _unmeasured(runs: list[Measurement], at_damper: Place) -> list[Finding]:
     findings = []
     there = set.intersection(*(set(run.channels) for run in runs))
     if "ground_acceleration" not in there:
@@ -233,5 +281,12 @@ def _unmeasured(runs: list[Measurement]) -> list[Finding]:
             "base. base_friction, a duffing spring and the base's mass cannot be separated from it."
         )
         do = "Put a load cell between damper and base."
+        if at_damper.ends and not at_damper.on_first:
+            text = (
+                f"the force of {at_damper.text} was not measured: it is reconstructed from "
+                "equilibrium. What the storeys there have that is not in the building's file "
+                "cannot be separated from it."
+            )
+            do = "Put a load cell at it."
         findings.append(Finding("force", "warning", text, do))
     return findings

@@ -1,5 +1,7 @@
 """What a researcher has at hand, as runs and a model: files, frames, arrays, measurements."""
 
+# Longer than 300 lines: every type of what is given has a message of its own.
+
 from __future__ import annotations
 
 import glob
@@ -11,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Union
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..data.channels import ChannelSpec, channel_unit, is_channel
+from ..data.channels import ChannelSpec, channel_unit, device_channel, is_channel
 from ..data.guess import Guess, guess_channels, specs
 from ..data.measurement import Measurement, measurements_of
 from ..data.model import StudyModel, new_model, read_model
@@ -19,7 +21,7 @@ from ..data.read import files_in, read_table
 from ..data.table import Table, from_arrays, table_from_frame
 from ..errors import RecordError, StudyError
 from ..findings import unknown, written
-from ..physics.building import Building, read_building, with_one_damper
+from ..physics.building import Building, read_building, with_damper
 from ..physics.effect import EFFECTS
 from ..physics.laws import law_names
 from .identified import Identified
@@ -84,7 +86,7 @@ def measurements(
             found += _read(table, given, building)
     if not found:
         raise RecordError("no run is given; one run or more is right.")
-    return found
+    return found if building is None else [one.at_device(building.studied) for one in found]
 
 
 def _read(
@@ -93,7 +95,7 @@ def _read(
     """Return the measurements of a table; what is wrong is told in terms of Python."""
     guesses: list[Guess] = []
     if given is None:
-        given = _by_name(table)
+        given = _by_name(table, building)
         guesses = _others(table, given, building)
         given = {**given, **specs(table, guesses)}
     try:
@@ -115,7 +117,8 @@ def _others(
     if taken == {column.text for column in table.columns}:
         return []
     levels = None if building is None else building.levels()
-    guesses = guess_channels(table, "bench" if building is None else "structure", levels)
+    rig = "bench" if building is None else "structure"
+    guesses = guess_channels(table, rig, levels, None if building is None else names_in(building))
     # Beside channels by name a column without a unit is no channel, as likely as not.
     alone = "time" not in named or len(named) == 1
     return [
@@ -185,15 +188,42 @@ def names_of(effects: str | Sequence[str]) -> tuple[str, ...]:
     return tuple(names)
 
 
-def building_from(given: str | Path | Building | None) -> Building | None:
-    """Return the building that was given, or that in a file; StudyError for another type."""
+def building_from(
+    given: str | Path | Building | None, device: str | None = None
+) -> Building | None:
+    """Return the building that was given, or that in a file, with the device that is identified.
+
+    Parameters
+    ----------
+    given : a building or its file; None for a test bench
+    device : name of one of its devices; None for the only one, or the damper on the first level
+
+    Raises
+    ------
+    StudyError
+        If the building is of another type, or a device is named without one.
+    PhysicsError
+        If the file is wrong, or it is not clear which device is meant.
+    """
     if given is None:
+        if device:
+            raise StudyError(
+                f"device is {told(device)}: it names one of a building, and none is given."
+            )
         return None
+    if device is not None and not isinstance(device, str):
+        raise StudyError(f"device is {told(device)}; the name of one of the building's is right.")
     if isinstance(given, Building):
-        return with_one_damper(given)
+        return with_damper(given, device or "")
     if not isinstance(given, str | Path):
         raise StudyError(f"building is {told(given)}; a building's file is right.")
-    return with_one_damper(read_building(given))
+    return with_damper(read_building(given), device or "")
+
+
+def names_in(building: Building) -> list[str]:
+    """Return the names of a building's devices, the one that is identified first."""
+    names = [device.name for device in building.devices]
+    return sorted(names, key=lambda name: name != building.studied)
 
 
 def _model(given: object) -> StudyModel:
@@ -274,11 +304,13 @@ def _of_arrays(columns: Mapping[str, ArrayLike], name: str) -> Table:
     return from_arrays(arrays, name)
 
 
-def _by_name(table: Table) -> dict[str, ChannelSpec]:
+def _by_name(table: Table, building: Building | None) -> dict[str, ChannelSpec]:
     """Return where the channels are that columns are named by; RecordError for an unknown unit."""
     found = {}
+    devices = [] if building is None else names_in(building)
     for column in table.columns:
-        if not is_channel(column.name):
+        of_device = device_channel(column.name)
+        if not (is_channel(column.name) or (of_device and of_device[0] in devices)):
             continue
         unit = "" if column.unit else channel_unit(column.name)
         if unit and column.text.strip() != column.name:

@@ -1,5 +1,7 @@
 """A new study's folder from files: channels guessed with reasons, runs to train on or held out."""
 
+# Longer than 300 lines: a folder is made whole or not at all, so that all of its checks are here.
+
 from __future__ import annotations
 
 import re
@@ -9,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..data.channels import DRIVE, ChannelSpec, channel_unit
+from ..data.channels import DRIVE, ChannelSpec, at_device, channel_unit, no_device
 from ..data.decimate import FAST, RATE
 from ..data.extra import found_in
 from ..data.guess import Guess, guess_channels, left_out, too_few_rows
@@ -20,7 +22,7 @@ from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import BristleError, StudyError, UnitError
-from ..physics.building import read_building, with_one_damper
+from ..physics.building import Building, read_building, with_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
 from ..quantity import plain
@@ -57,12 +59,13 @@ def make_folder(
     title: str = "",
     law: str | None = None,
     runs: RunChoices | None = None,
+    device: str | None = None,
 ) -> Made:
     """Make a study's folder from files.
 
     Parameters
     ----------
-    folder, files, rig, building, channels, title, law, runs : see
+    folder, files, rig, building, channels, title, law, runs, device : see
         `bristle.study.create.create_study`
 
     Raises
@@ -75,11 +78,15 @@ def make_folder(
     if not files:
         raise StudyError("a study needs measurements: --data 'lab/*.csv' names their files.")
     choices = runs or RunChoices()
-    levels = _levels(rig, building)
+    house = _house(rig, building, device)
+    levels = None if house is None else house.levels()
+    studied = "" if house is None else house.studied
+    devices = [] if house is None else [one.name for one in house.devices]
+    _refuse_no_device(channels or {}, devices)
     tables = [read_table(Path(file)) for file in files]
     closed = for_test([Path(file) for file in files], choices)
     first = tables[closed.index(False)]  # a guess is a choice, which no test run may see
-    guesses = _chosen(first, guess_channels(first, rig, levels), channels or {})
+    guesses = _chosen(first, guess_channels(first, rig, levels, devices), channels or {})
     _refuse_incomplete(first, guesses, rig, channels or {})
     specs = {
         guess.channel: ChannelSpec(guess.column, guess.unit, guess.sign) for guess in guesses
@@ -89,7 +96,7 @@ def make_folder(
     taken = [guess.column for guess in guesses]
     extra = found_in(first, taken, specs)
     names = _names([Path(file) for file in files])
-    about, notes = facts_of([Path(file) for file in files], choices, bool({*DRIVE} & {*specs}))
+    about, notes = facts_of([Path(file) for file in files], choices, _commanded(specs, studied))
     found = _parts(names, tables, specs, choices.split)
     of_file = dict(zip(names, about, strict=True))
     is_test = dict(zip(names, closed, strict=True))
@@ -101,6 +108,7 @@ def make_folder(
         mask=choices.mask, split=choices.split, law=ALL if law is None and rig == "bench" else "",
         excluded=tuple(run for run in every if run.role == EXCLUDE),
         rate=_rate([one for one in found if not is_test[one.file]], choices, notes), extra=extra,
+        device=studied,
     )  # fmt: skip
     _refuse_one_role(settings.runs)
     if settings.excluded:
@@ -195,12 +203,27 @@ def parse_channel(text: str) -> tuple[str, ChannelSpec]:
     return match["channel"], ChannelSpec(match["column"].strip(), unit, -1 if match["sign"] else 1)
 
 
-def _levels(rig: str, building: Path | str | None) -> list[str] | None:
+def _house(rig: str, building: Path | str | None, device: str | None) -> Building | None:
+    """Return the building of a new study with its device; None where no file is given."""
     if rig == "structure" and building is not None:
-        return with_one_damper(read_building(building)).levels()
+        return with_damper(read_building(building), device or "")
     if building is not None:
         raise StudyError("--building goes with --rig structure alone.")
+    if device:
+        raise StudyError("--device goes with --building: it names one of the building's devices.")
     return None
+
+
+def _refuse_no_device(channels: Iterable[str], devices: Sequence[str]) -> None:
+    """Refuse channels that were given of devices that the building does not have."""
+    for channel in channels:
+        if wrong := no_device(channel, devices):
+            raise StudyError(f"--channel {channel}=...: {wrong}.")
+
+
+def _commanded(channels: Iterable[str], device: str) -> bool:
+    """Return whether a channel commands the damper, which may be a device of a building."""
+    return any(at_device(name, device) in DRIVE for name in channels)
 
 
 def _chosen(table: Table, guesses: list[Guess], channels: Mapping[str, ChannelSpec]) -> list[Guess]:

@@ -51,6 +51,7 @@ def identify(
     holdout: Data | None = None,
     channels: Channels | None = None,
     building: str | Path | Building | None = None,
+    device: str | None = None,
     table: bool = False,
     write: bool = True,
 ) -> Identified:
@@ -79,6 +80,9 @@ def identify(
         says it itself.
     building : path or Building, optional
         The building that the damper is in, if it was measured there and not on a test bench.
+    device : str, optional
+        Of a building with several devices the one that is identified; the forces of the others
+        must be measured, as brace_force for one that is called brace.
     table : bool
         Whether to compare the laws, as the paper does.
     write : bool
@@ -116,14 +120,14 @@ def identify(
     given = _opened(data)
     free, model = _is_all(model), None if _is_all(model) else model
     if isinstance(given, Study):
-        _refuse_of_study(holdout=holdout, channels=channels, building=building)
+        _refuse_of_study(holdout=holdout, channels=channels, building=building, device=device)
         begin = None if model is None and not effects else _present(given, model, effects)
         return identify_study(
             given, law=ALL if free else None, model=begin, command=command, table=table,
             write=write,
         )  # fmt: skip
     chosen = model_of(model, effects, DEFAULT)
-    house = building_from(building)
+    house = building_from(building, device)
     refuse_in_building(ALL if free else None, house is not None)
     compile_ahead(bool(chosen.effects))
     runs = _runs(given, holdout, channels, house)
@@ -147,6 +151,7 @@ def compare(
     train: Data | None = None,
     channels: Channels | None = None,
     building: str | Path | Building | None = None,
+    device: str | None = None,
     role: str = "holdout",
 ) -> Comparison:
     """Compare a model's force with the measured one: how wrong, where, and where not.
@@ -165,6 +170,8 @@ def compare(
     channels : mapping, optional
         As in `bristle.identify`.
     building : path or Building, optional
+        As in `bristle.identify`.
+    device : str, optional
         As in `bristle.identify`.
     role : {"holdout", "train", "test"}
         Which runs of a study. It counts how often its test runs are opened.
@@ -200,7 +207,7 @@ def compare(
         raise StudyError(f"role is {written(role)}; {' or '.join(ROLES)} is right.")
     given = _opened(data)
     if isinstance(given, Study):
-        _refuse_of_study(train=train, channels=channels, building=building)
+        _refuse_of_study(train=train, channels=channels, building=building, device=device)
         chosen = _present(given, model, effects)
         return compare_study(given, chosen, role=role)
     if role == TEST:
@@ -213,7 +220,7 @@ def compare(
             "law's name."
         )
     chosen = model_of(model, effects, DEFAULT)
-    house = building_from(building)
+    house = building_from(building, device)
     runs = measurements(given, channels, building=house)
     fitted = runs if train is None else measurements(train, channels, building=house)
     present = as_model(chosen)
@@ -229,6 +236,7 @@ def diagnose(
     holdout: Data | None = None,
     channels: Channels | None = None,
     building: str | Path | Building | None = None,
+    device: str | None = None,
     profile: bool = False,
     write: bool = True,
 ) -> Diagnosis:
@@ -250,6 +258,8 @@ def diagnose(
     channels : mapping, optional
         As in `bristle.identify`.
     building : path or Building, optional
+        As in `bristle.identify`.
+    device : str, optional
         As in `bristle.identify`.
     profile : bool
         Whether the model is fitted again at the limit of every effect: exact where it is far from
@@ -290,7 +300,7 @@ def diagnose(
     """
     given = _opened(data)
     if isinstance(given, Study):
-        _refuse_of_study(holdout=holdout, channels=channels, building=building)
+        _refuse_of_study(holdout=holdout, channels=channels, building=building, device=device)
         if (model is None or _is_all(model)) and not effects:
             law = ALL if _is_all(model) else None
             return diagnose_study(given, law=law, profile=profile, write=write)
@@ -299,7 +309,7 @@ def diagnose(
             "bristle.identify(study, ...)."
         )
     chosen = model_of(None if _is_all(model) else model, effects, DEFAULT)
-    house = building_from(building)
+    house = building_from(building, device)
     free = _is_all(model) or (model is None and not effects and house is None)
     compile_ahead()
     runs = _runs(given, holdout, channels, house)

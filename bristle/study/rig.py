@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ..data.model import StudyModel
 from ..identify.rig import Rig, bench_rig, building_rig
-from ..physics.building import Building, paper_building, read_building, with_one_damper
+from ..physics.building import Building, paper_building, read_building, with_damper
 from .runs import Runs
 from .study import Study
 
@@ -29,15 +29,16 @@ def rig_of(study: Study, model: StudyModel, runs: Runs) -> Rig:
 def building_of(study: Study, model: StudyModel) -> Building | None:
     """Return the building of a study: its file, or the paper's where it names none.
 
-    None where the damper was measured on a test bench.
+    None where the damper was measured on a test bench. The building knows which of its devices the
+    study is about.
 
     Raises
     ------
     PhysicsError
-        If the building has devices besides the damper, or its file is wrong.
+        If the building has several devices and study.toml names none of them, or its file is wrong.
     """
     if not study.settings.has_building:
         return None
-    if not model.building:
-        return paper_building()
-    return with_one_damper(read_building(study.folder / model.building))
+    file = study.folder / model.building
+    building = read_building(file) if model.building else paper_building()
+    return with_damper(building, study.settings.device)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..data.channels import DRIVE, PLAIN, ChannelSpec, is_channel
+from ..data.channels import DRIVE, PLAIN, ChannelSpec, device_channel, is_channel
 from ..data.command_limits import LIMITS
 from ..data.corrections import FAULTS, Correction, wrong_value
 from ..data.files import Toml
@@ -136,7 +136,7 @@ def _corrections(toml: Toml, keys: KeyPath, table: Mapping[str, Any]) -> tuple[C
         toml.known(here, one, _CORRECTION_KEYS)
         channel, fault = toml.text(here, one, "channel"), toml.text(here, one, "fault")
         value = toml.number(here, one, "value")
-        if not is_channel(channel):
+        if not (is_channel(channel) or device_channel(channel)):
             toml.error(here, unknown("channel", channel, PLAIN))
         elif fault not in FAULTS:
             toml.error(here, unknown("fault", fault, FAULTS))

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..data.channels import DRIVE, ChannelSpec
+from ..data.channels import DRIVE, ChannelSpec, at_device
 from ..data.corrections import Correction
 from ..data.files import Toml, write_whole
 from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
+from ..errors import PhysicsError
 from ..findings import written
+from ..physics.building import read_building
 from .channel_file import channel_as_toml, is_right_channel, read_channel, read_extra
 from .run_file import (
     EXCLUDE,
@@ -27,7 +30,7 @@ RIGS = ("bench", "structure")
 CUT_OFF = 18.0
 """Low-pass of measured and predicted force [Hz], as in Shirazi et al. (2012), section III-C."""
 _KEYS = (
-    "schema", "title", "notes", "rig", "law", "cut_off", "rate", "mask", "split", "runs",
+    "schema", "title", "notes", "rig", "device", "law", "cut_off", "rate", "mask", "split", "runs",
     "channels", "extra",
 )  # fmt: skip
 ALL = "all"
@@ -43,7 +46,8 @@ class Settings:
     not measured; `split` how files hold several runs, "" where they hold one (`data.pieces`);
     `law` "all" where the law is sought together with its effects, "" where the model's is kept;
     `excluded` the runs that are left out, which are none of `runs`; `extra` the channels besides
-    those that bristle knows.
+    those that bristle knows; `device` the one of the building's that the study is about, "" for the
+    damper on the first level. As read, the channels of that device are `force` and `voltage`.
     """
 
     title: str
@@ -59,11 +63,13 @@ class Settings:
     law: str = ""
     excluded: tuple[RunFile, ...] = ()
     extra: dict[str, ChannelSpec] = field(default_factory=dict)
+    device: str = ""
 
     @property
     def drive(self) -> str:
         """The channel that commands the damper, "" where none was measured."""
-        there = {*self.channels, *(name for run in self.runs for name in run.levels)}
+        there = {at_device(name, self.device) for name in self.channels}
+        there |= {name for run in self.runs for name in run.levels}
         return next((name for name in DRIVE if name in there), "")
 
     @property
@@ -99,6 +105,9 @@ def read_settings(path: Path) -> Settings:
     rig = toml.text((), data, "rig", "bench")
     if rig not in RIGS:
         toml.error(("rig",), f'rig = "{rig}"; "bench" or "structure" is right.')
+    device = toml.text((), data, "device")
+    if device and rig == RIGS[0]:
+        toml.error(("device",), 'device goes with rig = "structure": it is one of a building\'s.')
     law = toml.text((), data, "law")
     if law not in ("", ALL):
         toml.error(
@@ -125,8 +134,11 @@ def read_settings(path: Path) -> Settings:
     channels = {
         name: read_channel(toml, name, table)
         for name, table in toml.table((), data, "channels").items()
-        if is_right_channel(toml, name, table)
+        if is_right_channel(toml, name, table, of_devices=rig != RIGS[0])
     }
+    if rig != RIGS[0] and not device:
+        device = only_device(path.parent)
+    channels = _at_device(toml, channels, device)
     extra = {
         name: read_extra(toml, name, table) for name, table in toml.table((), data, "extra").items()
     }
@@ -136,7 +148,40 @@ def read_settings(path: Path) -> Settings:
     return Settings(
         title, rig, runs, channels, notes, CUT_OFF if cut_off is None else cut_off,
         rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded, extra=extra,
+        device=device,
     )  # fmt: skip
+
+
+def only_device(folder: Path) -> str:
+    """Return the device of a study's building where it has one alone, else "".
+
+    Parameters
+    ----------
+    folder : the study's; what is wrong with its model or building is told where they are asked for
+    """
+    try:
+        model = tomllib.loads((folder / "model.toml").read_text(encoding="utf-8-sig"))
+        devices = read_building(folder / str(model.get("building"))).devices
+    except (OSError, ValueError, PhysicsError):
+        return ""
+    return devices[0].name if len(devices) == 1 else ""
+
+
+def _at_device(
+    toml: Toml, channels: Mapping[str, ChannelSpec], device: str
+) -> dict[str, ChannelSpec]:
+    """Return the channels with those of the study's device by the names of the one damper."""
+    out: dict[str, ChannelSpec] = {}
+    for name, spec in channels.items():
+        other = at_device(name, device)
+        if other in out or (other != name and other in channels):
+            toml.error(
+                ("channels", name),
+                f"{name} and {other} are both of the device {device!r}, which the study is about: "
+                "one of the two must go.",
+            )
+        out[other] = spec
+    return out
 
 
 def write_settings(path: Path, settings: Settings) -> None:
@@ -149,6 +194,9 @@ def write_settings(path: Path, settings: Settings) -> None:
     document.add("notes", tomlkit.item(settings.notes))
     document["notes"].comment("free text of the lab, shown in the report")
     document.add("rig", tomlkit.item(settings.rig))
+    if settings.device:
+        document.add("device", tomlkit.item(settings.device))
+        document["device"].comment("of the building's: whose law and effects are identified")
     if settings.law:
         document.add("law", tomlkit.item(settings.law))
         document["law"].comment("sought with its effects; without this line the model's is kept")

@@ -255,19 +255,32 @@ def test_outputs_follow_no_input_that_they_do_not_list(tmp_path: Path) -> None:
         assert followed <= listed, name
 
 
-# -- what knows one damper alone
+# -- which of them measurements tell
 
 
-def test_studies_refuse_a_building_with_devices_and_say_what_would_be_right() -> None:
-    from bristle import identify
-    from bristle.physics.building import with_one_damper
+def test_a_building_knows_which_of_its_devices_is_identified() -> None:
+    from bristle.physics.building import with_damper
 
-    text = r"has devices of its own \(brace, tie\): studies .* Take \[\[devices\]\] out"
-    with pytest.raises(PhysicsError, match=text):
-        with_one_damper(tower(BRACE, TIE))
-    with pytest.raises(PhysicsError, match=text):
-        identify({"time": [0.0, 1.0]}, building=tower(BRACE, TIE))
-    assert with_one_damper(tower()) == tower()
+    assert with_damper(tower()) == tower()
+    assert with_damper(tower()).device("").on_first
+    assert with_damper(tower(BRACE)).studied == "brace"
+    chosen = with_damper(tower(BRACE, TIE), "tie")
+    assert with_damper(chosen).studied == "tie"
+    with pytest.raises(PhysicsError, match=r"2 devices.*device = 'brace' or 'tie' .in study"):
+        with_damper(tower(BRACE, TIE))
+    with pytest.raises(PhysicsError, match="no device 'roof'; there are brace, tie"):
+        with_damper(tower(BRACE, TIE), "roof")
+    with pytest.raises(PhysicsError, match="no device 'roof'; there are none but the damper"):
+        with_damper(tower(), "roof")
+
+
+def test_a_device_tells_its_place_and_what_it_acts_across() -> None:
+    b = tower(BRACE, TIE)
+    levels = b.levels()
+    assert b.device("brace").place(levels) == f"at {BRACE['at']}"
+    assert b.device("tie").place(levels) == "between the ground and floor3"
+    crossed = [level for level in range(b.size) if b.device("tie").crosses(level)]
+    assert crossed == list(range(b.device("tie").lower + 1, b.device("tie").upper + 1))
 
 
 def test_a_batch_writes_the_devices_of_a_building(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from math import log10
 
 import numpy as np
@@ -22,6 +23,9 @@ from ..relation import (
 from ..table import Array
 from .finding import Finding
 
+ACROSS = "across_device"
+"""What stands before displacement and velocity across a device, as a level's name elsewhere."""
+
 _GAIN = 0.02  # share by which two channels may differ in gain
 _DELAY = 0.25  # share of the sampling step by which they may differ in time
 
@@ -35,6 +39,24 @@ def velocity_of_run(run: Measurement, level: str = "") -> Array | None:
         x = run[f"{before}displacement"]
         return differentiated(x, run.step, min(band(x, run.step), 0.2 / run.step))
     return None
+
+
+def with_motion_across(run: Measurement, lower: str, upper: str) -> Measurement:
+    """Return a measurement of a building with the motion across a device, as `ACROSS` names it.
+
+    Parameters
+    ----------
+    run : with the motion of the levels
+    lower, upper : the levels that the device connects; "" for the ground
+    """
+    channels, units = {**run.channels}, {**run.units}
+    for what in ("displacement", "velocity"):
+        ends = [f"{level}_{what}" for level in (upper, lower) if level]
+        if run.has(*ends):
+            rest = run[ends[1]] if len(ends) > 1 else 0.0
+            channels[f"{ACROSS}_{what}"] = run[ends[0]] - rest
+            units[f"{ACROSS}_{what}"] = run.units[ends[0]]
+    return replace(run, channels=channels, units=units)
 
 
 def check_motion(run: Measurement, level: str = "") -> Iterator[Finding]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...units import parse as parse_unit
-from ..channels import ChannelSpec, meaning, quantity_of_unit
+from ..channels import ChannelSpec, device_channel, meaning, quantity_of_unit
 from ..labels import TEMPERATURE
 from ..table import Table
 from .bench import bench_guesses
@@ -49,8 +49,9 @@ class Guess:
 
 
 def guess_channels(
-    table: Table, rig: str = "bench", levels: list[str] | None = None
-) -> list[Guess]:
+    table: Table, rig: str = "bench", levels: list[str] | None = None,
+    devices: list[str] | None = None,
+) -> list[Guess]:  # fmt: skip
     """Return the channels that a table seems to hold, each column at most once.
 
     Parameters
@@ -61,20 +62,28 @@ def guess_channels(
     levels : list of str
         Names of the building's levels, lowest first: ["base", "floor1", "floor2"]; numbers in
         names are counted along them.
+    devices : list of str
+        Names of the building's devices; columns such as brace_force are theirs.
     """
     time, step = _find_time(table)
     search = Search(table, step)
     taken = time.column if time else ""
-    candidates = [one for column in table.columns if (one := candidate_of(search, column, taken))]
+    own = device_guesses(table, devices or [])
+    theirs = {guess.column for guess in own}
+    candidates = [
+        one
+        for column in table.columns
+        if column.text not in theirs and (one := candidate_of(search, column, taken))
+    ]
     if rig == "structure":
         chosen = structure_guesses(candidates, levels or ["base", "floor1", "floor2"])
     else:
         chosen = bench_guesses(search, candidates)
-    found = fit_signs(search, fit_units(search, chosen), rig)
+    found = fit_signs(search, fit_units(search, chosen), rig, at_base=not devices)
     guesses = [
         Guess(channel, one.column.text, one.unit, one.sign, one.reason, one.doubt)
         for channel, one in found.items()
-    ]
+    ] + own
     known = {taken, *(guess.column for guess in guesses)}
     return ([time] if time else []) + guesses + _find_temperature(table, known)
 
@@ -91,6 +100,24 @@ def _find_temperature(table: Table, known: set[str]) -> list[Guess]:
     if len(chosen) != 1 or chosen[0].unit is None:
         return []
     return [Guess(TEMPERATURE, chosen[0].text, chosen[0].unit.name, 1, "its unit")]
+
+
+def device_guesses(table: Table, devices: list[str]) -> list[Guess]:
+    """Return the channels that columns are named by after a building's devices.
+
+    Parameters
+    ----------
+    table : of a run
+    devices : their names
+    """
+    found: dict[str, Guess] = {}
+    for column in table.columns:
+        name = column.name.rpartition(".")[2].lower()
+        of_device = device_channel(name)
+        if of_device and of_device[0] in devices and name not in found:
+            unit = column.unit.name if column.unit else ""
+            found[name] = Guess(name, column.text, unit, 1, "its name")
+    return list(found.values())
 
 
 def left_out(table: Table, guesses: list[Guess]) -> list[str]:

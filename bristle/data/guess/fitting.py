@@ -76,8 +76,17 @@ def _nearest(factor: float, quantity: str) -> str:
     return ""
 
 
-def fit_signs(search: Search, chosen: dict[str, Candidate], rig: str) -> dict[str, Candidate]:
-    """Return the channels with their signs: displacement as it is, the others to fit it."""
+def fit_signs(
+    search: Search, chosen: dict[str, Candidate], rig: str, at_base: bool = True
+) -> dict[str, Candidate]:
+    """Return the channels with their signs: displacement as it is, the others to fit it.
+
+    Parameters
+    ----------
+    search, chosen : the table, and what its columns seem to be
+    rig : "bench" or "structure"
+    at_base : whether the force resists the motion of the base, and not that across a storey
+    """
     before = "base_" if rig == "structure" else ""
     x, v, f = before + "displacement", before + "velocity", "force"
     out = dict(chosen)
@@ -86,7 +95,7 @@ def fit_signs(search: Search, chosen: dict[str, Candidate], rig: str) -> dict[st
         out[v] = replace(out[v], sign=sign, reason=joined(out[v].reason, text))
     moving = {name.removeprefix("base_"): out[name] for name in (x, v) if name in out}
     velocity = velocity_of(search, moving)
-    if f in out and velocity is not None:
+    if f in out and velocity is not None and at_base:
         along = velocity * (out[v].sign if v in out else 1)
         sign, text, doubt = force_sign(search.column(out[f].column.text), along)
         reason, doubt = joined(out[f].reason, text), joined(out[f].doubt, doubt)

@@ -1,0 +1,194 @@
+"""A study of a damper between two levels, from its files to its FMU in the building."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from braced import BRACE, DT, brace, noisy, shake, tie, tower
+
+import bristle
+from bristle.bridge.closed_loop_input import house_of
+from bristle.bridge.in_building import others_of, shaking_of
+from bristle.cli import main
+from bristle.data.channels import channel_unit
+from bristle.errors import PhysicsError, StudyError
+from bristle.study.building import identify_building_alone
+from bristle.study.data_check import check_data
+from bristle.study.rig import building_of
+from bristle.study.study import Study
+
+BUILDING = """
+schema = 1
+name = "tower"
+masses = [1.5, 1.6, 1.7]
+stiffnesses = [1400.0, 1310.0, 1220.0]
+base = "isolated"
+damping_ratio = 0.02
+
+[[devices]]
+name = "brace"
+at = "storey1"
+"""
+TIE = """
+[[devices]]
+name = "tie"
+between = ["ground", "floor2"]
+"""
+DEVICES = [{"name": "brace", "at": "storey1"}, {"name": "tie", "between": ["ground", "floor2"]}]
+
+
+def files_in(folder: Path, *, two: bool = True, without: tuple[str, ...] = (), fine: int = 1):
+    """Write a building with one device or two and three runs of it; return the building's file."""
+    house = folder / "tower.toml"
+    house.write_text(BUILDING + (TIE if two else ""), encoding="utf-8")
+    b = tower(DEVICES[: 1 + two], floors=2, isolated=True)
+    laws = {"brace": (brace, True), "tie": (tie, False)}
+    for k in range(3):
+        own = {device.name: laws[device.name] for device in b.devices}
+        clean = shake(b, 40 + k, own, samples=3000 * fine, step=DT / fine)
+        run = noisy({n: y[::fine] for n, y in clean.items()}, 40 + k, without=without)
+        head = ",".join(f"{n} [{'s' if n == 'time' else channel_unit(n)}]" for n in run)
+        rows = np.column_stack(list(run.values()))
+        np.savetxt(folder / f"shake{k}.csv", rows, "%.9g", ",", header=head, comments="")
+    return house
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    """Return the study of a brace beside a tie whose force is measured, identified."""
+    folder = tmp_path_factory.mktemp("two")
+    house = files_in(folder, fine=4)
+    assert main(
+        ["study", "new", str(folder / "rig"), "--rig", "structure", "--building", str(house),
+         "--device", "brace", "--law", "tanh", "--data", str(folder / "*.csv")]
+    ) == 0  # fmt: skip
+    assert main(["identify", str(folder / "rig"), "--no-table"]) == 0
+    return Study(folder / "rig")
+
+
+def test_a_study_is_about_the_device_that_is_named(two):
+    text = (two.folder / "study.toml").read_text()
+    assert 'device = "brace"' in text
+    assert "[channels.brace_force]" in text
+    assert "[channels.tie_force]" in text
+    assert building_of(two, two.model()).studied == "brace"
+    (run, *_) = two.read()
+    assert run.has("force", "voltage", "tie_force")
+    assert two.drive == "voltage"
+    values = two.model().values()
+    for name, value in BRACE.items():
+        assert values[name] == pytest.approx(value, rel=0.05)
+
+
+def test_its_error_is_noise_and_its_force_resists_the_motion_across_it(two):
+    assert bristle.compare(two).z == pytest.approx(1.0, abs=0.15)
+    checked = check_data(two)
+    assert checked.ok
+    assert not [one for one in checked.findings if "resists" in one.text or "sign" in one.text]
+
+
+def test_the_building_is_identified_beside_its_devices(two):
+    found = identify_building_alone(two, write=False)
+    truth = [1400.0, 1310.0, 1220.0]
+    assert found.fit.stiffnesses == pytest.approx(truth, rel=2e-3)
+    assert found.after["z_equilibrium_holdout"] < 1.2
+
+
+def test_its_model_goes_into_a_scenario_at_its_place(two, tmp_path, capsys):
+    assert main(["export", str(two.folder), "--out", str(tmp_path)]) == 0
+    text = (tmp_path / "structure.toml").read_text()
+    for wire in (
+        '"structure.brace_force" = "damper.force"',
+        '"damper.displacement" = "structure.brace_displacement"',
+        '"structure.tie_force" = "tie_measured.value"',
+    ):
+        assert wire in text
+    assert main(["check", str(tmp_path / "structure.toml")]) == 0
+    capsys.readouterr()
+
+
+def test_building_and_model_predict_the_responses_in_closed_loop(two, capsys):
+    assert main(["compare", str(two.folder), "--closed-loop", "--draws", "0", "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    rows = found["responses"] if "responses" in found else found["rows"]
+    for row in rows:
+        assert row["predicted"] == pytest.approx(row["measured"], rel=0.02)
+    assert any("the force of tie is the measured one" in note for note in found["notes"])
+
+
+def test_a_plan_and_a_building_for_several_dampers_are_refused(two, tmp_path):
+    with pytest.raises(StudyError, match=r"no test can be planned beside tie\. A plan is for"):
+        bristle.plan(two)
+    with pytest.raises(StudyError, match=r"places for 2 dampers \(brace, tie\), and a study is of"):
+        house_of(two.folder / "tower.toml")
+    shaking = replace(shaking_of(two.read()[0]), others={})
+    with pytest.raises(StudyError, match="the force of tie is not known"):
+        others_of(building_of(two, two.model()), shaking)
+
+
+def test_a_study_without_the_key_is_about_the_only_device(tmp_path):
+    house = files_in(tmp_path, two=False, without=("brace_force",))
+    study = Study.create(
+        tmp_path / "rig", sorted(tmp_path.glob("*.csv")), rig="structure", building=house,
+        law="tanh",
+    )  # fmt: skip
+    assert study.settings.device == "brace"
+    file = study.folder / "study.toml"
+    text = file.read_text()
+    file.write_text("\n".join(line for line in text.split("\n") if "device = " not in line))
+    again = Study(study.folder)
+    assert (again.settings.device, again.drive) == ("brace", "voltage")
+    lacking = [one for one in check_data(again).findings if one.kind == "force"]
+    assert "the force of brace (at storey1) was not measured" in lacking[0].text
+
+
+def test_what_is_wrong_with_a_device_is_named(tmp_path):
+    house = files_in(tmp_path)
+    files = sorted(tmp_path.glob("*.csv"))
+
+    def new(name, **choices):
+        given = {"rig": "structure", "building": house} | choices
+        return Study.create(tmp_path / name, files, **given)
+
+    with pytest.raises(PhysicsError, match=r"has 2 devices.*'brace' or 'tie'.*--device"):
+        new("a")
+    with pytest.raises(PhysicsError, match="has no device 'roof'; there are brace, tie"):
+        new("b", device="roof")
+    with pytest.raises(StudyError, match="--device goes with --building"):
+        new("c", building=None, device="brace")
+    study = new("d", device="brace")
+    file = study.folder / "study.toml"
+    text = file.read_text()
+    file.write_text(text.replace("[channels.tie_force]", "[channels.roof_force]"))
+    with pytest.raises(bristle.errors.RecordError, match='roof_force: there is no device "roof"'):
+        bristle.identify(Study(study.folder))
+    file.write_text(text.replace("[channels.tie_force]", "[channels.force]"))
+    with pytest.raises(StudyError, match=r"line \d+: brace_force and force are both of the device"):
+        Study(study.folder)
+    file.write_text(text.replace('rig = "structure"', 'rig = "bench"'))
+    with pytest.raises(StudyError, match='device goes with rig = "structure"'):
+        Study(study.folder)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("without", [(), ("brace_force",)])
+def test_a_diagnosis_finds_nothing_beside_the_law_and_a_spring_that_is_hidden(tmp_path, without):
+    b = tower(DEVICES[:1], floors=2, isolated=True)
+
+    def stiff(x, v, V):
+        return brace(x, v, V) + 3e6 * x**3
+
+    for law, kind in ((brace, "none"), (stiff, "effect")):
+        runs = [
+            noisy(shake(b, 60 + k, {"brace": (law, True)}, samples=4000), k, without=without)
+            for k in range(3)
+        ]
+        found = bristle.diagnose(runs[:2], "tanh", holdout=runs[2], building=b)
+        assert found.kind == kind
+        if kind == "effect":
+            assert found.sites == {"duffing@damper": "damper"}
+            assert any("storey's own" in text for text in found.reasons) == bool(without)
