@@ -25,7 +25,7 @@ from ..identify.instruments import true_motion
 from ..identify.prepare import prepare
 from ..identify.run_labels import following, values_of_labels
 from ..physics.device import GROUND
-from ..physics.drive import drive_named, state_for
+from ..physics.drive import drive_named, states_for
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..physics.user import own_effects
@@ -240,8 +240,9 @@ def _start_values(damper: StudyModel, run: Run) -> dict[str, float]:
     first = {"x": run.x[0], "v": run.v[0], "a": run.a[0], "V": run.V[0]}
     states = dict(LAWS[damper.base_law].starts)
     for name in damper.effects:
-        own = {state_for(s, drive): signal for s, signal in EFFECTS[name].starts.items()}
-        states |= {f"{name}.{state}": signal for state, signal in own.items()}
+        called = states_for(EFFECTS[name].states, drive)
+        starts = EFFECTS[name].starts
+        states |= {f"{name}.{called[state]}": signal for state, signal in starts.items()}
     begun = {f"{name}_0": float(first[s]) for name, s in states.items() if s in first}
     return begun | Problem([run]).carrying(as_model(damper), run)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
-from ..physics.drive import VOLTAGE, declared_for, state_for, text_for, unit_for
+from ..physics.drive import VOLTAGE, declared_for, states_for, text_for, unit_for
 from ..physics.effect import Effect, Parameter, effects_of
 from .slave import STEPPING, Slave
 
@@ -29,8 +29,8 @@ class EffectSlave(Slave):
                 if name in effect.channels:
                     continue  # an input
                 self.add_physical(f"{effect.name}.{name}", declared_for(parameter, self.drive))
-            for name, unit in effect.states.items():
-                called = state_for(name, self.drive)
+            for name, called in states_for(effect.states, self.drive).items():
+                unit = effect.states[name]
                 text = f"start value of the state {called}"
                 start = f"{effect.name}.{called}_0"
                 if called != name:

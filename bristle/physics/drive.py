@@ -7,6 +7,7 @@ per cent or per tesla: `declared_for` says a parameter so. No value changes by t
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from .parameter import Parameter
@@ -74,9 +75,20 @@ def text_for(text: str, drive: Drive) -> str:
     return re.sub(r"\bV\b", drive.unit, text.replace("Voltage", drive.name.capitalize()))
 
 
-def state_for(name: str, drive: Drive) -> str:
-    """Return how a state of an effect is called with a command: a held voltage, a held current."""
-    return drive.name if name == VOLTAGE.name else name
+def states_for(states: Iterable[str], drive: Drive) -> dict[str, str]:
+    """Return how an effect's states are called with a command: a held voltage is a held current.
+
+    Where another state has the command's name, as the field behind a coil, it is `held_field`.
+
+    Parameters
+    ----------
+    states : names as the effect declares them
+    drive : the command
+    """
+    names = list(states)
+    taken = drive.name != VOLTAGE.name and drive.name in names
+    own = f"held_{drive.name}" if taken else drive.name
+    return {name: own if name == VOLTAGE.name else name for name in names}
 
 
 def declared_for(parameter: Parameter, drive: Drive) -> Parameter:
