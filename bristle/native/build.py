@@ -15,6 +15,7 @@ from . import zig
 from .parts import functions_text, libraries, shim_digest
 from .platforms import Platform, here
 from .prepare import GUID, prepare
+from .universal import universal
 
 _NAMESPACE = UUID("0d7a6c1c-5f0e-5f3b-8a54-6e6174697665")
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
@@ -37,7 +38,7 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
         If a compiler is missing or refuses something, or a folder cannot be written; no FMU is
         written then.
     """
-    prepared = prepare(what)
+    prepared, platforms = prepare(what), sorted(platforms, key=lambda one: one.name)
     members = {f"resources/{name}": path.read_bytes() for name, path in what.files.items()}
     content = hashlib.sha256("".join([*prepared, shim_digest()]).encode())
     for name, data in sorted(members.items()):
@@ -45,16 +46,18 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
     guid = str(uuid5(_NAMESPACE, content.hexdigest()))
     target = folder / f"{what.name}.fmu"
     places = {one: f"binaries/{one.folder}/{what.name}{one.suffix}" for one in platforms}
-    if built_guid(target) == guid and _libraries_in(target) == set(places.values()):
+    note = f"libraries for {', '.join(one.name for one in platforms)}".encode()
+    if built_guid(target) == guid and _note_in(target) == note:
         return target
     members["modelDescription.xml"] = prepared.description.replace(GUID, guid).encode()
     table = prepared.tables.replace(GUID, guid)
     try:
         text = functions_text(what, prepared.functions)
-        for one, data in libraries(what.name, text, table, platforms).items():
-            members[places[one]] = data
+        made = libraries(what.name, text, table, platforms)
+        for place in set(places.values()):
+            members[place] = universal([made[one] for one in platforms if places[one] == place])
         folder.mkdir(parents=True, exist_ok=True)
-        _pack(members, target)
+        _pack(members, target, note)
     except OSError as error:
         why = error.strerror or error
         raise BuildError(f"{error.filename or target}: cannot be written ({why}).") from error
@@ -83,16 +86,18 @@ def ensure(
     return build(what, zig.folder() / "fmus", [here()])
 
 
-def _libraries_in(path: Path) -> set[str]:
+def _note_in(path: Path) -> bytes:
+    """Return what an archive is noted to hold."""
     with zipfile.ZipFile(path) as archive:
-        return {name for name in archive.namelist() if name.startswith("binaries/")}
+        return archive.comment
 
 
-def _pack(members: Mapping[str, bytes], target: Path) -> None:
+def _pack(members: Mapping[str, bytes], target: Path, note: bytes) -> None:
     """Write the archive in order and without times, and rename it into place."""
     part = target.with_suffix(".part")
     try:
         with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.comment = note
             for name, data in sorted(members.items()):
                 entry = zipfile.ZipInfo(name, _EPOCH)
                 entry.compress_type = zipfile.ZIP_DEFLATED

@@ -21,8 +21,8 @@ class Platform:
     target
         As the compiler names it.
     folder
-        Folder in the archive of an FMU of FMI 2.0; that standard names those for x86-64 alone,
-        others follow FMI 3.0.
+        Folder in the archive of an FMU of FMI 2.0. That standard names none for ARM: on macOS both
+        processors share one folder and one library, on Linux it is called as in FMI 3.0.
     suffix
         Ending of a shared library.
     libraries
@@ -43,7 +43,7 @@ PLATFORMS = {
         Platform("win64", "x86_64-windows-gnu", "win64", ".dll"),
         Platform("darwin64", "x86_64-macos", "darwin64", ".dylib"),
         Platform("aarch64-linux", "aarch64-linux-gnu.2.17", "aarch64-linux", ".so", ("m",)),
-        Platform("aarch64-darwin", "aarch64-macos", "aarch64-darwin", ".dylib"),
+        Platform("aarch64-darwin", "aarch64-macos", "darwin64", ".dylib"),
     )
 }
 """The platforms by name."""

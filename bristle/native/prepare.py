@@ -109,7 +109,11 @@ def component_of(what: Plan) -> ComponentSlave:
 
 def _prepare_here(what: Plan) -> Prepared:
     slave = component_of(what)
-    return Prepared(description(slave, GUID), tables(slave, GUID), _digest_of(slave))
+    try:
+        made = tables(slave, GUID)
+    except ValueError as error:  # what a component says of a design that it cannot take
+        raise BuildError(f"{what.name}: {error}") from error
+    return Prepared(description(slave, GUID), made, _digest_of(slave))
 
 
 def _digest_of(slave: ComponentSlave) -> str:

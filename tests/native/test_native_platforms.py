@@ -7,7 +7,6 @@ import shutil
 import struct
 import subprocess
 import sys
-import zipfile
 from functools import cache
 from pathlib import Path
 
@@ -21,6 +20,7 @@ from bristle.fmu.description import read_description
 from bristle.fmu.plan import plan
 from bristle.native.build import build
 from bristle.native.platforms import PLATFORMS, Platform, here
+from bristle.native.universal import universal
 
 SOURCE = Path(__file__).with_name("far_host.c")
 MOTION = {"V": (4.0, 3.0), "m": (0.0, 5e-3), "m/s": (0.0, 0.1), "m/s2": (0.0, 2.0), "N": (0.0, 1.0)}
@@ -125,13 +125,24 @@ def test_other_platforms_give_the_same_rows_and_take_the_same_states(
     assert difference(wanted, rows(name, here(), effects, tmp_path / "far", "load")) <= 1e-9
 
 
-@pytest.mark.parametrize("name", ["darwin64", "aarch64-darwin"])
-def test_libraries_for_macos_are_such_and_export_fmi(name: str) -> None:
-    platform = PLATFORMS[name]
-    with zipfile.ZipFile(folder() / "all" / f"{unpacked('GroundMotion').name}.fmu") as archive:
-        library = archive.read(f"binaries/{platform.folder}/GroundMotion.dylib")
-    magic, machine, _, kind = struct.unpack("<4I", library[:16])
-    assert (magic, kind) == (0xFEEDFACF, 6)  # a dynamic library of 64 bits
-    assert machine == {"darwin64": 0x01000007, "aarch64-darwin": 0x0100000C}[name]
-    for function in ("Instantiate", "DoStep", "GetReal", "SetFMUstate", "FreeInstance"):
-        assert f"_fmi2{function}".encode() in library
+MACHINES = {0x01000007: "darwin64", 0x0100000C: "aarch64-darwin"}
+
+
+def test_the_library_for_macos_serves_both_processors_and_exports_fmi() -> None:
+    library = (unpacked("GroundMotion") / "binaries/darwin64/GroundMotion.dylib").read_bytes()
+    magic, count = struct.unpack(">2I", library[:8])
+    assert (magic, count) == (0xCAFEBABE, 2)
+    found = []
+    for k in range(count):
+        machine, _, at, size, align = struct.unpack(">5I", library[8 + 20 * k : 28 + 20 * k])
+        own = library[at : at + size]
+        thin, inside, _, kind = struct.unpack("<4I", own[:16])
+        assert (thin, inside, kind) == (0xFEEDFACF, machine, 6)  # a dynamic library of 64 bits
+        assert at % (1 << align) == 0
+        for function in ("Instantiate", "DoStep", "GetReal", "SetFMUstate", "FreeInstance"):
+            assert f"_fmi2{function}".encode() in own
+        found.append(MACHINES[machine])
+    assert sorted(found) == ["aarch64-darwin", "darwin64"]
+    assert universal([b"alone"]) == b"alone"
+    with pytest.raises(ValueError, match="no library of 64 bits"):
+        universal([b"no library at all", b"nor is this one"])
