@@ -23,6 +23,7 @@ from ..jit import RefusedError, digest, library_text
 from ..native import zig
 from ..native.entrance import plain_text, refusal
 from ..native.prepare import COMPILER
+from ..physics.laws import LAWS
 from ..physics.user import own_effects, own_laws
 from ..progress import tell
 from ..simulate import records
@@ -52,7 +53,7 @@ def module() -> bytes:
         functions = digest(loop)
     sizes = [f"-D{name}_SIZE={make().itemsize}" for name, make in RECORDS.items()]
     content = hashlib.sha256(SOURCE.read_bytes())
-    for one in (functions, zig.tools(), *sizes):
+    for one in (functions, zig.tools(), repr(COMPILER), *sizes):
         content.update(one.encode())
     kept = zig.folder() / f"{content.hexdigest()[:24]}.wasm"
     if not kept.is_file():
@@ -60,28 +61,32 @@ def module() -> bytes:
             text = Path(temporary) / "march.ll"
             part = Path(temporary) / kept.name
             tell("compiling the time loop for the web, once")
-            _compile(text)
+            _compile(functions, text)
             zig.link_web([text, SOURCE], sizes, part)
             part.replace(kept)
     return kept.read_bytes()
 
 
-def _compile(target: Path) -> None:
-    """Write LLVM's text of the time loop, compiled in a process that knows no processor."""
+def _compile(functions: str, target: Path) -> None:
+    """Write LLVM's text of the time loop of a digest, compiled in a process of its own."""
     path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
     own = {kind: [str(file) for file in files] for kind, files in _own().items()}
+    order = {"own": own, "functions": functions, "target": str(target)}
     child = subprocess.run(
         [sys.executable, "-c", "from bristle.web.module import serve; serve()"],
-        input=json.dumps({"own": own, "target": str(target)}), capture_output=True, text=True,
-        check=False, env={**os.environ, **COMPILER, "PYTHONPATH": path},
+        input=json.dumps(order), capture_output=True, text=True, check=False,
+        env={**os.environ, **COMPILER, "PYTHONPATH": path},
     )  # fmt: skip
     if child.returncode != 0:
         raise BuildError(f"the time loop cannot be compiled: {child.stderr.strip()[-800:]}")
 
 
 def _own() -> dict[str, list[Path]]:
-    """Return the files of the laws and effects of the user's own that are registered."""
-    return {"law": [*own_laws().values()], "effect": [*own_effects().values()]}
+    """Return the files of the user's own laws, in the order of their codes, and effects."""
+    laws = own_laws()
+    return {
+        "law": [laws[name] for name in LAWS if name in laws], "effect": [*own_effects().values()],
+    }  # fmt: skip
 
 
 def serve() -> None:
@@ -93,6 +98,9 @@ def serve() -> None:
         for file in files:
             load_file(Path(file), kind)
     try:
+        with whole_loop() as (loop, _):
+            if digest(loop) != given["functions"]:
+                raise BuildError("laws or effects have changed meanwhile; export it again.")
         text = _text()
     except BristleError as error:
         sys.exit(str(error))
