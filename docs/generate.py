@@ -6,6 +6,7 @@ as files.
 
 from __future__ import annotations
 
+import os
 import sys
 import textwrap
 from functools import cache
@@ -298,13 +299,18 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_post_build(config: MkDocsConfig) -> None:
-    """Put the page of a scenario beside the others (a hook of mkdocs)."""
+    """Put the page of a scenario beside the others (a hook of mkdocs).
+
+    With DOCS_WITHOUT_LIVE in the environment nothing is compiled for it.
+    """
     from bristle.draw.html import page
     from bristle.errors import BuildError
     from bristle.web.export import export_web
 
     folder = Path(config.site_dir) / "live"
     try:
+        if os.environ.get("DOCS_WITHOUT_LIVE"):
+            raise BuildError("DOCS_WITHOUT_LIVE is set.")
         export_web(LIVE, folder, SLIDERS)
     except BuildError as error:
         folder.mkdir(parents=True, exist_ok=True)

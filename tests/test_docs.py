@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import importlib.util
+import os
 import re
 import subprocess
 import sys
@@ -109,6 +110,7 @@ def test_the_site_renders_without_a_warning(tmp_path: Path) -> None:
         text=True,
         check=False,
         timeout=120,
+        env={**os.environ, "DOCS_WITHOUT_LIVE": "1"},  # that takes minutes, tests/web makes one
     )
     assert done.returncode == 0, done.stderr
     for path in generate.pages():

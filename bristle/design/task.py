@@ -234,8 +234,9 @@ class Task:
 
     def digest(self) -> str:
         """Return 16 hexadecimal digits that stand for the task."""
-        plain = self.building[:-1]  # one without devices keeps its digest of before
-        named = self.building if self.building.devices else plain
+        # Which device measurements tell changes no design; one without devices is named as ever.
+        plain = self.building._replace(studied="")[:-1]
+        named = plain if plain[-1] else plain[:-1]
         text = json.dumps([self.data(), named], sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 

@@ -29,7 +29,8 @@ ELSEWHERE = {
     ("diagnose/load_cell.py", "delay"): "a kind of sensor fault",
     ("diagnose/model_based_faults.py", "delay"): "a kind of sensor fault",
     ("diagnose/sensors.py", "delay"): "a kind of sensor fault",
-    ("diagnose/equilibrium.py", "delay"): "a kind of sensor fault",
+    ("diagnose/building_sensors.py", "delay"): "a kind of sensor fault",
+    ("component/sensors.py", "delay"): "a property of an instrument",
     ("simulate/records.py", "delay"): "a field of the engine's record: a source's parameter",
     ("simulate/system.py", "delay"): "a field of the engine's record: a source's parameter",
 }
