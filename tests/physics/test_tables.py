@@ -281,7 +281,16 @@ def test_a_law_finds_its_quantities_at_the_voltage(law: type[Law]) -> None:
     assert force_at("mapped", v=0.03, V=3.5) == pytest.approx(expected, rel=1e-15)
 
 
-@pytest.mark.parametrize("effects", [[], ["stribeck"], ["coil_lag"], ["sloped"]])
+@pytest.mark.parametrize(
+    "effects",
+    [
+        [],
+        *(
+            pytest.param([effect], marks=pytest.mark.slow)  # compiles every effect with the law
+            for effect in ("stribeck", "coil_lag", "sloped")
+        ),
+    ],
+)
 def test_python_and_numba_agree(law: Any, effect: Any, effects: list[str]) -> None:
     x, v, a, V = motion(100)
     compiled = Bench("mapped", effects).force(x, v, a, V, DT, {"coil_lag.tau": 1e-4})
