@@ -12,7 +12,7 @@ from bristle.fmu.catalogue import component_names
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="components; else all of them")
-    add_native(parser)
+    add_native(parser, versions=True)
     parser.add_argument("--list", action="store_true", help="list the components, build nothing")
     given = parser.parse_args()
     try:
@@ -21,6 +21,7 @@ if __name__ == "__main__":
         else:
             folder = Path(__file__).resolve().parent / "fmus"
             build, folder = builder(given), folder / "native" if given.native else folder
+            folder = folder / "fmi3" if given.fmi == 3 else folder
             for name in given.names or component_names():
                 print(build(plan(name), folder), flush=True)
     except BristleError as error:

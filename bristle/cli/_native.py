@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from ..fmu.build import Plan
 
 
-def add_native(parser: argparse.ArgumentParser) -> None:
-    """Add --native and --platform."""
+def add_native(parser: argparse.ArgumentParser, *, versions: bool = False) -> None:
+    """Add --native and --platform; where versions of FMI can be chosen, --fmi."""
     text = "FMUs that need no Python: compiled, with a library for each platform"
     parser.add_argument("--native", action="store_true", help=text)
     parser.add_argument(
@@ -25,6 +25,10 @@ def add_native(parser: argparse.ArgumentParser) -> None:
         help="with --native: linux64, win64, darwin64, aarch64-linux or aarch64-darwin, several "
         "with commas between; else all of them",
     )
+    parser.set_defaults(fmi=2)
+    if versions:
+        text = "version of FMI; 3 goes with --native (default: 2)"
+        parser.add_argument("--fmi", type=int, choices=(2, 3), help=text)
 
 
 def builder(arguments: argparse.Namespace) -> Callable[[Plan, Path], Path]:
@@ -33,7 +37,7 @@ def builder(arguments: argparse.Namespace) -> Callable[[Plan, Path], Path]:
     Raises
     ------
     BuildError
-        If a platform is not known, or is named without --native.
+        If a platform is not known, or it or FMI 3.0 is asked for without --native.
     """
     from ..errors import BuildError
 
@@ -41,9 +45,11 @@ def builder(arguments: argparse.Namespace) -> Callable[[Plan, Path], Path]:
         from ..native.build import build as build_native
         from ..native.platforms import chosen
 
-        return partial(build_native, platforms=chosen(arguments.platforms))
+        return partial(build_native, platforms=chosen(arguments.platforms), fmi=arguments.fmi)
     if arguments.platforms:
         raise BuildError("--platform goes with --native: FMUs in Python hold all that they can.")
+    if arguments.fmi != 2:
+        raise BuildError("--fmi 3 goes with --native: FMUs in Python follow FMI 2.0.")
     from ..fmu.build import build
 
     return build

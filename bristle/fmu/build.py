@@ -104,10 +104,10 @@ def _serve() -> None:
 
 
 def built_guid(path: Path) -> str | None:
-    """Return the guid of an FMU file, None where there is no readable one."""
+    """Return the guid of an FMU file, FMI 3.0's token; None where there is no readable one."""
     try:
         with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
-            found = re.search(rb'guid="([^"]*)"', file.read(4096))
+            found = re.search(rb'(?:guid|instantiationToken)="([^"]*)"', file.read(4096))
     except (OSError, KeyError, zipfile.BadZipFile, zlib.error):
         return None
     return found.group(1).decode() if found else None

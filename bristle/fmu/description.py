@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..component import OVER_STEP
 from ..errors import FmuError
 from . import description_fmi3
 from .archive import (
@@ -21,7 +20,18 @@ from .archive import (
     read_member,
 )
 from .model_description import JUMPS_TAG, OVER_STEP_TAG, TOOL
-from .variables import Description, Value, Variable, number_of, reference_of, start_of, unsigned
+from .variables import (
+    Description,
+    Value,
+    Variable,
+    check_jumps,
+    mark_optional,
+    number_of,
+    over_step_of,
+    reference_of,
+    start_of,
+    unsigned,
+)
 from .xml_text import parse_xml
 
 __all__ = ["Description", "Value", "Variable", "extract", "read_description"]
@@ -101,7 +111,7 @@ def describe(root: ElementTree.Element) -> Description:
         raise FmuError(f"variables defined twice: {', '.join(twice)}.")
     _add_dependencies(root, listed, variables)
     _mark_optional(root, variables)
-    _check_jumps(variables)
+    check_jumps(variables)
     return Description(
         name=root.get("modelName", ""),
         guid=root.get("guid", ""),
@@ -160,18 +170,9 @@ def _variable(
         maximum=number_of(name, "max", own.get("max")),
         nominal=number_of(name, "nominal", own.get("nominal")),
         description=element.get("description", ""),
-        over_step=_over_step(name, element),
+        over_step=over_step_of(name, _annotation(element, OVER_STEP_TAG)),
         jumps_without=_annotation(element, JUMPS_TAG),
     )
-
-
-def _over_step(name: str, element: ElementTree.Element) -> str | None:
-    text = _annotation(element, OVER_STEP_TAG)
-    if text is not None and text not in OVER_STEP:
-        known = ", ".join(OVER_STEP)
-        said = f"the annotation {OVER_STEP_TAG} is {text!r}, none of {known}."
-        raise FmuError(f'variable "{name}": {said}')
-    return text
 
 
 def _annotation(element: ElementTree.Element, tag: str) -> str | None:
@@ -205,22 +206,8 @@ def _indexed(listed: list[Variable], text: str | None) -> Variable:
     return listed[number - 1]
 
 
-def _check_jumps(variables: dict[str, Variable]) -> None:
-    for variable in variables.values():
-        cure = variable.jumps_without
-        if cure is not None and (cure not in variables or variables[cure].causality != "input"):
-            raise FmuError(
-                f'"{variable.name}" may jump without "{cure}", but no input has that name.'
-            )
-
-
 def _mark_optional(root: ElementTree.Element, variables: dict[str, Variable]) -> None:
     for tool in root.iterfind("VendorAnnotations/Tool"):
         if tool.get("name") != TOOL:
             continue
-        for name in tool.findtext("optional", "").split():
-            if name not in variables or variables[name].causality != "input":
-                raise FmuError(
-                    f'the annotation calls "{name}" optional, but no input has that name.'
-                )
-            variables[name] = replace(variables[name], optional=True)
+        mark_optional(variables, tool.findtext("optional", ""))

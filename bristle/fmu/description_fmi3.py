@@ -12,7 +12,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ..errors import FmuError
-from .variables import Description, Variable, number_of, reference_of, start_of
+from .model_description import JUMPS_TAG, OVER_STEP_TAG, TOOL
+from .variables import (
+    Description,
+    Variable,
+    check_jumps,
+    mark_optional,
+    number_of,
+    over_step_of,
+    reference_of,
+    start_of,
+)
 
 KINDS = {
     **dict.fromkeys(("Float64", "Float32"), "Real"),
@@ -55,6 +65,8 @@ def describe(root: ElementTree.Element) -> Description:
                 raise FmuError(f"variables defined twice: {name}.")
             variables[name] = _variable(element, types)
     _add_dependencies(root, variables)
+    mark_optional(variables, _annotation(root, "optional") or "")
+    check_jumps(variables)
     return Description(
         name=root.get("modelName", ""),
         guid=root.get("instantiationToken", ""),
@@ -105,8 +117,19 @@ def _variable(element: ElementTree.Element, types: Mapping[str, ElementTree.Elem
         maximum=high if most is None else most,
         nominal=number_of(name, "nominal", own.get("nominal")),
         description=element.get("description", ""),
+        over_step=over_step_of(name, _annotation(element, OVER_STEP_TAG)),
+        jumps_without=_annotation(element, JUMPS_TAG),
         type=element.tag,
     )
+
+
+def _annotation(element: ElementTree.Element, tag: str) -> str | None:
+    """Return the text of one of bristle's annotations of a variable, or of the whole FMU."""
+    for own in element.iterfind("Annotations/Annotation"):
+        text = own.findtext(tag)
+        if own.get("type") == TOOL and text is not None:
+            return text
+    return None
 
 
 def _add_dependencies(root: ElementTree.Element, variables: dict[str, Variable]) -> None:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
+from ..component import OVER_STEP
 from ..errors import FmuError
+from .model_description import OVER_STEP_TAG
 
 Value = float | int | bool | str
 
@@ -96,3 +98,30 @@ def start_of(name: str, kind: str, text: str | None) -> Value | None:
         return int(text)
     except (ValueError, KeyError):
         raise FmuError(f'variable "{name}": the start {text!r} is no {kind}.') from None
+
+
+def over_step_of(name: str, text: str | None) -> str | None:
+    """Return what an annotation says of how an input is taken over a step, None without one."""
+    if text is not None and text not in OVER_STEP:
+        known = ", ".join(OVER_STEP)
+        said = f"the annotation {OVER_STEP_TAG} is {text!r}, none of {known}."
+        raise FmuError(f'variable "{name}": {said}')
+    return text
+
+
+def check_jumps(variables: dict[str, Variable]) -> None:
+    """Refuse an output that may jump without an input which is none."""
+    for variable in variables.values():
+        cure = variable.jumps_without
+        if cure is not None and (cure not in variables or variables[cure].causality != "input"):
+            raise FmuError(
+                f'"{variable.name}" may jump without "{cure}", but no input has that name.'
+            )
+
+
+def mark_optional(variables: dict[str, Variable], names: str) -> None:
+    """Mark the inputs that an annotation names as optional, in place."""
+    for name in names.split():
+        if name not in variables or variables[name].causality != "input":
+            raise FmuError(f'the annotation calls "{name}" optional, but no input has that name.')
+        variables[name] = replace(variables[name], optional=True)

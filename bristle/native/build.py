@@ -21,7 +21,7 @@ _NAMESPACE = UUID("0d7a6c1c-5f0e-5f3b-8a54-6e6174697665")
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
 
 
-def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
+def build(what: Plan, folder: Path, platforms: Sequence[Platform], fmi: int = 2) -> Path:
     """Build a native FMU into a folder, unless the same one stands there; return its path.
 
     Parameters
@@ -31,6 +31,8 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
     folder : Path
     platforms : sequence of Platform
         What it holds libraries for.
+    fmi : int
+        2 or 3: the version of FMI that it follows.
 
     Raises
     ------
@@ -38,14 +40,14 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
         If a compiler is missing or refuses something, or a folder cannot be written; no FMU is
         written then.
     """
-    prepared, platforms = prepare(what), sorted(platforms, key=lambda one: one.name)
+    prepared, platforms = prepare(what, fmi), sorted(platforms, key=lambda one: one.name)
     members = {f"resources/{name}": path.read_bytes() for name, path in what.files.items()}
-    content = hashlib.sha256("".join([*prepared, shim_digest()]).encode())
+    content = hashlib.sha256("".join([*prepared, shim_digest(fmi)]).encode())
     for name, data in sorted(members.items()):
         content.update(name.encode() + data)
     guid = str(uuid5(_NAMESPACE, content.hexdigest()))
     target = folder / f"{what.name}.fmu"
-    places = {one: f"binaries/{one.folder}/{what.name}{one.suffix}" for one in platforms}
+    places = {one: one.place(what.name, fmi) for one in platforms}
     note = f"libraries for {', '.join(one.name for one in platforms)}".encode()
     if built_guid(target) == guid and _note_in(target) == note:
         return target
@@ -53,7 +55,7 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform]) -> Path:
     table = prepared.tables.replace(GUID, guid)
     try:
         text = functions_text(what, prepared.functions)
-        made = libraries(what.name, text, table, platforms)
+        made = libraries(what.name, text, table, platforms, fmi)
         for place in set(places.values()):
             members[place] = universal([made[one] for one in platforms if places[one] == place])
         folder.mkdir(parents=True, exist_ok=True)
@@ -69,6 +71,7 @@ def ensure(
     building: Path | None = None,
     controller: Path | None = None,
     effects: Iterable[Path] = (),
+    fmi: int = 2,
 ) -> Path:
     """Return a built-in component's native FMU for this machine, built on first use.
 
@@ -76,6 +79,8 @@ def ensure(
     ----------
     component, building, controller, effects
         As in `fmu.build.ensure`.
+    fmi : int
+        2 or 3: the version of FMI that it follows.
 
     Raises
     ------
@@ -83,7 +88,7 @@ def ensure(
         If a name or a file is wrong, or the FMU cannot be built.
     """
     what = planned(component, building, controller, effects)
-    return build(what, zig.folder() / "fmus", [here()])
+    return build(what, zig.folder() / ("fmus_fmi3" if fmi == 3 else "fmus"), [here()], fmi)
 
 
 def _note_in(path: Path) -> bytes:

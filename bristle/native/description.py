@@ -28,10 +28,20 @@ def description(slave: ComponentSlave, guid: str) -> str:
     guid : str
         Of the FMU.
     """
+    return text_of(description_tree(slave, guid))
+
+
+def description_tree(slave: ComponentSlave, guid: str) -> Element:
+    """Return the XML tree of that description; the parameters are as in `description`."""
     options: dict[str, Any] = dict(_CAPABILITIES)
     root: Element = slave.to_xml(options)
     root.set("guid", guid)
     root.set("generationTool", NATIVE)
+    return root
+
+
+def text_of(root: Element) -> str:
+    """Return an XML tree as the text of a file."""
     indent(root)
     text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
     return text.decode()

@@ -19,10 +19,21 @@ SHIM = Path(__file__).resolve().parent / "shim"
 """Folder with the C that all native FMUs share."""
 
 
-def shim_digest() -> str:
-    """Return the digest of the C that all native FMUs share, and of what compiles it."""
+def shim_files(fmi: int = 2) -> list[Path]:
+    """Return the files of the C that all native FMUs of FMI 2.0, or all of FMI 3.0, share."""
+    others = tuple(f"fmi{one}" for one in (2, 3) if one != fmi)
+    return [path for path in sorted(SHIM.iterdir()) if not path.name.startswith(others)]
+
+
+def shim_sources(fmi: int = 2) -> list[Path]:
+    """Return those of these files that are compiled, not included by others."""
+    return [path for path in shim_files(fmi) if path.suffix == ".c"]
+
+
+def shim_digest(fmi: int = 2) -> str:
+    """Return the digest of the C that native FMUs of a version share, and of what compiles it."""
     content = hashlib.sha256(zig.tools().encode())
-    for path in sorted(SHIM.iterdir()):
+    for path in shim_files(fmi):
         content.update(path.name.encode() + path.read_bytes())
     return content.hexdigest()
 
@@ -55,7 +66,7 @@ def functions_text(what: Plan, functions: str) -> Path:
         return _kept(kept, compile_text)
 
 
-def library(name: str, text: Path, table: str, platform: Platform) -> bytes:
+def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2) -> bytes:
     """Return the bytes of a component's library for a platform.
 
     Parameters
@@ -67,6 +78,8 @@ def library(name: str, text: Path, table: str, platform: Platform) -> bytes:
     table : str
         C source of its tables.
     platform : Platform
+    fmi : int
+        2 or 3: the version of FMI whose functions it exports.
 
     Raises
     ------
@@ -74,7 +87,7 @@ def library(name: str, text: Path, table: str, platform: Platform) -> bytes:
         If it cannot be compiled; if the cache cannot be written.
     """
     content = hashlib.sha256()
-    for part in (zig.tools(), platform.target, text.stem, name, table, shim_digest()):
+    for part in (zig.tools(), platform.target, text.stem, name, table, shim_digest(fmi)):
         content.update(part.encode())
     kept = zig.folder() / f"{content.hexdigest()[:24]}{platform.suffix}"
     if kept.is_file():
@@ -88,7 +101,7 @@ def library(name: str, text: Path, table: str, platform: Platform) -> bytes:
         source = path.parent / "tables.c"
         source.write_text(table, encoding="utf-8")
         own = path.parent / f"{name}{platform.suffix}"
-        sources = [*sorted(SHIM.glob("*.c")), source, functions]
+        sources = [*shim_sources(fmi), source, functions]
         zig.link(sources, SHIM, own, platform)
         own.replace(path)
 
@@ -110,13 +123,13 @@ def _kept(path: Path, make: Callable[[Path], None]) -> Path:
 
 
 def libraries(
-    name: str, text: Path, table: str, platforms: Sequence[Platform]
+    name: str, text: Path, table: str, platforms: Sequence[Platform], fmi: int = 2
 ) -> dict[Platform, bytes]:
     """Return the libraries of a component for several platforms, compiled side by side.
 
     Parameters
     ----------
-    name, text, table
+    name, text, table, fmi
         As in `library`.
     platforms : sequence of Platform
 
@@ -126,5 +139,5 @@ def libraries(
         What is wrong with the first platform that fails, once all are done.
     """
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        runs = [pool.submit(library, name, text, table, one) for one in platforms]
+        runs = [pool.submit(library, name, text, table, one, fmi) for one in platforms]
     return {one: run.result() for one, run in zip(platforms, runs, strict=True)}

@@ -23,6 +23,8 @@ class Platform:
     folder
         Folder in the archive of an FMU of FMI 2.0. That standard names none for ARM: on macOS both
         processors share one folder and one library, on Linux it is called as in FMI 3.0.
+    folder_fmi3
+        Folder in the archive of an FMU of FMI 3.0.
     suffix
         Ending of a shared library.
     libraries
@@ -32,20 +34,29 @@ class Platform:
     name: str
     target: str
     folder: str
+    folder_fmi3: str
     suffix: str
     libraries: tuple[str, ...] = ()
+
+    def place(self, identifier: str, fmi: int) -> str:
+        """Return where an FMU of FMI 2.0 or 3.0 keeps its library for this platform."""
+        folder = self.folder_fmi3 if fmi == 3 else self.folder
+        return f"binaries/{folder}/{identifier}{self.suffix}"
 
 
 PLATFORMS = {
     one.name: one
     for one in (
-        Platform("linux64", "x86_64-linux-gnu.2.17", "linux64", ".so", ("m",)),
-        Platform("win64", "x86_64-windows-gnu", "win64", ".dll"),
-        Platform("darwin64", "x86_64-macos", "darwin64", ".dylib"),
-        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", "aarch64-linux", ".so", ("m",)),
-        Platform("aarch64-darwin", "aarch64-macos", "darwin64", ".dylib"),
+        Platform("linux64", "x86_64-linux-gnu.2.17", "linux64", "x86_64-linux", ".so", ("m",)),
+        Platform("win64", "x86_64-windows-gnu", "win64", "x86_64-windows", ".dll"),
+        Platform("darwin64", "x86_64-macos", "darwin64", "x86_64-darwin", ".dylib"),
+        Platform(
+            "aarch64-linux", "aarch64-linux-gnu.2.17", "aarch64-linux", "aarch64-linux", ".so",
+            ("m",),
+        ),
+        Platform("aarch64-darwin", "aarch64-macos", "darwin64", "aarch64-darwin", ".dylib"),
     )
-}
+}  # fmt: skip
 """The platforms by name."""
 _HERE = {
     ("linux", "x86_64"): "linux64",
@@ -75,7 +86,7 @@ def here() -> Platform:
     return PLATFORMS[name]
 
 
-WEB = Platform("web", "wasm32-wasi", "", ".wasm")
+WEB = Platform("web", "wasm32-wasi", "", "", ".wasm")
 """What a page of the web runs; no FMU is made for it."""
 
 

@@ -25,6 +25,7 @@ from ..jit import digest
 from ..physics.user import own_effects, own_laws
 from . import entrance
 from .description import description
+from .description_fmi3 import description_fmi3
 from .entrance import entrance_of, llvm_text
 from .tables import tables
 
@@ -51,8 +52,14 @@ class Prepared(NamedTuple):
     functions: str
 
 
-def prepare(what: Plan) -> Prepared:
+def prepare(what: Plan, fmi: int = 2) -> Prepared:
     """Return what Python knows of a planned component.
+
+    Parameters
+    ----------
+    what : Plan
+    fmi : int
+        2 or 3: the version of FMI that the description follows.
 
     Raises
     ------
@@ -62,8 +69,8 @@ def prepare(what: Plan) -> Prepared:
     named = {path.resolve() for path in (*what.effects, *what.laws)}
     loaded = {path.resolve() for path in (*own_effects().values(), *own_laws().values())}
     if loaded <= named:
-        return _prepare_here(what)
-    return Prepared(*json.loads(_in_fresh_process(what, {"do": "prepare"})))
+        return _prepare_here(what, fmi)
+    return Prepared(*json.loads(_in_fresh_process(what, {"do": "prepare", "fmi": fmi})))
 
 
 def compile_functions(what: Plan, functions: str, target: Path) -> None:
@@ -107,13 +114,14 @@ def component_of(what: Plan) -> ComponentSlave:
     return slave
 
 
-def _prepare_here(what: Plan) -> Prepared:
+def _prepare_here(what: Plan, fmi: int) -> Prepared:
     slave = component_of(what)
     try:
         made = tables(slave, GUID)
     except ValueError as error:  # what a component says of a design that it cannot take
         raise BuildError(f"{what.name}: {error}") from error
-    return Prepared(description(slave, GUID), made, _digest_of(slave))
+    about = description_fmi3 if fmi == 3 else description
+    return Prepared(about(slave, GUID), made, _digest_of(slave))
 
 
 def _digest_of(slave: ComponentSlave) -> str:
@@ -123,7 +131,7 @@ def _digest_of(slave: ComponentSlave) -> str:
     return hashlib.sha256(made.encode() + how).hexdigest()[:16]
 
 
-def _in_fresh_process(what: Plan, given: Mapping[str, str]) -> str:
+def _in_fresh_process(what: Plan, given: Mapping[str, Any]) -> str:
     """Return what `serve` answers in a process of its own."""
     order = {
         **given,
@@ -163,7 +171,7 @@ def serve() -> None:
     what = Plan(order["name"], Path(order["component"]), order["baked"], files, effects, laws)
     try:
         if order["do"] == "prepare":
-            json.dump(_prepare_here(what), sys.stdout)
+            json.dump(_prepare_here(what, order["fmi"]), sys.stdout)
             return
         slave = component_of(what)
         if _digest_of(slave) != order["functions"]:

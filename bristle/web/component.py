@@ -14,7 +14,7 @@ from ..errors import BuildError
 from ..fmu import catalogue
 from ..fmu.plan import plan
 from ..native import zig
-from ..native.parts import SHIM, functions_text, shim_digest
+from ..native.parts import SHIM, functions_text, shim_digest, shim_sources
 from ..native.prepare import GUID, Prepared, prepare
 
 _FOLDER = Path(__file__).parent
@@ -84,7 +84,7 @@ def _module(prepared: Prepared, guid: str, text: Path) -> bytes:
             table, part = Path(temporary) / "tables.c", Path(temporary) / kept.name
             table.write_text(prepared.tables.replace(GUID, guid), encoding="utf-8")
             options = [f"-I{SHIM}", *(f"-Wl,--export={one}" for one in _CALLED)]
-            zig.link_web([*sorted(SHIM.glob("*.c")), table, _SOURCE, text], options, part)
+            zig.link_web([*shim_sources(), table, _SOURCE, text], options, part)
             part.replace(kept)
     return kept.read_bytes()
 

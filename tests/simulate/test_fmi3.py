@@ -177,8 +177,15 @@ DESCRIPTION = """
   <CoSimulation modelIdentifier="Plant" canGetAndSetFMUState="true"/>
   <TypeDefinitions><Float64Type name="Force" unit="N" min="-5"/></TypeDefinitions>
   <ModelVariables>
-    <Float64 name="u" valueReference="1" causality="input" declaredType="Force" start="1.5"/>
-    <Float64 name="y" valueReference="2" causality="output" unit="m" nominal="0.1"/>
+    <Float64 name="u" valueReference="1" causality="input" declaredType="Force" start="1.5">
+      <Annotations><Annotation type="bristle"><overStep>held</overStep></Annotation></Annotations>
+    </Float64>
+    <Float64 name="y" valueReference="2" causality="output" unit="m" nominal="0.1">
+      <Annotations>
+        <Annotation type="other"><jumpsWithout>v</jumpsWithout></Annotation>
+        <Annotation type="bristle"><jumpsWithout>u</jumpsWithout></Annotation>
+      </Annotations>
+    </Float64>
     <Int8 name="n" valueReference="3" causality="parameter" variability="fixed" max="9"/>
     <String name="s" valueReference="4" causality="parameter" variability="fixed">
       <Start value="text"/></String>
@@ -187,6 +194,7 @@ DESCRIPTION = """
     <Binary name="b" valueReference="6" causality="parameter"/>
   </ModelVariables>
   <ModelStructure><Output valueReference="2" dependencies="1 3"/></ModelStructure>
+  <Annotations><Annotation type="bristle"><optional>u</optional></Annotation></Annotations>
 </fmiModelDescription>
 """
 
@@ -198,6 +206,7 @@ def test_a_description_is_read_as_in_fmi_2() -> None:
     assert list(found.variables) == ["u", "y", "n", "s"]  # arrays and binaries are no ports here
     u, y, n, s = found.variables.values()
     assert (u.kind, u.type, u.unit, u.minimum, u.start) == ("Real", "Float64", "N", -5.0, 1.5)
+    assert (u.over_step, y.jumps_without, u.optional, y.optional) == ("held", "u", True, False)
     assert (u.variability, n.variability) == ("continuous", "fixed")
     assert (y.unit, y.nominal, y.dependencies) == ("m", 0.1, ("u",))
     assert (n.kind, n.minimum, n.maximum) == ("Integer", -128.0, 9.0)
@@ -212,6 +221,9 @@ def test_a_description_is_read_as_in_fmi_2() -> None:
         ('name="y" ', "", "a variable has no name"),
         ('valueReference="2" causality', 'valueReference="x" causality', "no unsigned integer"),
         ('start="1.5"', 'start="many"', "the start 'many' is no Real"),
+        ("held", "often", "the annotation overStep is 'often', none of "),
+        (">u</jumpsWithout>", ">n</jumpsWithout>", '"y" may jump without "n", but no input has'),
+        ("<optional>u", "<optional>y", 'calls "y" optional, but no input has that name'),
         ('max="9"', 'max="nine"', "max is 'nine', not a number"),
     ],
 )

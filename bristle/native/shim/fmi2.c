@@ -3,11 +3,6 @@
 #include "fmi2.h"
 
 #include <stdlib.h>
-#include <string.h>
-
-static const char *const CATEGORIES[] = {"logAll", "logStatusWarning", "logStatusDiscard",
-                                         "logStatusError", "logStatusFatal"};
-enum { EVERY_CATEGORY = 31, ALWAYS = 1 << FAILED | 1 << FATAL };
 
 static void hand_on(const Host *host, const char *name, Status status, const char *text) {
     char line[2 * sizeof(((Text *)0)->at)];
@@ -20,7 +15,7 @@ static void hand_on(const Host *host, const char *name, Status status, const cha
     }
     line[used] = 0;
     host->callbacks.logger(host->callbacks.componentEnvironment, name, (fmi2Status)status,
-                           CATEGORIES[status], line);
+                           host_categories[status], line);
 }
 
 static void say(const Slave *slave, Status status, const char *text) {
@@ -34,7 +29,7 @@ EXPORT const char *fmi2GetVersion(void) { return "2.0"; }
 EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid,
                                      fmi2String resources, const fmi2CallbackFunctions *functions,
                                      fmi2Boolean visible, fmi2Boolean logging) {
-    const char *wrong = 0;
+    const char *wrong = host_refuses(guid);
     (void)visible;
     Host *host = calloc(1, sizeof *host);
     if (!host) return 0;
@@ -43,10 +38,7 @@ EXPORT fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String 
     if (!name) name = "";
     if (type != fmi2CoSimulation)
         wrong = "this FMU is for co-simulation alone.";
-    else if (!guid || strcmp(guid, component.guid) != 0)
-        wrong = "the guid is not that of this FMU: modelDescription.xml and library do not belong "
-                "together.";
-    else if (!(host->slave = slave_new(name, resources ? resources : "")))
+    else if (!wrong && !(host->slave = slave_new(name, resources ? resources : "")))
         wrong = "out of memory.";
     if (wrong) {
         hand_on(host, name, FAILED, wrong);
@@ -68,16 +60,7 @@ EXPORT fmi2Status fmi2SetDebugLogging(fmi2Component c, fmi2Boolean logging, size
                                       const fmi2String categories[]) {
     Host *host = c;
     if (!c) return fmi2Error;
-    int chosen = count == 0 ? EVERY_CATEGORY : 0, all = fmi2OK;
-    for (size_t i = 0; i < count; i++) {
-        int bit = 0;
-        for (int k = 0; k < 5; k++)
-            if (strcmp(categories[i], CATEGORIES[k]) == 0) bit = k == 0 ? EVERY_CATEGORY : 1 << k;
-        if (!bit) all = fmi2Warning;
-        chosen |= bit;
-    }
-    host->logged = logging ? host->logged | chosen : (host->logged & ~chosen) | ALWAYS;
-    return (fmi2Status)all;
+    return (fmi2Status)host_choose(&host->logged, logging, count, categories);
 }
 
 EXPORT fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2Real tolerance,

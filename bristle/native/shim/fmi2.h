@@ -3,13 +3,7 @@
 #ifndef FMI2_H
 #define FMI2_H
 
-#include "slave.h"
-
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
+#include "host.h"
 
 typedef void *fmi2Component;
 typedef void *fmi2FMUstate;
