@@ -82,8 +82,15 @@ def ensure(
     BuildError, DesignError, PhysicsError
         If a name or a file is wrong, or the FMU cannot be built.
     """
-    what = planned(component, building, controller, effects)
-    return build(what, zig.folder() / "fmus", [here()])
+    from filelock import FileLock
+
+    what, folder = planned(component, building, controller, effects), zig.folder() / "fmus"
+    try:
+        folder.mkdir(exist_ok=True)
+        with FileLock(folder / ".lock"):  # runs side by side that need it do not both write it
+            return build(what, folder, [here()])
+    except OSError as error:
+        raise BuildError(f"{folder}: cannot be written ({error.strerror or error}).") from error
 
 
 def _note_in(path: Path) -> bytes:
