@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 from both_forms import needs_zig
 
+from bristle.batch import ensemble
 from bristle.cli import main
 from bristle.errors import RunError
 from bristle.scenario.scenario import stock_scenarios
@@ -56,6 +57,23 @@ def test_forms_that_are_none_are_refused() -> None:
     assert caught.value.exit_code == 2
     with pytest.raises(RunError, match="steps no FMUs"):
         run("bench_sine_bingham", fmus="native", engine="compiled")
+
+
+def test_an_ensemble_steps_native_fmus(tmp_path: Path) -> None:
+    runs = {}
+    for form in ("python", "native"):
+        file = tmp_path / f"{form}.toml"
+        file.write_text(
+            'schema = 1\nscenario = "bench_sine_bingham"\nruns = 4\nseed = 7\nengine = "fmu"\n'
+            f'fmus = "{form}"\n[set]\n"run.stop" = 0.1\n'
+            '[vary]\n"damper.f_c" = { uniform = [1.0, 4.0] }\n'
+            '[outputs]\n"damper.force" = ["peak", "rms"]\n'
+        )
+        runs[form] = ensemble(file, workers=2)
+    assert runs["native"].failures == []
+    columns = [runs[form].runs[["peak damper.force", "rms damper.force"]] for form in runs]
+    assert difference(*columns) <= 1e-12
+    assert runs["python"].plan.digest() != runs["native"].plan.digest()
 
 
 def test_the_command_steps_native_fmus(
