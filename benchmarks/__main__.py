@@ -3,8 +3,8 @@
 A benchmark is a module of this folder with `run() -> list[Row]`; names choose among them. `blind`
 named first has options of its own (`python -m benchmarks blind --help`): it takes hours, and the
 table here shows what its last run found. So have `compatibility`, `exits`, `instruments`, `lab`,
-`law_free`, `learned`, `limits`, `plan`, `prediction` and `calibrate`, whose own table shows what
-each value of the rule trades.
+`law_free`, `learned`, `limits`, `native`, `plan`, `prediction` and `calibrate`, whose own table
+shows what each value of the rule trades.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from . import __path__ as folder
 from ._rows import Row
 
 COUNTED = (
-    "compatibility", "exits", "instruments", "lab", "law_free", "learned", "limits", "plan",
-    "prediction", "stated",
+    "compatibility", "exits", "instruments", "lab", "law_free", "learned", "limits", "native",
+    "plan", "prediction", "stated",
 )  # fmt: skip
 """Benchmarks whose own options say how many cases are made, or where."""
 

@@ -169,12 +169,16 @@ def libpython() -> Path | None:
 
 def c_host(folder: Path) -> Path | None:
     """Return the tests' host in C, compiled; None without a compiler or a shared libpython."""
+    return compiled(ROOT / "tests" / "fmu" / "host.c", folder) if libpython() else None
+
+
+def compiled(source: Path, folder: Path) -> Path | None:
+    """Return a host in C, compiled into a folder; None without a compiler, or not on Linux."""
     compiler = next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
-    if compiler is None or libpython() is None or sys.platform != "linux":
+    if compiler is None or sys.platform != "linux":
         return None
-    program = folder / "host"
+    program = folder / source.stem
     headers = Path(fmpy.__file__).parent / "c-code"
-    source = ROOT / "tests" / "fmu" / "host.c"
     command = [compiler, "-O1", f"-I{headers}", source, "-o", program, "-ldl", "-lm"]
     subprocess.run([str(part) for part in command], check=True, capture_output=True)
     return program
@@ -200,11 +204,6 @@ def by_c_host(program: Path, path: Path) -> list[float]:
         The host ended with another code than 0.
     """
     about = read_description(path)
-    reals = [str(v.reference) for v in about.of("output") if v.kind == "Real"]
-    moved = ",".join(
-        f"{about.variables[name].reference}:{centre!r}:{amplitude!r}"
-        for name, (centre, amplitude) in swung(about).items()
-    )
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("PYTHON", "VIRTUAL_ENV"))}
     kept["PATH"] = f"{sys.base_prefix}/bin:{kept.get('PATH', '')}"  # its standard library is there
     with tempfile.TemporaryDirectory(prefix="bristle-host-") as folder:
@@ -214,10 +213,53 @@ def by_c_host(program: Path, path: Path) -> list[float]:
             unpacked = extract(path, Path(folder, copy))
             command += [unpacked / library_member(about.identifier)]
             command += [(unpacked / "resources").as_uri()]
-        done = _run([*command, moved, ",".join(reals)], folder, kept)
+        done = _run([*command, *_moved_and_read(about)], folder, kept)
     if done.returncode:
         raise HostError(_last(done))
     return [float(line) for line in done.stdout.split()]
+
+
+def _moved_and_read(about: Description) -> tuple[str, str]:
+    """Return two arguments of a host in C: the inputs that it moves, the outputs that it reads."""
+    moved = ",".join(
+        f"{about.variables[name].reference}:{centre!r}:{amplitude!r}"
+        for name, (centre, amplitude) in swung(about).items()
+    )
+    read = ",".join(str(v.reference) for v in about.of("output") if v.kind == "Real")
+    return moved, read
+
+
+def times_of_steps(
+    program: Path, path: Path, switches: Sequence[str], steps: int, passes: int
+) -> list[int]:
+    """Return what `steps.c` measures of a native FMU, in ns.
+
+    Parameters
+    ----------
+    program : Path
+        That source, compiled.
+    path : Path
+    switches : sequence of str
+        Booleans that are on.
+    steps, passes : int
+
+    Raises
+    ------
+    HostError
+        The host ended with another code than 0.
+    """
+    about = read_description(path)
+    on = ",".join(str(about.variables[name].reference) for name in switches)
+    moved, read = _moved_and_read(about)
+    with tempfile.TemporaryDirectory(prefix="bristle-host-") as folder:
+        unpacked = extract(path, Path(folder, "one"))
+        resources = (unpacked / "resources").as_uri()
+        library = unpacked / library_member(about.identifier)
+        command = [program, library, about.guid, resources, on or "-", moved or "-", read]
+        done = _run([*command, steps, passes], folder, {})
+    if done.returncode:
+        raise HostError(_last(done))
+    return [int(number) for number in done.stdout.split()]
 
 
 if __name__ == "__main__":

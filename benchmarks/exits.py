@@ -6,8 +6,8 @@
 
 A script is made of parts that the seed draws: runs on both engines in either order, threads, pools,
 threads that are still stepping as the script ends, pandas, figures, FMUs loaded with FMPy that are
-freed, reset or left to the end, exceptions on the way, Ctrl-C, and the ways to end. Each should
-end with 0 and say nothing.
+freed, reset or left to the end, exceptions on the way, Ctrl-C, and the ways to end. Each part steps
+FMUs in Python or, two times in five, native ones. Each script should end with 0 and say nothing.
 
 `--harsh` turns off malloc's per-thread cache, so that freed memory is in one of malloc's lists, and
 loads a library that takes memory as the process ends. There a damaged list always aborts.
@@ -16,6 +16,7 @@ loads a library that takes memory as the process ends. There a damaged list alwa
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import os
 import random
 import shutil
@@ -28,6 +29,8 @@ from pathlib import Path
 
 import bristle
 from bristle.fmu.build import ensure
+from bristle.native import zig
+from bristle.native.build import ensure as ensure_native
 from bristle.resources import fmus_folder
 
 from ._rows import Row
@@ -38,6 +41,8 @@ FEW = 6
 LIMIT = 300.0
 """Seconds after which a script counts as hung."""
 DIVISION = "# --"
+NATIVE = 0.4 if importlib.util.find_spec("ziglang") else 0.0
+"""Share of the parts that step native FMUs, which zig compiles."""
 
 HEAD = """
 import sys
@@ -48,7 +53,7 @@ from fmpy.fmi2 import FMU2Slave
 SHORT = {"run.stop": 0.1}
 
 def load(name):
-    folder = str(fmpy.extract(f"{FMUS}/{name}.fmu"))
+    folder = str(fmpy.extract(f"{FMUS[form]}/{name}.fmu"))
     about = fmpy.read_model_description(folder)
     fmu = FMU2Slave(
         guid=about.guid, modelIdentifier=about.coSimulation.modelIdentifier,
@@ -68,7 +73,7 @@ def begin(fmu):
 
 ENGINES = (
     """
-results = bristle.run("bench_sine_bingham", SHORT)
+results = bristle.run("bench_sine_bingham", SHORT, fmus=form)
 """,
     """
 results = bristle.run("bench_sine_bingham", SHORT, engine="compiled")
@@ -78,19 +83,21 @@ results = bristle.run("bench_sine_bingham", SHORT, engine="compiled")
 PARTS = {
     "pandas": """
 import pandas as pd
-table = pd.DataFrame(bristle.run("bench_sine_lugre", SHORT)).rolling(5).mean().describe()
+table = pd.DataFrame(bristle.run("bench_sine_lugre", SHORT, fmus=form))
+table = table.rolling(5).mean().describe()
 """,
     "figure": """
 import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
-bristle.run("bench_sine_bingham", SHORT).plot().savefig("figure.png")
+bristle.run("bench_sine_bingham", SHORT, fmus=form).plot().savefig("figure.png")
 plt.close("all")
 """,
     "threads": """
 import threading
 workers = [
-    threading.Thread(target=bristle.run, args=("bench_sine_bingham", SHORT)) for _ in range(2)
+    threading.Thread(target=bristle.run, args=("bench_sine_bingham", SHORT), kwargs={"fmus": its})
+    for its in ("python", form)
 ]
 [worker.start() for worker in workers]
 [worker.join() for worker in workers]
@@ -98,9 +105,11 @@ workers = [
     "pool": """
 from concurrent.futures import ThreadPoolExecutor
 with ThreadPoolExecutor(3) as pool:
-    jobs = [("fmu", 1.0), ("compiled", 2.0), ("fmu", 3.0), ("fmu", 4.0)]
+    jobs = [("fmu", 1.0, form), ("compiled", 2.0, "python"), ("fmu", 3.0, "python"),
+            ("fmu", 4.0, form)]
     peaks = list(pool.map(lambda job: bristle.run(
-        "bench_sine_bingham", {**SHORT, "damper.f_c": job[1]}, engine=job[0]).abs().max(), jobs))
+        "bench_sine_bingham", {**SHORT, "damper.f_c": job[1]}, engine=job[0], fmus=job[2]
+    ).abs().max(), jobs))
 """,
     "daemon": """
 import threading
@@ -137,7 +146,7 @@ bench = Bench()
 """,
     "exception": """
 try:
-    bristle.run("bench_sine_bingham", {**SHORT, "damper.f_c": float("nan")})
+    bristle.run("bench_sine_bingham", {**SHORT, "damper.f_c": float("nan")}, fmus=form)
 except bristle.BristleError as error:
     caught = error
 """,
@@ -163,12 +172,12 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background
 threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
 try:
     while True:
-        bristle.run("bench_sine_lugre", {"run.stop": 2.0})
+        bristle.run("bench_sine_lugre", {"run.stop": 2.0}, fmus=form)
 except KeyboardInterrupt as error:
     interrupt = error
 """,
     "simulate_fmu": """
-table = fmpy.simulate_fmu(f"{FMUS}/ConstantVoltage.fmu", stop_time=0.1, step_size=0.01)
+table = fmpy.simulate_fmu(f"{FMUS[form]}/ConstantVoltage.fmu", stop_time=0.1, step_size=0.01)
 """,
 }
 
@@ -209,8 +218,17 @@ def script(number: int) -> str:
     names = draw.sample(sorted(PARTS), draw.randint(1, 4))
     blocks = [*engines, *(PARTS[name] for name in names)]
     draw.shuffle(blocks)
-    head = HEAD.replace("import fmpy\n", f"import fmpy\n\nFMUS = {str(fmus_folder())!r}\n", 1)
-    return head + f"\n{DIVISION} parts: {', '.join(names)}".join(["", *blocks]) + draw.choice(ENDS)
+    end = draw.choice(ENDS)
+    blocks = [_with_form(block, draw) for block in blocks]
+    folders = {"python": str(fmus_folder()), "native": str(zig.folder() / "fmus")}
+    head = HEAD.replace("import fmpy\n", f"import fmpy\n\nFMUS = {folders!r}\n", 1)
+    return head + f"\n{DIVISION} parts: {', '.join(names)}".join(["", *blocks]) + end
+
+
+def _with_form(block: str, draw: random.Random) -> str:
+    """Return a part with the form of the FMUs that it steps; one that steps none as it is."""
+    form = "native" if draw.random() < NATIVE else "python"
+    return f'\nform = "{form}"{block}' if "form" in block or "load(" in block else block
 
 
 def run_script(number: int, library: Path | None = None) -> End:
@@ -255,6 +273,8 @@ def count(numbers: range, harsh: bool = False, show: bool = False) -> list[End]:
     """Run scripts one after the other; return how they ended."""
     for name in LOADED:
         ensure(name)
+        if NATIVE:
+            ensure_native(name)
     bristle.run("bench_sine_bingham", {"run.stop": 0.1}, engine="compiled")  # compiled once
     with tempfile.TemporaryDirectory(prefix="bristle-exits-") as folder:
         library = harsh_library(Path(folder)) if harsh else None
@@ -276,7 +296,9 @@ def rows(ends: list[End], harsh: bool = False) -> list[Row]:
     said = f"; exit codes of the others: {dict(codes)}" if codes else ""
     name = "scripts with FMUs that end with 0" + (", damaged memory aborts" if harsh else "")
     measured = f"{good} of {len(ends)}{said}" + (f"; {noisy} with a message" if noisy else "")
-    return [Row(name, measured, f"{len(ends)} of {len(ends)}", len(ends) / max(good, 0.5))]
+    native = sum('form = "native"' in script(end.number) for end in ends)
+    note = f"{native} of them step native FMUs"
+    return [Row(name, measured, f"{len(ends)} of {len(ends)}", len(ends) / max(good, 0.5), note)]
 
 
 def run() -> list[Row]:
@@ -299,5 +321,5 @@ def main(given: list[str]) -> int:
         return 0
     ends = count(range(chosen.first, chosen.first + chosen.scripts), chosen.harsh, show=True)
     for row in rows(ends, chosen.harsh):
-        print(f"{row.name}: {row.measured}")
+        print(f"{row.name}: {row.measured}; {row.note}")
     return int(not all(end.good for end in ends))

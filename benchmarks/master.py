@@ -63,8 +63,8 @@ def _against(name: str, master: Times, other: Times, goal: float | None = None) 
     )
 
 
-def find_fmus(scenario: Scenario) -> Fmus:
-    """Return files, descriptions and parameters of a scenario's FMUs."""
+def find_fmus(scenario: Scenario, ensure: Callable[..., Path] = ensure) -> Fmus:
+    """Return files, descriptions and parameters of a scenario's FMUs, in Python or native."""
     paths = {c.name: c.path or ensure(c.fmu, c.building, c.controller) for c in scenario.components}
     descriptions = {name: read_description(path) for name, path in paths.items()}
     folder = scenario.file.parent

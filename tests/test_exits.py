@@ -133,6 +133,9 @@ def test_scripts_differ_and_each_stays_the_same() -> None:
     assert texts == [exits.script(number) for number in range(40)]
     assert all(any(part in text for text in texts) for part in exits.PARTS.values())
     assert all('engine="compiled"' in text for text in texts)
+    if exits.NATIVE:
+        mixed = [all(f'form = "{form}"' in text for form in ("python", "native")) for text in texts]
+        assert sum(mixed) > 20
     for text in texts:
         compile(text, "<script>", "exec")
 

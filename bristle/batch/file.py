@@ -3,7 +3,7 @@
 schema = 1
 title = "El Centro, damper and building as they may be"
 scenario = "el_centro_0p6g_constant_voltage"   # a stock scenario, or a file beside this one
-engine = "compiled"                            # or "fmu"
+engine = "compiled"                            # or "fmu"; then fmus = "native" steps native ones
 runs = 500
 seed = 1
 
@@ -44,6 +44,7 @@ from ..scenario.document import FILE_PARAMETERS, MADE_FROM
 from ..scenario.parameters import Wrong, typed
 from ..scenario.scenario import Component, Scenario, load_scenario, resolve_scenario
 from ..scenario.text import scenario_text
+from ..simulate.forms import FORMS
 from ..simulate.rows import make_columns
 from . import buildings
 from .distributions import KINDS, Distribution, Value
@@ -59,6 +60,7 @@ _KEYS = (
     "title",
     "scenario",
     "engine",
+    "fmus",
     "runs",
     "seed",
     "set",
@@ -156,6 +158,11 @@ class _Reader:
         engine = self.data.get("engine", "compiled")
         if engine not in ("compiled", "fmu"):
             self.error(("engine",), f"engine = {written(engine)}; compiled or fmu is right.")
+        fmus = self.data.get("fmus", "python")
+        if fmus not in FORMS:
+            self.error(("fmus",), f"fmus = {written(fmus)}; {' or '.join(FORMS)} is right.")
+        elif fmus == "native" and engine != "fmu":
+            self.error(("fmus",), 'fmus = "native" needs engine = "fmu": no other steps FMUs.')
         if runs is not None and not 1 <= runs <= MOST_RUNS:
             raise EnsembleError(f"--runs {runs}: 1 to {MOST_RUNS} is right.")
         fixed = {name: self._found(name, v) for name, v in self._table("set").items()}
@@ -183,7 +190,7 @@ class _Reader:
         title = str(self.data.get("title", "") or base.title)
         plan = Plan(
             self.path, title, base.file, str(engine), runs or asked, seed, varied, outputs, fixed,
-            content.hexdigest()[:16], identified,
+            content.hexdigest()[:16], identified, str(fmus),
         )  # fmt: skip
         refuse_few(plan)
         return plan

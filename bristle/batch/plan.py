@@ -65,6 +65,8 @@ class Plan:
         Digest of the base scenario and of the files that it reads.
     identified : Identified, optional
         A component whose parameters are drawn together.
+    fmus : str
+        "python" or "native": which FMUs the engine "fmu" steps.
     """
 
     file: Path
@@ -78,6 +80,7 @@ class Plan:
     fixed: dict[str, Value] = field(default_factory=dict)
     content: str = ""
     identified: Identified | None = None
+    fmus: str = "python"
 
     @property
     def left(self) -> bool:
@@ -132,6 +135,8 @@ class Plan:
             "varied": [asdict(v) for v in self.varied],
             "outputs": [o.name for o in self.outputs],
         }
+        if self.fmus != "python":
+            decides["fmus"] = self.fmus
         if self.identified is not None:
             decides["identified"] = asdict(self.identified)
         return hashlib.sha256(json.dumps(decides, sort_keys=True).encode()).hexdigest()[:16]

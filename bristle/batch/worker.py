@@ -132,7 +132,7 @@ def _numbers(plan: Plan, scenario: Scenario) -> tuple[float, ...]:
         from ..simulate.output import Output as Files
         from ..simulate.run import execute
 
-        columns = execute(scenario, None, "fmu", Files(None), False)
+        columns = execute(scenario, None, "fmu", Files(None), False, fmus=plan.fmus)
     return tuple(statistic(output, np.asarray(columns[output.column])) for output in plan.outputs)
 
 

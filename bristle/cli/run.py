@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,7 +75,7 @@ def main(arguments: argparse.Namespace) -> int:
         frame = execute(
             file, overrides, arguments.engine, output, True, end_process=True,
             coupling_error=arguments.coupling_error or arguments.tolerance is not None,
-            ensure=_ensure(arguments),
+            fmus=arguments.fmus,
         )  # fmt: skip
     except (IncompleteRunError, RunInterrupted) as error:
         if arguments.debug and isinstance(error, IncompleteRunError):
@@ -101,19 +101,6 @@ def main(arguments: argparse.Namespace) -> int:
     return code
 
 
-def _ensure(arguments: argparse.Namespace) -> Callable[..., Path] | None:
-    """Return what gives the FMUs of built-in components, None for those in Python."""
-    if arguments.fmus == "python":
-        return None
-    if arguments.engine != "fmu":
-        from ..errors import not_usable
-
-        raise not_usable('--fmus native: engine "compiled" steps no FMUs; "fmu" does.')
-    from ..native.build import ensure
-
-    return ensure
-
-
 def _step_for(
     arguments: argparse.Namespace, file: Path, overrides: dict[str, bool | int | float | str]
 ) -> float:
@@ -126,7 +113,8 @@ def _step_for(
     if arguments.engine != "fmu":
         raise not_usable('--tolerance: engine "compiled" makes no coupling error; "fmu" does.')
     tolerance = _share(arguments.tolerance)
-    scenario = find_step(load_scenario(file, overrides), tolerance, run_quietly)
+    again = partial(run_quietly, fmus=arguments.fmus)
+    scenario = find_step(load_scenario(file, overrides), tolerance, again)
     said = f"a step of {1e3 * scenario.step:.6g} ms keeps the coupling error below"
     print(f"{said} {100 * tolerance:.3g} %", file=sys.stderr)
     return scenario.step

@@ -87,8 +87,16 @@ def ensure(
     BuildError, DesignError, PhysicsError
         If a name or a file is wrong, or the FMU cannot be built.
     """
+    from filelock import FileLock
+
     what = planned(component, building, controller, effects)
-    return build(what, zig.folder() / ("fmus_fmi3" if fmi == 3 else "fmus"), [here()], fmi)
+    folder = zig.folder() / ("fmus_fmi3" if fmi == 3 else "fmus")
+    try:
+        folder.mkdir(exist_ok=True)
+        with FileLock(folder / ".lock"):  # runs side by side that need it do not both write it
+            return build(what, folder, [here()], fmi)
+    except OSError as error:
+        raise BuildError(f"{folder}: cannot be written ({error.strerror or error}).") from error
 
 
 def _note_in(path: Path) -> bytes:

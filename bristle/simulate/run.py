@@ -8,6 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from ..interrupt import Interrupt
 from ..scenario.scenario import Scenario, fmu_parameters, load_scenario
 from ..scenario.text import scenario_text
 from .coupling_error import as_data, estimate
+from .forms import ensure_of
 from .output import Output
 from .results import Table, to_frame
 from .rows import make_columns, times
@@ -56,6 +58,7 @@ def run(
     overrides: Mapping[str, object] | None = None,
     *,
     engine: str = "fmu",
+    fmus: str = "python",
     out: str | Path | None = None,
     format: str = "csv",
     progress: bool = False,
@@ -71,6 +74,9 @@ def run(
         Values that take the place of the file's: `{"damper.f_c": 2.0, "run.stop": 10.0}`.
     engine : str
         "fmu" steps FMUs; "compiled" solves built-in components together, without coupling error.
+    fmus : str
+        Which FMUs of built-in components are stepped: "python", or "native", which are compiled on
+        first use and need bristle[native]. The rows are the same.
     out : path, optional
         Folder for results, log and, on the command line, a figure; without it nothing is written.
     format : str
@@ -109,7 +115,9 @@ def run(
     """
     _refuse_types(scenario, overrides, out)
     output = Output(_folder(out), format)
-    return execute(scenario, overrides, engine, output, progress, coupling_error=coupling_error)
+    return execute(
+        scenario, overrides, engine, output, progress, coupling_error=coupling_error, fmus=fmus
+    )
 
 
 def _refuse_types(scenario: object, overrides: object, out: object) -> None:
@@ -137,13 +145,13 @@ def execute(
     end_process: bool = False,
     coupling_error: bool = False,
     reference: bool = False,
-    ensure: Callable[..., Path] | None = None,
+    fmus: str = "python",
 ) -> Results:
     """Run a scenario as `run` does, into an output that is closed afterwards.
 
     Parameters
     ----------
-    scenario, overrides, engine, progress
+    scenario, overrides, engine, progress, fmus
         As in `run`, and what is returned and raised too.
     output : Output
         What takes results and log.
@@ -153,12 +161,11 @@ def execute(
         Whether to estimate the coupling error as well.
     reference : bool
         Whether the coupled engine takes the substeps of one that tells the errors of other runs.
-    ensure : callable, optional
-        Returns the FMU of a built-in component, in place of `fmu.build.ensure`.
     """
     try:
         if engine not in ENGINES:
             raise not_usable(f'engine "{engine}" is not known; there are: {", ".join(ENGINES)}.')
+        ensure = ensure_of(fmus, engine)
         if isinstance(scenario, Scenario) and overrides:
             scenario = scenario.file
         if not isinstance(scenario, Scenario):
@@ -172,16 +179,18 @@ def execute(
             return job.solve(reference)
         frame = job.step(progress, end_process)
         if coupling_error:
-            _add_error(scenario, frame, output)
+            _add_error(scenario, frame, output, partial(run_quietly, fmus=fmus))
         return frame
     finally:
         output.close()
 
 
-def _add_error(scenario: Scenario, frame: Results, output: Output) -> None:
+def _add_error(
+    scenario: Scenario, frame: Results, output: Output, again: Callable[[Scenario, str], Results]
+) -> None:
     """Estimate the coupling error of a run, keep it with the results and tell it."""
     try:
-        how, found = estimate(scenario, frame, run_quietly)
+        how, found = estimate(scenario, frame, again)
     except RunError as error:  # the run itself is whole
         output.warn(f"the coupling error cannot be estimated: {error}")
         return
@@ -194,7 +203,7 @@ def _add_error(scenario: Scenario, frame: Results, output: Output) -> None:
             output.warn(f"{name}: {one.doubt()}: the estimate is worth nothing")
 
 
-def run_quietly(scenario: Scenario, engine: str) -> Results:
+def run_quietly(scenario: Scenario, engine: str, fmus: str = "python") -> Results:
     """Run a scenario for its numbers alone: nothing is written, and what it warns of is known.
 
     Parameters
@@ -202,8 +211,11 @@ def run_quietly(scenario: Scenario, engine: str) -> Results:
     scenario : Scenario
     engine : str
         As in `run`; "compiled" with substeps short enough to tell the errors of other runs.
+    fmus : str
+        As in `run`, for the engine "fmu".
     """
-    return execute(scenario, None, engine, _Silent(None), progress=False, reference=True)
+    form = fmus if engine == "fmu" else "python"
+    return execute(scenario, None, engine, _Silent(None), False, reference=True, fmus=form)
 
 
 class _Silent(Output):
@@ -222,7 +234,7 @@ class _Job:
         overrides: dict[str, object],
         engine: str,
         output: Output,
-        ensure: Callable[..., Path] | None = None,
+        ensure: Callable[..., Path],
     ) -> None:
         self.scenario = scenario
         self.ensure = ensure
@@ -352,12 +364,9 @@ class _Job:
 
     def _fmus(self) -> tuple[dict[str, Path], dict[str, Description]]:
         """Return each component's FMU file, built where needed, and what it says of itself."""
-        from ..fmu import build
-
-        ensure = self.ensure or build.ensure
         paths, descriptions = {}, {}
         for component in self.scenario.components:
-            path = component.path or ensure(
+            path = component.path or self.ensure(
                 component.made_of(), component.building, component.controller, component.effects
             )
             # A missing binary is explained when the FMU is loaded, with the way out.

@@ -117,6 +117,8 @@ def test_the_stock_ensembles_are_right() -> None:
         ("seed = 7", "seed = -1", "seed = -1"),
         ("seed = 7", "sede = 7", 'no key "sede"'),
         ("seed = 7", 'engine = "gpu"', "compiled or fmu"),
+        ("seed = 7", 'engine = "fmu"\nfmus = "wasm"', "python or native"),
+        ("seed = 7", 'fmus = "native"', 'needs engine = "fmu"'),
         ("seed = 7", "vary = 3", "not TOML"),
         ('scenario = "half_sine_pulse"', "", "names the base"),
         ("half_sine_pulse", "half_sine_plus", 'mean "half_sine_pulse"'),

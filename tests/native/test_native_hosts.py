@@ -12,6 +12,8 @@ import fmpy
 import pytest
 from both_forms import both, native, needs_zig
 
+from benchmarks import _hosts
+from benchmarks.native import timer
 from bristle.fmu import catalogue
 from bristle.fmu.archive import library_member
 
@@ -63,6 +65,18 @@ def test_a_host_without_python_runs_them(name: str, host: Path, tmp_path: Path) 
     done = run(name, host, tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     assert all(abs(float(line)) < 1e6 for line in done.stdout.split())
+
+
+def test_a_host_in_c_times_steps(tmp_path: Path) -> None:
+    program = timer(tmp_path)
+    assert program is not None
+    path = native("GroundMotion").path
+    median, worst, seen, clock = _hosts.times_of_steps(program, path, [], steps=200, passes=2)
+    assert 0 < median <= seen
+    assert 0 < worst <= seen
+    assert 0 <= clock <= median
+    with pytest.raises(_hosts.HostError, match="no steps"):
+        _hosts.times_of_steps(program, path, [], steps=0, passes=2)
 
 
 @pytest.mark.slow

@@ -9,11 +9,11 @@ import pandas as pd
 import pytest
 from both_forms import needs_zig
 
+from bristle.batch import ensemble
 from bristle.cli import main
-from bristle.native.build import ensure
+from bristle.errors import RunError
 from bristle.scenario.scenario import stock_scenarios
-from bristle.simulate.output import Output
-from bristle.simulate.run import execute, run
+from bristle.simulate.run import run
 
 pytestmark = needs_zig
 
@@ -32,9 +32,48 @@ def difference(one: pd.DataFrame, other: pd.DataFrame) -> float:
 @pytest.mark.parametrize("scenario", sorted(stock_scenarios()), ids=lambda path: path.stem)
 def test_every_stock_scenario_gives_the_same_rows(scenario: Path) -> None:
     stop = {"run.stop": LONGEST} if "el_centro" in scenario.stem else {}
-    native = execute(scenario, stop, "fmu", Output(None), False, ensure=ensure)
+    native = run(scenario, stop, fmus="native")
     assert difference(run(scenario, stop), native) <= 1e-12
     assert np.isfinite(native.to_numpy()).all()
+
+
+def test_a_run_in_python_takes_them_and_so_do_the_runs_of_its_coupling_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    shown = {}
+    for form in ("python", "native"):
+        if form == "native":  # none of its runs may fall back
+            monkeypatch.setattr("bristle.fmu.build.ensure", None)
+        shown[form] = run("bench_sine_bingham", {"run.stop": 0.1}, fmus=form, coupling_error=True)
+    assert difference(shown["python"], shown["native"]) <= 1e-12
+    errors = [frame.attrs["coupling_error"] for frame in shown.values()]
+    assert errors[0] == errors[1]
+    assert shown["python"].attrs["made"]["fmus"] != shown["native"].attrs["made"]["fmus"]
+
+
+def test_forms_that_are_none_are_refused() -> None:
+    with pytest.raises(RunError, match=r'fmus "wasm" is not known') as caught:
+        run("bench_sine_bingham", fmus="wasm")
+    assert caught.value.exit_code == 2
+    with pytest.raises(RunError, match="steps no FMUs"):
+        run("bench_sine_bingham", fmus="native", engine="compiled")
+
+
+def test_an_ensemble_steps_native_fmus(tmp_path: Path) -> None:
+    runs = {}
+    for form in ("python", "native"):
+        file = tmp_path / f"{form}.toml"
+        file.write_text(
+            'schema = 1\nscenario = "bench_sine_bingham"\nruns = 4\nseed = 7\nengine = "fmu"\n'
+            f'fmus = "{form}"\n[set]\n"run.stop" = 0.1\n'
+            '[vary]\n"damper.f_c" = { uniform = [1.0, 4.0] }\n'
+            '[outputs]\n"damper.force" = ["peak", "rms"]\n'
+        )
+        runs[form] = ensemble(file, workers=2)
+    assert runs["native"].failures == []
+    columns = [runs[form].runs[["peak damper.force", "rms damper.force"]] for form in runs]
+    assert difference(*columns) <= 1e-12
+    assert runs["python"].plan.digest() != runs["native"].plan.digest()
 
 
 def test_the_command_steps_native_fmus(
