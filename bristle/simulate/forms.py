@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import not_usable
+from ..interrupt import Interrupt
 
 FORMS = ("python", "native")
 
@@ -24,6 +25,8 @@ def ensure_of(form: str, engine: str) -> Callable[..., Path]:
     ------
     BristleError
         If there is no such form; if native FMUs are asked for where none is stepped.
+    KeyboardInterrupt
+        Ctrl-C while what makes native FMUs was imported, raised once that is whole.
     """
     if form not in FORMS:
         raise not_usable(f'fmus "{form}" is not known; there are: {", ".join(FORMS)}.')
@@ -33,6 +36,8 @@ def ensure_of(form: str, engine: str) -> Callable[..., Path]:
         return ensure
     if engine != "fmu":
         raise not_usable(f'native FMUs: engine "{engine}" steps no FMUs; "fmu" does.')
-    from ..native.build import ensure as ensure_native
-
+    with Interrupt() as interrupt:  # an import of numba that Ctrl-C breaks off is never made good
+        from ..native.build import ensure as ensure_native
+    if interrupt.asked:
+        raise KeyboardInterrupt
     return ensure_native
