@@ -37,6 +37,7 @@ def test_every_stock_scenario_gives_the_same_rows(scenario: Path) -> None:
     assert np.isfinite(native.to_numpy()).all()
 
 
+@pytest.mark.slow
 def test_a_run_in_python_takes_them_and_so_do_the_runs_of_its_coupling_error(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
