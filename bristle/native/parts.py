@@ -63,7 +63,7 @@ def functions_text(what: Plan, functions: str) -> Path:
             tell(f"compiling the functions of {what.name}, once")
             compile_functions(what, functions, path)
 
-        return _kept(kept, compile_text)
+        return keep(kept, compile_text)
 
 
 def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2) -> bytes:
@@ -92,7 +92,7 @@ def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2)
     kept = zig.folder() / f"{content.hexdigest()[:24]}{platform.suffix}"
     if kept.is_file():
         return kept.read_bytes()
-    functions = _kept(
+    functions = keep(
         zig.folder() / f"{_object_digest(text, platform)}.o",
         lambda path: zig.compile_object(text, path, platform),
     )
@@ -105,15 +105,15 @@ def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2)
         zig.link(sources, SHIM, own, platform)
         own.replace(path)
 
-    return _kept(kept, link).read_bytes()
+    return keep(kept, link).read_bytes()
 
 
 def _object_digest(text: Path, platform: Platform) -> str:
     return hashlib.sha256(f"{zig.tools()} {platform.target} {text.stem}".encode()).hexdigest()[:24]
 
 
-def _kept(path: Path, make: Callable[[Path], None]) -> Path:
-    """Return a file of the cache, made beside it and renamed into place if it is not there."""
+def keep(path: Path, make: Callable[[Path], None]) -> Path:
+    """Return a file of the cache; if it is not there, `make` writes it into a folder of its own."""
     if not path.is_file():
         with tempfile.TemporaryDirectory(dir=path.parent) as temporary:
             part = Path(temporary) / path.name

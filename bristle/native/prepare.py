@@ -11,7 +11,7 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -126,9 +126,13 @@ def _prepare_here(what: Plan, fmi: int) -> Prepared:
 
 def _digest_of(slave: ComponentSlave) -> str:
     """Return the digest of a component's functions and of how they become text."""
-    made = digest(entrance_of(slave.flat_functions(), isinstance(slave, SampledSlave)))
+    return text_digest(entrance_of(slave.flat_functions(), isinstance(slave, SampledSlave)))
+
+
+def text_digest(function: Callable[..., Any]) -> str:
+    """Return the digest of a function with all that it calls, and of how that becomes text."""
     how = Path(entrance.__file__).read_bytes() + repr(COMPILER).encode()
-    return hashlib.sha256(made.encode() + how).hexdigest()[:16]
+    return hashlib.sha256(digest(function).encode() + how).hexdigest()[:16]
 
 
 def _in_fresh_process(what: Plan, given: Mapping[str, Any]) -> str:
@@ -142,15 +146,35 @@ def _in_fresh_process(what: Plan, given: Mapping[str, Any]) -> str:
         "effects": [str(path) for path in what.effects],
         "laws": [str(path) for path in what.laws],
     }
+    return answer_of("bristle.native.prepare", order, what.name)
+
+
+def answer_of(module: str, order: Mapping[str, Any], about: str) -> str:
+    """Return what `serve` of a module answers, in a process of its own, told to know no processor.
+
+    Parameters
+    ----------
+    module : str
+        Its full name.
+    order : mapping
+        What stands on the standard input there, as JSON.
+    about : str
+        What is compiled, for the message.
+
+    Raises
+    ------
+    BuildError
+        With what the process said, if it fails.
+    """
     path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
     child = subprocess.run(
-        [sys.executable, "-c", "from bristle.native.prepare import serve; serve()"],
+        [sys.executable, "-c", f"from {module} import serve; serve()"],
         input=json.dumps(order), env={**os.environ, **COMPILER, "PYTHONPATH": path},
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     if child.returncode != 0:
         said = child.stderr.strip() or f"its process ended with {child.returncode}"
-        raise BuildError(f"{what.name}: {said[-1000:]}")
+        raise BuildError(f"{about}: {said[-1000:]}")
     return child.stdout
 
 

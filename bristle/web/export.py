@@ -10,15 +10,14 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from ..data.files import write_whole
 from ..draw.html import escape, page
-from ..errors import BuildError, ScenarioError
+from ..errors import ScenarioError
 from ..fmu.variables import Variable
 from ..scenario.scenario import Component, Scenario
+from .files import loader, write_files
 from .module import module
 from .numbers import Numbers, Slider
 
-_FOLDER = Path(__file__).parent
 LOADER = ("bristle.mjs", "bristle.d.mts")
 """What runs the module, and its types for editors and TypeScript."""
 
@@ -60,21 +59,13 @@ def export_web(
     found = chosen(numbers, sliders)
     wasm = module()
     description = described(numbers, found)
-    texts = {
-        "scenario.json": json.dumps(description, indent=1) + "\n",
+    contents: dict[str, str | bytes] = {
         "index.html": page_of(wasm, description),
-        **{name: (_FOLDER / name).read_text(encoding="utf-8") for name in LOADER},
+        "scenario.wasm": wasm,
+        "scenario.json": json.dumps(description, indent=1) + "\n",
+        **loader(*LOADER),
     }
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for name, text in texts.items():
-            write_whole(folder / name, text)
-        part = folder / "scenario.wasm.part"
-        part.write_bytes(wasm)
-        part.replace(folder / "scenario.wasm")
-    except OSError as error:
-        raise BuildError(f"{folder}: cannot be written ({error.strerror or error}).") from None
-    return [folder / name for name in ("index.html", "scenario.wasm", "scenario.json", *LOADER)]
+    return write_files(folder, contents)
 
 
 def chosen(numbers: Numbers, sliders: Mapping[str, Range] | None) -> list[Slider]:
@@ -155,10 +146,10 @@ def described(numbers: Numbers, sliders: Sequence[Slider]) -> dict[str, Any]:
 
 def page_of(wasm: bytes, description: Mapping[str, Any]) -> str:
     """Return the page as one file that needs no other, and no server."""
-    loader, own = ((_FOLDER / name).read_text(encoding="utf-8") for name in (LOADER[0], "page.mjs"))
-    script = re.sub(r"^export ", "", loader, flags=re.MULTILINE)
-    script += re.sub(r"^import .*\n", "", own, flags=re.MULTILINE)
-    body = Template((_FOLDER / "page.html").read_text(encoding="utf-8")).substitute(
+    parts = loader(LOADER[0], "page.mjs", "page.html")
+    script = re.sub(r"^export ", "", parts[LOADER[0]], flags=re.MULTILINE)
+    script += re.sub(r"^import .*\n", "", parts["page.mjs"], flags=re.MULTILINE)
+    body = Template(parts["page.html"]).substitute(
         title=escape(description["title"]),
         scenario=json.dumps(description).replace("</", "<\\/"),
         module=base64.b64encode(wasm).decode(),

@@ -9,20 +9,17 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import subprocess
 import sys
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import BristleError, BuildError
-from ..fmu.plan import PACKAGE
-from ..jit import RefusedError, digest, library_text
+from ..jit import RefusedError, library_text
 from ..native import zig
 from ..native.entrance import plain_text, refusal
-from ..native.prepare import COMPILER
+from ..native.parts import keep
+from ..native.prepare import answer_of, text_digest
 from ..physics.laws import LAWS
 from ..physics.user import own_effects, own_laws
 from ..progress import tell
@@ -50,43 +47,29 @@ def module() -> bytes:
         written.
     """
     with whole_loop() as (loop, _):
-        functions = digest(loop)
+        functions = text_digest(loop)
     sizes = [f"-D{name}_SIZE={make().itemsize}" for name, make in RECORDS.items()]
     content = hashlib.sha256(SOURCE.read_bytes())
-    for one in (functions, zig.tools(), repr(COMPILER), *sizes):
+    for one in (functions, zig.tools(), *sizes):
         content.update(one.encode())
-    kept = zig.folder() / f"{content.hexdigest()[:24]}.wasm"
-    if not kept.is_file():
-        with tempfile.TemporaryDirectory(dir=zig.folder()) as temporary:
-            text = Path(temporary) / "march.ll"
-            part = Path(temporary) / kept.name
-            tell("compiling the time loop for the web, once")
-            _compile(functions, text)
-            zig.link_web([text, SOURCE], sizes, part)
-            part.replace(kept)
-    return kept.read_bytes()
+
+    def link(path: Path) -> None:
+        tell("compiling the time loop for the web, once")
+        text = path.parent / "march.ll"
+        order = {"own": _own(), "functions": functions, "target": str(text)}
+        answer_of("bristle.web.module", order, "the time loop")
+        zig.link_web([text, SOURCE], sizes, path)
+
+    return keep(zig.folder() / f"{content.hexdigest()[:24]}.wasm", link).read_bytes()
 
 
-def _compile(functions: str, target: Path) -> None:
-    """Write LLVM's text of the time loop of a digest, compiled in a process of its own."""
-    path = os.pathsep.join([str(PACKAGE.parent), os.environ.get("PYTHONPATH", "")])
-    own = {kind: [str(file) for file in files] for kind, files in _own().items()}
-    order = {"own": own, "functions": functions, "target": str(target)}
-    child = subprocess.run(
-        [sys.executable, "-c", "from bristle.web.module import serve; serve()"],
-        input=json.dumps(order), capture_output=True, text=True, check=False,
-        env={**os.environ, **COMPILER, "PYTHONPATH": path},
-    )  # fmt: skip
-    if child.returncode != 0:
-        raise BuildError(f"the time loop cannot be compiled: {child.stderr.strip()[-800:]}")
-
-
-def _own() -> dict[str, list[Path]]:
+def _own() -> dict[str, list[str]]:
     """Return the files of the user's own laws, in the order of their codes, and effects."""
     laws = own_laws()
     return {
-        "law": [laws[name] for name in LAWS if name in laws], "effect": [*own_effects().values()],
-    }  # fmt: skip
+        "law": [str(laws[name]) for name in LAWS if name in laws],
+        "effect": [str(file) for file in own_effects().values()],
+    }
 
 
 def serve() -> None:
@@ -99,7 +82,7 @@ def serve() -> None:
             load_file(Path(file), kind)
     try:
         with whole_loop() as (loop, _):
-            if digest(loop) != given["functions"]:
+            if text_digest(loop) != given["functions"]:
                 raise BuildError("laws or effects have changed meanwhile; export it again.")
         text = _text()
     except BristleError as error:
@@ -114,7 +97,7 @@ def _text() -> str:
         (0, 0, 0.0), (sources, row, row), (dampers, structures), (sampled, row, row), row, whole,
         np.zeros((0, 0)),
     )  # fmt: skip
-    own = [file.resolve() for files in _own().values() for file in files]
+    own = [Path(file).resolve() for files in _own().values() for file in files]
     with whole_loop() as (loop, inline):
         try:
             return plain_text(*library_text(loop, examples, inline))
