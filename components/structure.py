@@ -30,14 +30,14 @@ class Structure(ComponentSlave):
         self.add_input("extra_force", "N", text, over_step=HELD, optional=True)
         for device in devices:
             text = f"force of the device {device.name}, positive against its displacement"
-            self.add_input(device.ports[0], "N", text, over_step=HELD)
+            self.add_input(device.ports.force, "N", text, over_step=HELD)
         levels = self.building.levels()
         coupled = laws.matrices(self.building).M_inverse
         for i, level in enumerate(levels):
             self.add_output(level + "_displacement", "m", "relative to the ground", nominal=0.01)
             self.add_output(level + "_velocity", "m/s", "relative to the ground", nominal=0.1)
             depends = forces if coupled[i * len(levels)] else []
-            depends = [*depends, *(d.ports[0] for d in devices if moves(coupled, d, i))]
+            depends = [*depends, *(d.ports.force for d in devices if moves(coupled, d, i))]
             text = "absolute acceleration"
             self.add_output(level + "_acceleration_absolute", "m/s2", text, depends=depends)
         first = 1 if self.building.isolated else 0
@@ -47,7 +47,7 @@ class Structure(ComponentSlave):
             "damper force at which the damper's level would not accelerate relative to the ground"
         )
         depends = ["ground_acceleration", "extra_force"]
-        depends += [device.ports[0] for device in devices if 0 in device.levels]
+        depends += [device.ports.force for device in devices if 0 in device.levels]
         self.add_output("holding_force", "N", text, depends=depends)
         for device in devices:
             self.add_motion(device, coupled)
@@ -56,21 +56,21 @@ class Structure(ComponentSlave):
 
     def add_motion(self, device, coupled):
         """Declare what a device shows: its motion, and the force that would hold it."""
-        _, displacement, velocity, holding = device.ports
+        ports = device.ports
         above = self.building.levels()[device.upper]
         below = self.building.levels()[device.lower] if device.lower >= 0 else "the ground"
         text = f"of {above} relative to {below}"
-        self.add_output(displacement, "m", text, nominal=0.01)
-        self.add_output(velocity, "m/s", text, nominal=0.1)
+        self.add_output(ports.displacement, "m", text, nominal=0.01)
+        self.add_output(ports.velocity, "m/s", text, nominal=0.1)
         ends = [level for level in device.levels if level >= 0]
         depends = ["ground_acceleration"]
         if any(coupled[i * self.building.size] for i in ends):
             depends += ["damper_force", "extra_force"]
         for other in self.building.devices:
             if other is not device and any(moves(coupled, other, i) for i in ends):
-                depends.append(other.ports[0])
+                depends.append(other.ports.force)
         text = f"force of {device.name} at which {above} would not accelerate relative to {below}"
-        self.add_output(holding, "N", text, depends=depends)
+        self.add_output(ports.holding_force, "N", text, depends=depends)
 
     def bake(self):
         return structure.bake(self.building, self.parameter_names(), laws.SLOTS)

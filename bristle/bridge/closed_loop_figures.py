@@ -19,7 +19,7 @@ from .closed_loop_result import MISSED, PARAMETERS, Predicted
 from .closed_loop_runs import Trial
 from .closed_loop_sizes import Key, names_of, size_of, sizes_of
 from .draws import Simulator
-from .in_building import House, ports_of
+from .in_building import House, studied_ports
 from .left_open import Left, changes_left_open
 
 Array = NDArray[np.float64]
@@ -140,7 +140,7 @@ def figures_of(
             for key, values in sizes_of(one, names, trial, generator, 1).items():
                 collected[key] += values
     left = changes_left_open(model, place, trial, effects, number) if effects else {}
-    across = ports_of(house.building).displacement
+    across = studied_ports(house.building).displacement
     stroke = float(np.max(np.abs(columns[f"structure.{across}"])))
     drawn = {key: np.array(values) for key, values in collected.items()}
     return Figures(best, drawn, stroke, failed, missed, left)

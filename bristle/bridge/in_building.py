@@ -18,7 +18,7 @@ from ..data.measurement import Measurement
 from ..data.model import StudyModel
 from ..errors import StudyError
 from ..physics.building import Building
-from ..physics.device import driven_mass
+from ..physics.device import Ports, driven_mass
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
@@ -179,7 +179,7 @@ def write_scenario(
     if own.effects:
         source["effects"] = list(own.effects)
     files += write_signals(folder, shaking)
-    ports = ports_of(house.building)
+    ports = studied_ports(house.building)
     wires = {
         "structure.ground_acceleration": "ground.ground_acceleration",
         f"structure.{ports.force}": "damper.force",
@@ -216,21 +216,9 @@ def write_scenario(
     return scenario, files
 
 
-class Ports(NamedTuple):
-    """The names of a structure's ports at the damper of a study."""
-
-    force: str
-    displacement: str
-    velocity: str
-    holding_force: str
-
-
-def ports_of(building: Building) -> Ports:
+def studied_ports(building: Building) -> Ports:
     """Return the ports of a structure at the damper that is identified."""
-    if building.studied:
-        return Ports(*building.device(building.studied).ports)
-    level = building.levels()[0]
-    return Ports("damper_force", f"{level}_displacement", f"{level}_velocity", "holding_force")
+    return building.ports(building.device(building.studied))
 
 
 def others_of(building: Building, shaking: Shaking) -> list[str]:

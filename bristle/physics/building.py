@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..errors import PhysicsError
-from .device import GROUND, Device, either, read_devices
+from .device import GROUND, Device, Ports, either, read_devices
 from .linear import cholesky
 
 MAX_FLOORS = 20
@@ -66,6 +66,13 @@ class Building(NamedTuple):
                 return device
         known = ", ".join(device.name for device in self.devices) or "none but the damper"
         raise PhysicsError(f"building {self.name!r} has no device {name!r}; there are {known}.")
+
+    def ports(self, device: Device) -> Ports:
+        """Return the ports of a Structure at a device, or at the damper on the first level."""
+        if device.name:
+            return device.ports
+        level = self.levels()[0]
+        return Ports("damper_force", f"{level}_displacement", f"{level}_velocity", "holding_force")
 
 
 PAPER: dict[str, Any] = {

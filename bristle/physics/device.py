@@ -18,6 +18,15 @@ _WORDS = {"name", "at", "between"}
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 
+class Ports(NamedTuple):
+    """The ports of a Structure at a device: the force goes in, the others come out."""
+
+    force: str
+    displacement: str
+    velocity: str
+    holding_force: str
+
+
 class Device(NamedTuple):
     """A device by name, and the levels that it connects: `lower` is `GROUND` or below `upper`.
 
@@ -30,10 +39,9 @@ class Device(NamedTuple):
     upper: int
 
     @property
-    def ports(self) -> tuple[str, ...]:
-        """Names of the ports of a Structure: force in; displacement, velocity, holding force."""
-        what = ("force", "displacement", "velocity", "holding_force")
-        return tuple(f"{self.name}_{each}" for each in what)
+    def ports(self) -> Ports:
+        """The ports of a Structure at a device that has a name."""
+        return Ports(*(f"{self.name}_{each}" for each in Ports._fields))
 
     @property
     def levels(self) -> tuple[int, int]:

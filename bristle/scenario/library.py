@@ -126,7 +126,7 @@ def driven_mass(building: Path | None, port: str = "damper_force", attached: flo
     from ..physics.device import driven_mass as driven_by
 
     found = read_building(building) if building else paper_building()
-    pushed = next((d for d in found.devices if d.ports[0] == port), found.device(""))
+    pushed = next((d for d in found.devices if d.ports.force == port), found.device(""))
     return driven_by(found.with_attached_mass(attached).M, pushed)
 
 

@@ -44,13 +44,14 @@ def pushed_by(
         return None
     building = buildings[name]
     moves = {f"{level}_velocity": (GROUND, i) for i, level in enumerate(building.levels())}
-    moves |= {device.ports[2]: device.levels for device in building.devices}
+    moves |= {device.ports.velocity: device.levels for device in building.devices}
     first = building.device("")
-    forces = dict.fromkeys(("damper_force", "extra_force"), (first, "holding_force"))
-    forces |= {device.ports[0]: (device, device.ports[3]) for device in building.devices}
-    for port, (device, holding) in forces.items():
+    forces = dict.fromkeys((building.ports(first).force, "extra_force"), first)
+    forces |= {device.ports.force: device for device in building.devices}
+    for port, device in forces.items():
         pushes = source_of.get((name, port)) == (damper, "force")
         if pushes and device.levels == moves.get(felt):
+            holding = building.ports(device).holding_force
             return Pushed(list(buildings).index(name), device, slots[name, holding])
     return None
 

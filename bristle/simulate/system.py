@@ -201,7 +201,7 @@ class System:
             for field, port in (("friction", "damper_force"), ("extra_friction", "extra_force")):
                 record[field] = self._friction_at(name, port)
             for k, device in enumerate(self.slaves[name].building.devices):
-                record["frictions"][k] = self._friction_at(name, device.ports[0])
+                record["frictions"][k] = self._friction_at(name, device.ports.force)
         return found
 
     def _friction_at(self, structure: str, port: str) -> int:
@@ -218,7 +218,8 @@ class System:
             for level in self._levels(structure)
             for what in ("displacement", "velocity")
         }
-        motion |= {port for d in self.slaves[structure].building.devices for port in d.ports[1:3]}
+        for device in self.slaves[structure].building.devices:
+            motion |= {device.ports.displacement, device.ports.velocity}
         return bool(read - motion)
 
     def _levels(self, structure: str) -> list[str]:
