@@ -196,7 +196,6 @@ def responses(
     smoothed = [
         [smoothed_level(m, name, looser) for name in building.levels()] for m in measurements
     ]
-    corner = SLOW * frequencies(building)[0]
     longest = max(len(m.time) for m in measurements)
     made: dict[tuple[int, tuple[bool, ...]], Array] = {}
     for i in range(building.size):
@@ -208,27 +207,46 @@ def responses(
     out = []
     for m, levels, own in zip(measurements, smoothed, across, strict=True):
         errors = []
-        others = [
-            Load(one, m[f"{one.name}_force"], m.noise.get(f"{one.name}_force", 0.0))
-            for one in building.devices
-            if one is not device
-        ]
         for i, one in enumerate(levels):
             if _is_smooth(i, _instruments(one), building):
                 levels[i], error = corrected(one, m.step, draws, seed + i)
                 errors.append(error)
             else:
                 errors.append(made[i, _instruments(one)])
-        a, noise_a = _accelerations(m, building, levels)
-        made_of = _response(m, levels, errors, (a, noise_a))
-        made_of = replace(made_of, device=device, others=tuple(others), across=own)
-        levels, errors = anchored(
-            levels, errors, deflected(building, a, made_of.loads), m.step, corner,
-            {i for i in range(1, building.size) if made_of.hides(i)},
-            [f"{m.name}: {level}_displacement" for level in building.levels()],
-        )  # fmt: skip
-        out.append(_with_motion(made_of, levels, errors))
+        found = _response(m, levels, errors, _accelerations(m, building, levels))
+        found = replace(found, device=device, others=_loads(m, building, device), across=own)
+        out.append(_anchored(found, m, building, levels, errors))
     return out
+
+
+def _loads(m: Measurement, building: Building, device: Device) -> tuple[Load, ...]:
+    """Return the measured forces of the devices beside the one that is identified."""
+    return tuple(
+        Load(one, m[f"{one.name}_force"], m.noise.get(f"{one.name}_force", 0.0))
+        for one in building.devices
+        if one is not device
+    )
+
+
+def _anchored(
+    found: Response, m: Measurement, building: Building,
+    levels: list[dict[str, Any]], errors: list[Array],
+) -> Response:  # fmt: skip
+    """Return a response whose slow motion is held by the forces, where a level hides its own.
+
+    Parameters
+    ----------
+    found : of one run
+    m, building : the run, and whose levels were measured
+    levels, errors : smoothed motion and draws of its error, by level
+    """
+    levels, errors = anchored(
+        levels, errors, deflected(building, found.a, found.loads), m.step,
+        SLOW * frequencies(building)[0],
+        {i for i in range(1, building.size) if found.hides(i)},
+        [f"{m.name}: {level}_displacement" for level in building.levels()],
+    )  # fmt: skip
+    return _with_motion(found, levels, errors)
 
 
 def _instruments(level: dict[str, Any]) -> tuple[bool, ...]:

@@ -175,7 +175,7 @@ def test_a_full_cache_is_one_message(tmp_path: Path, monkeypatch: pytest.MonkeyP
     def full(*_: object) -> Path:
         raise OSError(28, "No space left on device", str(tmp_path / "cache"))
 
-    monkeypatch.setattr(parts, "_kept", full)
+    monkeypatch.setattr(parts, "keep", full)
     what = plan("ConstantVoltage", name="Other")
     with pytest.raises(BuildError, match=r"cache: cannot be written \(No space left on device\)"):
         build(what, tmp_path / "out", [here()])
