@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import ceil
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +13,10 @@ from numpy.typing import NDArray
 from ..data.model import StudyModel
 from ..errors import RunError
 from ..physics.drive import VOLTAGE
-from ..physics.effect import EFFECTS
-from ..physics.forms import split_form
-from ..physics.user import own_effects, own_laws
 from ..scenario.scenario import Scenario, load_scenario
 from ..simulate.coupled import simulate
-from .in_building import House, Parameters, Shaking, loads, write_scenario, write_signals
-from .scenario_files import part_text
+from .in_building import House, Shaking, loads, write_scenario, write_signals
+from .scenario_files import Parameters, part_text, source_of, values_of
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
@@ -118,34 +114,21 @@ class Simulator:
         own = loads(model, self.house.building, self.bench)
         # A mass that is drawn as zero is in no load, and must not stay what it is in the scenario.
         structure = {"attached_mass": 0.0, **own.structure}
-        given = {"structure": structure, "damper": {**self._values(model), **own.damper}}
+        given = {
+            "structure": structure,
+            "damper": {**values_of(model.at("damper", self.bench)), **own.damper},
+        }
         parts = [
             replace(one, parameters={**one.parameters, **given.get(one.name, {})})
             for one in scenario.components
         ]
         return replace(scenario, components=tuple(parts))
 
-    def _values(self, model: StudyModel) -> Parameters:
-        """Return what the damper is given: values and switches of its law and effects."""
-        damper = model.at("damper", self.bench)
-        values = {
-            name: value
-            for name, value in damper.values().items()
-            if "." not in name or name.partition(".")[0] in damper.effects
-        }
-        return {**values, **{f"{effect}.on": True for effect in damper.effects}}
-
     def _damper(self, moving: Parameters) -> str:
         """Return the text of the damper."""
-        plain, form, knots = split_form(self.model.base_law)
-        source: dict[str, Any] = {"law": own_laws().get(plain, plain)}
-        source |= {"command": form} if form else {}
-        source |= {"command_knots": list(knots)} if knots else {}
-        effects = self.model.at("damper", self.bench).effects
-        own = [own_effects()[name] for name in effects if EFFECTS[name].own]
-        source |= {"effects": own} if own else {}
         most = float(
             np.max(self.shaking.level if self.shaking.command is None else self.shaking.command)
         )
         limit = {VOLTAGE.limit: float(ceil(1.05 * most))} if most > VOLTAGE.largest else {}
-        return part_text("damper", source, {**self._values(self.model), **limit, **moving})
+        damper = self.model.at("damper", self.bench)
+        return part_text("damper", source_of(damper), {**values_of(damper), **limit, **moving})

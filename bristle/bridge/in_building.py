@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
@@ -23,10 +23,9 @@ from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..physics.user import own_effects
-from .scenario_files import part_text, scenario_text, signal_file
+from .scenario_files import DamperText, Parameters, part_text, scenario_text, signal_file
 
 Array = NDArray[np.float64]
-Parameters = dict[str, float | bool]
 
 STEP = 2e-3
 """Longest step [s] of a building's scenario."""
@@ -155,7 +154,7 @@ def masses(damper: StudyModel) -> list[str]:
 
 def write_scenario(
     folder: Path, head: tuple[str, str], house: House, shaking: Shaking, own: Loads,
-    damper: Callable[[Parameters], str],
+    damper: DamperText,
 ) -> tuple[Path, list[Path]]:  # fmt: skip
     """Write the scenario of a building with its damper under a ground motion, and its files.
 

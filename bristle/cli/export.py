@@ -1,7 +1,7 @@
 """Write a study's present model as an FMU and a scenario that uses it; a scenario as a web page.
 
-A study's values are baked into the FMU. `--web` writes a scenario of built-in components as a
-WebAssembly module, a loader and a page with sliders, which needs no server.
+A study's values are baked into the FMU. `--web` writes a scenario of built-in components, or that
+of a study, as a WebAssembly module, a loader and a page with sliders, which needs no server.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from ._common import add_overrides
 from ._consent import add_trust
 from ._native import add_native, builder
 
-HELP = "write a study's model as an FMU, or a scenario as a web page"
+HELP = "write a study's model as an FMU; or a scenario, or a study, as a web page"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle export`."""
-    text = "the study; with --web a scenario file, or the name of a scenario or component"
+    text = "the study; with --web also a scenario file, or the name of a scenario or component"
     parser.add_argument("what", metavar="FOLDER", help=text)
     parser.add_argument(
         "--out", type=Path, metavar="DIR", help="where to write; else export/ in the study"
@@ -40,7 +40,7 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.web is not None:
         return _web(arguments)
     if arguments.slider or arguments.overrides:
-        raise StudyError("--slider and --set belong to --web, which writes a scenario as a page.")
+        raise StudyError("--slider and --set belong to --web, which writes a page with sliders.")
     from ..bridge.export import export_study
     from ..study.study import Study
 
@@ -66,9 +66,11 @@ def main(arguments: argparse.Namespace) -> int:
 
 
 def _web(arguments: argparse.Namespace) -> int:
-    """Write a scenario as a web page, or a component as a module; print the files."""
+    """Write a scenario or study as a web page, or a component as a module; print the files."""
     from ..fmu.catalogue import component_names
+    from ..report.what_if import movable
     from ..scenario.scenario import parse_overrides
+    from ..study.study import Study
     from ..web.component import export_component
     from ..web.export import export_web
 
@@ -79,6 +81,10 @@ def _web(arguments: argparse.Namespace) -> int:
         if sliders or arguments.overrides:
             raise ScenarioError("--slider and --set are for a scenario; a component has no page.")
         files = export_component(arguments.what, arguments.web)
+    elif (Path(arguments.what) / "study.toml").is_file():
+        with movable(Study(Path(arguments.what))) as found:
+            overrides = parse_overrides(arguments.overrides)
+            files = export_web(found.scenario, arguments.web, sliders, overrides, found.shown)
     else:
         files = export_web(
             arguments.what, arguments.web, sliders, parse_overrides(arguments.overrides)

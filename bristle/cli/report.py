@@ -20,6 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--keep-test-closed", action="store_true", help="leave the study's test runs closed"
     )
+    text = "add sliders for the model's numbers, computed in the page (needs bristle[native])"
+    parser.add_argument("--what-if", action="store_true", help=text)
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
@@ -32,7 +34,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    content = gather(study, open_test=not arguments.keep_test_closed)
+    content = gather(study, open_test=not arguments.keep_test_closed, what_if=arguments.what_if)
     page = render(content)
     if arguments.out is None:
         file = study.write_report("report.html", page)

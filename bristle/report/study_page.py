@@ -36,7 +36,7 @@ class Content:
 
     `now` is the present model on held-out runs, `before` the model before the last effect that was
     added, `test` the present one on the test runs; None where there is none. `trouble` says why the
-    model could not be compared.
+    model could not be compared. `what_if` is the section with sliders, "" without.
     """
 
     study: Study
@@ -50,6 +50,7 @@ class Content:
     notes: tuple[str, ...]
     trouble: str
     test: Comparison | None = None
+    what_if: str = ""
 
 
 def study_report(study: Study) -> str:
@@ -66,15 +67,18 @@ def study_report(study: Study) -> str:
     return render(gather(study))
 
 
-def gather(study: Study, *, open_test: bool = True) -> Content:
+def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Content:
     """Return what the report of a study tells; it compares the models before and after.
 
     `open_test` False leaves test runs closed; else the study counts that they were opened.
+    `what_if` adds sliders that compute the model in the page, which needs zig.
     """
     from ..data.model import read_model
     from ..study.comparison import compare_study, comparer
     from ..study.identification import as_model
+    from .what_if import what_if_section
 
+    moved = what_if_section(study) if what_if else ""  # first: it may lack its compiler
     model, steps = study.model(to_show=True), tuple(study.steps())
     runs = study.runs()
     now = before = test = None
@@ -100,7 +104,7 @@ def gather(study: Study, *, open_test: bool = True) -> Content:
         trouble = str(error)
     return Content(
         study, model, study.verdict(), steps, tuple(found), now, before, added, runs.notes, trouble,
-        test,
+        test, moved,
     )  # fmt: skip
 
 
@@ -134,6 +138,7 @@ def render(content: Content) -> str:
         _history(content),
         _before_after(content),
         curves_section(study, content.model.effects),
+        content.what_if,
         _where(content),
         _on_test_runs(content),
         _parameters(content),

@@ -25,6 +25,8 @@ export interface Description {
   h: number;
   outputs: Output[];
   sliders: Slider[];
+  /** Output to the one that holds its measured values. */
+  measured: Record<string, string>;
   /** First byte and number of items of each array. */
   places: Record<string, [begin: number, count: number]>;
   /** The numbers, base64. */

@@ -8,7 +8,8 @@ import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from string import Template
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from ..draw.html import escape, page
 from ..errors import ScenarioError
@@ -27,12 +28,30 @@ MOST_SLIDERS = 12
 Range = tuple[float | None, float | None]
 _ANY: Range = (None, None)
 
+_HEAD = "<style>main {{ max-width: 76rem; }}</style>\n<h1>{}</h1>"
+_FOOT = "Made by bristle."
+
+
+class Shown(NamedTuple):
+    """What a page offers beside what its scenario says.
+
+    `sliders` are the numbers that it moves where they can be moved, else it has its own choice;
+    `measured` maps outputs to those that hold their measured values.
+    """
+
+    sliders: Sequence[str] = ()
+    measured: Mapping[str, str] = MappingProxyType({})
+
+
+NOTHING_MORE = Shown()
+
 
 def export_web(
     file: str | Path,
     folder: Path,
     sliders: Mapping[str, Range] | None = None,
     overrides: Mapping[str, object] | None = None,
+    shown: Shown = NOTHING_MORE,
 ) -> list[Path]:
     """Write a scenario as a WebAssembly module, its numbers, a loader and a page; return the files.
 
@@ -47,6 +66,8 @@ def export_web(
         of its own; else the numbers that the scenario sets and those of the dampers' laws.
     overrides : mapping, optional
         As for `scenario.load_scenario`.
+    shown : Shown
+        What the page offers beside the scenario's own.
 
     Raises
     ------
@@ -55,12 +76,10 @@ def export_web(
     BuildError
         If zig is not installed, or the folder cannot be written.
     """
-    numbers = Numbers(file, overrides)
-    found = chosen(numbers, sliders)
-    wasm = module()
-    description = described(numbers, found)
+    description, wasm = described(Numbers(file, overrides), sliders, shown), module()
+    title = description["title"]
     contents: dict[str, str | bytes] = {
-        "index.html": page_of(wasm, description),
+        "index.html": page(title, [_HEAD.format(escape(title)), body(wasm, description)], _FOOT),
         "scenario.wasm": wasm,
         "scenario.json": json.dumps(description, indent=1) + "\n",
         **loader(*LOADER),
@@ -68,8 +87,10 @@ def export_web(
     return write_files(folder, contents)
 
 
-def chosen(numbers: Numbers, sliders: Mapping[str, Range] | None) -> list[Slider]:
-    """Return the sliders that are named, or those that a scenario has by itself.
+def chosen(
+    numbers: Numbers, sliders: Mapping[str, Range] | None, offered: Sequence[str] = ()
+) -> list[Slider]:
+    """Return the sliders that are named, else those of the numbers offered, or of the scenario's.
 
     Raises
     ------
@@ -77,7 +98,8 @@ def chosen(numbers: Numbers, sliders: Mapping[str, Range] | None) -> list[Slider
         If one that is named cannot be, or moves what another one moves.
     """
     found: list[Slider] = []
-    for name, (low, high) in (sliders or dict.fromkeys(_offered(numbers.scenario), _ANY)).items():
+    names = offered or _offered(numbers.scenario)
+    for name, (low, high) in (sliders or dict.fromkeys(names, _ANY)).items():
         try:
             one = numbers.slider(name, low, high)
             _check_apart(one, found)
@@ -123,8 +145,24 @@ def _own_numbers(component: Component) -> list[Variable]:
     return found
 
 
-def described(numbers: Numbers, sliders: Sequence[Slider]) -> dict[str, Any]:
-    """Return what the loader reads, as plain data: see bristle.d.mts."""
+def described(
+    numbers: Numbers, named: Mapping[str, Range] | None = None, shown: Shown = NOTHING_MORE
+) -> dict[str, Any]:
+    """Return what the loader reads, as plain data: see bristle.d.mts.
+
+    Parameters
+    ----------
+    numbers : Numbers
+        Of the scenario.
+    named, shown
+        As `sliders` and `shown` of `export_web`.
+
+    Raises
+    ------
+    ScenarioError
+        If a slider that is named cannot be.
+    """
+    sliders = chosen(numbers, named, shown.sliders)
     outputs = zip(numbers.names, numbers.units, strict=True)
     return {
         "title": numbers.scenario.title,
@@ -139,20 +177,19 @@ def described(numbers: Numbers, sliders: Sequence[Slider]) -> dict[str, Any]:
             }
             for one in sliders
         ],
+        "measured": dict(shown.measured),
         "places": {name: list(place) for name, place in numbers.places.items()},
         "numbers": base64.b64encode(numbers.data).decode(),
     }  # fmt: skip
 
 
-def page_of(wasm: bytes, description: Mapping[str, Any]) -> str:
-    """Return the page as one file that needs no other, and no server."""
+def body(wasm: bytes, description: Mapping[str, Any]) -> str:
+    """Return sliders and pictures as HTML that needs no other file; once in a page."""
     parts = loader(LOADER[0], "page.mjs", "page.html")
     script = re.sub(r"^export ", "", parts[LOADER[0]], flags=re.MULTILINE)
     script += re.sub(r"^import .*\n", "", parts["page.mjs"], flags=re.MULTILINE)
-    body = Template(parts["page.html"]).substitute(
-        title=escape(description["title"]),
+    return Template(parts["page.html"]).substitute(
         scenario=json.dumps(description).replace("</", "<\\/"),
         module=base64.b64encode(wasm).decode(),
         script=script,
     )
-    return page(description["title"], [body], "Made by bristle.")

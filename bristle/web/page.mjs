@@ -6,6 +6,7 @@ const SOFT = "#5b6770";
 const LINE = "#dfe4e8";
 const BEFORE = "#a3adb5";
 const NOW = "#0072b2";
+const MEASURED = "#1f2933";
 
 const part = (id) => document.getElementById(id);
 
@@ -102,6 +103,8 @@ class Page {
     this.values = Object.fromEntries(scenario.sliders.map((one) => [one.name, one.value]));
     this.waiting = false;
     this.units = Object.fromEntries(scenario.description.outputs.map((o) => [o.name, o.unit]));
+    this.measured = scenario.description.measured; // output to the one of its measured values
+    part("black").hidden = Object.keys(this.measured).length === 0;
     this.addSliders();
     for (const [id, name] of Object.entries(this.first())) this.addChoice(id, name);
     window.addEventListener("resize", () => this.show());
@@ -116,7 +119,8 @@ class Page {
     const top = names.filter((n) => n.endsWith("_acceleration_absolute")).pop();
     const moved = like("base_displacement", "displacement", ".value") ?? names[0];
     const force = like(".force") ?? names[names.length - 1];
-    return { first: top ?? moved, second: moved, across: moved, along: force };
+    const compared = Object.keys(this.measured)[0];
+    return { first: compared ?? top ?? moved, second: moved, across: moved, along: force };
   }
 
   addChoice(id, chosen) {
@@ -192,6 +196,7 @@ class Page {
     for (const id of ["first", "second"]) {
       const port = part(id).value;
       const curves = runs.map(([run, colour]) => ({ x: run.time, y: run.column(port), colour }));
+      curves.unshift(...this.beside(port, this.before.time));
       draw(part(`${id}-picture`), curves, "time [s]", unit(port), true);
     }
     const [across, along] = [part("across").value, part("along").value];
@@ -200,11 +205,34 @@ class Page {
       y: run.column(along),
       colour,
     }));
+    loops.unshift(...this.beside(along, this.before.column(across)));
     draw(part("loop-picture"), loops, name(across), unit(along), false);
     this.tell();
   }
 
+  /** Returns the measured curve of an output over x, if there is one. */
+  beside(port, x) {
+    const name = this.measured[port];
+    return name ? [{ x, y: this.before.column(name), colour: MEASURED }] : [];
+  }
+
+  /** Says how far outputs are from what was measured. */
+  tellApart() {
+    const apart = (run, port) => {
+      const [is, was] = [run.column(port), this.before.column(this.measured[port])];
+      return Math.sqrt(is.reduce((sum, one, k) => sum + (one - was[k]) ** 2, 0) / is.length);
+    };
+    part("apart").textContent = Object.keys(this.measured)
+      .map((port) => {
+        const sizes = [this.before, this.now].map((run) => number(apart(run, port), 3));
+        const unit = this.units[port] ?? "";
+        return `RMS of ${port} minus measured: ${sizes[0]} ${unit}, now ${sizes[1]} ${unit}.`;
+      })
+      .join(" ");
+  }
+
   tell() {
+    this.tellApart();
     const body = part("figures");
     body.replaceChildren();
     for (const { name, unit } of this.scenario.description.outputs) {

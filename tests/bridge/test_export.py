@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import bristle
-from bristle.bridge.export import AGREEMENT, export_study, prediction
+from bristle.bridge.export import export_study
+from bristle.bridge.on_bench import AGREEMENT, prediction
 from bristle.cli import main
 from bristle.fmu.description import read_description
 from bristle.identify.bench import Bench

@@ -60,20 +60,28 @@ def test_forms_that_are_none_are_refused() -> None:
         run("bench_sine_bingham", fmus="native", engine="compiled")
 
 
+SOURCES = (
+    'schema = 1\ntitle = "two sources"\n[run]\nstop = 0.1\nstep = 0.01\n'
+    '[components.ground]\nfmu = "GroundMotion"\nparameters = { peak = 2.0 }\n'
+    '[components.level]\nfmu = "ConstantVoltage"\nparameters = { level = 3.0 }\n'
+)
+
+
 def test_an_ensemble_steps_native_fmus(tmp_path: Path) -> None:
+    (tmp_path / "two.toml").write_text(SOURCES)
     runs = {}
     for form in ("python", "native"):
         file = tmp_path / f"{form}.toml"
         file.write_text(
-            'schema = 1\nscenario = "bench_sine_bingham"\nruns = 4\nseed = 7\nengine = "fmu"\n'
-            f'fmus = "{form}"\n[set]\n"run.stop" = 0.1\n'
-            '[vary]\n"damper.f_c" = { uniform = [1.0, 4.0] }\n'
-            '[outputs]\n"damper.force" = ["peak", "rms"]\n'
+            'schema = 1\nscenario = "two.toml"\nruns = 4\nseed = 7\nengine = "fmu"\n'
+            f'fmus = "{form}"\n[vary]\n"level.level" = {{ uniform = [1.0, 4.0] }}\n'
+            '[outputs]\n"level.voltage" = ["peak", "rms"]\n'
         )
         runs[form] = ensemble(file, workers=2)
     assert runs["native"].failures == []
-    columns = [runs[form].runs[["peak damper.force", "rms damper.force"]] for form in runs]
+    columns = [runs[form].runs[["peak level.voltage", "rms level.voltage"]] for form in runs]
     assert difference(*columns) <= 1e-12
+    assert runs["native"].runs["peak level.voltage"].nunique() == 4
     assert runs["python"].plan.digest() != runs["native"].plan.digest()
 
 
@@ -81,11 +89,7 @@ def test_the_command_steps_native_fmus(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "two.toml").write_text(
-        'schema = 1\ntitle = "two sources"\n[run]\nstop = 0.1\nstep = 0.01\n'
-        '[components.ground]\nfmu = "GroundMotion"\nparameters = { peak = 2.0 }\n'
-        '[components.level]\nfmu = "ConstantVoltage"\nparameters = { level = 3.0 }\n'
-    )
+    (tmp_path / "two.toml").write_text(SOURCES)
     assert main(["run", "two.toml", "--fmus", "native", "--no-figure", "--out", "native"]) == 0
     assert main(["run", "two.toml", "--no-figure", "--out", "python"]) == 0
     texts = [Path(name, "results.csv").read_text().splitlines() for name in ("native", "python")]

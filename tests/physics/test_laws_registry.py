@@ -240,6 +240,12 @@ def test_fits_find_its_parameters(law: type[Law], slow_law: type[Law]) -> None:
     found = identify(made, "hyperbolic")
     for name, value in truth.items():
         assert found.model.value(name) == pytest.approx(value, abs=5.0 * found.std[name])
+
+
+@pytest.mark.slow
+def test_it_stands_in_the_table_of_all_laws(law: type[Law], slow_law: type[Law]) -> None:
+    truth = {"f_c": 1.2, "f_v": 0.6, "c": 25.0, "k": 110.0, "v_s": 0.03}
+    made = problem("hyperbolic", truth, [])
     rows = error_table(made, None, 0.0, starts=1)
     assert [row.law for row in rows] == list(law_names())
     best = min(row.train for row in rows)

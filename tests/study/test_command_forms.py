@@ -10,7 +10,8 @@ import pandas as pd
 import pytest
 
 import bristle
-from bristle.bridge.export import AGREEMENT, export_study, prediction
+from bristle.bridge.export import export_study
+from bristle.bridge.on_bench import AGREEMENT, prediction
 from bristle.cli import main
 from bristle.data.model import new_model, read_model
 from bristle.errors import StudyError

@@ -20,7 +20,7 @@ from bristle.native import zig
 from bristle.scenario.scenario import load_scenario, stock_scenarios
 from bristle.simulate.coupled import simulate
 from bristle.web.component import export_component
-from bristle.web.export import chosen, described, export_web, page_of
+from bristle.web.export import body, chosen, described, export_web
 from bristle.web.numbers import Numbers, Slider
 
 PASSIVE = "el_centro_lugre_passive"
@@ -131,7 +131,7 @@ def test_ends_that_are_no_numbers_are_refused(
 
 
 def test_the_page_needs_no_other_file(numbers: Numbers) -> None:
-    page = page_of(b"\0asm", described(numbers, chosen(numbers, {"voltage.level": (0.0, 8.0)})))
+    page = body(b"\0asm", described(numbers, {"voltage.level": (0.0, 8.0)}))
     script = page.partition('<script type="module">')[2]
     assert not re.search(r"^(import|export) ", script, re.MULTILINE)
     assert "http" not in page

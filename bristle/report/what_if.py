@@ -1,0 +1,66 @@
+"""What if: a study's damper with sliders, computed in the page by the functions of the commands."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..bridge.export import write_editable
+from ..draw import html
+
+if TYPE_CHECKING:
+    from ..study.study import Study
+    from ..web.export import Shown
+
+
+class Movable(NamedTuple):
+    """A study's scenario as a page runs it: its file, what the page shows, run and notes."""
+
+    scenario: Path
+    shown: Shown
+    run: str
+    notes: tuple[str, ...]
+
+
+@contextmanager
+def movable(study: Study) -> Iterator[Movable]:
+    """Yield the scenario of a study's damper whose numbers a page can move, in a folder that goes.
+
+    Raises
+    ------
+    StudyError, RecordError
+        If the model or its run cannot be read.
+    """
+    from ..web.export import Shown
+
+    with tempfile.TemporaryDirectory() as folder:
+        found = write_editable(study, Path(folder))
+        measured = {"damper.force": "measured.value"} if found.force else {}
+        shown = Shown([f"damper.{name}" for name in found.numbers], measured)
+        yield Movable(found.scenario, shown, found.run, found.notes)
+
+
+def what_if_section(study: Study) -> str:
+    """Return the section of a report whose sliders move the numbers of the model.
+
+    Raises
+    ------
+    BuildError
+        If zig is not installed.
+    ScenarioError, StudyError, RecordError
+        If the study has no model, or its scenario cannot be compiled.
+    """
+    from ..web.export import body, described
+    from ..web.module import module
+    from ..web.numbers import Numbers
+
+    with movable(study) as found:
+        description = described(Numbers(found.scenario), shown=found.shown)
+    return html.section(
+        f"What if: the model in {found.run}, with other numbers",
+        body(module(), description),
+        html.items(found.notes),
+    )
