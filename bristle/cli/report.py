@@ -29,7 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Write the report; print where it is."""
     from ..data.files import write_whole
-    from ..report.study_page import gather, render
+    from ..report.study_content import gather
+    from ..report.study_page import render
     from ..study.staircase import Staircase
     from ..study.study import Study
 

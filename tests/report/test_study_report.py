@@ -17,8 +17,9 @@ from made import write_runs
 
 from bristle.cli import main
 from bristle.data.model import StudyModel, Value
+from bristle.report.study_content import gather
 from bristle.report.study_curves import curves_section
-from bristle.report.study_page import gather, render, study_report
+from bristle.report.study_page import render, study_report
 from bristle.report.study_tables import parameter_table, with_interval
 from bristle.study import Study, create_study
 
