@@ -25,6 +25,8 @@ def add_native(parser: argparse.ArgumentParser, *, versions: bool = False) -> No
         help="with --native: linux64, win64, darwin64, aarch64-linux or aarch64-darwin, several "
         "with commas between; else all of them",
     )
+    text = "with --native: put the C into the FMU too, for hosts that compile it themselves"
+    parser.add_argument("--sources", action="store_true", help=text)
     parser.set_defaults(fmi=2)
     if versions:
         text = "version of FMI; 3 goes with --native (default: 2)"
@@ -37,7 +39,7 @@ def builder(arguments: argparse.Namespace) -> Callable[[Plan, Path], Path]:
     Raises
     ------
     BuildError
-        If a platform is not known, or it or FMI 3.0 is asked for without --native.
+        If a platform is not known; if what belongs to --native is asked for without it.
     """
     from ..errors import BuildError
 
@@ -45,9 +47,16 @@ def builder(arguments: argparse.Namespace) -> Callable[[Plan, Path], Path]:
         from ..native.build import build as build_native
         from ..native.platforms import chosen
 
-        return partial(build_native, platforms=chosen(arguments.platforms), fmi=arguments.fmi)
+        return partial(
+            build_native,
+            platforms=chosen(arguments.platforms),
+            fmi=arguments.fmi,
+            sources=arguments.sources,
+        )
     if arguments.platforms:
         raise BuildError("--platform goes with --native: FMUs in Python hold all that they can.")
+    if arguments.sources:
+        raise BuildError("--sources goes with --native: FMUs in Python are their own sources.")
     if arguments.fmi != 2:
         raise BuildError("--fmi 3 goes with --native: FMUs in Python follow FMI 2.0.")
     from ..fmu.build import build

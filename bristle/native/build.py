@@ -15,13 +15,20 @@ from . import zig
 from .parts import functions_text, libraries, shim_digest
 from .platforms import Platform, here
 from .prepare import GUID, prepare
+from .sources import described, source_members
 from .universal import universal
 
 _NAMESPACE = UUID("0d7a6c1c-5f0e-5f3b-8a54-6e6174697665")
 _EPOCH = (1980, 1, 1, 0, 0, 0)  # the earliest time that a zip can hold
 
 
-def build(what: Plan, folder: Path, platforms: Sequence[Platform], fmi: int = 2) -> Path:
+def build(
+    what: Plan,
+    folder: Path,
+    platforms: Sequence[Platform],
+    fmi: int = 2,
+    sources: bool = False,
+) -> Path:
     """Build a native FMU into a folder, unless the same one stands there; return its path.
 
     Parameters
@@ -33,6 +40,8 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform], fmi: int = 2)
         What it holds libraries for.
     fmi : int
         2 or 3: the version of FMI that it follows.
+    sources : bool
+        Whether it also holds its C, for hosts that compile it.
 
     Raises
     ------
@@ -48,13 +57,18 @@ def build(what: Plan, folder: Path, platforms: Sequence[Platform], fmi: int = 2)
     guid = str(uuid5(_NAMESPACE, content.hexdigest()))
     target = folder / f"{what.name}.fmu"
     places = {one: one.place(what.name, fmi) for one in platforms}
-    note = f"libraries for {', '.join(one.name for one in platforms)}".encode()
+    held = ", ".join(one.name for one in platforms)
+    note = f"libraries for {held}{'; sources' if sources else ''}".encode()
     if built_guid(target) == guid and _note_in(target) == note:
         return target
-    members["modelDescription.xml"] = prepared.description.replace(GUID, guid).encode()
+    description = prepared.description.replace(GUID, guid)
+    members["modelDescription.xml"] = description.encode()
     table = prepared.tables.replace(GUID, guid)
     try:
         text = functions_text(what, prepared.functions)
+        if sources:
+            own = source_members(text, table, fmi)
+            members |= own | described(description, own, fmi)
         made = libraries(what.name, text, table, platforms, fmi)
         for place in set(places.values()):
             members[place] = universal([made[one] for one in platforms if places[one] == place])

@@ -1,8 +1,8 @@
 """One compiled function per component, which leads to all of its functions.
 
-It is generated, compiled by numba and written as LLVM's text, in which nothing of Python is left.
-Compiling runs in a process of its own: numba is told there to know no more of this machine's
-processor than every other has.
+It is generated, compiled by numba and written as C, in which nothing of Python is left. Compiling
+runs in a process of its own: numba is told there to know no more of this machine's processor than
+every other has.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ import numpy as np
 from ..component.clock import ORIGIN
 from ..errors import BuildError
 from ..jit import RefusedError, library_text
+from .c_text import c_text
 
 NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
 """Functions that a component must have, see `bristle.component`."""
@@ -108,8 +109,8 @@ def _part(functions: Any, name: str) -> Any:
     return getattr(functions, name, None)
 
 
-def llvm_text(functions: Any, sampled: bool = False, files: Sequence[Path] = ()) -> str:
-    """Return LLVM's text of a component's functions behind one entrance.
+def functions_in_c(functions: Any, sampled: bool = False, files: Sequence[Path] = ()) -> str:
+    """Return the C of a component's functions behind one entrance.
 
     Parameters
     ----------
@@ -125,7 +126,8 @@ def llvm_text(functions: Any, sampled: bool = False, files: Sequence[Path] = ())
     """
     examples = (0, 0.0, 0.0, *[np.zeros(0)] * len(ROWS))
     try:
-        return plain_text(*library_text(entrance_of(functions, sampled), examples, INLINE))
+        text, root = library_text(entrance_of(functions, sampled), examples, INLINE)
+        return c_text(plain_text(text, root))
     except RefusedError as error:
         raise BuildError(refusal(str(error), [path.resolve() for path in files])) from error
 

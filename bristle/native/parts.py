@@ -39,7 +39,7 @@ def shim_digest(fmi: int = 2) -> str:
 
 
 def functions_text(what: Plan, functions: str) -> Path:
-    """Return the file with LLVM's text of a component's functions, compiled if need be.
+    """Return the file with the C of a component's functions, compiled if need be.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def functions_text(what: Plan, functions: str) -> Path:
     """
     from filelock import FileLock
 
-    kept = zig.folder() / f"{functions}.ll"
+    kept = zig.folder() / f"{functions}.c"
     if kept.is_file():
         return kept
     with FileLock(kept.with_suffix(".lock")):  # two who need it do not both compile it
@@ -74,7 +74,7 @@ def library(name: str, text: Path, table: str, platform: Platform, fmi: int = 2)
     name : str
         Of the FMU.
     text : Path
-        LLVM's text of its functions.
+        The C of its functions.
     table : str
         C source of its tables.
     platform : Platform

@@ -26,7 +26,7 @@ from ..physics.user import own_effects, own_laws
 from . import entrance
 from .description import description
 from .description_fmi3 import description_fmi3
-from .entrance import entrance_of, llvm_text
+from .entrance import entrance_of, functions_in_c
 from .tables import tables
 
 GUID = "00000000-0000-0000-0000-000000000000"
@@ -74,7 +74,7 @@ def prepare(what: Plan, fmi: int = 2) -> Prepared:
 
 
 def compile_functions(what: Plan, functions: str, target: Path) -> None:
-    """Write LLVM's text of a planned component's functions.
+    """Write the C of a planned component's functions.
 
     Parameters
     ----------
@@ -131,7 +131,9 @@ def _digest_of(slave: ComponentSlave) -> str:
 
 def text_digest(function: Callable[..., Any]) -> str:
     """Return the digest of a function with all that it calls, and of how that becomes text."""
-    how = Path(entrance.__file__).read_bytes() + repr(COMPILER).encode()
+    own = Path(entrance.__file__)
+    files = [own, *sorted(own.parent.glob("c_*.py"))]
+    how = b"".join(file.read_bytes() for file in files) + repr(COMPILER).encode()
     return hashlib.sha256(digest(function).encode() + how).hexdigest()[:16]
 
 
@@ -179,9 +181,9 @@ def answer_of(module: str, order: Mapping[str, Any], about: str) -> str:
 
 
 def _text(slave: ComponentSlave, files: Sequence[Path]) -> str:
-    """Return LLVM's text; what a controller of a user's own may use is told where it is refused."""
+    """Return the C; what a controller of a user's own may use is told where it is refused."""
     try:
-        return llvm_text(slave.flat_functions(), isinstance(slave, SampledSlave), files)
+        return functions_in_c(slave.flat_functions(), isinstance(slave, SampledSlave), files)
     except BuildError as error:
         told = f"{COMPILED_MAY_USE} " if isinstance(slave, OwnController) else ""
         raise BuildError(f"{error} {told}Without --native it builds as it is.") from error

@@ -16,8 +16,8 @@ from ..resources import cache_folder
 from .platforms import WEB, Platform
 
 _OPTIONS = (
-    "-O2", "-std=c11", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-Wall", "-Wextra",
-    "-Wno-override-module",
+    "-O2", "-g0", "-std=c11", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off", "-Wall",
+    "-Wextra", "-Wno-unused-parameter",
 )  # fmt: skip
 
 
@@ -70,7 +70,7 @@ def _not_writable(where: Path, why: str) -> str:
 
 
 def compile_object(source: Path, target: Path, platform: Platform) -> None:
-    """Compile one source, C or LLVM's text, into an object file.
+    """Compile one source into an object file.
 
     Raises
     ------
@@ -109,7 +109,7 @@ def link_web(sources: Sequence[Path], macros: Sequence[str], target: Path) -> No
     Parameters
     ----------
     sources : sequence of Path
-        C and LLVM's text.
+        C.
     macros : sequence of str
         Options of the compiler that define what the C asks for.
     target : Path
@@ -119,7 +119,7 @@ def link_web(sources: Sequence[Path], macros: Sequence[str], target: Path) -> No
     BuildError
         With what the compiler says.
     """
-    own = ["-Os", "-mexec-model=reactor", "-s", "-Wl,--export=__heap_base"]
+    own = ["-O2", "-mexec-model=reactor", "-s", "-Wl,--export=__heap_base"]
     _run([*own, *macros, *map(str, sources), "-o", str(target)], WEB)
 
 

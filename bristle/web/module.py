@@ -1,6 +1,6 @@
 """The WebAssembly module that runs any scenario of built-in components.
 
-It is the coupled engine's time loop, compiled by numba to LLVM's text and by zig from there. A
+It is the coupled engine's time loop, compiled by numba to C and by zig from there. A
 scenario is numbers alone, so one module serves all; it is made once for the registered laws and
 effects.
 """
@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import BristleError, BuildError
 from ..jit import RefusedError, library_text
 from ..native import zig
+from ..native.c_text import c_text
 from ..native.entrance import plain_text, refusal
 from ..native.parts import keep
 from ..native.prepare import answer_of, text_digest
@@ -55,7 +56,7 @@ def module() -> bytes:
 
     def link(path: Path) -> None:
         tell("compiling the time loop for the web, once")
-        text = path.parent / "march.ll"
+        text = path.parent / "loop.c"
         order = {"own": _own(), "functions": functions, "target": str(text)}
         answer_of("bristle.web.module", order, "the time loop")
         zig.link_web([text, SOURCE], sizes, path)
@@ -100,6 +101,6 @@ def _text() -> str:
     own = [Path(file).resolve() for files in _own().values() for file in files]
     with whole_loop() as (loop, inline):
         try:
-            return plain_text(*library_text(loop, examples, inline))
+            return c_text(plain_text(*library_text(loop, examples, inline)))
         except RefusedError as error:
             raise BuildError(refusal(str(error), own)) from error
