@@ -151,6 +151,8 @@ class Types:
             inside = ", ".join(items)
             inside = f"{{{inside}}}" if isinstance(kind, Items) else inside
             return f"({self.name(kind)}){{{inside}}}"
+        if word.startswith('c"'):
+            return f"({self.name(kind)}){{{{{', '.join(_bytes(word[2:-1]))}}}}}"
         if kind == "double":
             return _double(word)
         if kind == "i1":
@@ -185,6 +187,13 @@ def _double(word: str) -> str:
     if math.isinf(value):
         return "INFINITY" if value > 0.0 else "-INFINITY"
     return repr(float(value))
+
+
+def _bytes(text: str) -> list[str]:
+    """Return a text's bytes, of which LLVM writes some as two hexadecimal digits, as numbers."""
+    found = re.findall(r"\\([0-9A-F]{2})|(.)", text)
+    values = [int(code, 16) if code else ord(plain) for code, plain in found]
+    return [str(value - 256 if value > 127 else value) for value in values]
 
 
 def _whole(value: int, kind: str) -> str:

@@ -127,6 +127,20 @@ def test_numbers_keep_their_bits() -> None:
     assert "= INFINITY;" in text
 
 
+def test_constants_are_kept_and_what_python_needs_is_not() -> None:
+    text = c_text(
+        '@.bytes.1 = internal constant [3 x i8] c"a\\C3\\00"\n'
+        "@table = internal constant [2 x double] [double 1.0e+00, double -2.5e+00]\n"
+        "@_ZN08NumbaEnv1f = internal global ptr null\n"
+        f"{BEGIN}  %a = load double, ptr @table\n  store double %a, ptr %retptr\n"
+        "  ret i32 0\n}\n"
+    )
+    assert "{97, -61, 0}" in text
+    assert "{1.0, -2.5}" in text
+    assert "*(double *)(void *)&table_" in text
+    assert "NumbaEnv" not in text
+
+
 def test_what_nothing_reads_is_left_out() -> None:
     lines = [Line("a = 1;", "a"), Line("b = a;", "b"), Line("f(c);"), Line("c = 2;", "c")]
     assert [one.text for one in needed(lines)] == ["f(c);", "c = 2;"]
