@@ -1,4 +1,4 @@
-/* FMI 2.0: values of variables. Derivatives are neither taken nor given. */
+/* FMI 2.0: values of variables, and derivatives of inputs; none of outputs are given. */
 
 #include "fmi2.h"
 
@@ -79,8 +79,10 @@ EXPORT fmi2Status fmi2SetString(fmi2Component c, const fmi2ValueReference vr[], 
 EXPORT fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference vr[],
                                               size_t count, const fmi2Integer order[],
                                               const fmi2Real value[]) {
-    (void)c, (void)vr, (void)count, (void)order, (void)value;
-    return fmi2Error;
+    fmi2Status status = c ? fmi2OK : fmi2Error;
+    for (size_t i = 0; c && i < count; i++)
+        status = worse(status, slave_set_derivative(slave_of(c), vr[i], order[i], value[i]));
+    return status;
 }
 
 EXPORT fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[],
