@@ -110,8 +110,9 @@ static void take_changing(Slave *slave, double dt) {
 
 /* Inputs behind a step stand where it has brought them, and outputs follow them there. */
 static void move_inputs(Slave *slave, double dt) {
+    double *inputs = slave->values + component.inputs_at;
     for (int i = 0; i < component.inputs; i++)
-        if (slave->slopes[i] != 0.0) slave->values[component.inputs_at + i] += slave->slopes[i] * dt;
+        if (slave->slopes[i] != 0.0) inputs[i] += slave->slopes[i] * dt;
     slave->stale = 1;
 }
 

@@ -1,8 +1,8 @@
 /* The whole state of an instance as bytes: little-endian, the same on every platform.
 
    Behind a mark, the FMU's guid and a digest of the rest stand: mode and time, the values and what
-   inputs change by, what was set and said, the texts; and, once the model is built, what its parameters imply, its state, the
-   inputs before and the outputs. */
+   inputs change by, what was set and said, the texts; and, once the model is built, what its
+   parameters imply, its state, the inputs before and the outputs. */
 
 #include <stdlib.h>
 #include <string.h>
