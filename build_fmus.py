@@ -12,7 +12,7 @@ from bristle.fmu.catalogue import component_names
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="components; else all of them")
-    add_native(parser, versions=True)
+    add_native(parser)
     parser.add_argument("--list", action="store_true", help="list the components, build nothing")
     given = parser.parse_args()
     try:

@@ -10,12 +10,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
 import bristle
-from bristle.errors import ScenarioError
+from bristle.errors import BuildError, ScenarioError
+from bristle.fmu.build import ensure
+from bristle.native.build import ensure as ensure_native
 from bristle.scenario.scenario import Scenario, load_scenario
 from bristle.simulate.coupling_error import CouplingError, against, estimate, finer
 from bristle.simulate.master import Master
@@ -216,31 +219,46 @@ def _stated(name: str, algorithm: str) -> list[tuple[CouplingError, CouplingErro
 
 
 def costs() -> Iterator[Row]:
-    """Yield what a step costs with midpoint against Gauss-Seidel, the same scenario and step."""
-    goals = {"midpoint": 1.1, "midpoint-iterated": None}
+    """Yield what a step costs with midpoint against Gauss-Seidel, the same scenario and step.
+
+    Native FMUs take derivatives of their inputs, those in Python take none.
+    """
     for name in ("el_centro_lugre_passive", SCENARIO):
-        with ExitStack() as stack:
-            jobs = {
-                algorithm: _started(stack, name, algorithm)
-                for algorithm in ("gauss-seidel", *goals)
-            }
-            least = least_times(jobs, SLICE, SLICES)
-        for algorithm, goal in goals.items():
-            ratio = least[algorithm] / least["gauss-seidel"]
-            each = f"{1e6 * least[algorithm] / SLICE:.1f}"
-            yield Row(
-                f"{algorithm} / gauss-seidel, time per step, {name}",
-                f"{ratio:.3f} x: {each} us",
-                f"<= {goal:g} x" if goal else "",
-                ratio / goal if goal else None,
-            )
+        yield from _costs(name, "FMUs in Python", ensure)
+        try:
+            yield from _costs(name, "native FMUs", ensure_native)
+        except BuildError as error:
+            yield Row(f"time per step, {name}, native FMUs", f"not measured: {error}")
 
 
-def _started(stack: ExitStack, name: str, algorithm: str) -> Callable[[int], None]:
+def _costs(name: str, form: str, build: Callable[..., Path]) -> Iterator[Row]:
+    """Yield the same for one scenario and one form of its FMUs."""
+    goals = {"midpoint": 1.1, "midpoint-iterated": None}
+    with ExitStack() as stack:
+        jobs = {
+            algorithm: _started(stack, name, algorithm, build)
+            for algorithm in ("gauss-seidel", *goals)
+        }
+        least = least_times(jobs, SLICE, SLICES)
+    for algorithm, goal in goals.items():
+        ratio = least[algorithm] / least["gauss-seidel"]
+        each = f"{1e6 * least[algorithm] / SLICE:.1f}"
+        yield Row(
+            f"{algorithm} / gauss-seidel, time per step, {name}, {form}",
+            f"{ratio:.3f} x: {each} us",
+            f"<= {goal:g} x" if goal else "",
+            ratio / goal if goal else None,
+        )
+
+
+def _started(
+    stack: ExitStack, name: str, algorithm: str, build: Callable[..., Path]
+) -> Callable[[int], None]:
     """Return what makes steps of a scenario in its master, which the stack closes."""
     step, steps = 0.0005, (SLICES + 1) * SLICE
     given = {"run.algorithm": algorithm, "run.step": step, "run.stop": step * steps}
     scenario = load_scenario(name, given)
-    master = stack.enter_context(Master(scenario, *find_fmus(scenario), lambda message: None))
+    fmus = find_fmus(scenario, build)
+    master = stack.enter_context(Master(scenario, *fmus, lambda message: None))
     master.start()
     return master.advance

@@ -12,8 +12,8 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType, TracebackType
 from typing import Any, NoReturn, Self
 
@@ -62,6 +62,15 @@ class Interrupt:
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self.asked = True
+
+
+@contextmanager
+def deferred() -> Iterator[None]:
+    """A context that Ctrl-C does not break off: it raises KeyboardInterrupt behind it."""
+    with Interrupt() as interrupt:
+        yield
+    if interrupt.asked:
+        raise KeyboardInterrupt
 
 
 class Hurry:

@@ -12,19 +12,24 @@ import hashlib
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 from threading import Lock
 from types import CodeType, FunctionType
 from typing import Any
 
-import numba
 import numpy as np
-from numba.core import event, types
-from numba.core.errors import NumbaError
-from numba.extending import intrinsic
 
+from .interrupt import deferred
 from .progress import tell
 from .resources import cache_folder
+
+with deferred():  # an import of numba that Ctrl-C breaks off is never made good in this process
+    import numba
+    from numba.core import event, types
+    from numba.core.errors import NumbaError
+    from numba.core.registry import cpu_target
+    from numba.extending import intrinsic
 
 # Python's arrays outlive every call, so compiled code need not count references to them.
 _OPTIONS = {"error_model": "numpy", "_nrt": False}
@@ -84,6 +89,7 @@ def compiled(
     keep : bool
         Whether to keep the machine code on disk.
     """
+    _import_the_rest()
     folder = _folder(function) if keep else None
     with _FOLDER:
         before = numba.config.CACHE_DIR
@@ -93,6 +99,14 @@ def compiled(
             return numba.njit(cache=folder is not None, nogil=True, **_OPTIONS)(root)
         finally:
             numba.config.CACHE_DIR = before
+
+
+@cache
+def _import_the_rest() -> None:
+    """Import what numba imports as it first compiles or reads machine code, two hundred modules."""
+    with deferred():
+        cpu_target.typing_context.refresh()
+        cpu_target.target_context.refresh()
 
 
 class RefusedError(Exception):
@@ -116,6 +130,7 @@ def library_text(
     RefusedError
         If numba cannot compile it.
     """
+    _import_the_rest()
     kinds = tuple(numba.typeof(one) for one in examples)
     try:
         dispatcher = numba.njit(**_CALLEE)(_closed(function, {}, inline))

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
     from ..fmu.build import Plan
 
 
-def add_native(parser: argparse.ArgumentParser, *, versions: bool = False) -> None:
-    """Add --native and --platform; where versions of FMI can be chosen, --fmi."""
+def add_native(parser: argparse.ArgumentParser) -> None:
+    """Add --native, --platform and --fmi."""
     text = "FMUs that need no Python: compiled, with a library for each platform"
     parser.add_argument("--native", action="store_true", help=text)
     parser.add_argument(
@@ -27,10 +27,8 @@ def add_native(parser: argparse.ArgumentParser, *, versions: bool = False) -> No
     )
     text = "with --native: put the C into the FMU too, for hosts that compile it themselves"
     parser.add_argument("--sources", action="store_true", help=text)
-    parser.set_defaults(fmi=2)
-    if versions:
-        text = "version of FMI; 3 goes with --native (default: 2)"
-        parser.add_argument("--fmi", type=int, choices=(2, 3), help=text)
+    text = "version of FMI; 3 goes with --native (default: 2)"
+    parser.add_argument("--fmi", type=int, choices=(2, 3), default=2, help=text)
 
 
 def builder(arguments: argparse.Namespace) -> Callable[[Plan, Path], Path]:

@@ -59,7 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="where NAME.fmu goes, in place of an older one; else the current folder",
     )
-    add_native(parser, versions=True)
+    add_native(parser)
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 

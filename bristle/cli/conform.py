@@ -1,4 +1,4 @@
-"""Judge any FMI 2.0 co-simulation FMU: what was tried, what was seen, what the standard says."""
+"""Judge any FMU of FMI 2.0 or 3.0: what was tried, what was seen, what the standard says."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from ..conformance.report import Report
 
-HELP = "check an FMU against FMI 2.0 co-simulation"
+HELP = "check an FMU against FMI 2.0 or 3.0 co-simulation"
 
 _COLOURS = {"pass": "green", "fail": "bold red", "note": "yellow"}
 

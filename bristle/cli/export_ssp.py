@@ -40,10 +40,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Export; print the files, what is otherwise elsewhere, and the error to expect there."""
+    from ..errors import ScenarioError
     from ..scenario.export_ssp import export_ssp
     from ..scenario.naming import run_name
     from ..scenario.scenario import load_scenario, parse_overrides, resolve_scenario
 
+    if arguments.osp is not None and arguments.fmi != 2:
+        raise ScenarioError("--osp goes with FMI 2.0: tools of OSP know no FMUs of FMI 3.0.")
     overrides = parse_overrides(arguments.overrides)
     file = resolve_scenario(arguments.scenario)
     scenario = load_scenario(file, overrides)

@@ -1,4 +1,4 @@
-"""Judge an FMU: every rule of FMI 2.0 co-simulation that can be tried from outside.
+"""Judge an FMU: every rule of FMI 2.0 or 3.0 co-simulation that can be tried from outside.
 
 `conform(path)` tries each probe in a process of its own, so that an FMU that crashes, hangs or
 leaves the process ends one row of the table and nothing else.
@@ -24,7 +24,7 @@ def conform(
     beside: Path | str | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Report:
-    """Try an FMI 2.0 co-simulation FMU against the standard and return what was seen.
+    """Try a co-simulation FMU of FMI 2.0 or 3.0 against the standard; return what was seen.
 
     Parameters
     ----------

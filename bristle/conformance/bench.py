@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
 from collections.abc import Iterable, Sequence
@@ -11,6 +12,7 @@ from typing import Any
 from ..fmu.archive import library_member
 from ..fmu.description import Value, Variable
 from .native import DISCARD, OK, STATUS, WARNING, BlackBox, Instance, Library
+from .native_fmi3 import LibraryFmi3
 from .plan import Plan
 from .registry import UnexpectedError
 
@@ -35,8 +37,13 @@ class Bench:
     def library(self) -> Library:
         """The FMU's library, loaded at first use."""
         if self._library is None:
-            file = Path(self.plan.folder) / library_member(self.plan.about.identifier)
-            self._library = Library(file, self.box)
+            about = self.plan.about
+            file = Path(self.plan.folder) / library_member(about.identifier, about.version)
+            if about.version == "3.0":
+                types = {v.reference: v.type for v in about.variables.values()}
+                self._library = LibraryFmi3(file, self.box, types)
+            else:
+                self._library = Library(file, self.box)
         return self._library
 
     def instance(self, *, name: str = NAME, logging: bool = False) -> Instance:
@@ -70,7 +77,8 @@ class Bench:
     def driven(self, i: int, k: float) -> float:
         """Return the value of input `i` at step `k`: a sine about its start value."""
         centre, amplitude = self._amplitudes[i]
-        return centre + amplitude * math.sin(0.3 * k + 0.7 * i)
+        value = centre + amplitude * math.sin(0.3 * k + 0.7 * i)
+        return ctypes.c_float(value).value if self.inputs[i].type == "Float32" else value
 
     def time(self, k: float) -> float:
         """Return the time of communication point `k` in s."""

@@ -76,6 +76,9 @@ class BlackBox:
 class Library:
     """A loaded FMU library; `messages` holds what its instances logged."""
 
+    prefix = "fmi2"
+    required, optional, results = REQUIRED, OPTIONAL, RESULTS
+
     def __init__(self, file: Path, box: BlackBox) -> None:
         self.box = box
         self.messages: list[tuple[str, int, str, str]] = []
@@ -87,11 +90,11 @@ class Library:
             self._dll = ctypes.CDLL(str(file))
         box.note("")
         self._functions: dict[str, Callable[..., Any]] = {}
-        for name, arguments in {**REQUIRED, **OPTIONAL}.items():
+        for name, arguments in {**self.required, **self.optional}.items():
             function = getattr(self._dll, name, None)
             if function is not None:
                 function.argtypes = list(arguments)
-                function.restype = RESULTS.get(name, c_int)
+                function.restype = self.results.get(name, c_int)
                 self._functions[name] = function
         runtime = ctypes.CDLL("msvcrt" if sys.platform == "win32" else None)
         self._callbacks = _Callbacks(
@@ -114,8 +117,8 @@ class Library:
     def missing(self) -> tuple[list[str], list[str]]:
         """Return the functions that every FMU needs, and the others, that are not exported."""
         return (
-            [name for name in REQUIRED if name not in self._functions],
-            [name for name in OPTIONAL if name not in self._functions],
+            [name for name in self.required if name not in self._functions],
+            [name for name in self.optional if name not in self._functions],
         )
 
     def call(self, name: str, *arguments: Any) -> Any:
@@ -190,19 +193,19 @@ class Instance:
 
     def leave(self) -> int:
         """Call fmi2ExitInitializationMode."""
-        return self._do("fmi2ExitInitializationMode")
+        return self._do(f"{self.library.prefix}ExitInitializationMode")
 
     def terminate(self) -> int:
         """Call fmi2Terminate."""
-        return self._do("fmi2Terminate")
+        return self._do(f"{self.library.prefix}Terminate")
 
     def reset(self) -> int:
         """Call fmi2Reset."""
-        return self._do("fmi2Reset")
+        return self._do(f"{self.library.prefix}Reset")
 
     def free(self) -> None:
         """Call fmi2FreeInstance."""
-        self.library.call("fmi2FreeInstance", self.handle)
+        self.library.call(f"{self.library.prefix}FreeInstance", self.handle)
 
     def step(self, time_: float, step: float) -> int:
         """Call fmi2DoStep (s), and wait where the FMU computes asynchronously."""
@@ -287,11 +290,11 @@ class Instance:
         )
         return status, list(result)
 
-    def input_derivative(self, reference: int, value: float) -> int:
-        """Call fmi2SetRealInputDerivatives with one first derivative."""
+    def input_derivative(self, reference: int, value: float, order: int = 1) -> int:
+        """Call fmi2SetRealInputDerivatives with one derivative [per s, per s2 ...] of an order."""
         one = (c_uint * 1)(reference)
         return self._do(
-            "fmi2SetRealInputDerivatives", one, 1, (c_int * 1)(1), (c_double * 1)(value)
+            "fmi2SetRealInputDerivatives", one, 1, (c_int * 1)(order), (c_double * 1)(value)
         )
 
     def output_derivative(self, reference: int) -> tuple[int, float]:

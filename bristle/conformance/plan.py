@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ class Plan:
 
     `steps` is how many communication steps the comparing probes take, `instances` how often
     the repeating ones instantiate; both shrink for an FMU that is slow. `driven` says whether
-    real inputs may be moved. `ours` says that bristle's rules for faults apply.
+    real inputs may be moved. `ours` says that bristle's rules for faults apply. `fmi3` is also
+    known where the variables cannot be read.
     """
 
     fmu: str
@@ -32,6 +34,7 @@ class Plan:
     driven: bool = True
     repeatable: bool = True
     ours: bool = False
+    fmi3: bool = False
     categories: list[str] = field(default_factory=list)
     beside: Plan | None = None
 
@@ -43,8 +46,9 @@ class Plan:
 
     @property
     def resources(self) -> str:
-        """Return the URI of the unpacked resources."""
-        return (Path(self.folder) / "resources").as_uri()
+        """Return where the resources are: an URI, in FMI 3.0 a path that ends like a folder's."""
+        folder = Path(self.folder) / "resources"
+        return f"{folder}{os.sep}" if self.about.version == "3.0" else folder.as_uri()
 
     @property
     def end(self) -> float:

@@ -41,7 +41,8 @@ class Probe:
     "run" that a legal run gave a reference. `unless` returns why a probe does not apply, or None.
     `bare` runs it in an interpreter without site-packages. `rule` says what a failure is: a
     violation of the "standard"; a lack of "robustness" against what the standard forbids the
-    importer or says nothing of; or a violation of a rule of "bristle" for its own FMUs.
+    importer or says nothing of; or a violation of a rule of "bristle" for its own FMUs. `fmi3` is
+    the rule of FMI 3.0 where that is another; `only_fmi2` why it does not apply to FMI 3.0, or "".
     """
 
     name: str
@@ -52,6 +53,8 @@ class Probe:
     unless: Callable[[Plan], str | None]
     bare: bool
     rule: Rule
+    fmi3: str = ""
+    only_fmi2: str = ""
 
 
 PROBES: dict[str, Probe] = {}
@@ -66,6 +69,8 @@ def probe(
     unless: Callable[[Plan], str | None] = lambda plan: None,
     bare: bool = False,
     rule: Rule = "standard",
+    fmi3: str = "",
+    only_fmi2: str = "",
 ) -> Callable[[Callable[[Bench], Finding]], Callable[[Bench], Finding]]:
     """Return a decorator that enters a function into the list of probes.
 
@@ -83,10 +88,16 @@ def probe(
         Whether it runs without site-packages.
     rule : "standard", "robustness" or "bristle"
         What a failure is; see `Probe`.
+    fmi3 : str
+        The rule of FMI 3.0, where it is another one and not only told in other names.
+    only_fmi2 : str
+        Why it does not apply to FMI 3.0, or "".
     """
 
     def enter(function: Callable[[Bench], Finding]) -> Callable[[Bench], Finding]:
-        PROBES[name] = Probe(name, tried, standard, function, needs, unless, bare, rule)
+        PROBES[name] = Probe(
+            name, tried, standard, function, needs, unless, bare, rule, fmi3, only_fmi2
+        )
         return function
 
     return enter

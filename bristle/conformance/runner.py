@@ -15,6 +15,7 @@ from typing import Any
 from ..errors import BristleError, FmuError
 from ..fmu.archive import extract
 from ..fmu.description import NATIVE, describe, read_description, read_root
+from ..fmu.description_fmi3 import check_ports
 from ._probe import BOX, FINDING, PLAN
 from .native import BlackBox
 from .plan import Plan
@@ -22,6 +23,7 @@ from .probes import PROBES
 from .registry import Finding, Probe, failed, noted
 from .report import Report, Row
 from .subprocesses import Subprocesses
+from .wording import in_fmi3
 
 _BUNDLE = re.compile(r"bristle_[0-9a-f]{12}")  # the code inside our FMUs, named by its digest
 _LIBRARY, _LEGAL, _REFERENCE, _REPEATABLE = "library", "legal run", "driven run", "repeatable"
@@ -30,8 +32,6 @@ _FIRST = {  # what a probe rests on, by its level
     "library": {_LIBRARY, _LEGAL},
     "run": {_LIBRARY, _LEGAL, _REFERENCE, _REPEATABLE},
 }
-KNOWN = ("2.0",)
-"""Versions of FMI that the probes know."""
 _DEFAULT_STEPS = 100  # where the FMU names no step
 
 
@@ -60,22 +60,25 @@ def judge(
     Raises
     ------
     FmuError
-        If a file cannot or must not be opened, a probe is unknown, or the time limit is not
-        positive and finite.
+        If a file cannot or must not be opened, ports of FMI 3.0 are arrays or belong to clocks, a
+        probe is unknown, or the time limit is not positive and finite.
     """
     if not 0.0 < timeout < math.inf:
         raise FmuError(f"the time limit is {timeout} s; it must be positive and finite.")
     unknown = sorted(set(only or ()) - set(PROBES))
     if unknown:
         raise FmuError(f"no probe is named {', '.join(unknown)}. There are: {', '.join(PROBES)}.")
-    root = read_root(path, versions=KNOWN)
+    root = read_root(path)
+    if root.get("fmiVersion") == "3.0":
+        try:
+            check_ports(root)  # no fault of the FMU, but nothing that the probes could move
+        except FmuError as error:
+            raise FmuError(f"{path} modelDescription.xml: {error}") from None
     with tempfile.TemporaryDirectory(prefix="bristle-conform-") as folder:
         plan = make_plan(path, root, Path(folder), timeout)
         if beside is not None:
-            read_description(beside, versions=KNOWN)  # which says what is wrong with it
-            plan.beside = make_plan(
-                beside, read_root(beside, versions=KNOWN), Path(folder) / "beside", timeout
-            )
+            read_description(beside)  # which says what is wrong with it
+            plan.beside = make_plan(beside, read_root(beside), Path(folder) / "beside", timeout)
         elif only is None or any(name.startswith("another FMU") for name in only):
             plan.beside = _companion(plan, Path(folder))
         with Subprocesses(Path(plan.work)) as subprocesses:
@@ -99,6 +102,7 @@ def make_plan(path: Path, root: ElementTree.Element, folder: Path, timeout: floa
     work = folder / "work"
     work.mkdir(parents=True)
     plan = Plan(str(path.resolve()), str(extract(path, folder / "fmu")), str(work), timeout)
+    plan.fmi3 = root.get("fmiVersion") == "3.0"
     try:
         plan.description = describe(root)
     except FmuError:
@@ -177,12 +181,20 @@ class _Session:
                 self.progress(probe.name)
                 finding = self.find(probe)
                 if wanted or finding.verdict == "fail":
-                    row = (probe.name, probe.tried, finding.seen, probe.standard, finding.verdict)
-                    rows.append(Row(*row, finding.rule or probe.rule))
+                    rows.append(self._row(probe, finding))
         return rows
+
+    def _row(self, probe: Probe, finding: Finding) -> Row:
+        tried, seen, standard = probe.tried, finding.seen, probe.standard
+        if self.plan.fmi3 and not probe.only_fmi2:
+            tried, seen = in_fmi3(tried), in_fmi3(seen)
+            standard = probe.fmi3 or in_fmi3(standard)
+        return Row(probe.name, tried, seen, standard, finding.verdict, finding.rule or probe.rule)
 
     def find(self, probe: Probe) -> Finding:
         """Try one probe, unless there is a reason not to."""
+        if probe.only_fmi2 and self.plan.fmi3:
+            return noted(f"not tried: {probe.only_fmi2}")
         if probe.needs != "file" and self.plan.description is None:
             return noted("not tried: modelDescription.xml cannot be read")
         if probe.needs != "file" and "library" not in self.reached:

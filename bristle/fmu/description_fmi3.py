@@ -41,6 +41,7 @@ _RANGES = {
 _CAPABILITIES = {
     "canGetAndSetFMUState": "canGetAndSetFMUstate",
     "canSerializeFMUState": "canSerializeFMUstate",
+    "providesDirectionalDerivatives": "providesDirectionalDerivative",
 }
 """Capabilities by another name than in FMI 2.0."""
 
@@ -57,9 +58,9 @@ def describe(root: ElementTree.Element) -> Description:
     assert slave is not None  # read_root refuses what has none
     types = {child.get("name", ""): child for child in root.iterfind("TypeDefinitions/*")}
     variables: dict[str, Variable] = {}
+    check_ports(root)
     for element in root.iterfind("ModelVariables/*"):
         name = element.get("name", "")
-        _refuse(element)
         if element.tag in KINDS and element.find("Dimension") is None:
             if name in variables:
                 raise FmuError(f"variables defined twice: {name}.")
@@ -80,8 +81,19 @@ def describe(root: ElementTree.Element) -> Description:
     )
 
 
+def check_ports(root: ElementTree.Element) -> None:
+    """Refuse ports that a scenario cannot connect and the master cannot step.
+
+    Raises
+    ------
+    FmuError
+        If a port is an array or belongs to a clock.
+    """
+    for element in root.iterfind("ModelVariables/*"):
+        _refuse(element)
+
+
 def _refuse(element: ElementTree.Element) -> None:
-    """Refuse ports that a scenario cannot connect and the master cannot step."""
     name = element.get("name")
     if not name:
         raise FmuError("a variable has no name.")

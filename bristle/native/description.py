@@ -11,7 +11,6 @@ from ..fmu.description import NATIVE
 _CAPABILITIES = {
     "needsExecutionTool": False,
     "canHandleVariableCommunicationStepSize": True,
-    "canInterpolateInputs": False,
     "canBeInstantiatedOnlyOncePerProcess": False,
     "canGetAndSetFMUstate": True,
     "canSerializeFMUstate": True,
@@ -33,7 +32,7 @@ def description(slave: ComponentSlave, guid: str) -> str:
 
 def description_tree(slave: ComponentSlave, guid: str) -> Element:
     """Return the XML tree of that description; the parameters are as in `description`."""
-    options: dict[str, Any] = dict(_CAPABILITIES)
+    options: dict[str, Any] = {**_CAPABILITIES, "canInterpolateInputs": bool(slave._inputs)}
     root: Element = slave.to_xml(options)
     root.set("guid", guid)
     root.set("generationTool", NATIVE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf, isfinite
 from string import Formatter
 
+from ..component import HELD
 from ..errors import BuildError
 from ..fmu.component import STEP_LENGTH, ComponentSlave
 from ..fmu.controller import SampledSlave
@@ -121,6 +122,7 @@ def _variable(slave: ComponentSlave, index: int, has_words: bool) -> str:
         number(-inf if low is None else low), number(inf if high is None else high),
         quoted(f"[{low!r}, {high!r}]"),
         f"words_{index}" if has_words else "0",
+        str(int(slave._over_step.get(variable.name) == HELD)),
     ]  # fmt: skip
     return f"    {{{', '.join(fields)}}},"
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import not_usable
-from ..interrupt import Interrupt
+from ..interrupt import deferred
 
 FORMS = ("python", "native")
 
@@ -36,8 +36,6 @@ def ensure_of(form: str, engine: str) -> Callable[..., Path]:
         return ensure
     if engine != "fmu":
         raise not_usable(f'native FMUs: engine "{engine}" steps no FMUs; "fmu" does.')
-    with Interrupt() as interrupt:  # an import of numba that Ctrl-C breaks off is never made good
+    with deferred():  # an import of llvmlite that Ctrl-C breaks off is never made good
         from ..native.build import ensure as ensure_native
-    if interrupt.asked:
-        raise KeyboardInterrupt
     return ensure_native

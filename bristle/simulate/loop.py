@@ -8,6 +8,7 @@ from the place where its source was read to), and the row is kept by copying tha
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -19,10 +20,12 @@ from .operations import (
     FAULT,
     MIDDLE,
     NEWEST,
+    PAST,
     Keep,
     Node,
     Operation,
     Port,
+    Ramp,
     Read,
     Restore,
     Save,
@@ -39,11 +42,14 @@ _SIZE = {"Real": 8, "Integer": 4, "Boolean": 4, FAULT: 4}
 _FUNCTION = {"Real": "Real", "Integer": "Integer", "Boolean": "Boolean", FAULT: "Integer"}
 _VALUE = {
     NEWEST: "m[{now}]",
-    MIDDLE: "0.5 * (m[{now}] + m[{past}])",
-    AHEAD: "1.5 * m[{now}] - 0.5 * m[{past}]",
-    END: "2.0 * m[{now}] - m[{past}]",
+    MIDDLE: "0.5 * (m[{now}] + past{past})",
+    AHEAD: "1.5 * m[{now}] - 0.5 * past{past}",
+    END: "2.0 * m[{now}] - past{past}",
+    PAST: "past{past}",
 }
-"""What an input is given, of doubles in memory."""
+"""What an input is given, of doubles in memory m; those of a step before are in local names."""
+_SLOPE = "(m[{now}] - past{past}) / step"
+"""What its derivative is given."""
 _DTYPE = {"Real": "<f8", "Integer": "<i4", "Boolean": "<i4", FAULT: "<i4"}
 
 
@@ -71,7 +77,7 @@ class Memory:
         self.past = {port: start + 8 * i for i, port in enumerate(kept)}
         self._gathered = start + 8 * len(kept)
         total = self._gathered + 8 * sum(
-            len(o.names) for o in schedule.operations if isinstance(o, Write)
+            len(o.names) for o in schedule.operations if isinstance(o, Write | Ramp)
         )
         self._buffer = bytearray(total)
         self._address = ctypes.addressof((ctypes.c_char * total).from_buffer(self._buffer))
@@ -80,7 +86,7 @@ class Memory:
         self.views: dict[str, memoryview[Any]] = {"Real": view[: total // 8 * 8].cast("d")}
         self.views["Integer"] = self.views["Boolean"] = view[: total // 4 * 4].cast("i")
 
-    def place(self, operation: Read | Write) -> tuple[tuple[str, ...], int, list[str]]:
+    def place(self, operation: Read | Write | Ramp) -> tuple[tuple[str, ...], int, list[str]]:
         """Return the order of the names in a call, its offset, and the lines that gather before.
 
         In these lines m is the view of the kind of values.
@@ -95,23 +101,26 @@ class Memory:
         )
         names = tuple(name for _, name in places)
         offsets = [offset for offset, _ in places]
-        changed = node.transformed if isinstance(operation, Write) else {}
-        plain = isinstance(operation, Read) or not operation.values
+        changed = {} if isinstance(operation, Read) else node.transformed
+        plain = isinstance(operation, Read) or (
+            isinstance(operation, Write) and not (operation.values or operation.if_changed)
+        )
         plain = plain and not changed.keys() & set(names)
         if plain and all(offset == offsets[0] + i * size for i, offset in enumerate(offsets)):
             return names, offsets[0], []
         if isinstance(operation, Read):
             raise AssertionError(f"outputs of one call are not neighbours: {names}")
-        values = dict(zip(operation.names, operation.values or [NEWEST] * len(names), strict=True))
+        forms = _forms(operation)
         start = self._gathered
         self._gathered += 8 * len(names)
         lines = []
         for i, (name, offset) in enumerate(zip(names, offsets, strict=True)):
             past = self.past.get(node.sources[name], 0)
-            value = _VALUE[values[name]].format(now=offset // size, past=past // size)
+            value = forms[name].format(now=offset // size, past=past // size)
             if name in changed:
                 factor, shift = changed[name]
-                value = f"{factor!r} * ({value}) + {shift!r}"
+                value = f"{factor!r} * ({value})"
+                value += "" if isinstance(operation, Ramp) else f" + {shift!r}"
             lines.append(f"m[{start // size + i}] = {value}")
         return names, start, lines
 
@@ -176,7 +185,7 @@ def compile_loop(
         (None, 0) when a `fault` is not 0; it raises unless the run may go on.
     """
     names: dict[str, Any] = {"fail": fail, "keep": rows.append, "take": memory.row.tobytes}
-    names["real"] = ctypes.c_double.from_param
+    names |= {"real": ctypes.c_double.from_param, "step": step, "reals": memory.views["Real"]}
     body: list[str] = []
     for number, operation in enumerate(schedule.operations):
         names[f"o{number}"] = operation
@@ -187,7 +196,6 @@ def compile_loop(
         elif isinstance(operation, Save | Restore):
             body += _state(number, operation, instance, names)
         elif isinstance(operation, Keep | Shift):
-            names["reals"] = memory.views["Real"]
             body += _keep(operation, memory)
         else:
             body += _transfer(number, operation, instance, memory, names)
@@ -196,7 +204,13 @@ def compile_loop(
         names["healthy"] = bytes(memory.row_size - memory.faults)
         body += ["if not row.endswith(healthy): fail(None, 0)"]
     head = f"def loop({', '.join(('times', *(f'{name}={name}' for name in names)))}):"
-    source = [head, " for t in times:", "  now = real(t)", *("  " + line for line in body)]
+    kept = [offset // 8 for offset in memory.past.values()]  # in memory between two calls
+    taken, put = (
+        [f" past{k} = reals[{k}]" for k in kept],
+        [f" reals[{k}] = past{k}" for k in kept],
+    )
+    steps = [" for t in times:", "  now = real(t)", *("  " + line for line in body)]
+    source = [head, *taken, *steps, *put]
     exec(compile("\n".join(source), "<macro step>", "exec"), names)
     made: Callable[[Sequence[float]], None] = names["loop"]
     return made
@@ -217,8 +231,20 @@ def _step(
     return [f"for d in d{number}:", f" if s := {call}: fail(o{number}, s)"]
 
 
+def _forms(operation: Write | Ramp) -> dict[str, str]:
+    """Return what each input is given, by its name."""
+    if isinstance(operation, Ramp):
+        return dict.fromkeys(operation.names, _SLOPE)
+    values = operation.values or [NEWEST] * len(operation.names)
+    return {name: _VALUE[value] for name, value in zip(operation.names, values, strict=True)}
+
+
 def _transfer(
-    number: int, operation: Read | Write, instance: Instance, memory: Memory, names: dict[str, Any]
+    number: int,
+    operation: Read | Write | Ramp,
+    instance: Instance,
+    memory: Memory,
+    names: dict[str, Any],
 ) -> list[str]:
     order, offset, lines = memory.place(operation)
     variables = [instance.description.variables[name] for name in order]
@@ -227,7 +253,13 @@ def _transfer(
     kind = _FUNCTION[operation.kind]
     verb = "Get" if isinstance(operation, Read) else "Set"
     address = memory.address(offset)
-    names[f"f{number}"] = instance.library.transfer(verb, kind, variables, address)
+    if isinstance(operation, Ramp):
+        orders = (ctypes.c_int * len(order))(*[1] * len(order))
+        names[f"orders{number}"] = orders  # kept as well
+        names[f"f{number}"] = instance.library.function("SetRealInputDerivatives")
+        names[f"q{number}"] = ctypes.c_void_p.from_param(ctypes.addressof(orders))
+    else:
+        names[f"f{number}"] = instance.library.transfer(verb, kind, variables, address)
     names[f"c{number}"] = ctypes.c_void_p.from_param(instance.component)
     names[f"v{number}"] = ctypes.c_void_p.from_param(ctypes.addressof(references))
     names[f"n{number}"] = ctypes.c_size_t.from_param(len(order))
@@ -235,8 +267,16 @@ def _transfer(
     if lines:
         names[f"m{number}"] = memory.views[kind]
         lines = [line.replace("m[", f"m{number}[") for line in lines]
-    call = f"f{number}(c{number}, v{number}, n{number}, p{number})"
-    return [*lines, f"if s := {call}: fail(o{number}, s)"]
+    condition = ""
+    if isinstance(operation, Write) and operation.if_changed:
+        for i in range(len(order)):
+            names[f"m{number}"][offset // 8 + i] = math.nan  # as yet it has none of them
+        pairs = (line.split(" = ") for line in lines)
+        condition = " or ".join(f"{place} != {value}" for place, value in pairs)
+    given = f"q{number}, p{number}" if isinstance(operation, Ramp) else f"p{number}"
+    call = f"f{number}(c{number}, v{number}, n{number}, {given})"
+    whole = [*lines, f"if s := {call}: fail(o{number}, s)"]
+    return [f"if {condition}:", *(f" {line}" for line in whole)] if condition else whole
 
 
 def _state(
@@ -261,7 +301,7 @@ def _state(
 
 def _keep(operation: Keep | Shift, memory: Memory) -> list[str]:
     assign = operation.change if isinstance(operation, Shift) else "="
-    return [f"reals[{past}] {assign} reals[{now}]" for now, past in memory.kept(operation)]
+    return [f"past{past} {assign} reals[{now}]" for now, past in memory.kept(operation)]
 
 
 def _kept(schedule: Schedule) -> set[Port]:

@@ -19,7 +19,7 @@ from ..fmu.description import Description, Value
 from .graph import find_loop
 from .loop import Memory, compile_loop
 from .nodes import make_nodes
-from .operations import Node, Operation, Port, Read, Restore, Save, Step, kind_of
+from .operations import Node, Operation, Port, Ramp, Read, Restore, Save, Step, kind_of
 from .results import Array, Table
 from .rows import count_steps, make_columns, times
 from .schedule import make_schedule
@@ -34,6 +34,7 @@ SETTLE = 100
 VERBS = {
     Step: "doStep",
     Read: "reading its outputs",
+    Ramp: "setting the derivatives of its inputs",
     Save: "getting its state",
     Restore: "setting its state",
 }
@@ -248,7 +249,14 @@ class Master:
         node = self.nodes[operation.component]
         if not instance.poisoned and any(kind_of(v) == "fault" for v in node.outputs.values()):
             text += self._code(instance.get(["fault"])["fault"])
-        raise RunError(text + self._inputs(operation.component) + instance.said())
+        text += self._inputs(operation.component) + instance.said()
+        if isinstance(operation, Ramp):
+            held = ", ".join(f'{name} = "held"' for name in operation.names)
+            text += (
+                "\n  Its description says canInterpolateInputs. Without derivatives it is stepped "
+                f"by over_step = {{ {held} }} in [components.{instance.name}]."
+            )
+        raise RunError(text)
 
     def _explain_fault(self, when: str) -> NoReturn:
         for c, node in enumerate(self.nodes):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..errors import ScenarioError
 from ..fmu.description import Description
 from ..scenario.over_step import as_told, told_over_step
-from .operations import Node, Port
+from .operations import Node, Port, is_continuous
 
 if TYPE_CHECKING:
     from ..scenario.scenario import Scenario
@@ -37,5 +37,19 @@ def make_nodes(scenario: Scenario, descriptions: Mapping[str, Description]) -> l
         told = told_over_step(component)
         outputs = {v.name: as_told(v, told) for v in description.of("output") if v.kind != "String"}
         inputs = {v.name: as_told(v, told) for v in description.of("input")}
-        nodes.append(Node(component.name, inputs, outputs, sources[c], substeps, transformed[c]))
+        takes = _interpolates(description, told) if substeps == 1 else frozenset()
+        nodes.append(
+            Node(component.name, inputs, outputs, sources[c], substeps, transformed[c], takes)
+        )
     return nodes
+
+
+def _interpolates(description: Description, told: Mapping[str, str]) -> frozenset[str]:
+    """Return the inputs whose derivative an FMU takes, but those of which the scenario says how.
+
+    That is a matter of FMI 2.0; FMI 3.0 has no call for it.
+    """
+    if description.capabilities.get("canInterpolateInputs") not in ("true", "1"):
+        return frozenset()
+    inputs = (v for v in description.of("input") if is_continuous(v))
+    return frozenset(v.name for v in inputs if description.version == "2.0" and v.name not in told)

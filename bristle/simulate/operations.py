@@ -14,9 +14,10 @@ Port = tuple[int, str]
 
 FAULT = "fault"
 
-NEWEST, MIDDLE, AHEAD, END = "newest", "middle", "ahead", "end"
+NEWEST, MIDDLE, AHEAD, END, PAST = "newest", "middle", "ahead", "end", "past"
 """Which value an input is given, of its source's newest u and the kept one p of a step before:
-u; (u + p)/2; (3 u - p)/2, the middle of a step that the source has still to make; 2 u - p, its end.
+u; (u + p)/2; (3 u - p)/2, the middle of a step that the source has still to make; 2 u - p, its end;
+p.
 """
 
 
@@ -25,6 +26,7 @@ class Node:
     """A component as the schedule sees it: outputs, and the source of each connected input.
 
     `transformed` has (factor, offset) of the inputs that get factor output + offset.
+    `interpolates` names the inputs whose derivative it takes, to follow it over the next step.
     """
 
     name: str
@@ -33,6 +35,7 @@ class Node:
     sources: Mapping[str, Port]
     substeps: int = 1
     transformed: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    interpolates: frozenset[str] = frozenset()
 
     def followed(self, output: str) -> tuple[str, ...]:
         """Return the connected inputs that an output follows without a step."""
@@ -87,13 +90,27 @@ class Read:
 class Write:
     """Set inputs of one component and kind in one call, each from the output that feeds it.
 
-    `values` says which value each gets, one of those above; empty: all the newest.
+    `values` says which value each gets, one of those above; empty: all the newest. `if_changed`
+    leaves the call out where each has its value already.
     """
 
     component: int
     kind: str
     names: tuple[str, ...]
     values: tuple[str, ...] = ()
+    if_changed: bool = False
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Set derivatives of inputs over the step: the last change of what feeds each of them.
+
+    An input goes on by it from the value that it has as the step begins.
+    """
+
+    component: int
+    names: tuple[str, ...]
+    kind: str = "Real"
 
 
 @dataclass(frozen=True)
@@ -127,7 +144,7 @@ class Restore:
     component: int
 
 
-Operation = Step | Read | Write | Keep | Shift | Save | Restore
+Operation = Step | Read | Write | Ramp | Keep | Shift | Save | Restore
 
 
 @dataclass(frozen=True)
@@ -158,9 +175,9 @@ def reads(component: int, node: Node, names: Iterable[str]) -> list[Operation]:
     return [Read(component, *group) for group in _by_kind(node.outputs, names)]
 
 
-def writes(component: int, node: Node, values: Mapping[str, str]) -> list[Operation]:
+def writes(component: int, node: Node, values: Mapping[str, str]) -> list[Write]:
     """Return the calls that set these inputs of a component, each to one of the values above."""
-    found: list[Operation] = []
+    found: list[Write] = []
     for kind, names in _by_kind(node.inputs, values):
         given = tuple(values[name] for name in names)
         found.append(Write(component, kind, names, given if set(given) != {NEWEST} else ()))

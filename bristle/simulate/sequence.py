@@ -4,17 +4,21 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import replace
 
+from ..fmu.description import Variable
 from .graph import at_level, find_late, lay_out, loop_members, read_early, signal_graph
 from .operations import (
     AHEAD,
     END,
     MIDDLE,
     NEWEST,
+    PAST,
     Keep,
     Node,
     Operation,
     Port,
+    Ramp,
     Restore,
     Save,
     Schedule,
@@ -59,11 +63,15 @@ class _Plan:
         # When each output was read and each input written: only inputs that are older are set.
         self._read: dict[Port, int] = defaultdict(int)
         self._written: dict[Port, int] = defaultdict(lambda: 1)
+        # When each input had its source's newest value, and when that was read for the last row.
+        self._current: dict[Port, int] = defaultdict(lambda: 1)
+        self._row: dict[Port, int] = {}
         self._clock = 1
 
     def macro_step(self) -> None:
         """Work out a macro step that follows on those before."""
         self.operations = []
+        self._row = dict(self._read)
         for c in self.again:
             late = [n for n in self._older(c) if self.nodes[c].sources[n][0] >= c]
             self._write(c, dict.fromkeys(late, NEWEST))
@@ -90,10 +98,16 @@ class _Plan:
     def _held(self, c: int) -> list[str]:
         return [name for name in self.nodes[c].sources if (c, name) in self.held]
 
-    def _write(self, c: int, values: Mapping[str, str]) -> None:
+    def _write(self, c: int, values: Mapping[str, str], if_changed: bool = False) -> None:
         self._clock += 1
         self._written.update({(c, name): self._clock for name in values})
-        self.operations += writes(c, self.nodes[c], values)
+        self._give(c, values, if_changed)
+
+    def _give(self, c: int, values: Mapping[str, str], if_changed: bool = False) -> None:
+        newest = (name for name, value in values.items() if value == NEWEST)
+        self._current.update({(c, name): self._clock for name in newest})
+        found = writes(c, self.nodes[c], values)
+        self.operations += [replace(one, if_changed=if_changed) for one in found]
 
     def _read_outputs(self, c: int, names: Iterable[str]) -> None:
         self.operations += reads(c, self.nodes[c], names)
@@ -103,11 +117,43 @@ class _Plan:
         stepped = {name: self._has_stepped(node.sources[name][0], c) for name in self._held(c)}
         values = {name: MIDDLE if stepped[name] else AHEAD for name in stepped}
         values.update(dict.fromkeys(self._older(c), NEWEST))
-        self._write(c, {name: values[name] for name in node.sources if name in values})
+        ramped = self._ramped_by_others(c)
+        values.update({name: PAST if stepped[name] else NEWEST for name in ramped})
+        own = not ramped and self._ramps_alone(c, stepped)
+        if own:
+            values, ramped = dict.fromkeys(self._older(c), NEWEST), tuple(stepped)
+        self._write(c, {name: values[name] for name in node.sources if name in values}, own)
+        self.operations += [Ramp(c, ramped)] if ramped else []
         past = tuple(name for name in node.outputs if (c, name) in self.kept)
         self.operations += [Keep(c, past)] if past else []
         self.operations.append(Step(c))
-        self._show(c, stepped)
+        self._current.update({(c, name): self._clock for name in ramped if stepped[name]})
+        self._show(c, {name: known for name, known in stepped.items() if name not in ramped})
+
+    def _ramped_by_others(self, c: int) -> tuple[str, ...]:
+        """Return the held inputs that a foreign FMU interpolates over its step.
+
+        It gets value and derivative; how it takes them over the step is its own matter.
+        """
+        node = self.nodes[c]
+        found = (name for name in self._held(c) if node.inputs[name].over_step is None)
+        return tuple(name for name in found if name in node.interpolates)
+
+    def _ramps_alone(self, c: int, stepped: Mapping[str, bool]) -> bool:
+        """Return whether derivatives in place of the middle save a call, and mean the same.
+
+        They do where end values would be set behind the step, and no value that changes all the
+        time is before it. One of bristle's FMUs holds the middle then, and goes on from where the
+        step before has brought its inputs.
+        """
+        held, sources = set(stepped), self.nodes[c].sources
+        able = held and held <= self.nodes[c].interpolates and not self.again
+        if not able or not self._end_values(c, stepped):
+            return False
+        feeding = (sources[name] for name in self._older(c))
+        if not all(_stands(self.nodes[d].outputs[output]) for d, output in feeding):
+            return False
+        return all(self._current[c, name] >= self._row.get(sources[name], 0) for name in held)
 
     def _has_stepped(self, source: int, c: int) -> bool:
         """Return whether a source steps before a component; those behind a loop come last."""
@@ -117,10 +163,12 @@ class _Plan:
         """Step from the restored state: the ends of all inputs are known, if only nearly."""
         node = self.nodes[c]
         before = [n for n, (d, _) in node.sources.items() if d < c and (c, n) not in self.held]
-        values = dict.fromkeys(self._held(c), MIDDLE)
+        values, ramped = dict.fromkeys(self._held(c), MIDDLE), self._ramped_by_others(c)
+        values.update(dict.fromkeys(ramped, PAST))
         self._write(c, {**dict.fromkeys(before, NEWEST), **values})
+        self.operations += [Ramp(c, ramped)] if ramped else []
         self.operations.append(Step(c))
-        self._show(c, dict.fromkeys(values, True))
+        self._show(c, dict.fromkeys((name for name in values if name not in ramped), True))
 
     def _show(self, c: int, known: Mapping[str, bool]) -> None:
         """Give held inputs the end of the step for the outputs that follow them, and read these.
@@ -133,15 +181,19 @@ class _Plan:
         c : the component
         known : held inputs, and whether their value at the end is known
         """
+        self._give(c, self._end_values(c, known))
+        self._read_outputs(c, self.early[c])
+        self._read.update({(c, name): self._clock for name in self.early[c]})
+
+    def _end_values(self, c: int, known: Mapping[str, bool]) -> dict[str, str]:
+        """Return what is set behind a step, as `_show` says."""
         values = {}
         for name in known:
             following = {output for _, output in self.graph[c, name]}
             wanted = following.intersection(self.early[c])
             if wanted or (known[name] and following and (c, name) not in self.refresh.inputs):
                 values[name] = NEWEST if known[name] else END
-        self.operations += writes(c, self.nodes[c], values)
-        self._read_outputs(c, self.early[c])
-        self._read.update({(c, name): self._clock for name in self.early[c]})
+        return values
 
     def _refresh(self) -> None:
         """Set what came too late, and read what follows it, link by link."""
@@ -176,3 +228,8 @@ class _Plan:
                 reached.add(port)
                 queue += self.graph[port]
         return {port for port in self.kept if port in reached and port[1] in self.early[port[0]]}
+
+
+def _stands(output: Variable) -> bool:
+    """Return whether a signal stands over many steps, as the voltage of a sampled controller."""
+    return output.kind == "Real" and not is_continuous(output)

@@ -155,7 +155,9 @@ def test_spoilt_fmu_fails(compiled: Compile, trait: str, probe: str, seen: str) 
 
 # Probes that judge nothing, and those with a test of their own in which they fail.
 NEVER_FAIL = {"memory", "repeatable", "driven run"}
-ELSEWHERE = {"archive", "claimed capabilities"}
+ELSEWHERE = {
+    *("archive", "claimed capabilities", "input derivatives", "input derivative of order 0"),
+}
 
 
 def test_every_probe_has_an_fmu_that_fails_it() -> None:
@@ -167,7 +169,8 @@ def test_every_probe_has_an_fmu_that_fails_it() -> None:
 
 def test_every_c_trait_is_used() -> None:
     traits = set(re.findall(r"#define (\w+) \d+", SOURCE.read_text()))
-    used = {trait for trait, *_ in FAILING} | {"HEALTHY", "LEAK_ON_FREE"}
+    used = {trait for trait, *_ in (*FAILING, *SPOILT_DERIVATIVES)}
+    used |= {"HEALTHY", "LEAK_ON_FREE", "INTERPOLATES"}
     assert traits == used
 
 
@@ -198,6 +201,35 @@ def test_fmu_for_one_instance_per_process_is_not_blamed(compiled: Compile) -> No
 def test_claim_that_is_not_kept_fails(compiled: Compile, flag: str, seen: str) -> None:
     claim = ('modelIdentifier="Strict"', f'modelIdentifier="Strict" {flag}="true"')
     row = conform(compiled("HEALTHY", claim), only=["claimed capabilities"]).rows[0]
+    assert row.verdict == "fail"
+    assert seen in row.seen
+
+
+INTERPOLATES = ('modelIdentifier="Strict"', 'modelIdentifier="Strict" canInterpolateInputs="true"')
+DERIVATIVES = ["input derivatives", "input derivative of order 0"]
+SPOILT_DERIVATIVES = [
+    ("ZERO_MOVES", "input derivatives", "by derivatives of 0: y at t = "),
+    ("SLOPE_OUTLIVES_RESET", "input derivatives", "fmi2Reset does not clear them: y at t = "),
+    ("SLOPE_OUTSIDE_STATE", "input derivatives", "behind a copied state: y at t = "),
+    ("CRASH_ON_ORDER_0", DERIVATIVES[1], "crashed in fmi2SetRealInputDerivatives: SIGABRT"),
+]
+
+
+def test_derivatives_of_inputs_are_tried_where_they_are_claimed(compiled: Compile) -> None:
+    report = conform(compiled("INTERPOLATES", INTERPOLATES))
+    assert report.ok, report.to_text()
+    assert [report.row(name).seen for name in DERIVATIVES] == [
+        "1 inputs moved by them; zero, a reset and a state hold", "refused with Error",
+    ]  # fmt: skip
+    unclaimed = conform(compiled("HEALTHY"), only=DERIVATIVES)
+    assert {row.seen for row in unclaimed.rows} == {
+        "not tried: canInterpolateInputs is not claimed"
+    }
+
+
+@pytest.mark.parametrize(("trait", "probe", "seen"), SPOILT_DERIVATIVES)
+def test_spoilt_derivatives_fail(compiled: Compile, trait: str, probe: str, seen: str) -> None:
+    row = conform(compiled(trait, INTERPOLATES), only=[probe]).row(probe)
     assert row.verdict == "fail"
     assert seen in row.seen
 

@@ -23,6 +23,11 @@
 #define CRASH_ON_EMPTY_LIST 14
 #define COPY_CHANGES_RUN 15
 #define CRASH_ON_NULL_STATE 16
+#define INTERPOLATES 17
+#define ZERO_MOVES 18
+#define SLOPE_OUTLIVES_RESET 19
+#define SLOPE_OUTSIDE_STATE 20
+#define CRASH_ON_ORDER_0 21
 #ifndef TRAIT
 #define TRAIT HEALTHY
 #endif
@@ -33,6 +38,7 @@
 typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED, BROKEN } Mode;
 typedef struct {
     double u, y, gain;
+    double slope; /* of u */
     double stop;
     Mode mode;
 } State;
@@ -109,7 +115,9 @@ fmi2Status fmi2ExitInitializationMode(fmi2Component c) { return go(c, INITIALISI
 fmi2Status fmi2Terminate(fmi2Component c) { return go(c, STEPPING, TERMINATED); }
 fmi2Status fmi2Reset(fmi2Component c) {
     Toy *toy = c;
+    double slope = TRAIT == SLOPE_OUTLIVES_RESET ? toy->s.slope : 0.0;
     memset(&toy->s, 0, sizeof toy->s);
+    toy->s.slope = slope;
     toy->s.gain = 2.0;
     toy->s.stop = INFINITY;
     return fmi2OK;
@@ -165,7 +173,9 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
     if (toy->s.mode != STEPPING) return refuse(toy, "not in step mode");
     if (!(step > 0.0) || !isfinite(step)) return refuse(toy, "no step");
     if (time + step > toy->s.stop * (1 + 1e-9)) return refuse(toy, "past the stop time");
+    if (TRAIT >= INTERPOLATES) toy->s.u += 0.5 * step * toy->s.slope; /* its middle */
     toy->s.y += step / 0.3 * (toy->s.gain * toy->s.u - toy->s.y);
+    if (TRAIT >= INTERPOLATES) toy->s.u += 0.5 * step * toy->s.slope;
     return TRAIT == ODD_STATUS ? 17 : fmi2OK;
 }
 
@@ -176,7 +186,9 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *state) {
     return fmi2OK;
 }
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
+    double slope = ((Toy *)c)->s.slope;
     memcpy(&((Toy *)c)->s, state, sizeof(State));
+    if (TRAIT == SLOPE_OUTSIDE_STATE) ((Toy *)c)->s.slope = slope;
     return fmi2OK;
 }
 fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
@@ -203,6 +215,18 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
     memcpy(*state, bytes, n);
     return fmi2OK;
 }
+
+#if TRAIT >= INTERPOLATES
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference r[], size_t n,
+                                       const fmi2Integer order[], const fmi2Real v[]) {
+    for (size_t i = 0; i < n; i++) {
+        if (order[i] == 0 && TRAIT == CRASH_ON_ORDER_0) abort();
+        if (r[i] != 0 || order[i] != 1) return refuse(c, "no such derivative");
+        ((Toy *)c)->s.slope = v[i] + (TRAIT == ZERO_MOVES);
+    }
+    return fmi2OK;
+}
+#endif
 
 #ifndef MISSING
 fmi2Status fmi2CancelStep(fmi2Component c) { return refuse(c, "nothing to cancel"); }

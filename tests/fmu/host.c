@@ -6,25 +6,13 @@
  *   INPUTS     REFERENCE:CENTRE:AMPLITUDE,...   real inputs, moved as centre + amplitude * sine
  *   OUTPUTS    REFERENCE,...                    real outputs
  * Prints the last outputs and returns 0, or says on stderr what went wrong and returns 1. */
-#include <dlfcn.h>
-#include <math.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-
 #include "fmi2Functions.h"
+
+#include "../../benchmarks/host.h"
 
 #define STEPS 40
 #define HALF (STEPS / 2)
 #define STEP 0.002
-#define MOST 64
-
-#define DIE(...) (fprintf(stderr, __VA_ARGS__), fputc('\n', stderr), exit(1))
-#define GOOD(call)                                             \
-    do {                                                       \
-        int status_ = (call);                                  \
-        if (status_ > fmi2Warning) DIE("%s: %d", #call, status_); \
-    } while (0)
 
 typedef struct {
     void *handle;
@@ -48,44 +36,26 @@ typedef struct {
 } Fmu;
 
 static const char *guid;
-static fmi2ValueReference inputs[MOST], outputs[MOST];
-static double centre[MOST], amplitude[MOST];
-static size_t n_inputs, n_outputs;
+static Ports inputs, outputs;
 
-static void log_message(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status,
-                        fmi2String category, fmi2String text, ...) {
-    (void)e;
-    if (status > fmi2Warning) fprintf(stderr, "%s [%s] %s\n", name, category, text);
-}
-
-static const fmi2CallbackFunctions callbacks = {log_message, calloc, free, NULL, NULL};
-
-static void *symbol(void *handle, const char *name) {
-    void *found = dlsym(handle, name);
-    if (!found) DIE("%s is missing: %s", name, dlerror());
-    return found;
-}
-
-static Fmu load(const char *library, const char *resources) {
-    void *h = dlopen(library, RTLD_NOW | RTLD_LOCAL);
-    if (!h) DIE("%s", dlerror());
+static Fmu load_fmu(const char *library, const char *resources) {
+    void *h = load(library);
     Fmu fmu = {h, resources,
-               symbol(h, "fmi2Instantiate"), symbol(h, "fmi2FreeInstance"),
-               symbol(h, "fmi2SetupExperiment"), symbol(h, "fmi2EnterInitializationMode"),
-               symbol(h, "fmi2ExitInitializationMode"), symbol(h, "fmi2Terminate"),
-               symbol(h, "fmi2Reset"), symbol(h, "fmi2GetReal"), symbol(h, "fmi2SetReal"),
-               symbol(h, "fmi2DoStep"), symbol(h, "fmi2GetFMUstate"),
-               symbol(h, "fmi2SetFMUstate"), symbol(h, "fmi2FreeFMUstate"),
-               symbol(h, "fmi2SerializedFMUstateSize"), symbol(h, "fmi2SerializeFMUstate"),
-               symbol(h, "fmi2DeSerializeFMUstate")};
+               find(h, "fmi2Instantiate"), find(h, "fmi2FreeInstance"),
+               find(h, "fmi2SetupExperiment"), find(h, "fmi2EnterInitializationMode"),
+               find(h, "fmi2ExitInitializationMode"), find(h, "fmi2Terminate"),
+               find(h, "fmi2Reset"), find(h, "fmi2GetReal"), find(h, "fmi2SetReal"),
+               find(h, "fmi2DoStep"), find(h, "fmi2GetFMUstate"),
+               find(h, "fmi2SetFMUstate"), find(h, "fmi2FreeFMUstate"),
+               find(h, "fmi2SerializedFMUstateSize"), find(h, "fmi2SerializeFMUstate"),
+               find(h, "fmi2DeSerializeFMUstate")};
     return fmu;
 }
 
 static void move(const Fmu *fmu, fmi2Component c, int k) {
     double values[MOST];
-    for (size_t i = 0; i < n_inputs; i++)
-        values[i] = centre[i] + amplitude[i] * sin(0.3 * k + 0.7 * (double)i);
-    GOOD(fmu->set(c, inputs, n_inputs, values));
+    for (size_t i = 0; i < inputs.count; i++) values[i] = moved(&inputs, i, (size_t)k);
+    GOOD(fmu->set(c, inputs.reference, inputs.count, values));
 }
 
 static void initialise(const Fmu *fmu, fmi2Component c) {
@@ -106,34 +76,22 @@ static fmi2Component instantiate(const Fmu *fmu, const char *name) {
 static void advance(const Fmu *fmu, fmi2Component c, int k, double *row) {
     move(fmu, c, k);
     GOOD(fmu->step(c, k * STEP, STEP, fmi2True));
-    GOOD(fmu->get(c, outputs, n_outputs, row));
+    GOOD(fmu->get(c, outputs.reference, outputs.count, row));
 }
 
 static void compare(const double *a, const double *b, const char *what, int k) {
-    if (memcmp(a, b, n_outputs * sizeof *a)) DIE("%s differs at step %d", what, k);
-}
-
-static size_t numbers(char *text, int inputs_too) {
-    size_t n = 0;
-    for (char *part = strtok(text, ","); part && n < MOST; part = strtok(NULL, ","), n++) {
-        unsigned reference;
-        if (!inputs_too) sscanf(part, "%u", &outputs[n]);
-        else if (sscanf(part, "%u:%lf:%lf", &reference, &centre[n], &amplitude[n]) == 3)
-            inputs[n] = reference;
-        else DIE("not REFERENCE:CENTRE:AMPLITUDE: %s", part);
-    }
-    return n;
+    if (memcmp(a, b, outputs.count * sizeof *a)) DIE("%s differs at step %d", what, k);
 }
 
 int main(int argc, char **argv) {
     if (argc != 9) DIE("eight arguments are needed");
     if (strcmp(argv[1], "-") && !dlopen(argv[1], RTLD_NOW | RTLD_GLOBAL)) DIE("%s", dlerror());
     guid = argv[2];
-    n_inputs = numbers(argv[7], 1);
-    n_outputs = numbers(argv[8], 0);
+    inputs = ports(argv[7]);
+    outputs = ports(argv[8]);
     static double wanted[STEPS][MOST], row[MOST];
 
-    Fmu one = load(argv[3], argv[4]), two = load(argv[5], argv[6]);
+    Fmu one = load_fmu(argv[3], argv[4]), two = load_fmu(argv[5], argv[6]);
     fmi2Component a = instantiate(&one, "a"), b = instantiate(&two, "b");
     fmi2FMUstate state = NULL;
     for (int k = 0; k < STEPS; k++) {
@@ -175,6 +133,6 @@ int main(int argc, char **argv) {
     one.free_instance(a);
     two.free_instance(b);
     two.free_instance(c);
-    for (size_t i = 0; i < n_outputs; i++) printf("%.17g\n", row[i]);
+    for (size_t i = 0; i < outputs.count; i++) printf("%.17g\n", row[i]);
     return 0;
 }

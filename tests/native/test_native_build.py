@@ -36,7 +36,7 @@ def test_the_description_is_that_of_the_python_form_but_for_how_it_runs() -> Non
     assert list(mine.variables.items()) == list(other.variables.items())
     assert mine.guid != other.guid
     flags = {key for key in mine.capabilities if mine.capabilities[key] != other.capabilities[key]}
-    assert flags == {"needsExecutionTool"}
+    assert flags == {"needsExecutionTool", "canInterpolateInputs"}
     assert other.capabilities["needsExecutionTool"] == "false"
     assert validate_fmu(str(native("ClippedOptimal").path)) == []
 

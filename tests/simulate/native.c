@@ -1,5 +1,6 @@
 /* An FMU in C for the tests of the master: y = u summed over steps, twice = 2 u follows u at once.
- * The Integer parameter `how` spoils the step that begins at `at`. */
+ * The Integer parameter `how` spoils the step that begins at `at`. With INTERPOLATES it takes the
+ * derivative of u for one step, and y is the mean of u^2 over each step, summed. */
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
@@ -10,6 +11,7 @@ enum { FINE, ABORT, HANG, DISCARD, ERROR, PENDING, WARN };
 
 typedef struct {
     double real[4]; /* u, y, twice, at */
+    double slope; /* of u, in the next step */
     int how;
     char name[64];
     const fmi2CallbackFunctions *calls;
@@ -81,9 +83,25 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step, fmi2Boolean
         me->real[1] += me->real[0];
         return fmi2Warning;
     }
+#ifdef INTERPOLATES
+    double from = me->real[0], to = from + step * me->slope;
+    me->real[1] += (from * from + from * to + to * to) / 3;
+    me->real[0] = to;
+    me->slope = 0;
+#else
     me->real[1] += me->real[0];
+#endif
     return fmi2OK;
 }
+
+#ifdef INTERPOLATES
+fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference r[], size_t n,
+                                       const fmi2Integer order[], const fmi2Real v[]) {
+    if (n != 1 || r[0] != 0 || order[0] != 1) return fmi2Error;
+    ((Native *)c)->slope = v[0];
+    return fmi2OK;
+}
+#endif
 
 /* What the master never asks for. */
 #define REFUSE(name, ...) \
@@ -102,8 +120,10 @@ REFUSE(fmi2SerializeFMUstate, fmi2Component c, fmi2FMUstate s, fmi2Byte b[], siz
 REFUSE(fmi2DeSerializeFMUstate, fmi2Component c, const fmi2Byte b[], size_t n, fmi2FMUstate *s)
 REFUSE(fmi2GetDirectionalDerivative, fmi2Component c, const fmi2ValueReference u[], size_t nu,
        const fmi2ValueReference k[], size_t nk, const fmi2Real dk[], fmi2Real du[])
+#ifndef INTERPOLATES
 REFUSE(fmi2SetRealInputDerivatives, fmi2Component c, const fmi2ValueReference r[], size_t n,
        const fmi2Integer o[], const fmi2Real v[])
+#endif
 REFUSE(fmi2GetRealOutputDerivatives, fmi2Component c, const fmi2ValueReference r[], size_t n,
        const fmi2Integer o[], fmi2Real v[])
 REFUSE(fmi2GetStatus, fmi2Component c, const fmi2StatusKind k, fmi2Status *v)

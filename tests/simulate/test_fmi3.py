@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 import bristle
-from bristle.conformance.runner import judge
 from bristle.errors import FmuError, ScenarioError
 from bristle.fmu import description_fmi3
 from bristle.fmu.archive import platform_folder
@@ -167,9 +166,9 @@ def test_what_cannot_run_is_refused(name: str, words: str) -> None:
 
 
 @needs_fmus
-def test_the_conformance_checker_knows_fmi_2_alone() -> None:
+def test_what_knows_fmi_2_alone_refuses_it() -> None:
     with pytest.raises(FmuError, match=r"FMI version 3\.0; FMI 2\.0 for co-simulation is right"):
-        judge(REFERENCE / "3.0" / "Dahlquist.fmu", 1.0, None, None, None)
+        read_description(REFERENCE / "3.0" / "Dahlquist.fmu", versions=("2.0",))
 
 
 DESCRIPTION = """

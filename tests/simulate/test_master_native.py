@@ -49,21 +49,32 @@ ABORT, HANG, DISCARD, ERROR, PENDING, WARN = range(1, 7)
 @pytest.fixture(scope="session")
 def native(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return an FMU compiled from native.c."""
-    folder = tmp_path_factory.mktemp("native")
+    return compiled(tmp_path_factory.mktemp("native"), DESCRIPTION)
+
+
+def compiled(folder: Path, description: str, *flags: str) -> Path:
+    """Return an FMU compiled from native.c into a folder, with a description and flags of its own.
+
+    All of them hold a library of the same name.
+    """
+    folder.mkdir(exist_ok=True)
     library = folder / "native.so"
     headers = Path(fmpy.__file__).parent / "c-code"
     subprocess.run(
-        [str(COMPILER), "-shared", "-fPIC", "-O1", f"-I{headers}", "-o", str(library),
+        [str(COMPILER), "-shared", "-fPIC", "-O1", *flags, f"-I{headers}", "-o", str(library),
          str(Path(__file__).with_name("native.c"))],
         check=True, capture_output=True,
     )  # fmt: skip
     with zipfile.ZipFile(folder / "native.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", DESCRIPTION)
+        archive.writestr("modelDescription.xml", description)
         archive.write(library, f"binaries/{fmpy.platform}/native{fmpy.sharedLibraryExtension}")
     return folder / "native.fmu"
 
 
-def scenario(native: Path, folder: Path, how: int = 0, at: float = 0.5, stop: float = 1.0) -> Path:
+def scenario(
+    native: Path, folder: Path, how: int = 0, at: float = 0.5, stop: float = 1.0,
+    second: Path | None = None, more: str = "", algorithm: str = "gauss-seidel",
+) -> Path:  # fmt: skip
     file = folder / "native.toml"
     file.write_text(f"""
         schema = 1
@@ -71,11 +82,13 @@ def scenario(native: Path, folder: Path, how: int = 0, at: float = 0.5, stop: fl
         [run]
         stop = {stop}
         step = 0.1
+        algorithm = "{algorithm}"
         [components.one]
         fmu = "{native}"
         parameters = {{ u = 1.0 }}
         [components.two]
-        fmu = "{native}"
+        fmu = "{second or native}"
+        {more}
         parameters = {{ how = {how}, at = {at} }}
         [connections]
         "two.u" = "one.y"

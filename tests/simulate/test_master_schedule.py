@@ -11,6 +11,7 @@ from bristle.simulate.graph import find_loop
 from bristle.simulate.operations import (
     Keep,
     Node,
+    Ramp,
     Read,
     Restore,
     Save,
@@ -58,7 +59,7 @@ LOOP = [GROUND, STRUCTURE, VOLTAGE, DAMPER]
 
 def calls(schedule: Schedule) -> list[tuple[object, ...]]:
     """Return the operations in short: (kind, component, names)."""
-    verbs = {Read: "get", Write: "set", Keep: "keep", Shift: "shift"}
+    verbs = {Read: "get", Write: "set", Ramp: "ramp", Keep: "keep", Shift: "shift"}
     found: list[tuple[object, ...]] = []
     for o in schedule.operations:
         if isinstance(o, Step | Save | Restore):
@@ -67,7 +68,8 @@ def calls(schedule: Schedule) -> list[tuple[object, ...]]:
             each = (f"{n}:{v}" for n, v in zip(o.names, o.values, strict=True))
             found.append(("set", o.component, " ".join(each)))
         else:
-            found.append((verbs[type(o)], o.component, " ".join(o.names)))
+            changed = " if changed" if isinstance(o, Write) and o.if_changed else ""
+            found.append((verbs[type(o)] + changed, o.component, " ".join(o.names)))
     return found
 
 

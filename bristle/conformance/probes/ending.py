@@ -57,7 +57,7 @@ def free_without_terminate(bench: Bench) -> Finding:
 )
 def free_nothing(bench: Bench) -> Finding:
     """Free a null pointer, then run."""
-    bench.library.call("fmi2FreeInstance", None)
+    bench.library.call(f"{bench.library.prefix}FreeInstance", None)
     bench.whole_run()
     return passed("ignored")
 

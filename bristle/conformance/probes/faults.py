@@ -75,7 +75,8 @@ def _feed(bench: Bench, v: Variable, value: float) -> Callable[[Instance], int]:
 
 @probe(
     "fault: input",
-    tried="each real input set to NaN and to infinity, a step, another step, reset",
+    tried="each real input, and its derivative where that is taken, set to NaN and to infinity, a "
+    "step, another step, reset",
     standard=_RULE.format(INPUT),
     rule="bristle",
 )
@@ -85,7 +86,18 @@ def fault_input(bench: Bench) -> Finding:
         for value in (math.nan, math.inf, -math.inf):
             what = f"{v.name} = {value}"
             _mended(bench, _faulted(bench, _feed(bench, v, value), INPUT, what), what)
+            if bench.plan.claims("canInterpolateInputs"):
+                slope, what = _slope(bench, v, value), f"derivative of {what}"
+                _mended(bench, _faulted(bench, slope, INPUT, what), what)
     return passed(f"{len(bench.inputs)} inputs, three values each")
+
+
+def _slope(bench: Bench, v: Variable, value: float) -> Callable[[Instance], int]:
+    def act(instance: Instance) -> int:
+        status = instance.input_derivative(v.reference, value)
+        return instance.step(bench.time(2), bench.plan.step) if status in GOOD else status
+
+    return act
 
 
 @probe(

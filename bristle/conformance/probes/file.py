@@ -72,11 +72,13 @@ def model_description(bench: Bench) -> Finding:
     "guid",
     tried="the guid in modelDescription.xml",
     standard="FMI 2.0 section 2.2.1: guid is required; it ties the file to the code",
+    fmi3="FMI 3.0: instantiationToken, as it is called there, is required; it ties the file to the "
+    "code",
     needs="file",
 )
 def guid(bench: Bench) -> Finding:
     """Ask for a guid that is there and says something."""
-    text = _root(bench).get("guid")
+    text = _root(bench).get("instantiationToken" if bench.plan.fmi3 else "guid")
     if text is None or not text.strip():
         return failed("there is none")
     return passed(text)
@@ -87,11 +89,15 @@ def guid(bench: Bench) -> Finding:
     tried="whether two variables of one type share a reference",
     standard="FMI 2.0 section 2.2.7: variables of one base type with one value reference are "
     "aliases, and at most one of an alias set may be set",
+    fmi3="FMI 3.0: a value reference belongs to one variable; further names of it are aliases "
+    "inside that",
     needs="file",
     unless=_unreadable,
 )
 def value_references(bench: Bench) -> Finding:
     """Find aliases, and the ones that cannot be."""
+    if bench.plan.fmi3:
+        return _unique_references(bench)
     sets: dict[tuple[str, int], list[Variable]] = defaultdict(list)
     for v in bench.plan.about.variables.values():
         kind = "Integer" if v.kind == "Enumeration" else v.kind
@@ -106,6 +112,16 @@ def value_references(bench: Bench) -> Finding:
     if wrong:
         return failed(f"aliases that cannot be set or read as one: {some(wrong)}")
     return passed(f"{len(sets)} references, {len(aliases)} of them shared by aliases")
+
+
+def _unique_references(bench: Bench) -> Finding:
+    variables = _root(bench).findall("ModelVariables/*")
+    counts = Counter(v.get("valueReference") for v in variables)
+    wrong = [str(reference) for reference, times in counts.items() if times > 1]
+    if wrong:
+        return failed(f"references that two variables have: {some(wrong)}")
+    aliases = sum(len(v.findall("Alias")) for v in variables)
+    return passed(f"{len(counts)} references, {aliases} aliases")
 
 
 @probe(

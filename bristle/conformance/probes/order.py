@@ -258,8 +258,8 @@ def variable_steps(bench: Bench) -> Finding:
 @probe(
     "split steps",
     tried="each step as two halves",
-    standard=f"FMI 2.0 section 4.3.1: {_VARIABLE} promises that shorter steps are taken; section "
-    "4.2.2: an FMU integrates exactly to the end of each. It does not limit the change.",
+    standard=f"FMI 2.0 section 4.3.1: {_VARIABLE} promises that shorter steps are taken; FMI 2.0 "
+    "section 4.2.2: an FMU integrates exactly to the end of each. It does not limit the change.",
     unless=unless_claimed(_VARIABLE),
 )
 def split_steps(bench: Bench) -> Finding:

@@ -18,6 +18,8 @@ _MOST_STEPS = 20_000
     tried="loading the binary, its functions, fmi2GetVersion, fmi2GetTypesPlatform",
     standard='FMI 2.0 sections 2.1.2 and 2.1.4: the version is "2.0", the types platform '
     '"default"; the functions of co-simulation are exported under their plain names',
+    fmi3="FMI 3.0: the version begins with 3.0; the functions of co-simulation are exported, under "
+    "their plain names, for all types",
     needs="file",
 )
 def library(bench: Bench) -> Finding:
@@ -26,13 +28,15 @@ def library(bench: Bench) -> Finding:
     required, optional = loaded.missing()
     if required:
         return failed(f"functions that are missing: {some(required)}")
-    version = loaded.call("fmi2GetVersion")
-    platform = loaded.call("fmi2GetTypesPlatform")
-    if version != b"2.0" or platform != b"default":
+    wanted, version = bench.plan.about.version, loaded.call(f"{loaded.prefix}GetVersion")
+    if version is None or not version.startswith(wanted.encode()):
+        return failed(f"version {version!r} instead of {wanted}")
+    platform = loaded.call("fmi2GetTypesPlatform") if wanted == "2.0" else b"default"
+    if platform != b"default":
         return failed(f"version {version!r}, types platform {platform!r}")
     if optional:
         return noted(f"loads; optional functions that are missing: {some(optional)}")
-    return passed("loads; all functions exported, version 2.0")
+    return passed(f"loads; all functions exported, version {wanted}")
 
 
 @probe(

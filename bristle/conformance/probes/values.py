@@ -55,8 +55,8 @@ def _answer(bench: Bench, instance: Instance, v: Variable, value: float) -> str:
 
 
 _STRANGE = (
-    "No clause on inputs that are no numbers. The host must survive, and section 2.1.6 demands "
-    "that fmi2Reset clears it; a value accepted without a message is a note."
+    "No clause on inputs that are no numbers. The host must survive, and FMI 2.0 section 2.1.6 "
+    "demands that fmi2Reset clears it; a value accepted without a message is a note."
 )
 
 

@@ -17,6 +17,7 @@ typedef struct {
     double low, high;         /* what a parameter may be; infinite: no bound */
     const char *bounds;       /* both, as messages show them */
     const char *const *words; /* what a String chooses from, NULL behind the last; NULL: any text */
+    int held;                 /* whether it is an input that is held over a step */
 } Variable;
 
 /* What a code of the functions means: words and, between them, values of variables. */

@@ -3,10 +3,6 @@
 
 #include "fmi3.h"
 
-static fmi3Status worse(fmi3Status one, Status other) {
-    return (fmi3Status)other > one ? (fmi3Status)other : one;
-}
-
 /* Whether values can go in or out: one for each reference, of an instance. */
 static fmi3Status begin(fmi3Instance c, size_t references, size_t values) {
     if (!c) return fmi3Error;
@@ -20,8 +16,8 @@ EXPORT fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], 
     for (size_t i = 0; i < count; i++) {
         if (vr[i] == (fmi3ValueReference)component.count)
             values[i] = slave_of(c)->time;
-        else
-            status = worse(status, slave_get(slave_of(c), vr[i], REAL, &values[i]));
+        else if (host_get(slave_of(c), &vr[i], 1, REAL, DOUBLES, &values[i]) != DONE)
+            status = fmi3Error;
     }
     return status;
 }
@@ -30,67 +26,47 @@ EXPORT fmi3Status fmi3GetInt32(fmi3Instance c, const fmi3ValueReference vr[], si
                                fmi3Int32 values[], size_t size) {
     fmi3Status status = begin(c, count, size);
     if (status != fmi3OK) return status;
-    for (size_t i = 0; i < count; i++) {
-        double value = 0.0;
-        status = worse(status, slave_get(slave_of(c), vr[i], INTEGER, &value));
-        values[i] = (fmi3Int32)value;
-    }
-    return status;
+    return (fmi3Status)host_get(slave_of(c), vr, count, INTEGER, INTS, values);
 }
 
 EXPORT fmi3Status fmi3GetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t count,
                                  fmi3Boolean values[], size_t size) {
     fmi3Status status = begin(c, count, size);
     if (status != fmi3OK) return status;
-    for (size_t i = 0; i < count; i++) {
-        double value = 0.0;
-        status = worse(status, slave_get(slave_of(c), vr[i], BOOLEAN, &value));
-        values[i] = value != 0.0;
-    }
-    return status;
+    return (fmi3Status)host_get(slave_of(c), vr, count, BOOLEAN, BOOLS, values);
 }
 
 EXPORT fmi3Status fmi3GetString(fmi3Instance c, const fmi3ValueReference vr[], size_t count,
                                 fmi3String values[], size_t size) {
     fmi3Status status = begin(c, count, size);
     if (status != fmi3OK) return status;
-    for (size_t i = 0; i < count; i++)
-        status = worse(status, slave_get_text(slave_of(c), vr[i], &values[i]));
-    return status;
+    return (fmi3Status)host_get_texts(slave_of(c), vr, count, values);
 }
 
 EXPORT fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t count,
                                  const fmi3Float64 values[], size_t size) {
     fmi3Status status = begin(c, count, size);
     if (status != fmi3OK) return status;
-    for (size_t i = 0; i < count; i++)
-        status = worse(status, slave_set(slave_of(c), vr[i], REAL, values[i]));
-    return status;
+    return (fmi3Status)host_set(slave_of(c), vr, count, REAL, DOUBLES, values);
 }
 
 EXPORT fmi3Status fmi3SetInt32(fmi3Instance c, const fmi3ValueReference vr[], size_t count,
                                const fmi3Int32 values[], size_t size) {
     fmi3Status status = begin(c, count, size);
     if (status != fmi3OK) return status;
-    for (size_t i = 0; i < count; i++)
-        status = worse(status, slave_set(slave_of(c), vr[i], INTEGER, values[i]));
-    return status;
+    return (fmi3Status)host_set(slave_of(c), vr, count, INTEGER, INTS, values);
 }
 
 EXPORT fmi3Status fmi3SetBoolean(fmi3Instance c, const fmi3ValueReference vr[], size_t count,
                                  const fmi3Boolean values[], size_t size) {
     fmi3Status status = begin(c, count, size);
     if (status != fmi3OK) return status;
-    for (size_t i = 0; i < count; i++)
-        status = worse(status, slave_set(slave_of(c), vr[i], BOOLEAN, values[i] ? 1.0 : 0.0));
-    return status;
+    return (fmi3Status)host_set(slave_of(c), vr, count, BOOLEAN, BOOLS, values);
 }
 
 EXPORT fmi3Status fmi3SetString(fmi3Instance c, const fmi3ValueReference vr[], size_t count,
                                 const fmi3String values[], size_t size) {
     fmi3Status status = begin(c, count, size);
     if (status != fmi3OK) return status;
-    for (size_t i = 0; i < count; i++)
-        status = worse(status, slave_set_text(slave_of(c), vr[i], values[i] ? values[i] : ""));
-    return status;
+    return (fmi3Status)host_set_texts(slave_of(c), vr, count, values);
 }

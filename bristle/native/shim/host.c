@@ -2,6 +2,7 @@
 
 #include "host.h"
 
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -26,6 +27,50 @@ const char *host_refuses(const char *guid) {
     if (guid && strcmp(guid, component.guid) == 0) return 0;
     return "the guid is not that of this FMU: modelDescription.xml and library do not belong "
            "together.";
+}
+
+static Status worse(Status one, Status other) { return other > one ? other : one; }
+
+Status host_get(Slave *slave, const unsigned references[], size_t count, int kind, int form,
+                void *values) {
+    Status status = slave ? DONE : FAILED;
+    for (size_t i = 0; slave && i < count; i++) {
+        double value = form == DOUBLES ? ((double *)values)[i] : 0.0;
+        status = worse(status, slave_get(slave, references[i], kind, &value));
+        if (form == DOUBLES) ((double *)values)[i] = value;
+        if (form == INTS) ((int *)values)[i] = kind == BOOLEAN ? value != 0.0 : (int)value;
+        if (form == BOOLS) ((bool *)values)[i] = value != 0.0;
+    }
+    return status;
+}
+
+Status host_set(Slave *slave, const unsigned references[], size_t count, int kind, int form,
+                const void *values) {
+    Status status = slave ? DONE : FAILED;
+    for (size_t i = 0; slave && i < count; i++) {
+        double value = form == DOUBLES ? ((const double *)values)[i]
+                       : form == INTS  ? ((const int *)values)[i]
+                                       : ((const bool *)values)[i];
+        if (kind == BOOLEAN) value = value != 0.0;
+        status = worse(status, slave_set(slave, references[i], kind, value));
+    }
+    return status;
+}
+
+Status host_get_texts(Slave *slave, const unsigned references[], size_t count,
+                      const char *values[]) {
+    Status status = slave ? DONE : FAILED;
+    for (size_t i = 0; slave && i < count; i++)
+        status = worse(status, slave_get_text(slave, references[i], &values[i]));
+    return status;
+}
+
+Status host_set_texts(Slave *slave, const unsigned references[], size_t count,
+                      const char *const values[]) {
+    Status status = slave ? DONE : FAILED;
+    for (size_t i = 0; slave && i < count; i++)
+        status = worse(status, slave_set_text(slave, references[i], values[i] ? values[i] : ""));
+    return status;
 }
 
 Status host_save(Slave *slave, void **state) {

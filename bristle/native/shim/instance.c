@@ -29,8 +29,9 @@ Slave *slave_new(const char *name, const char *resources) {
     slave->texts = calloc(count, sizeof *slave->texts);
     slave->given = calloc(count, 1);
     slave->held = calloc((size_t)component.outputs + 1, sizeof *slave->held);
+    slave->slopes = calloc((size_t)component.inputs + 1, sizeof *slave->slopes);
     int whole = slave->name && slave->resources && slave->values && slave->texts &&
-                slave->given && slave->held;
+                slave->given && slave->held && slave->slopes;
     if (whole && slave_reset(slave)) return slave;
     slave_free(slave);
     return 0;
@@ -44,6 +45,7 @@ void slave_free(Slave *slave) {
     free(slave->values);
     free(slave->given);
     free(slave->held);
+    free(slave->slopes);
     free(slave->memory);
     free(slave->sampled);
     free(slave);
@@ -59,7 +61,8 @@ int slave_reset(Slave *slave) {
     memset(slave->given, 0, (size_t)component.count);
     slave->mode = INSTANTIATED;
     slave->stale = slave->unbuilt = 1;
-    slave->fresh = slave->warnings = 0;
+    memset(slave->slopes, 0, (size_t)component.inputs * sizeof *slave->slopes);
+    slave->sloping = slave->warnings = 0;
     slave->time = 0.0;
     return 1;
 }
@@ -92,6 +95,25 @@ static void take_inputs(Slave *slave) {
            (size_t)component.inputs * sizeof(double));
     for (int i = 0; i < component.inputs; i++)
         slave->given_inputs.at[i] = slave->given[component.inputs_at + i];
+}
+
+/* Take inputs that change over a step: those that the component holds in its middle, the others,
+   which it interpolates or samples itself, from its begin to its end. */
+static void take_changing(Slave *slave, double dt) {
+    for (int i = 0; i < component.inputs; i++) {
+        int held = component.variables[component.inputs_at + i].held;
+        if (slave->slopes[i] == 0.0) continue;
+        if (!held) slave->before.at[i] = slave->now.at[i];
+        slave->now.at[i] += (held ? 0.5 : 1.0) * slave->slopes[i] * dt;
+    }
+}
+
+/* Inputs behind a step stand where it has brought them, and outputs follow them there. */
+static void move_inputs(Slave *slave, double dt) {
+    double *inputs = slave->values + component.inputs_at;
+    for (int i = 0; i < component.inputs; i++)
+        if (slave->slopes[i] != 0.0) inputs[i] += slave->slopes[i] * dt;
+    slave->stale = 1;
 }
 
 static void keep_inputs(Slave *slave) {
@@ -129,10 +151,6 @@ static int outputs_are_finite(const Slave *slave, Text *wrong) {
 /* Compute the outputs from inputs and state, without moving the model. */
 static int refresh(Slave *slave, Text *wrong) {
     int64_t code;
-    if (slave->fresh) {
-        slave->fresh = 0;
-        return 1;
-    }
     int call = slave->mode == STEPPING ? SHOW : START;
     take_inputs(slave);
     if (call == START) keep_inputs(slave); /* until the first step the state follows them */
@@ -166,6 +184,7 @@ void slave_follow(Slave *slave, int final) {
 static int advance(Slave *slave, double time, double dt, Text *wrong) {
     int64_t code;
     take_inputs(slave);
+    if (slave->sloping) take_changing(slave, dt);
     Row after = component.in_place ? slave->state : slave->new_state;
     if (component.discretises && slave->discretised != dt) {
         int done = slave_call(slave, DISCRETISE, time, dt, after, slave->work, &code);
@@ -184,6 +203,23 @@ static int advance(Slave *slave, double time, double dt, Text *wrong) {
     return 1;
 }
 
+/* Whether all inputs are finite over a step; what is not is said. */
+static int step_is_finite(const Slave *slave, double dt, Text *wrong) {
+    for (int i = 0; i < component.inputs; i++) {
+        double value = slave->values[component.inputs_at + i], slope = slave->slopes[i];
+        double change = slope != 0.0 ? slope * dt : 0.0;
+        if (isfinite(value + change)) continue;
+        int of_slope = isfinite(value) && !isfinite(slope);
+        if (of_slope) text_add(wrong, "the derivative of ");
+        text_add(wrong, component.variables[component.inputs_at + i].name);
+        text_add(wrong, " = ");
+        text_repr(wrong, of_slope ? slope : value + change);
+        text_add(wrong, ".");
+        return 0;
+    }
+    return 1;
+}
+
 Status slave_step(Slave *slave, double time, double dt) {
     Text wrong;
     text_clear(&wrong);
@@ -199,18 +235,10 @@ Status slave_step(Slave *slave, double time, double dt) {
         text_add(&wrong, " s.");
         return slave_stop(slave, BAD_STEP, wrong.at);
     }
-    for (int i = component.inputs_at; i < component.inputs_at + component.inputs; i++) {
-        if (isfinite(slave->values[i])) continue;
-        text_add(&wrong, component.variables[i].name);
-        text_add(&wrong, " = ");
-        text_repr(&wrong, slave->values[i]);
-        text_add(&wrong, ".");
-        return slave_stop(slave, NOT_FINITE_INPUT, wrong.at);
-    }
+    if (!step_is_finite(slave, dt, &wrong)) return slave_stop(slave, NOT_FINITE_INPUT, wrong.at);
     hold_outputs(slave);
     double before = slave->time;
     slave->time = time + dt;
-    slave->fresh = 0;
     if (!advance(slave, time, dt, &wrong) || !outputs_are_finite(slave, &wrong)) {
         memcpy(slave->values + component.outputs_at, slave->held,
                (size_t)component.outputs * sizeof(double));
@@ -218,5 +246,6 @@ Status slave_step(Slave *slave, double time, double dt) {
         return slave_stop(slave, BAD_STATE, wrong.at);
     }
     slave->stale = 0;
+    if (slave->sloping) move_inputs(slave, dt);
     return DONE;
 }

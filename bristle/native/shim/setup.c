@@ -127,7 +127,6 @@ int slave_configure(Slave *slave, Text *wrong) {
     memcpy(slave->new_state.at, slave->state.at, (size_t)sizes[1] * sizeof(double));
     memcpy(slave->before.at, slave->values + component.inputs_at,
            (size_t)component.inputs * sizeof(double));
-    slave->fresh = 0;
     slave->discretised = 0.0;
     return 1;
 }

@@ -31,8 +31,9 @@ typedef struct Slave {
     double *values;       /* of all variables but Strings, by value reference */
     char **texts;         /* of Strings */
     unsigned char *given; /* whether the host has set it */
+    double *slopes;       /* of the inputs over the next steps, in their unit per second */
+    int sloping;          /* whether one of them is not 0 */
     int mode, stale, unbuilt;
-    int fresh; /* outputs are as the step has left them */
     double time;
     double discretised; /* length of the step that `store` is prepared for, 0: none */
     uint64_t warned[MOST_WARNINGS]; /* digests of the warnings that were said */
@@ -59,6 +60,7 @@ Status slave_get(Slave *slave, unsigned reference, int kind, double *value);
 Status slave_get_text(Slave *slave, unsigned reference, const char **value);
 Status slave_set(Slave *slave, unsigned reference, int kind, double value);
 Status slave_set_text(Slave *slave, unsigned reference, const char *value);
+Status slave_set_derivative(Slave *slave, unsigned reference, int order, double value);
 
 /* setup.c: from parameters to constants and the first state */
 int slave_configure(Slave *slave, Text *wrong); /* 0: `wrong` says why it cannot be */

@@ -1,8 +1,8 @@
 /* The whole state of an instance as bytes: little-endian, the same on every platform.
 
-   Behind a mark, the FMU's guid and a digest of the rest stand: mode and time, the values, what was
-   set and said, the texts; and, once the model is built, what its parameters imply, its state, the
-   inputs before and the outputs. */
+   Behind a mark, the FMU's guid and a digest of the rest stand: mode and time, the values and what
+   inputs change by, what was set and said, the texts; and, once the model is built, what its
+   parameters imply, its state, the inputs before and the outputs. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -80,6 +80,7 @@ static void put_all(const Slave *slave, Bytes *to) {
     put_whole(to, (uint64_t)slave->unbuilt);
     put_number(to, slave->time);
     for (int i = 0; i < component.count; i++) put_number(to, slave->values[i]);
+    for (int i = 0; i < component.inputs; i++) put_number(to, slave->slopes[i]);
     put_bytes(to, slave->given, (size_t)component.count);
     put_whole(to, (uint64_t)slave->warnings);
     for (int i = 0; i < slave->warnings; i++) put_whole(to, slave->warned[i]);
@@ -173,6 +174,11 @@ static int take_values(Slave *slave, Bytes *from) {
         if (component.variables[i].causality == PARAMETER && value != slave->values[i]) changes = 1;
         slave->values[i] = value;
     }
+    slave->sloping = 0;
+    for (int i = 0; i < component.inputs; i++) {
+        slave->slopes[i] = take_number(from);
+        slave->sloping |= slave->slopes[i] != 0.0;
+    }
     const unsigned char *given = take_bytes(from, (size_t)component.count);
     uint64_t warnings = take_whole(from);
     if (!given || warnings > MOST_WARNINGS) return -1;
@@ -190,7 +196,6 @@ Status slave_restore(Slave *slave, const State *state) {
     text_clear(&wrong);
     int changes = take_values(slave, &from);
     slave->stale = slave->unbuilt;
-    slave->fresh = 0;
     if (changes >= 0 && slave->unbuilt) return DONE;
     if (changes < 0) {
         text_add(&wrong, "it is damaged.");

@@ -99,3 +99,28 @@ Status slave_set_text(Slave *slave, unsigned reference, const char *value) {
     slave->stale = 1;
     return DONE;
 }
+
+static Status refuse_derivative(Slave *slave, const Variable *variable, const char *why) {
+    Text text;
+    text_clear(&text);
+    text_add(&text, slave->name);
+    text_add(&text, ": the derivative of ");
+    text_add(&text, variable->name);
+    text_add(&text, " cannot be set: ");
+    text_add(&text, why);
+    slave->say(slave, FAILED, text.at);
+    return FAILED;
+}
+
+/* Let an input change over the next steps, until another derivative is set, by `value` a second. */
+Status slave_set_derivative(Slave *slave, unsigned reference, int order, double value) {
+    if (!known(slave, reference, REAL)) return FAILED;
+    const Variable *v = &component.variables[reference];
+    if (v->causality != INPUT)
+        return refuse_derivative(slave, v, "it is no input.");
+    if (order != 1) return refuse_derivative(slave, v, "order 1 is right.");
+    slave->slopes[(int)reference - component.inputs_at] = value;
+    slave->sloping = 0;
+    for (int i = 0; i < component.inputs; i++) slave->sloping |= slave->slopes[i] != 0.0;
+    return DONE;
+}
