@@ -77,7 +77,7 @@ def chosen(numbers: Numbers, sliders: Mapping[str, Range] | None) -> list[Slider
         If one that is named cannot be, or moves what another one moves.
     """
     found: list[Slider] = []
-    for name, (low, high) in (sliders or dict.fromkeys(_offered(numbers.scenario), _ANY)).items():
+    for name, (low, high) in (sliders or dict.fromkeys(offered(numbers.scenario), _ANY)).items():
         try:
             one = numbers.slider(name, low, high)
             _check_apart(one, found)
@@ -99,7 +99,7 @@ def _check_apart(one: Slider, others: Sequence[Slider]) -> None:
             raise ScenarioError(f"{one.name} and {other.name} move the same: take one of them.")
 
 
-def _offered(scenario: Scenario) -> list[str]:
+def offered(scenario: Scenario) -> list[str]:
     """Return the numbers that a reader would move first: what is set, then the laws' own."""
     names = [name for component in scenario.components for name in _set(component)]
     for component in scenario.components:
