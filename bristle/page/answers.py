@@ -16,8 +16,8 @@ from typing import Any
 
 from ..errors import BristleError
 
-LONGEST = 180.0
-"""Seconds that an answer may take; compiling all laws for the first time takes most of a minute."""
+LONGEST = 600.0
+"""Seconds that an answer may take: a scenario's first run compiles all laws, a minute or more."""
 LARGEST = 1024**3
 """Memory [bytes] beyond which a worker is replaced after its answer."""
 KEPT = 64 * 1024**2

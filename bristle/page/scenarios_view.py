@@ -1,4 +1,4 @@
-"""View 7, Simulate: the scenarios that can be moved, stock ones and those that studies exported."""
+"""View 7, Simulate: the scenarios that can be moved, and the studies with a damper for them."""
 
 from __future__ import annotations
 
@@ -10,17 +10,15 @@ from ..scenario.scenario import stock_scenarios
 
 
 def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the scenarios by name, each with its first comment line.
+    """Return the stock scenarios by name, and the studies.
 
     Parameters
     ----------
     folder : that holds studies
     arguments : none are taken
     """
-    stock = [{"name": file.stem, "file": file.stem, "study": ""} for file in stock_scenarios()]
-    exported = [
-        {"name": file.stem, "file": file.relative_to(folder).as_posix(),
-         "study": file.relative_to(folder).parts[0]}
-        for file in sorted(folder.glob("*/export/*.toml"))
-    ]  # fmt: skip
-    return {"scenarios": [*exported, *stock]}
+    studies = [file.parent.name for file in sorted(folder.glob("*/study.toml"))]
+    return {
+        "scenarios": [file.stem for file in stock_scenarios()],
+        "studies": [name for name in studies if not name.startswith(".")],
+    }

@@ -44,7 +44,7 @@ export async function show(page) {
       h("li", { class: "card" }, h("h3", {}, "FMU and scenario"),
         h("p", {}, "The damper with the identified values, for any FMI tool, and a scenario that applies a measured motion to it."), fmu),
       h("li", { class: "card" }, h("h3", {}, "In a building"),
-        h("p", {}, "The damper with these values in a building under an earthquake."), h("a", { href: page.link("simulate") }, "Simulate"))),
+        h("p", {}, "The damper with these values in a building under an earthquake."), h("a", { href: page.link("simulate"), onclick: () => (page.damper = page.study) }, "Simulate it"))),
     trouble,
     h("div", { class: "files" }, groups.filter(([, own]) => own.length).map(([title, own]) => table(title, ["file", "size", "written", "download"], own.map((file) => {
       const button = h("button", { type: "button", class: "quiet", "aria-label": `Download ${file.name}` }, "Download");

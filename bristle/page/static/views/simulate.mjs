@@ -7,31 +7,38 @@ import { Plot, colour, extent } from "../plot.mjs";
 const FIRST = "el_centro_lugre_passive";
 
 export async function show(page) {
-  const { scenarios } = await packed("scenarios");
-  const own = scenarios.filter((one) => one.study === page.study && page.study);
-  const file = page.scenario ?? FIRST;
-  const select = h("select", { id: "scenario" }, scenarios.map((one) =>
-    h("option", { value: one.file, selected: one.file === file }, one.study ? `${one.study}: ${one.name}` : one.name)));
-  select.addEventListener("change", () => {
-    page.scenario = select.value;
-    page.again();
-  });
-  const whole = h("div", {}, h("p", { class: "loading", role: "status" }, "Running the scenario; the first time all laws are compiled, which takes a minute …"));
+  const { scenarios, studies } = await packed("scenarios");
+  const scenario = page.scenario ?? FIRST;
+  const study = page.damper ?? "";
+  const select = (id, options, chosen, then) => {
+    const made = h("select", { id }, options.map(([value, text]) => h("option", { value, selected: value === chosen }, text)));
+    made.addEventListener("change", () => {
+      then(made.value);
+      page.again();
+    });
+    return made;
+  };
+  const whole = h("div", {}, h("p", { class: "loading", role: "status" },
+    "Running the scenario; the first time all laws are compiled, which takes a minute …"));
   const head = [
     h("h1", {}, "Simulate"),
-    h("div", { class: "act" }, h("label", { class: "field", for: "scenario" }, "Scenario", select)),
+    h("div", { class: "act" },
+      h("label", { class: "field", for: "scenario" }, "Scenario",
+        select("scenario", scenarios.map((one) => [one, one]), scenario, (value) => (page.scenario = value))),
+      h("label", { class: "field", for: "damper" }, "Damper",
+        select("damper", [["", "the scenario's"], ...studies.map((one) => [one, `that of ${one}`])], study, (value) => (page.damper = value)))),
     whole,
   ];
-  postPacked("simulate", { scenario: file, values: {}, about: true }).then(
-    (first) => new Simulation(page, file, first, whole),
+  postPacked("simulate", { scenario, study, values: {}, about: true }).then(
+    (first) => new Simulation(page, { scenario, study }, first, whole),
     (error) => whole.replaceChildren(page.failure(error)),
   );
   return head;
 }
 
 class Simulation {
-  constructor(page, file, first, whole) {
-    Object.assign(this, { page, file, before: first, now: first, whole, sliders: first.sliders });
+  constructor(page, what, first, whole) {
+    Object.assign(this, { page, what, before: first, now: first, whole, sliders: first.sliders });
     this.values = {};
     this.names = first.outputs.map((one) => one.name);
     this.at = 0; // row that is shown of the building
@@ -119,7 +126,8 @@ class Simulation {
 
   slider(slider) {
     const shownValue = h("output", {});
-    const input = h("input", { type: "range", min: 0, max: 1000, step: "any" });
+    const id = `slider-${slider.name}`; // the label is the input's: an output could have it, too
+    const input = h("input", { id, type: "range", min: 0, max: 1000, step: "any" });
     const say = (value) => (shownValue.textContent = `${number(value, 4)} ${slider.unit === "1" ? "" : slider.unit}`);
     const put = (value) => {
       input.value = String((1000 * (value - slider.low)) / (slider.high - slider.low));
@@ -133,7 +141,7 @@ class Simulation {
       this.run();
     });
     slider.put = () => put(slider.value);
-    return h("label", { class: "slider" }, h("span", {}, slider.name), shownValue, h("small", {}, slider.text), input);
+    return h("label", { class: "slider", for: id }, h("span", {}, slider.name), shownValue, h("small", {}, slider.text), input);
   }
 
   back() {
@@ -151,7 +159,7 @@ class Simulation {
       this.wanted = false;
       const began = performance.now();
       try {
-        this.now = await postPacked("simulate", { scenario: this.file, values: this.values });
+        this.now = await postPacked("simulate", { ...this.what, values: this.values });
         this.finish();
         const took = performance.now() - began;
         this.took.textContent = `${this.now.time.length} rows in ${took.toFixed(0)} ms.`;
