@@ -64,6 +64,8 @@ class Page {
     if (study === "-" && this.view !== "simulate") this.view = "home";
     if (study !== "-" && !this.study) this.view = "home";
     this.listeners.clear();
+    this.editing = false;
+    this.ended = null;
     this.frame();
     const turn = ++this.turn;
     const target = part("view");
@@ -187,7 +189,7 @@ class Page {
       this.stampOf = this.study;
       this.stamp = state.stamp;
       this.showJobs();
-      if (ended || (moved && !busy)) await this.again();
+      if ((ended || (moved && !busy)) && !this.editing) await this.again();
       this.lost = false;
     } catch (error) {
       if (!this.lost) this.fail(error);
@@ -218,7 +220,7 @@ class Page {
         busy ? h("span", { class: "moving", "aria-hidden": "true" }) : null,
         word ? h("strong", { class: job.state === "failed" ? "level-error" : null }, word) : null,
         h("code", {}, job.command),
-        h("span", { class: "now" }, busy ? `${seconds(job.seconds)} ${job.now ? `· ${job.now}` : ""}` : this.after(job)),
+        h("span", { class: "now" }, busy ? `${seconds(job.seconds)} · ${job.now || "beginning"}` : this.after(job)),
         busy
           ? h("button", { type: "button", disabled: job.state === "cancelling", onclick: () => this.cancel(job) }, "Cancel")
           : h("button", { type: "button", class: "quiet", onclick: close }, "Close")),

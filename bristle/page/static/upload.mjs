@@ -14,6 +14,7 @@ export function uploader(page) {
 }
 
 function begin(page, whole) {
+  page.editing = false;
   const input = h("input", { type: "file", multiple: true, class: "unseen", id: "files", "aria-label": "Measurement files" });
   const choose = h("button", { type: "button", onclick: () => input.click() }, "Choose files");
   const drop = h("div", { class: "drop" },
@@ -63,10 +64,11 @@ function trouble(page, whole, text) {
 
 /** Returns the columns as they were guessed, each with menus to correct it. */
 function preview(page, whole, batch, building, found) {
-  const name = h("input", { type: "text", id: "new-name", value: "my_rig", maxlength: "60", pattern: "\\w[\\w .+-]*", required: true });
+  const name = h("input", { type: "text", id: "new-name", value: "my_rig", maxlength: "60", pattern: "\\w[\\w .+\\-]*", required: true });
   const rows = found.columns.map((column) => columnRow(column, found.known));
   const said = h("p", { role: "alert" });
   const make = h("button", { type: "submit", class: "main" }, "Make the study");
+  page.editing = true; // what is chosen here stays until it is made or left
   const form = h("form", { class: "act" },
     h("label", { class: "field" }, "Name of the study", name), make,
     h("button", { type: "button", onclick: () => begin(page, whole) }, "Other files"));
