@@ -27,7 +27,7 @@ ROOM = 512 * 1024**2
 """Bytes that must be free on the disk beside an upload."""
 _PIECE = 1024**2
 
-OF_STUDY = ("data", "fit", "errors", "verdict", "history")
+OF_STUDY = ("data", "check", "fit", "errors", "verdict", "history")
 """Views of a study."""
 
 

@@ -1,4 +1,4 @@
-"""View 1, Data: the runs as time traces, what the data check found, where the runs have been."""
+"""View 1, Data: the runs as time traces, their channels and roles, where they have been."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.checks.clipping import LONG, stretches
-from ..data.checks.finding import grouped, sentence
+from ..data.checks.clipping import stretches
 from ..data.checks.motion import velocity_of_run
 from ..data.measurement import Measurement
 from ..quantity import scale
-from ..study.data_check import DataCheck, Place, check_data, place_of_damper
+from ..study.data_check import Place, place_of_damper
 from ..study.reading import place_of_run
 from ..study.run_file import TEST
 from ..study.study import Study
@@ -29,7 +28,7 @@ DOTS = 4000
 
 
 def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what view 1 shows of a study.
+    """Return what view 1 shows of a study before anything is checked: `check_view` tells the rest.
 
     Parameters
     ----------
@@ -39,32 +38,23 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     Raises
     ------
     StudyError, RecordError
-        As `check_data`.
+        If the study or a file of it cannot be read.
     """
     study = Study(folder)
-    found = check_data(study)
-    place = place_of_damper(study, found.runs) if study.settings.has_building else Place()
+    runs = study.read()
+    place = place_of_damper(study, runs) if study.settings.has_building else Place()
     settings = study.settings
     return {
         "title": settings.title, "rig": settings.rig, "notes": settings.notes,
-        "channels": _channels(study, found.runs),
+        "channels": _channels(study, runs),
         "files": [
             {"name": run.name, "file": run.file, "role": run.role}
             for run in (*settings.runs, *settings.excluded)
         ],
         "runs": [
-            {**_run(run, found), "role": _role(study, run), "excitation": _excitation(run, place)}
-            for run in found.runs
+            {**_run(run), "role": _role(study, run), "excitation": _excitation(run, place)}
+            for run in runs
         ],
-        "findings": [
-            {
-                "kind": finding.kind, "level": finding.level, "channel": finding.channel,
-                "run": finding.run, "text": sentence(finding, runs), "do": finding.do,
-                "can_correct": bool(finding.corrections),
-            }
-            for finding, runs in grouped(found.findings)
-        ],
-        "ok": found.ok,
     }  # fmt: skip
 
 
@@ -96,33 +86,19 @@ def _role(study: Study, run: Measurement) -> str:
     return roles[0] if roles else TEST
 
 
-def _run(run: Measurement, found: DataCheck) -> dict[str, Any]:
-    clipped = {
-        one.channel for one in found.findings if one.kind == "clipping" and one.run == run.name
-    }
+def _run(run: Measurement) -> dict[str, Any]:
     rows = thinned(run.time, run.channels)
-    cut = [name for name in run.channels if name in clipped]
     return {
         "name": run.name, "seconds": run.duration, "rate": run.sampling.rate,
         "samples": len(run.time), "time": run.time[rows],
         "channels": {name: values[rows] for name, values in run.channels.items()},
-        "gaps": _spans(run.time, ~run.measured),
-        "clipped": {name: _spans(run.time, at_extreme(run[name])) for name in cut},
+        "gaps": spans(run.time, ~run.measured),
     }  # fmt: skip
 
 
-def _spans(time: Array, flags: NDArray[np.bool_]) -> list[list[float]]:
+def spans(time: Array, flags: NDArray[np.bool_]) -> list[list[float]]:
     """Return the first and last time [s] of each stretch of samples that are flagged."""
     return [[float(time[a]), float(time[b - 1])] for a, b in stretches(flags)]
-
-
-def at_extreme(values: Array) -> NDArray[np.bool_]:
-    """Return the samples (n,) in stretches of equal ones at an extreme, of a clipped channel."""
-    flags = np.zeros(len(values), dtype=np.bool_)
-    for extreme in (values.max(), values.min()):
-        for a, b in stretches(values == extreme):
-            flags[a:b] |= b - a >= LONG
-    return flags
 
 
 def thinned(time: Array, channels: Mapping[str, Array], points: int = POINTS) -> NDArray[np.int64]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import threading
 import traceback
 from collections.abc import Callable, Mapping
 from importlib import import_module
@@ -19,6 +20,7 @@ from typing import Any, BinaryIO
 from ..errors import BristleError, TrustError
 
 VIEWS = {
+    "check": "check_view",
     "columns": "columns_view",
     "data": "data_view",
     "errors": "errors_view",
@@ -30,8 +32,8 @@ VIEWS = {
 }
 """Modules with `answer(folder, arguments)`, which returns what `packing.pack` takes."""
 
-AHEAD = ("data_view", "errors_view", "fit_view", "history_view", "verdict_view")
-"""Modules that are imported before anybody asks."""
+AHEAD = ("check_view", "fit_view", "errors_view", "verdict_view", "history_view")
+"""Modules that are imported behind the first answer, before anybody asks for them."""
 
 Answered = tuple[dict[str, Any], bytes]
 
@@ -67,15 +69,21 @@ def answer(view: str, folder: Path, arguments: Mapping[str, Any]) -> Answered:
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:
     """Answer requests until there are no more."""
-    for name in AHEAD:
-        import_module(f"{__package__}.{name}")
-    for line in requests:
+    import_module(f"{__package__}.data_view")
+    for number, line in enumerate(requests):
         asked = json.loads(line)
         head, body = answer(asked["view"], Path(asked["folder"]), asked["arguments"])
         head |= {"bytes": len(body), "memory": memory()}
         answers.write(json.dumps(head).encode() + b"\n")
         answers.write(body)
         answers.flush()
+        if number == 0:
+            threading.Thread(target=_import_ahead, daemon=True).start()
+
+
+def _import_ahead() -> None:
+    for name in AHEAD:
+        import_module(f"{__package__}.{name}")
 
 
 def memory() -> int:

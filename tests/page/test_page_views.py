@@ -12,6 +12,7 @@ import bristle
 from bristle.data.model_value import Value
 from bristle.errors import ScenarioError, StudyError
 from bristle.page import (
+    check_view,
     columns_view,
     data_view,
     errors_view,
@@ -43,7 +44,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_view_of_the_worker_is_a_module_that_answers(home: Path) -> None:
-    for view in ("data", "fit", "errors", "history", "verdict"):
+    for view in ("data", "check", "fit", "errors", "history", "verdict"):
         told, body = answer(view, home / "rig", {})
         assert told["ok"], told
         assert unpack(body)
@@ -58,16 +59,19 @@ def test_what_is_wrong_is_told_in_the_words_of_the_commands(home: Path) -> None:
 
 def test_view_1_has_the_runs_and_findings_of_the_data_check(home: Path) -> None:
     shown, found = data_view.answer(home / "rig", {}), check_data(Study(home / "rig"))
-    assert [run["name"] for run in shown["runs"]] == [run.name for run in found.runs]
-    assert shown["ok"] == found.ok
-    clipping = [one for one in found.findings if one.kind == "clipping"]
-    assert {one.run for one in clipping} == {"cut"}
-    cut = next(run for run in shown["runs"] if run["name"] == "cut")
-    for begin, end in cut["clipped"]["force"]:
-        run = next(one for one in found.runs if one.name == "cut")
+    assert {run["name"] for run in shown["runs"]} == {run.name for run in found.runs}
+    check = check_view.answer(home / "rig", {})
+    assert check["ok"] == found.ok
+    assert {one["text"] for one in check["findings"]} >= {
+        f"{one.run}: {one.text}" for one in found.findings if one.kind == "clipping"
+    }
+    (cut,) = check["clipped"]
+    assert (cut["run"], cut["channel"]) == ("cut", "force")
+    run = next(one for one in found.runs if one.name == "cut")
+    for begin, end in cut["spans"]:
         inside = (run.time >= begin) & (run.time <= end)
         assert np.all(np.abs(run["force"][inside]) == np.abs(run["force"]).max())
-    assert cut["clipped"]["force"]
+    assert cut["spans"]
 
 
 def test_a_thinned_trace_keeps_every_extreme() -> None:

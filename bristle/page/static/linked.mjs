@@ -87,21 +87,26 @@ export class Linked {
     const [fv, uv] = shown("m/s");
     const force = `${found.quantity} [${found.unit}]`;
     const own = () => this.runs[this.run];
+    const shade = (p) => this.part && p.band(this.part[0], this.part[1], "shade", 0.75);
     this.time = new Plot("", "force over time, measured and predicted", (p) => {
       const run = own();
-      p.axes([run.time[0], run.time.at(-1)], extent([run.measured, run.predicted]), null, force);
-      if (this.part) p.band(this.part[0], this.part[1], "shade");
-      p.line(run.time, run.measured, "mark", { width: 1.6 });
-      p.line(run.time, run.predicted, "blue", { width: 1.1 });
+      p.cached(`time ${this.run}`, () => {
+        p.axes([run.time[0], run.time.at(-1)], extent([run.measured, run.predicted]), null, force);
+        p.trace(run.time, run.measured, "mark", { width: 1.6 });
+        p.trace(run.time, run.predicted, "blue", { width: 1.1 });
+      });
+      shade(p);
     });
     this.error = new Plot("middle", "error over time, with twice the expected noise", (p) => {
       const run = own();
-      const error = run.measured.map((value, k) => (run.known && !run.known[k] ? 0 : value - run.predicted[k]));
-      const size = Math.max(...extent([error]).map(Math.abs), 2 * run.noise);
-      p.axes([run.time[0], run.time.at(-1)], [-size, size], "time [s]", `error [${found.unit}]`);
-      if (this.part) p.band(this.part[0], this.part[1], "shade");
-      p.between(run.time, (k) => -2 * run.sigma[k], (k) => 2 * run.sigma[k], "floor");
-      p.line(run.time, error, "red", { width: 0.9 });
+      const error = this.errorOf(this.run);
+      p.cached(`error ${this.run}`, () => {
+        const size = Math.max(...extent([error]).map(Math.abs), 2 * run.noise);
+        p.axes([run.time[0], run.time.at(-1)], [-size, size], "time [s]", `error [${found.unit}]`);
+        p.between(run.time, (k) => -2 * run.sigma[k], (k) => 2 * run.sigma[k], "floor");
+        p.trace(run.time, error, "red", { width: 0.9 });
+      });
+      shade(p);
       const begin = this.starts[this.run];
       if (this.chosen && !this.part) {
         p.dots(run.time, error, "ink", { size: 2.4, chosen: (k) => this.chosen[begin + k] });
@@ -109,13 +114,19 @@ export class Linked {
     });
     this.plots = [this.time, this.error];
     const loop = (values, factor, name, unit) => new Plot("high", `force over ${name}, measured and predicted`, (p) => {
-      p.axes(extent([values], 0.04, factor), extent([this.measured], 0.04), `${name} [${unit}]`, force);
+      const axes = () => p.axes(extent([values], 0.04, factor), extent([this.measured], 0.04), `${name} [${unit}]`, force);
       if (!this.chosen) {
-        p.dots(values, this.measured, "mark", { fx: factor, size: 1.5 });
-        p.dots(values, this.predicted, "blue", { fx: factor, size: 1.1 });
+        p.cached("all", () => {
+          axes();
+          p.dots(values, this.measured, "mark", { fx: factor, size: 1.5 });
+          p.dots(values, this.predicted, "blue", { fx: factor, size: 1.1 });
+        });
         return;
       }
-      p.dots(values, this.measured, "pale", { fx: factor, size: 1.2 });
+      p.cached("behind", () => {
+        axes();
+        p.dots(values, this.measured, "pale", { fx: factor, size: 1.2 });
+      });
       const chosen = (k) => this.chosen[k];
       p.dots(values, this.measured, "ink", { fx: factor, size: 2.2, chosen });
       p.dots(values, this.predicted, "blue", { fx: factor, size: 1.8, chosen });
@@ -136,6 +147,13 @@ export class Linked {
       brush(this.map, (part) => this.chooseCells(part, fx, fv), { both: true });
       this.plots.push(this.map);
     }
+  }
+
+  /** Returns the error of a run, 0 where nothing was measured. */
+  errorOf(number) {
+    const run = this.runs[number];
+    run.error ??= run.measured.map((value, k) => (run.known && !run.known[k] ? 0 : value - run.predicted[k]));
+    return run.error;
   }
 
   drawMap(p, fx, fv, ux, uv) {

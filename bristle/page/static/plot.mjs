@@ -186,6 +186,54 @@ export class Plot {
     });
   }
 
+  /** Draws a line over time: of each column of the screen what is lowest and highest. */
+  trace(x, y, name, { fx = 1, fy = 1, ...how } = {}) {
+    const wide = Math.max(1, this.box[2] - this.box[0]);
+    if (x.length < 4 * wide) {
+      this.line(x, y, name, { fx, fy, ...how });
+      return;
+    }
+    const [thinX, thinY] = [[], []];
+    const per = x.length / wide;
+    for (let column = 0; column < wide; column++) {
+      const [from, to] = [Math.floor(column * per), Math.floor((column + 1) * per)];
+      let [low, high] = [from, from];
+      for (let k = from + 1; k < to; k++) {
+        if (y[k] < y[low]) low = k;
+        else if (y[k] > y[high]) high = k;
+      }
+      for (const k of [from, Math.min(low, high), Math.max(low, high)]) {
+        thinX.push(x[k]);
+        thinY.push(y[k]);
+      }
+    }
+    this.line(thinX, thinY, name, { fx, fy, ...how });
+  }
+
+  /** Draws what stays the same as long as size and theme do: once, and from then on as it was. */
+  cached(name, act) {
+    const { width, height } = this.canvas;
+    const own = `${width} ${height} ${document.documentElement.dataset.theme}`;
+    if (this.layersOf !== own) this.layers = new Map();
+    this.layersOf = own;
+    if (!this.layers.has(name)) {
+      const layer = new OffscreenCanvas(width, height);
+      const shown = this.c;
+      this.c = layer.getContext("2d");
+      this.c.setTransform(shown.getTransform());
+      this.c.font = shown.font;
+      act();
+      this.c = shown;
+      this.layers.set(name, { layer, axes: [this.x0, this.x1, this.y0, this.y1, this.box] });
+    }
+    const kept = this.layers.get(name);
+    [this.x0, this.x1, this.y0, this.y1, this.box] = kept.axes;
+    this.c.save();
+    this.c.setTransform(1, 0, 0, 1, 0, 0);
+    this.c.drawImage(kept.layer, 0, 0);
+    this.c.restore();
+  }
+
   scales(fx, fy) {
     const sx = (this.box[2] - this.box[0]) / (this.x1 - this.x0);
     const sy = (this.box[3] - this.box[1]) / (this.y1 - this.y0);

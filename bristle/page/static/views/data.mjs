@@ -16,23 +16,47 @@ export async function show(page) {
   page.same(`bristle study check ${page.study}`);
   const names = data.channels.map((one) => one.name);
   const state = { run: data.runs[0]?.name };
-  const errors = data.findings.filter((one) => one.level === "error").length;
-  const next = page.link("fit");
+  const lead = h("p", { class: "lead", role: "status" }, `${runsOf(data)}. Checking the data …`);
+  const found = h("div", {}, h("p", { class: "loading" }, "Checking the data …"));
+  const drawn = traces(data, names, state);
+  packed(page.path("check")).then(
+    (check) => {
+      const errors = check.findings.filter((one) => one.level === "error").length;
+      lead.textContent = check.ok
+        ? `${runsOf(data)}, nothing that must be corrected first.`
+        : `${errors} error${errors === 1 ? "" : "s"} in the data. Correct them before you fit a model.`;
+      found.replaceChildren(findings(page, check));
+      mark(data, check);
+      drawn.again();
+    },
+    (error) => {
+      lead.textContent = `${runsOf(data)}.`;
+      found.replaceChildren(page.failure(error));
+    },
+  );
   return [
     h("h1", {}, data.title),
     data.notes ? h("p", { class: "soft pre" }, data.notes) : null,
-    h("p", { class: "lead" }, data.ok
-      ? `${data.runs.length} run${data.runs.length === 1 ? "" : "s"}, nothing that must be corrected first.`
-      : `${errors} error${errors === 1 ? "" : "s"} in the data. Correct them before you fit a model.`),
-    h("div", { class: "act" }, h("a", { href: next }, "Next: fit the model")),
-    traces(data, names, state),
+    lead,
+    h("div", { class: "act" }, h("a", { href: page.link("fit") }, "Next: fit the model")),
+    drawn.node,
     h("h2", {}, "What the check found"),
-    findings(page, data),
+    found,
     h("h2", {}, "What the runs are for"),
     roles(page, data),
     excitation(data),
     channels(data),
   ];
+}
+
+const runsOf = (data) => `${data.runs.length} run${data.runs.length === 1 ? "" : "s"}`;
+
+/** Puts what is cut off beside the traces; a run that is split in time has the name of its file. */
+function mark(data, check) {
+  for (const { run, channel, spans } of check.clipped) {
+    const one = data.runs.find((other) => run === other.name || run.startsWith(`${other.name} (`) || run.startsWith(`${other.name}, `));
+    if (one) ((one.clipped ??= {})[channel] ??= []).push(...spans);
+  }
 }
 
 function traces(data, names, state) {
@@ -46,19 +70,26 @@ function traces(data, names, state) {
     p.axes([one.time[0], one.time[one.time.length - 1]], extent([values], 0.06, channel.factor),
       channel === kinds.at(-1) ? "time [s]" : null, "");
     for (const [a, b] of one.gaps) p.band(a, b, "line");
-    for (const [a, b] of one.clipped[channel.name] ?? []) p.band(a, b, "shade");
+    for (const [a, b] of one.clipped?.[channel.name] ?? []) p.band(a, b, "shade");
     p.line(one.time, values, "blue", { fy: channel.factor, width: 1 });
   }));
   select.addEventListener("change", () => {
     state.run = select.value;
     plots.forEach((plot) => plot.later());
   });
-  const marked = data.runs.some((one) => one.gaps.length || Object.keys(one.clipped).length);
-  return h("section", { "aria-label": "Traces" },
+  const keys = h("div", {});
+  const again = () => {
+    const marked = data.runs.some((one) => one.gaps.length || one.clipped);
+    keys.replaceChildren(...(marked ? [key(["shade", "cut off at the end of its range", true], ["line", "not measured", true])] : []));
+    plots.forEach((plot) => plot.later());
+  };
+  again();
+  const node = h("section", { "aria-label": "Traces" },
     h("div", { class: "act" }, h("label", { class: "field", for: "run" }, "Run", select)),
     plots.map((plot, k) => h("figure", {}, h("h3", { class: "small" },
       kinds[k].name.replaceAll("_", " "), unitText(kinds[k].unit)), plot.canvas)),
-    marked ? key(["shade", "cut off at the end of its range", true], ["line", "not measured", true]) : null);
+    keys);
+  return { node, again };
 }
 
 function findings(page, data) {

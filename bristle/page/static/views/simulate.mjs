@@ -84,8 +84,8 @@ class Simulation {
       const [a, b] = [this.before, this.now].map((run) => ({ t: run.time, one: this.output(run, this.shown[id]) }));
       const [factor, unit] = shown(b.one.unit);
       p.axes([b.t[0], b.t.at(-1)], extent([a.one.values, b.one.values], 0.05, factor), "time [s]", unit);
-      p.line(a.t, a.one.values, "mark", { fy: factor, width: 1 });
-      p.line(b.t, b.one.values, "blue", { fy: factor, width: 1.1 });
+      if (this.before !== this.now) p.trace(a.t, a.one.values, "mark", { fy: factor, width: 1 });
+      p.trace(b.t, b.one.values, "blue", { fy: factor, width: 1.1 });
       p.band(b.t[this.at], b.t[this.at], "red");
     });
     const loop = this.plot("high", "one output over another, before and now", (p) => {
@@ -93,7 +93,7 @@ class Simulation {
       const [[ax, ay], [bx, by]] = [pick(this.before), pick(this.now)];
       const [[fx, ux], [fy, uy]] = [shown(bx.unit), shown(by.unit)];
       p.axes(extent([ax.values, bx.values], 0.05, fx), extent([ay.values, by.values], 0.05, fy), `${this.shown.across}${unitText(ux)}`, uy);
-      p.line(ax.values, ay.values, "mark", { fx, fy, width: 0.9 });
+      if (this.before !== this.now) p.line(ax.values, ay.values, "mark", { fx, fy, width: 0.9 });
       p.line(bx.values, by.values, "blue", { fx, fy, width: 1 });
     });
     const levels = this.levels();
