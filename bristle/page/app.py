@@ -83,9 +83,9 @@ class App:
         self.answers.start()
 
     def close(self) -> None:
-        """Interrupt the commands that are at work, and end the worker."""
-        self.jobs.close()
+        """End the worker, and interrupt the commands that are at work."""
         self.answers.close()
+        self.jobs.close()
 
     def route(self, method: str, path: str) -> tuple[Handler, tuple[str, ...]]:
         """Return what answers a request, and what its path names.

@@ -50,7 +50,7 @@ class Client:
         }  # fmt: skip
         known |= {name.replace("_", "-"): value for name, value in headers.items()}
         data = body if isinstance(body, bytes) or body is None else json.dumps(body).encode()
-        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=120.0)
+        connection = http.client.HTTPConnection("127.0.0.1", port, timeout=600.0)
         try:
             connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
             for name, value in known.items():

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import http.client
 import json
+import re
+import shutil
+import signal
 import socket
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -231,6 +237,34 @@ def test_the_server_ends_its_commands_when_it_ends(home: Path) -> None:
         number = own.post("/api/jobs", order).json["number"]
         process = own.server.app.jobs.get(number).process
     assert process.poll() is not None
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C of another process is POSIX")
+def test_ctrl_c_ends_the_page_and_its_worker(home: Path) -> None:
+    order = [sys.executable, "-m", "bristle.cli", "page", str(home), "--no-browser"]
+    process = subprocess.Popen(order, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    address = process.stdout.readline().strip()
+    host, token = re.fullmatch(r"http://(127\.0\.0\.1:\d+)/#token=(\S+)", address).groups()  # type: ignore[union-attr]
+    line = http.client.HTTPConnection(host, timeout=20.0)
+    line.request("GET", "/api/home", headers={"Authorization": f"Bearer {token}"})
+    assert line.getresponse().status == 200
+    line.close()
+    process.send_signal(signal.SIGINT)
+    _, told = process.communicate(timeout=20.0)
+    assert (process.returncode, told) == (0, "")
+
+
+@pytest.mark.slow
+def test_a_file_of_200_mb_is_read_in_another_process(client: Client, home: Path) -> None:
+    rows = "".join(f"{np.sin(0.01 * k):.6f},{np.cos(0.01 * k):.6f}\n" for k in range(20_000))
+    body = b"x [mm],F [N]\n" + rows.encode() * (200 * 1024**2 // len(rows))
+    assert client.ask("PUT", "/api/uploads/large/large.csv", body).status == 201
+    assert (home / "uploads" / "large" / "large.csv").stat().st_size == len(body)
+    found = unpack(client.get("/api/uploads/large/columns").body)
+    assert [one["channel"] for one in found["columns"]] == ["displacement", "force"]
+    assert max(len(one["values"]) for one in found["columns"]) < 5000
+    shutil.rmtree(home / "uploads" / "large")
 
 
 def test_roles_are_written_by_a_command(client: Client, home: Path) -> None:

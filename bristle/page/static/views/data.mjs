@@ -11,6 +11,9 @@ const ROLES = [
   ["exclude", "Left out", "nothing reads them"],
 ];
 
+const FIRST = ["ground_acceleration", "displacement", "velocity", "voltage", "current", "force"];
+const SHOWN = 6; // channels that are drawn at once
+
 export async function show(page) {
   const data = await packed(page.path("data"));
   page.same(`bristle study check ${page.study}`);
@@ -62,13 +65,14 @@ function mark(data, check) {
 function traces(data, names, state) {
   const run = () => data.runs.find((one) => one.name === state.run);
   const select = h("select", { id: "run" }, data.runs.map((one) => h("option", { value: one.name }, one.name)));
-  const kinds = data.channels.slice(0, 8);
+  const rank = (name) => FIRST.findIndex((end) => name.endsWith(end));
+  const kinds = data.channels.map((one) => [rank(one.name), one]).sort(([a], [b]) => (a < 0 ? 9 : a) - (b < 0 ? 9 : b)).map(([, one]) => one);
   const plots = kinds.map((channel) => new Plot("low", `${channel.name} over time`, (p) => {
     const one = run();
     const values = one.channels[channel.name];
     if (!values) return;
     p.axes([one.time[0], one.time[one.time.length - 1]], extent([values], 0.06, channel.factor),
-      channel === kinds.at(-1) ? "time [s]" : null, "");
+      channel === kinds[Math.min(SHOWN, kinds.length) - 1] || channel === kinds.at(-1) ? "time [s]" : null, "");
     for (const [a, b] of one.gaps) p.band(a, b, "line");
     for (const [a, b] of one.clipped?.[channel.name] ?? []) p.band(a, b, "shade");
     p.line(one.time, values, "blue", { fy: channel.factor, width: 1 });
@@ -77,6 +81,8 @@ function traces(data, names, state) {
     state.run = select.value;
     plots.forEach((plot) => plot.later());
   });
+  const drawn = plots.map((plot, k) => h("figure", {}, h("h3", { class: "small" },
+    kinds[k].name.replaceAll("_", " "), unitText(kinds[k].unit)), plot.canvas));
   const keys = h("div", {});
   const again = () => {
     const marked = data.runs.some((one) => one.gaps.length || one.clipped);
@@ -86,8 +92,8 @@ function traces(data, names, state) {
   again();
   const node = h("section", { "aria-label": "Traces" },
     h("div", { class: "act" }, h("label", { class: "field", for: "run" }, "Run", select)),
-    plots.map((plot, k) => h("figure", {}, h("h3", { class: "small" },
-      kinds[k].name.replaceAll("_", " "), unitText(kinds[k].unit)), plot.canvas)),
+    drawn.slice(0, SHOWN),
+    drawn.length > SHOWN ? h("details", {}, h("summary", {}, `${drawn.length - SHOWN} more channels`), drawn.slice(SHOWN)) : null,
     keys);
   return { node, again };
 }
@@ -97,13 +103,15 @@ function findings(page, data) {
   const rows = data.findings.filter((one) => one.kind !== "noise" || one.level !== "note");
   const word = { error: "Error", warning: "Warning", note: "Note" };
   const correct = h("button", { type: "button", onclick: () => page.run("check", { correct: true }) }, "Correct what can be corrected");
-  page.onJobs(() => (correct.disabled = Boolean(page.working())));
+  const spikes = data.findings.some((one) => one.kind === "spikes");
+  const mask = h("button", { type: "button", onclick: () => page.run("check", { mask: true }) }, "Mask isolated spikes");
+  page.onJobs(() => (correct.disabled = mask.disabled = Boolean(page.working())));
   if (!rows.length) return h("p", { class: "soft" }, "Nothing.");
   return h("div", {},
     h("ul", { class: "findings" }, rows.map((one) => h("li", {},
       h("span", { class: `level-${one.level}` }, `${word[one.level]}: `), one.text,
       one.do ? h("div", { class: "soft" }, one.do) : null))),
-    can ? h("div", { class: "act" }, correct) : null);
+    can || spikes ? h("div", { class: "act" }, can ? correct : null, spikes ? mask : null) : null);
 }
 
 /** The roles of runs: dragged between columns, or chosen from a menu. */
