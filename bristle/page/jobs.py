@@ -30,6 +30,8 @@ KEPT_LINES = 500
 KEPT_JOBS = 50
 LONGEST_ANSWER = 32 * 1024**2
 """Bytes of a command's output that are kept."""
+AGAIN = 3.0
+"""Seconds after Ctrl-C until it is sent again: one that comes amid an import may be lost."""
 PATIENCE = 10.0
 """Seconds after Ctrl-C until a command that does not end is ended."""
 ENDED = {0: "done", INTERRUPTED: "cancelled", -signal.SIGINT: "cancelled"}
@@ -179,8 +181,10 @@ class Jobs:
         job.process.stderr.close()
         with self._lock:
             job.output, job.ended = output, time.monotonic()
-            # A command that ended before Ctrl-C reached it has done its work.
-            job.state = ENDED.get(code, "failed")
+            # A command that ended before Ctrl-C reached it has done its work; one that it reached
+            # while Python was still starting may end with any code.
+            asked = job.state == "cancelling" and code != 0
+            job.state = "cancelled" if asked else ENDED.get(code, "failed")
             if job.state == "failed":
                 job.error = "\n".join(wrong) or f"the process ended with code {code}."
 
@@ -214,7 +218,12 @@ def _interrupt(process: subprocess.Popen[bytes]) -> None:
 
 
 def _insist(process: subprocess.Popen[bytes]) -> None:
-    """End a process that Ctrl-C did not end."""
+    """Send Ctrl-C again to a process that lost the first one, and end one that does not end."""
+    try:
+        process.wait(AGAIN)
+        return
+    except subprocess.TimeoutExpired:
+        _interrupt(process)
     try:
         process.wait(PATIENCE)
     except subprocess.TimeoutExpired:

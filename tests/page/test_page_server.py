@@ -231,6 +231,15 @@ def test_one_command_of_a_study_at_a_time_and_cancel_leaves_the_study_as_it_was(
     assert not (home / "rig" / "verdict.json").exists()
 
 
+@pytest.mark.parametrize("after", [0.0, 0.2, 0.5])
+def test_a_command_is_cancelled_while_it_is_starting(client: Client, after: float) -> None:
+    order = {"what": "diagnose", "study": "rig", "options": {"law": "all"}}
+    number = client.post("/api/jobs", order).json["number"]
+    time.sleep(after)
+    client.post(f"/api/jobs/{number}/cancel", {})
+    assert client.ended(number, 30.0)["state"] == "cancelled"
+
+
 def test_the_server_ends_its_commands_when_it_ends(home: Path) -> None:
     with page_on(home, start=False) as own:
         order = {"what": "diagnose", "study": "rig", "options": {"law": "all"}}

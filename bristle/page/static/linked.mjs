@@ -87,15 +87,14 @@ export class Linked {
     const [fv, uv] = shown("m/s");
     const force = `${found.quantity} [${found.unit}]`;
     const own = () => this.runs[this.run];
-    const shade = (p) => this.part && p.band(this.part[0], this.part[1], "shade", 0.75);
+    const shade = (p) => () => this.part && p.band(this.part[0], this.part[1], "shade");
     this.time = new Plot("", "force over time, measured and predicted", (p) => {
       const run = own();
       p.cached(`time ${this.run}`, () => {
         p.axes([run.time[0], run.time.at(-1)], extent([run.measured, run.predicted]), null, force);
         p.trace(run.time, run.measured, "mark", { width: 1.6 });
         p.trace(run.time, run.predicted, "blue", { width: 1.1 });
-      });
-      shade(p);
+      }, shade(p));
     });
     this.error = new Plot("middle", "error over time, with twice the expected noise", (p) => {
       const run = own();
@@ -105,8 +104,7 @@ export class Linked {
         p.axes([run.time[0], run.time.at(-1)], [-size, size], "time [s]", `error [${found.unit}]`);
         p.between(run.time, (k) => -2 * run.sigma[k], (k) => 2 * run.sigma[k], "floor");
         p.trace(run.time, error, "red", { width: 0.9 });
-      });
-      shade(p);
+      }, shade(p));
       const begin = this.starts[this.run];
       if (this.chosen && !this.part) {
         p.dots(run.time, error, "ink", { size: 2.4, chosen: (k) => this.chosen[begin + k] });

@@ -148,6 +148,7 @@ class Page {
       this.look();
       return job;
     } catch (error) {
+      this.row = "";
       part("job").hidden = false;
       part("job").replaceChildren(h("div", { class: "row", role: "alert" }, error.message));
       return null;
@@ -203,7 +204,11 @@ class Page {
     const job = this.working() ?? own.findLast((one) => AT_WORK.includes(one.state)) ?? own.at(-1);
     const wanted = job && job.state !== "done" && job.number !== this.dismissed;
     part("job").hidden = !wanted;
-    if (wanted) part("job").replaceChildren(...this.jobRow(job));
+    // A row is made anew for another state alone: a button that is replaced loses the click on it.
+    const row = wanted ? `${job.number} ${job.state}` : "";
+    if (row && row !== this.row) part("job").replaceChildren(...this.jobRow(job));
+    else if (row) part("job").querySelector(".now").textContent = this.nowOf(job);
+    this.row = row;
     this.showCommands(own);
     for (const listener of this.listeners) listener();
   }
@@ -220,7 +225,7 @@ class Page {
         busy ? h("span", { class: "moving", "aria-hidden": "true" }) : null,
         word ? h("strong", { class: job.state === "failed" ? "level-error" : null }, word) : null,
         h("code", {}, job.command),
-        h("span", { class: "now" }, busy ? `${seconds(job.seconds)} · ${job.now || "beginning"}` : this.after(job)),
+        h("span", { class: "now" }, this.nowOf(job)),
         busy
           ? h("button", { type: "button", disabled: job.state === "cancelling", onclick: () => this.cancel(job) }, "Cancel")
           : h("button", { type: "button", class: "quiet", onclick: close }, "Close")),
@@ -228,7 +233,9 @@ class Page {
     ].filter(Boolean);
   }
 
-  after(job) {
+  /** Returns what a job is at, or how it ended. */
+  nowOf(job) {
+    if (AT_WORK.includes(job.state)) return `${seconds(job.seconds)} · ${job.now || "beginning"}`;
     if (job.state === "cancelled") return "What was finished before is in the study.";
     return `after ${seconds(job.seconds)}`;
   }
@@ -241,6 +248,9 @@ class Page {
   showCommands(own) {
     part("did").hidden = !own.length && !this.also?.length;
     const word = { running: "at work", cancelling: "at work" };
+    const lines = JSON.stringify([this.also, own.map((job) => [job.command, job.state])]);
+    if (lines === this.commandsShown) return;
+    this.commandsShown = lines;
     part("commands").replaceChildren(
       h("p", { class: "soft small" }, `In ${this.home?.folder ?? ""}`),
       ...(this.also ?? []).map((text) => commandLine(text)),

@@ -210,8 +210,11 @@ export class Plot {
     this.line(thinX, thinY, name, { fx, fy, ...how });
   }
 
-  /** Draws what stays the same as long as size and theme do: once, and from then on as it was. */
-  cached(name, act) {
+  /**
+   * Draws what stays the same as long as size and theme do: once, and from then on as it was.
+   * `behind` is drawn before it, each time.
+   */
+  cached(name, act, behind = null) {
     const { width, height } = this.canvas;
     const own = `${width} ${height} ${document.documentElement.dataset.theme}`;
     if (this.layersOf !== own) this.layers = new Map();
@@ -228,6 +231,7 @@ export class Plot {
     }
     const kept = this.layers.get(name);
     [this.x0, this.x1, this.y0, this.y1, this.box] = kept.axes;
+    behind?.();
     this.c.save();
     this.c.setTransform(1, 0, 0, 1, 0, 0);
     this.c.drawImage(kept.layer, 0, 0);

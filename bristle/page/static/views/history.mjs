@@ -117,7 +117,7 @@ function compare(page, found) {
   draw();
   return h("section", {},
     h("h2", {}, "Two steps side by side"),
-    h("ol", { class: "timeline" }, steps.map((step, k) => h("li", { class: k === steps.length - 1 ? "present" : null },
+    h("ol", { class: "timeline", tabindex: "0", "aria-label": "the steps of the history" }, steps.map((step, k) => h("li", { class: k === steps.length - 1 ? "present" : null },
       h("b", {}, step.what), h("span", { class: "soft small" }, step.z === null ? "not judged" : `z = ${z(step.z)}`),
       h("span", { class: "soft small why" }, step.why)))),
     h("div", { class: "act" }, labelA, labelB, back, on),
