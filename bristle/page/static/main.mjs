@@ -148,9 +148,8 @@ class Page {
       this.look();
       return job;
     } catch (error) {
-      this.row = "";
-      part("job").hidden = false;
-      part("job").replaceChildren(h("div", { class: "row", role: "alert" }, error.message));
+      this.refused = error.message;
+      this.showJobs();
       return null;
     }
   }
@@ -206,11 +205,26 @@ class Page {
     part("job").hidden = !wanted;
     // A row is made anew for another state alone: a button that is replaced loses the click on it.
     const row = wanted ? `${job.number} ${job.state}` : "";
-    if (row && row !== this.row) part("job").replaceChildren(...this.jobRow(job));
+    if (this.refused) this.showRefused();
+    else if (row && row !== this.row) part("job").replaceChildren(...this.jobRow(job));
     else if (row) part("job").querySelector(".now").textContent = this.nowOf(job);
-    this.row = row;
+    this.row = this.refused || row;
     this.showCommands(own);
     for (const listener of this.listeners) listener();
+  }
+
+  /** Shows why a command was not started, until its user closes it. */
+  showRefused() {
+    const close = () => {
+      this.refused = "";
+      this.showJobs();
+    };
+    if (this.row !== this.refused) {
+      part("job").replaceChildren(h("div", { class: "row", role: "alert" },
+        h("strong", { class: "level-error" }, "Not started"), h("span", { class: "why" }, this.refused),
+        h("button", { type: "button", class: "quiet", onclick: close }, "Close")));
+    }
+    part("job").hidden = false;
   }
 
   jobRow(job) {
