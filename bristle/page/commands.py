@@ -137,7 +137,7 @@ def _new(study: str, options: Options) -> list[str]:
         if not isinstance(step, int | float) or not step > 0.0:
             raise RequestError(f"step: {written(step)}; seconds above 0 are right.")
         words.append(f"--step={step:g}")
-    return [*words, "--json"]
+    return words
 
 
 def _building(options: Options, folder: str) -> list[str]:

@@ -28,7 +28,7 @@ from bristle.page.app import App
 from bristle.page.commands import order_of
 from bristle.page.message import RequestError
 from bristle.page.packing import pack, unpack
-from bristle.study import create_study
+from bristle.study import Study, create_study
 
 
 @pytest.fixture(scope="module")
@@ -144,9 +144,7 @@ def test_files_are_dropped_looked_at_and_made_a_study(client: Client, home: Path
     job = client.run("new", "dropped", batch="b1", channels=["force=-F [N]@N"])
     assert job["state"] == "done", job
     assert job["command"].startswith("bristle study new dropped --data uploads/b1")
-    signs = {one["channel"]: one["sign"] for one in job["answer"]["channels"]}
-    assert signs["force"] == -1
-    assert (home / "dropped" / "study.toml").is_file()
+    assert Study(home / "dropped").settings.channels["force"].sign == -1
 
 
 @pytest.mark.parametrize(

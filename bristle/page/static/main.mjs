@@ -150,6 +150,7 @@ class Page {
     } catch (error) {
       this.refused = error.message;
       this.showJobs();
+      this.look(); // another page may have started what is in the way
       return null;
     }
   }
