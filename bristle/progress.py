@@ -31,6 +31,10 @@ _AGAIN = 30.0
 _SOON = 3.0
 """Seconds, left or spent, below which none are told."""
 
+LINES = "BRISTLE_PROGRESS"
+"""The environment variable by which a program that starts a command asks for every text as a line
+of its own, at once: `lines`."""
+
 _teller: ContextVar[Callable[[str], None] | None] = ContextVar("teller", default=None)
 
 
@@ -51,6 +55,11 @@ def telling(teller: Callable[[str], None] | None) -> Iterator[None]:
         _teller.reset(before)
 
 
+def wants_lines() -> bool:
+    """Return whether a program reads what is told, and wants all of it."""
+    return os.environ.get(LINES) == "lines"
+
+
 class Line:
     """Shows texts on stderr: overwritten on a terminal; in a pipe only after some silence.
 
@@ -59,7 +68,8 @@ class Line:
     """
 
     def __init__(self) -> None:
-        self._live = sys.stderr.isatty()
+        self._every = wants_lines()
+        self._live = sys.stderr.isatty() and not self._every
         self._stdout = sys.stdout
         self._process = os.getpid()
         self._lock = threading.Lock()
@@ -120,7 +130,8 @@ class Line:
                 self._shown = text
             return
         same = self._text == self._shown
-        if now - self._last >= (_AGAIN if same else _PLAIN_AFTER):
+        due = now - self._last >= (_AGAIN if same else _PLAIN_AFTER)
+        if due or (self._every and not same):
             text = f"{self._text}, {spent} s" if same else self._text
             print(f"{text} ...", file=sys.stderr, flush=True)
             self._shown, self._last = self._text, now

@@ -34,6 +34,14 @@ def digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
+def readable(text: str) -> str:
+    """Return a text in which nothing hides: what moves a cursor or turns writing is spelled."""
+    return "".join(
+        one if one in "\n\t" or one.isprintable() else one.encode("unicode_escape").decode()
+        for one in text
+    )
+
+
 def is_trusted(text: str) -> bool:
     """Return whether this user consented to a text before, or to all in this process."""
     return os.environ.get(VARIABLE) == "1" or _consent(text).is_file()

@@ -34,7 +34,9 @@ SIMULATE = (
     {"batch", "web"},
 )
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
-ROOF = ({"study"}, {"bridge"}, {"plan"}, {"example"}, {"report"}, {"paper"}, {"cli"})
+ROOF = (
+    {"study"}, {"bridge"}, {"plan"}, {"example"}, {"report"}, {"paper"}, {"page"}, {"cli"},
+)  # fmt: skip
 STOREYS: tuple[tuple[tuple[set[str], ...], ...], ...] = ((BASE,), (SIMULATE, MEASURE), (ROOF,))
 PLAIN = ("physics", "control", "component", "units", "errors")
 """What imports the standard library alone."""

@@ -80,6 +80,16 @@ def test_what_takes_long_is_told_though_nothing_more_is_said(
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-terminal is needed")
+def test_a_program_that_asks_for_lines_gets_every_text_at_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(progress.LINES, "lines")
+    with Line() as line, telling(line.say):
+        for text in ("reading", "fitting", "fitting", "judging"):
+            tell(text)
+    assert capsys.readouterr().err.splitlines() == ["reading ...", "fitting ...", "judging ..."]
+
+
 def test_a_terminal_has_one_line_that_is_gone_before_the_answer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -12,7 +12,6 @@ from study.made import write_runs
 
 from bristle import trust
 from bristle.cli import main
-from bristle.cli._consent import plain
 from bristle.cli._effect_template import template
 from bristle.cli._law_template import template as law_template
 from bristle.errors import PhysicsError, StudyError, TrustError
@@ -358,8 +357,8 @@ def test_a_text_in_another_coding_is_refused(tmp_path: Path) -> None:
 
 
 def test_nothing_hides_in_what_is_shown() -> None:
-    assert plain("a\tb\n") == "a\tb\n"
-    assert plain("x = 1\x1b[2K\rgood \u202e\u200b") == r"x = 1\x1b[2K\rgood \u202e\u200b"
+    assert trust.readable("a\tb\n") == "a\tb\n"
+    assert trust.readable("x = 1\x1b[2K\rgood \u202e\u200b") == r"x = 1\x1b[2K\rgood \u202e\u200b"
 
 
 def test_without_the_gate_nothing_runs(tmp_path: Path) -> None:

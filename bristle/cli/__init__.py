@@ -102,9 +102,9 @@ def _run(arguments: argparse.Namespace) -> int:
 @contextmanager
 def _progress(arguments: argparse.Namespace) -> Iterator[None]:
     """Tell on stderr what is being done, unless nobody wants to know."""
-    from ..progress import Line, telling
+    from ..progress import Line, telling, wants_lines
 
-    if arguments.quiet or getattr(arguments, "json", False):
+    if arguments.quiet or (getattr(arguments, "json", False) and not wants_lines()):
         yield
         return
     with Line() as line, telling(line.say):

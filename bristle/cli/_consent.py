@@ -22,10 +22,10 @@ def given(error: TrustError) -> bool:
     """
     if not error.text or not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False
-    from ..trust import remember
+    from ..trust import readable, remember
 
     print(f"{error.path} has not run on this machine before:\n", file=sys.stderr)
-    for line in plain(error.text).splitlines():
+    for line in readable(error.text).splitlines():
         print(f"    {line}", file=sys.stderr)
     print("\nIt runs with your rights. Run it, and remember that? [y/N] ", end="", file=sys.stderr)
     sys.stderr.flush()
@@ -33,11 +33,3 @@ def given(error: TrustError) -> bool:
         return False
     remember(Path(error.path), error.text)
     return True
-
-
-def plain(text: str) -> str:
-    """Return a text in which nothing hides: what moves the cursor or turns writing is spelled."""
-    return "".join(
-        one if one in "\n\t" or one.isprintable() else one.encode("unicode_escape").decode()
-        for one in text
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..findings import command
 from ..physics.drive import DRIVES
@@ -89,16 +89,21 @@ def main(arguments: argparse.Namespace) -> int:
     picture = None
     if not arguments.dry_run:
         picture = study.write_report("identify.png", identify_png(found))
+        study.write_report("identify.json", _as_json(found.as_dict()) + "\n")
     if arguments.json:
-        import json
-
-        answer = {**found.as_dict(), "picture": str(picture.absolute()) if picture else None}
-        print(json.dumps(answer, indent=2, ensure_ascii=False))
+        place = str(picture.absolute()) if picture else None
+        print(_as_json({**found.as_dict(), "picture": place}))
         return 0
     print(text(found, arguments.folder))
     if picture:
         print(f"Picture: {picture}")
     return 0
+
+
+def _as_json(answer: dict[str, Any]) -> str:
+    import json
+
+    return json.dumps(answer, indent=2, ensure_ascii=False)
 
 
 def text(found: Identified, folder: Path) -> str:

@@ -11,13 +11,13 @@ from ._common import add_common_to_actions
 from ._consent import add_trust
 from ._extend import add_extend
 from ._files import add_run_facts, channels_of, files_of, test_files
+from ._roles import add_roles
 
 if TYPE_CHECKING:
     from ..study.create import Created
     from ..study.data_check import DataCheck
 
-HELP = "studies of measurements: new, extend, check, auto"
-
+HELP = "studies of measurements: new, extend, check, roles, auto"
 _OLD = "first-look"
 
 
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_new(commands.add_parser("new", help="make a study's folder from measurement files"))
     add_extend(commands.add_parser("extend", help="add measured runs to a study"))
     _add_check(commands.add_parser("check", help="check the data, before any model"))
+    add_roles(commands.add_parser("roles", help="show or change what the runs are for"))
     # The name until 0.1; here for one release.
     _add_check(commands.add_parser(_OLD, description="The old name of `study check`."))
     auto = commands.add_parser(

@@ -21,7 +21,8 @@ from .reading import read_runs
 from .roles import roles_added
 from .run_facts import RunChoices, facts_of
 from .run_file import EXCLUDE, RunFile
-from .settings import read_settings, with_runs
+from .settings import read_settings
+from .settings_text import with_runs
 from .study import Study
 
 EARLIER = "verdict_before_runs.json"

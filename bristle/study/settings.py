@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 from ..data.channels import DRIVE, ChannelSpec, at_device
-from ..data.corrections import Correction
 from ..data.files import Toml, write_whole
 from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
@@ -21,7 +19,6 @@ from .run_file import (
     EXCLUDE,
     RunFile,
     check_levels,
-    corrections_as_toml,
     read_runs,
     run_as_toml,
 )
@@ -225,71 +222,3 @@ def write_settings(path: Path, settings: Settings) -> None:
         if listed:
             document.add(key, channels)
     write_whole(path, tomlkit.dumps(document))
-
-
-def with_mask(text: str) -> str:
-    """Return the text of a study.toml with `mask = true`, all else as it was."""
-    import tomlkit
-
-    document = tomlkit.parse(text)
-    if "mask" in document:
-        document["mask"] = True
-        return tomlkit.dumps(document)
-    # Above the first key or below the schema: further down a line may be part of a longer text.
-    lines = text.split("\n")
-    keys = (k for k, line in enumerate(lines) if line.strip() and line.lstrip()[0] != "#")
-    first = next(keys, len(lines))
-    first += "".join(lines[first : first + 1]).startswith("schema")
-    line = "mask = true # isolated spikes count as not measured"
-    return "\n".join([*lines[:first], line, *lines[first:]])
-
-
-def with_excluded(text: str, files: Sequence[tuple[str, int]]) -> str:
-    """Return the text of a study.toml with runs left out from now on, all else as it was.
-
-    Parameters
-    ----------
-    text : of the file
-    files : file and piece of each run, its piece 0 where the file holds one
-    """
-    import tomlkit
-
-    document: Any = tomlkit.parse(text)
-    for table in document["runs"]:
-        if (table["file"], table.get("piece", 0)) in files:
-            before = table.get("role", "train")
-            table["role"] = EXCLUDE
-            table["role"].comment(f"was {before}")
-    return tomlkit.dumps(document)
-
-
-def with_runs(text: str, runs: Sequence[RunFile]) -> str:
-    """Return the text of a study.toml with more runs after its own, all else as it was."""
-    import tomlkit
-
-    document: Any = tomlkit.parse(text)
-    for run in runs:
-        table = run_as_toml(run)
-        table.add(tomlkit.nl())
-        document["runs"].append(table)
-    return tomlkit.dumps(document)
-
-
-def with_corrections(text: str, found: Mapping[tuple[str, int], Sequence[Correction]]) -> str:
-    """Return the text of a study.toml with more corrections of runs, all else as it was.
-
-    Parameters
-    ----------
-    text : of the file
-    found : corrections by file and piece of the run, its piece 0 where the file holds one
-    """
-    import tomlkit
-
-    document: Any = tomlkit.parse(text)
-    for table in document["runs"]:
-        corrections = found.get((table["file"], table.get("piece", 0)))
-        if corrections is None:
-            continue
-        known = [Correction(**one) for one in table.unwrap().get("correct", [])]
-        table["correct"] = corrections_as_toml([*known, *corrections])
-    return tomlkit.dumps(document)

@@ -27,14 +27,16 @@ from .added_runs import added_text
 from .history import History, Step
 from .new import make_folder
 from .reading import place_of_run, read_runs
+from .role_changes import roles_by_place
 from .run_file import ROLES, TEST
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
-from .settings import Settings, read_settings, with_corrections, with_excluded, with_mask
+from .settings import Settings, read_settings
+from .settings_text import with_corrections, with_excluded, with_mask, with_roles
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-OF_MODEL = ("identify.png", "compare.png", "report.html")
+OF_MODEL = ("identify.png", "identify.json", "compare.png", "report.html")
 """Reports that show a model: they are set aside when another becomes the present one."""
 
 PATIENCE = 10.0
@@ -335,6 +337,21 @@ class Study:
             path = self.folder / "study.toml"
             raise StudyError(f"{path}: these are all runs; some for training are needed.")
         return self._with_settings(lambda text: with_excluded(text, places))
+
+    def with_roles(self, roles: Mapping[str, str]) -> Study:
+        """Write what runs are for into study.toml, and return the study as it is then.
+
+        Parameters
+        ----------
+        roles : role by the name or the file of a run: "train", "holdout", "test" or "exclude"
+
+        Raises
+        ------
+        StudyError
+            If there is no such run or role, or no run for training would be left.
+        """
+        places = roles_by_place(self.folder / "study.toml", self.settings, roles)
+        return self._with_settings(lambda text: with_roles(text, places))
 
     def _with_settings(self, change: Callable[[str], str]) -> Study:
         """Write study.toml with its text changed, and return the study as it is then."""

@@ -88,7 +88,7 @@ def export_web(
 
 
 def chosen(
-    numbers: Numbers, sliders: Mapping[str, Range] | None, offered: Sequence[str] = ()
+    numbers: Numbers, sliders: Mapping[str, Range] | None, among: Sequence[str] = ()
 ) -> list[Slider]:
     """Return the sliders that are named, else those of the numbers offered, or of the scenario's.
 
@@ -98,7 +98,7 @@ def chosen(
         If one that is named cannot be, or moves what another one moves.
     """
     found: list[Slider] = []
-    names = offered or _offered(numbers.scenario)
+    names = among or offered(numbers.scenario)
     for name, (low, high) in (sliders or dict.fromkeys(names, _ANY)).items():
         try:
             one = numbers.slider(name, low, high)
@@ -121,7 +121,7 @@ def _check_apart(one: Slider, others: Sequence[Slider]) -> None:
             raise ScenarioError(f"{one.name} and {other.name} move the same: take one of them.")
 
 
-def _offered(scenario: Scenario) -> list[str]:
+def offered(scenario: Scenario) -> list[str]:
     """Return the numbers that a reader would move first: what is set, then the laws' own."""
     names = [name for component in scenario.components for name in _set(component)]
     for component in scenario.components:

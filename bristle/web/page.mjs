@@ -140,6 +140,8 @@ class Page {
       const shown = document.createElement("output");
       const input = document.createElement("input");
       input.type = "range";
+      input.id = `slider-${slider.name}`;
+      row.htmlFor = input.id; // else the label would be that of the output
       input.min = "0";
       input.max = "1000";
       input.step = "any";

@@ -154,7 +154,11 @@ def test_the_step_holds_the_errors_before_and_after_and_can_be_undone(tmp_path, 
     model = Study(study.folder).model()
     assert model.parameters["f_c"].origin == "identified"
     assert model.parameters["f_c"].std is not None
-    assert (study.folder / "reports" / "identify.png").stat().st_size > 10_000
+    reports = study.folder / "reports"
+    assert (reports / "identify.png").stat().st_size > 10_000
+    answer = json.loads((reports / "identify.json").read_text())
+    assert answer["step"] == step.number
+    assert {row["law"] for row in answer["table"]} >= {"bingham", "lugre"}
     Study(study.folder).undo()
     assert Study(study.folder).model().parameters["f_c"].std is None
 

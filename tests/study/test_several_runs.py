@@ -17,7 +17,7 @@ from bristle.errors import RecordError, StudyError
 from bristle.study.create import create_study
 from bristle.study.data_check import check_data
 from bristle.study.run_facts import RunChoices
-from bristle.study.settings import with_mask
+from bristle.study.settings_text import with_mask
 from bristle.study.study import Study
 
 

@@ -1,0 +1,264 @@
+"""What the page's server does: each route is a function from a request to an answer."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import tomllib
+from collections.abc import Iterator
+from contextlib import suppress
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from ..errors import BristleError, StudyError
+from .answers import Answers, stamp
+from .commands import COMMANDS, UPLOADS, batch_name, file_name, order_of
+from .consent import consent, waiting_texts
+from .files import files_of, is_given, kind_of
+from .jobs import Jobs
+from .message import PACKED, Answer, Handler, Request, RequestError, as_json
+
+LARGEST_UPLOAD = 256 * 1024**2
+"""Bytes of a file that may be dropped: as much as the reader of measurements takes."""
+ROOM = 512 * 1024**2
+"""Bytes that must be free on the disk beside an upload."""
+_PIECE = 1024**2
+
+OF_STUDY = ("data", "check", "fit", "errors", "verdict", "history")
+"""Views of a study."""
+
+
+class App:
+    """The page on a folder that holds studies.
+
+    Parameters
+    ----------
+    folder : path
+        The folder of a study, or one that holds studies.
+
+    Attributes
+    ----------
+    home : path
+        The folder that holds studies.
+    first : str
+        The study that the page opens, "" where it shows them all.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        folder = folder.resolve()
+        if not folder.is_dir():
+            raise StudyError(
+                f"{folder}: there is no such folder. Name a study, or a folder for studies."
+            )
+        is_study = (folder / "study.toml").is_file()
+        self.home = folder.parent if is_study else folder
+        self.first = folder.name if is_study else ""
+        self.jobs = Jobs(self.home)
+        self.answers = Answers()
+        self._routes: list[tuple[str, re.Pattern[str], Handler]] = [
+            (method, re.compile(pattern), handler)
+            for method, pattern, handler in (
+                ("GET", "/api/home", self._home),
+                ("GET", "/api/state", self._state),
+                ("GET", rf"/api/studies/([^/]+)/({'|'.join(OF_STUDY)})", self._view),
+                ("GET", "/api/studies/([^/]+)/files", self._files),
+                ("GET", "/api/studies/([^/]+)/file", self._file),
+                ("GET", "/api/studies/([^/]+)/consent", self._waiting),
+                ("POST", "/api/studies/([^/]+)/consent", self._consent),
+                ("PUT", "/api/uploads/([^/]+)/(building/)?([^/]+)", self._upload),
+                ("GET", "/api/uploads/([^/]+)/columns", self._columns),
+                ("POST", "/api/jobs", self._start),
+                ("GET", "/api/jobs/([0-9]+)", self._job),
+                ("POST", "/api/jobs/([0-9]+)/cancel", self._cancel),
+                ("GET", "/api/scenarios", self._scenarios),
+                ("POST", "/api/simulate", self._simulate),
+            )
+        ]
+
+    def start(self) -> None:
+        """Start what takes time before anybody asks."""
+        self.answers.start()
+
+    def close(self) -> None:
+        """End the worker, and interrupt the commands that are at work."""
+        self.answers.close()
+        self.jobs.close()
+
+    def route(self, method: str, path: str) -> tuple[Handler, tuple[str, ...]]:
+        """Return what answers a request, and what its path names.
+
+        Raises
+        ------
+        RequestError
+            If there is nothing at that path, or not for that method.
+        """
+        there = [(m, found, h) for m, p, h in self._routes if (found := p.fullmatch(path))]
+        for own, found, handler in there:
+            if own == method:
+                return handler, tuple(part or "" for part in found.groups())
+        if there:
+            raise RequestError(f"{path}: {method} is not for this.", HTTPStatus.METHOD_NOT_ALLOWED)
+        raise RequestError(f"{path}: there is no such page.", HTTPStatus.NOT_FOUND)
+
+    def study(self, name: str) -> Path:
+        """Return the folder of a study; RequestError if there is none of that name."""
+        folder = self.home / file_name(name, "the study")
+        if not (folder / "study.toml").is_file():
+            raise RequestError(f"{name}: there is no such study.", HTTPStatus.NOT_FOUND)
+        return folder
+
+    def _home(self, request: Request) -> Answer:
+        studies = [_about(folder) for folder in sorted(self.home.iterdir()) if _is_study(folder)]
+        return as_json(
+            {
+                "version": __version__, "folder": str(self.home), "first": self.first,
+                "studies": studies, "commands": sorted(COMMANDS),
+                "jobs": [job.as_dict() for job in self.jobs.all()],
+            }
+        )  # fmt: skip
+
+    def _state(self, request: Request) -> Answer:
+        name = request.query.get("study", "")
+        known = bool(name) and _is_study(self.home / file_name(name, "the study"))
+        since = _whole(request.query.get("since", "0"))
+        jobs = [job.as_dict(since if job.at_work else 0) for job in self.jobs.all()]
+        return as_json({"jobs": jobs, "stamp": stamp(self.home / name) if known else ""})
+
+    def _view(self, request: Request) -> Answer:
+        name, view = request.parts
+        arguments = {key: request.query[key] for key in ("role",) if key in request.query}
+        return Answer(self.answers.get(view, self.study(name), arguments), PACKED)
+
+    def _files(self, request: Request) -> Answer:
+        return as_json({"files": files_of(self.study(request.parts[0]))})
+
+    def _file(self, request: Request) -> Answer:
+        folder = self.study(request.parts[0])
+        name = request.query.get("name", "")
+        if not is_given(folder, name):
+            raise RequestError(f"{name}: there is no such file.", HTTPStatus.NOT_FOUND)
+        path = folder / name
+        headers = {"Content-Disposition": "attachment"}
+        return Answer(_pieces(path), kind_of(path), length=path.stat().st_size, headers=headers)
+
+    def _waiting(self, request: Request) -> Answer:
+        return as_json({"texts": waiting_texts(self.study(request.parts[0]))})
+
+    def _consent(self, request: Request) -> Answer:
+        asked = request.json()
+        consent(self.study(request.parts[0]), asked.get("file"), asked.get("digest"))
+        return as_json({"ok": True})
+
+    def _upload(self, request: Request) -> Answer:
+        batch, below, name = request.parts
+        if request.length > LARGEST_UPLOAD:
+            raise RequestError(
+                f"{name}: {request.length / 1024**2:.0f} MB; a measurement may have "
+                f"{LARGEST_UPLOAD // 1024**2} MB. Cut it, or sample it more coarsely.",
+                HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+            )
+        if request.length == 0:
+            raise RequestError(f"{name}: the file is empty.")
+        folder = self.home / UPLOADS / batch_name(batch) / below
+        path = folder / file_name(name, "the file")
+        if shutil.disk_usage(self.home).free < request.length + ROOM:
+            raise RequestError(
+                f"{name}: the disk has no room for it.", HTTPStatus.INSUFFICIENT_STORAGE
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        _receive(request, path)
+        return as_json({"name": path.name, "bytes": request.length}, HTTPStatus.CREATED)
+
+    def _columns(self, request: Request) -> Answer:
+        folder = self.home / UPLOADS / batch_name(request.parts[0])
+        if not folder.is_dir():
+            raise RequestError("these files are no longer there; drop them again.")
+        arguments = {"building": request.query.get("building", "")}
+        return Answer(self.answers.get("columns", folder, arguments, keep=False), PACKED)
+
+    def _start(self, request: Request) -> Answer:
+        asked = request.json()
+        options = asked.get("options", {})
+        if not isinstance(options, dict):
+            raise RequestError("options: an object is right.")
+        order = order_of(asked.get("what"), asked.get("study"), options)
+        if order.what not in ("new", "example"):
+            self.study(order.study)
+        return as_json(self.jobs.start(order).as_dict(), HTTPStatus.CREATED)
+
+    def _job(self, request: Request) -> Answer:
+        job = self.jobs.get(int(request.parts[0]))
+        told = job.as_dict(_whole(request.query.get("since", "0")))
+        return as_json({**told, "answer": None if job.at_work else job.answer()})
+
+    def _cancel(self, request: Request) -> Answer:
+        return as_json(self.jobs.cancel(int(request.parts[0])).as_dict())
+
+    def _scenarios(self, request: Request) -> Answer:
+        return Answer(self.answers.get("scenarios", self.home, {}, keep=False), PACKED)
+
+    def _simulate(self, request: Request) -> Answer:
+        return Answer(self.answers.get("simulate", self.home, request.json(), keep=False), PACKED)
+
+
+def _is_study(folder: Path) -> bool:
+    return (folder / "study.toml").is_file() and not folder.name.startswith(".")
+
+
+def _about(folder: Path) -> dict[str, Any]:
+    """Return what the first screen tells of a study, without reading its measurements."""
+    about: dict[str, Any] = {"name": folder.name, "title": folder.name, "error": ""}
+    try:
+        with (folder / "study.toml").open("rb") as file:
+            settings = tomllib.load(file)
+        runs = [run for run in settings.get("runs", []) if isinstance(run, dict)]
+        about |= {
+            "title": str(settings.get("title", folder.name)),
+            "rig": str(settings.get("rig", "bench")), "runs": len(runs),
+            "held_out": sum(run.get("role") == "holdout" for run in runs),
+        }  # fmt: skip
+    except (OSError, ValueError) as error:
+        about["error"] = f"study.toml cannot be read: {error}"
+    with suppress(OSError, ValueError):
+        verdict = json.loads((folder / "verdict.json").read_text(encoding="utf-8"))
+        about |= {"verdict": str(verdict["kind"]), "effects": list(verdict.get("effects", []))}
+    return about
+
+
+def _receive(request: Request, path: Path) -> None:
+    """Write the body of a request into a file, whole or not at all."""
+    draft = path.with_name(f".{path.name}.part")
+    left = request.length
+    try:
+        with draft.open("wb") as file:
+            while left:
+                piece = request.body.read(min(left, _PIECE))
+                if not piece:
+                    raise RequestError(f"{path.name}: the upload broke off. Drop it again.")
+                file.write(piece)
+                left -= len(piece)
+        draft.replace(path)
+    except OSError as error:
+        raise RequestError(f"{path.name}: cannot be kept ({error.strerror or error}).") from None
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def _pieces(path: Path) -> Iterator[bytes]:
+    with path.open("rb") as file:
+        while piece := file.read(_PIECE):
+            yield piece
+
+
+def _whole(text: str) -> int:
+    return int(text) if text.isascii() and text.isdigit() and len(text) < 10 else 0
+
+
+def error_of(error: BristleError) -> tuple[HTTPStatus, dict[str, Any]]:
+    """Return how an error is told to a page: status, and what JSON holds."""
+    status = getattr(error, "status", HTTPStatus.UNPROCESSABLE_ENTITY)
+    told = getattr(error, "told", {"error": str(error), "kind": type(error).__name__})
+    return status, told

@@ -1,0 +1,95 @@
+"""Files before they are a study: their columns as traces, and which channel each is guessed to be.
+
+It is what `bristle study new` would read, without making anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..data.channels import channel_unit
+from ..data.guess import guess_channels, left_out
+from ..data.read import files_in, read_table
+from ..data.table import Table
+from ..errors import BristleError, RecordError
+from ..physics.building import read_building, with_damper
+from .data_view import thinned
+
+SHOWN = 24
+"""Columns that are drawn of a file."""
+
+
+def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what is read of dropped files.
+
+    Parameters
+    ----------
+    folder : of the files
+    arguments : `building` the name of a building's file among them, "" on a bench
+
+    Raises
+    ------
+    RecordError, PhysicsError
+        If no file can be read, or the building cannot.
+    """
+    files = files_in(folder)
+    levels: list[str] | None = None
+    devices: list[str] = []
+    if name := str(arguments.get("building", "")):
+        house = with_damper(read_building(folder / "building" / Path(name).name), "")
+        levels, devices = house.levels(), [one.name for one in house.devices]
+    tables: list[Table] = []
+    read: list[dict[str, Any]] = []
+    for file in files:
+        try:
+            table = read_table(file)
+        except BristleError as error:
+            read.append({"name": file.name, "rows": 0, "error": _plainly(str(error), folder)})
+            continue
+        tables.append(table)
+        read.append({"name": file.name, "rows": table.rows, "error": ""})
+    if not tables:
+        raise RecordError(read[0]["error"])
+    first = tables[0]
+    rig = "structure" if levels else "bench"
+    guesses = guess_channels(first, rig, levels, devices)
+    chosen = {guess.column: guess for guess in guesses}
+    numeric = {
+        column.text: np.asarray(first.values[column.text], dtype=float)
+        for column in first.columns if column.text in first.values
+    }  # fmt: skip
+    rows = thinned(np.arange(first.rows, dtype=float), dict(list(numeric.items())[:SHOWN]))
+    return {
+        "files": read, "first": Path(first.source).name, "rig": rig,
+        "columns": [
+            {
+                "text": column.text, "unit": column.unit.name if column.unit else "",
+                "values": numeric[column.text][rows] if column.text in numeric else None,
+                "channel": guess.channel if (guess := chosen.get(column.text)) else "",
+                "guessed_unit": guess.unit if guess else "", "sign": guess.sign if guess else 1,
+                "reason": guess.reason if guess else "", "doubt": guess.doubt if guess else "",
+            }
+            for column in first.columns
+        ],
+        "unused": left_out(first, guesses), "known": _known(levels or [], devices),
+    }  # fmt: skip
+
+
+def _plainly(text: str, folder: Path) -> str:
+    """Return a message without the folder that dropped files are kept in."""
+    return text.replace(f"{folder}/", "")
+
+
+def _known(levels: list[str], devices: list[str]) -> list[dict[str, str]]:
+    """Return the channels that a column may be: name and SI unit."""
+    names = ["time", "displacement", "velocity", "acceleration", "force", "voltage", "current"]
+    if levels:
+        own = [f"{level}_{what}" for level in levels for what in
+               ("displacement", "velocity", "acceleration_absolute")]  # fmt: skip
+        of_devices = [f"{one}_{what}" for one in devices for what in ("force", "voltage")]
+        names = ["time", "ground_acceleration", *own, "force", "voltage", "current", *of_devices]
+    return [{"name": name, "unit": channel_unit(name)} for name in names]

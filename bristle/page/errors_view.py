@@ -1,0 +1,89 @@
+"""View 3, Where it fails: every sample of the compared runs, for views that are linked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..compare.comparison import Comparison
+from ..compare.coordinates import shown
+from ..compare.names import name_of, site_name
+from ..compare.patterns import ResidualPattern
+from ..compare.prediction import RunPrediction
+from ..errors import StudyError
+from ..study.comparison import compare_study
+from ..study.run_file import ROLES, TEST
+from ..study.study import Study
+
+MOST = 250_000
+"""Samples of all runs that are sent; of more every second, third ... is."""
+PATTERNS = 5
+
+
+def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what view 3 shows of a study.
+
+    Parameters
+    ----------
+    folder : of the study
+    arguments : `role` "holdout" or "train"; test runs are opened by a command alone
+
+    Raises
+    ------
+    StudyError, RecordError, TrustError
+        As `compare_study`.
+    """
+    role = arguments.get("role", "holdout")
+    if role == TEST or role not in ROLES:
+        raise StudyError(f'role "{role}"; "holdout" or "train" is right.')
+    study = Study(folder)
+    found = compare_study(study, role=role)
+    samples = sum(len(one.measured) for one in found.predictions)
+    every = -(-samples // MOST)
+    return {
+        "role": role, "sentences": list(found.sentences), "z": found.z,
+        "interval": list(found.z_interval), "right": found.right, "quantity": found.quantity,
+        "unit": found.unit, "site": site_name(found.site) if found.site else "",
+        "every": every, "drive": found.drive.name, "drive_unit": found.drive.unit,
+        "runs": [_run(one, found, every) for one in found.predictions],
+        "patterns": [_pattern(one, found) for one in found.patterns[:PATTERNS]],
+        "spectrum": {
+            "frequency": found.spectrum.frequency, "residual": found.spectrum.residual,
+            "noise": found.spectrum.noise,
+        },
+        "sites": [
+            {"name": site_name(one.site), "z": one.z, "fails": one.fails} for one in found.sites
+        ],
+    }  # fmt: skip
+
+
+def _run(one: RunPrediction, found: Comparison, every: int) -> dict[str, Any]:
+    """Return a run's samples in SI: measured, predicted, the noise expected, and the motion."""
+    error = next(run for run in found.runs if run.name == one.name)
+    part = slice(one.skip, None, every)
+    coordinates = {
+        name: one.coordinates[name][part]
+        for name in ("displacement", "velocity", one.drive)
+        if name in one.coordinates
+    }
+    known = one.known[part] if one.known is not None else None
+    return {
+        "name": one.name, "z": error.z, "rms": error.rms, "noise": error.noise,
+        "dt": one.dt * every, "time": one.time[part], "measured": one.measured[part],
+        "predicted": one.predicted[part], "sigma": one.sigma[part],
+        "normalised": one.normalised[::every],
+        "known": None if known is None else known.astype(float), **coordinates,
+    }  # fmt: skip
+
+
+def _pattern(one: ResidualPattern, found: Comparison) -> dict[str, Any]:
+    units = found.predictions[0].units
+    factor, unit = shown(one.coordinate, units, float(np.max(np.abs(one.centre))))
+    return {
+        "name": name_of(one.coordinate, found.site), "unit": unit, "share": one.share, "p": one.p,
+        "significant": one.significant, "turned": one.turned, "centre": factor * one.centre,
+        "mean": one.mean, "std": one.std,
+    }  # fmt: skip

@@ -1,0 +1,68 @@
+"""Answers with many numbers: JSON in front, the arrays behind it as 32-bit floats.
+
+    bytes 0 to 3      length of the JSON in bytes, little-endian
+    JSON              padded with spaces to a multiple of four
+    arrays            float32, little-endian, one after the other
+
+In the JSON an array is `{"array": [first, count]}`, counted in floats. A page reads them without
+parsing a number: 40,000 samples of a dozen signals in a millisecond.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from typing import Any
+
+import numpy as np
+
+ALIGN = 4
+
+
+def pack(content: Any) -> bytes:
+    """Return plain data with numpy arrays in it as bytes; what is not finite in JSON is null.
+
+    Parameters
+    ----------
+    content : dict, list, tuple, text, number, None, and arrays of any shape, which are made flat
+    """
+    arrays: list[bytes] = []
+    count = 0
+
+    def plain(value: Any) -> Any:
+        nonlocal count
+        if isinstance(value, np.ndarray):
+            flat = np.ascontiguousarray(value, dtype="<f4").ravel()
+            arrays.append(flat.tobytes())
+            count += len(flat)
+            return {"array": [count - len(flat), len(flat)]}
+        if isinstance(value, dict):
+            return {str(key): plain(one) for key, one in value.items()}
+        if isinstance(value, list | tuple):
+            return [plain(one) for one in value]
+        if isinstance(value, np.generic):
+            value = value.item()
+        if isinstance(value, float) and not math.isfinite(value):
+            return None
+        return value
+
+    head = json.dumps(plain(content), ensure_ascii=False).encode()
+    head += b" " * (-len(head) % ALIGN)
+    return b"".join([struct.pack("<I", len(head)), head, *arrays])
+
+
+def unpack(data: bytes) -> Any:
+    """Return what `pack` was given; arrays are flat and of 32-bit floats."""
+    (length,) = struct.unpack_from("<I", data)
+    floats = np.frombuffer(data, dtype="<f4", offset=4 + length)
+
+    def whole(value: Any) -> Any:
+        if isinstance(value, dict):
+            if set(value) == {"array"}:
+                first, count = value["array"]
+                return floats[first : first + count]
+            return {key: whole(one) for key, one in value.items()}
+        return [whole(one) for one in value] if isinstance(value, list) else value
+
+    return whole(json.loads(data[4 : 4 + length]))

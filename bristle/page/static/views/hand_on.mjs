@@ -1,0 +1,62 @@
+// View 6, Hand on: report, FMU and scenario, and all files of the study to download.
+
+import { download, get } from "../api.mjs";
+import { bytes, h, say, table, wrong } from "../dom.mjs";
+
+const GROUPS = [
+  ["reports/", "Reports"],
+  ["export/", "FMU and scenario"],
+  ["plan", "Next tests"],
+  ["", "The study itself"],
+];
+
+export async function show(page) {
+  const { files } = await get(page.path("files"));
+  page.same(`bristle report ${page.study}`, `bristle export ${page.study}`);
+  const trouble = h("div", {});
+  const report = h("button", { type: "button", class: "main", onclick: () => page.run("report") }, "Write the report");
+  const fmu = h("button", { type: "button", class: "main", onclick: () => page.run("export") }, "Export the damper as an FMU");
+  page.onJobs(() => {
+    report.disabled = fmu.disabled = Boolean(page.working());
+  });
+  const take = async (name, button) => {
+    button.disabled = true;
+    try {
+      await download(page.study, name);
+      say(`${name} is downloaded.`);
+      trouble.replaceChildren();
+    } catch (error) {
+      trouble.replaceChildren(wrong("The file cannot be had", error.message));
+    }
+    button.disabled = false;
+  };
+  const left = new Set(files);
+  const groups = GROUPS.map(([prefix, title]) => {
+    const own = files.filter((file) => left.has(file) && file.name.startsWith(prefix));
+    own.forEach((file) => left.delete(file));
+    return [title, own];
+  });
+  return [
+    h("h1", {}, "Hand on"),
+    h("ul", { class: "cards" },
+      h("li", { class: "card" }, h("h3", {}, "Report"),
+        h("p", {}, "One HTML file that opens offline: verdict and evidence, loops, parameters with intervals, the commands that repeat it."), report),
+      h("li", { class: "card" }, h("h3", {}, "FMU and scenario"),
+        h("p", {}, "The damper with the identified values, for any FMI tool, and a scenario that applies a measured motion to it."), fmu),
+      h("li", { class: "card" }, h("h3", {}, "In a building"),
+        h("p", {}, "The damper with these values in a building under an earthquake."), h("a", { href: page.link("simulate"), onclick: () => (page.damper = page.study) }, "Simulate it"))),
+    trouble,
+    h("div", { class: "files" }, groups.filter(([, own]) => own.length).map(([title, own]) => table(title, ["file", "size", "written", "download"], own.map((file) => {
+      const button = h("button", { type: "button", class: "quiet", "aria-label": `Download ${file.name}` }, "Download");
+      button.addEventListener("click", () => take(file.name, button));
+      return [h("code", {}, file.name), bytes(file.bytes), when(file.written), button];
+    }), [1]))),
+  ];
+}
+
+/** Returns date and time of day of a moment [s]. */
+function when(moment) {
+  const at = new Date(1000 * moment);
+  const two = (number) => String(number).padStart(2, "0");
+  return `${at.getFullYear()}-${two(at.getMonth() + 1)}-${two(at.getDate())} ${two(at.getHours())}:${two(at.getMinutes())}`;
+}

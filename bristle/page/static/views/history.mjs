@@ -1,0 +1,125 @@
+// View 5, Add and watch the error fall: the staircase, and any two steps side by side.
+
+import { packed } from "../api.mjs";
+import { bars, commandLine, empty, h, number, percent, table, z } from "../dom.mjs";
+
+export async function show(page) {
+  const found = await packed(page.path("history"));
+  page.same(`bristle study auto ${page.study}`, `bristle report ${page.study}`);
+  return [
+    h("h1", {}, headline(found)),
+    orders(page, found),
+    staircase(found),
+    compare(page, found),
+    found.commands.length
+      ? h("details", {}, h("summary", {}, "The commands that repeat this study"), found.commands.map((text) => commandLine(text)))
+      : null,
+  ];
+}
+
+function headline(found) {
+  const known = found.steps.filter((step) => step.z !== null);
+  if (!known.length) return "No error yet: identify the model first";
+  const [first, last] = [known[0], known.at(-1)];
+  if (known.length === 1) return `Error / noise (z) on held-out runs: ${z(first.z)}`;
+  return `Error / noise (z) ${last.z < first.z ? "fell" : "went"} from ${z(first.z)} to ${z(last.z)}`;
+}
+
+function orders(page, found) {
+  const buttons = [];
+  if (found.kind === "effect") {
+    buttons.push(h("button", { type: "button", class: "main", onclick: () => page.run("add", { effects: found.named }) },
+      `Add ${found.named.join(" and ")}`));
+  } else {
+    for (const name of found.named) {
+      buttons.push(h("button", { type: "button", onclick: () => page.run("add", { effects: [name] }) }, `Add ${name}`));
+    }
+  }
+  const other = h("select", { id: "other" }, h("option", { value: "" }, "choose …"),
+    found.can_add.map((one) => h("option", { value: one.name, title: one.about }, one.name)));
+  const add = h("button", { type: "button", onclick: () => other.value && page.run("add", { effects: [other.value] }) }, "Add it");
+  const undo = h("button", { type: "button", onclick: () => page.run("undo") }, "Undo the last step");
+  const auto = h("button", { type: "button", onclick: () => page.run("auto") }, "Go on until nothing is missing");
+  page.onJobs(() => {
+    const busy = Boolean(page.working());
+    for (const one of [...buttons, auto]) one.disabled = busy;
+    add.disabled = busy || !found.can_add.length;
+    undo.disabled = busy || found.steps.length < 2;
+  });
+  return h("div", { class: "act" }, buttons,
+    h("label", { class: "field", for: "other" }, "Another effect", other), add, undo, auto);
+}
+
+/** The error of each model on held-out runs, on a logarithmic scale from the noise floor. */
+function staircase(found) {
+  const known = found.steps.filter((step) => step.z !== null);
+  if (!known.length) return empty("The history holds the first model alone", "Identify fits it and gives its first error.", null);
+  const log = (value) => Math.log10(Math.max(value, 1) * 1.03);
+  const top = log(Math.max(...known.map((step) => step.z), 2));
+  return h("section", {},
+    h("h2", {}, "How the error fell"),
+    bars("error / noise (z) of each step on held-out runs", found.steps.map((step) => ({
+      name: `${step.number} ${step.what}`, value: step.z === null ? null : log(step.z), strong: true,
+      good: step.z !== null && step.z <= found.close,
+      text: step.z === null ? "not judged" : `${z(step.z)}${step.rms === null ? "" : ` · ${number(step.rms)} N`}`,
+    })), { most: top, edge: log(1) }),
+    h("p", { class: "soft small" }, "Error / noise (z) on held-out runs, logarithmic; RMS error ",
+      found.cut_off ? `below ${number(found.cut_off)} Hz. ` : ". ", "Green: on the noise floor, where a correct model is."));
+}
+
+function compare(page, found) {
+  const steps = found.steps;
+  if (steps.length < 2) return null;
+  const chosen = page.compared?.study === page.study && page.compared.b < steps.length
+    ? page.compared : { study: page.study, a: steps.length - 2, b: steps.length - 1 };
+  const target = h("div", {});
+  const menu = (side, text) => {
+    const select = h("select", { id: `step-${side}` }, steps.map((step, k) =>
+      h("option", { value: k, selected: k === chosen[side] }, `${step.number} ${step.what}`)));
+    select.addEventListener("change", () => {
+      chosen[side] = Number(select.value);
+      page.compared = chosen;
+      draw();
+    });
+    return [h("label", { class: "field", for: `step-${side}` }, text, select), select];
+  };
+  const [[labelA, selectA], [labelB, selectB]] = [menu("a", "This step"), menu("b", "beside this one")];
+  const move = (way) => {
+    const [a, b] = [chosen.a + way, chosen.b + way];
+    if (a < 0 || b < 0 || a >= steps.length || b >= steps.length) return;
+    Object.assign(chosen, { a, b });
+    selectA.value = a;
+    selectB.value = b;
+    page.compared = chosen;
+    draw();
+  };
+  const back = h("button", { type: "button", onclick: () => move(-1) }, "Earlier");
+  const on = h("button", { type: "button", onclick: () => move(1) }, "Later");
+
+  function draw() {
+    const [a, b] = [steps[chosen.a], steps[chosen.b]];
+    const names = [...new Set([...a.parameters, ...b.parameters].map((row) => row.name))];
+    const of = (step, name) => step.parameters.find((row) => row.name === name);
+    const cell = (row) => (row ? `${number(row.value, 4)}${row.half === null ? "" : ` ± ${number(row.half, 2)}`}` : "–");
+    back.disabled = Math.min(chosen.a, chosen.b) === 0;
+    on.disabled = Math.max(chosen.a, chosen.b) === steps.length - 1;
+    target.replaceChildren(
+      table("Errors", ["", a.what, b.what], [
+        ["z, held-out runs", z(a.z), z(b.z)],
+        ["z, training runs", z(a.train), z(b.train)],
+        ["RMS error, held-out runs [N]", number(a.rms), number(b.rms)],
+        ["of the force", a.share === null ? "–" : percent(a.share), b.share === null ? "–" : percent(b.share)],
+      ], [1, 2]),
+      table("Parameters", ["parameter", a.what, b.what, "unit"], names.map((name) => [
+        h("code", {}, name), cell(of(a, name)), cell(of(b, name)), (of(a, name) ?? of(b, name)).unit.replace(/^1$/, ""),
+      ]), [1, 2]));
+  }
+  draw();
+  return h("section", {},
+    h("h2", {}, "Two steps side by side"),
+    h("ol", { class: "timeline", tabindex: "0", "aria-label": "the steps of the history" }, steps.map((step, k) => h("li", { class: k === steps.length - 1 ? "present" : null },
+      h("b", {}, step.what), h("span", { class: "soft small" }, step.z === null ? "not judged" : `z = ${z(step.z)}`),
+      h("span", { class: "soft small why" }, step.why)))),
+    h("div", { class: "act" }, labelA, labelB, back, on),
+    target);
+}

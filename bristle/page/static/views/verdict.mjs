@@ -1,0 +1,148 @@
+// View 4, What is missing: verdict, evidence, limits of each effect, the next tests.
+
+import { packed } from "../api.mjs";
+import { bars, empty, h, key, shown, table, wrong, z } from "../dom.mjs";
+import { Plot, extent } from "../plot.mjs";
+
+export async function show(page) {
+  const found = await packed(page.path("verdict"));
+  page.same(`bristle diagnose ${page.study}`, `bristle plan ${page.study}`);
+  const verdict = found.verdict;
+  return [
+    h("h1", {}, "What is missing"),
+    trials(page),
+    verdict ? badge(verdict) : null,
+    orders(page, verdict),
+    verdict ? evidence(verdict) : empty("Not diagnosed",
+      "Diagnose puts every effect into the model, refits it, and judges each on the held-out runs. It names the effect that is missing, a few that the data cannot distinguish, or none."),
+    plans(page, found, verdict),
+  ];
+}
+
+function badge(verdict) {
+  const [first, ...rest] = verdict.sentences;
+  return h("section", { class: `verdict ${verdict.kind}`, "aria-label": "Verdict" },
+    h("div", { class: "kind" }, verdict.heading),
+    h("p", { class: "say" }, first),
+    Object.values(verdict.about).map((text) => h("p", {}, text)),
+    rest.map((text) => h("p", {}, text)),
+    verdict.alternatives.length ? h("p", {}, "It could also be: ", verdict.alternatives.join(", "), ".") : null,
+    verdict.notes.map((text) => h("p", { class: "soft small" }, text)));
+}
+
+function orders(page, verdict) {
+  const go = h("button", { type: "button", class: verdict ? null : "main", onclick: () => page.run("diagnose") },
+    verdict ? "Diagnose again" : "Diagnose");
+  const learn = verdict?.kind === "unknown"
+    ? h("button", { type: "button", onclick: () => page.run("learn") }, "Learn it as a curve") : null;
+  page.onJobs(() => {
+    go.disabled = Boolean(page.working());
+    if (learn) learn.disabled = go.disabled;
+  });
+  return h("div", { class: "act" }, go, learn,
+    verdict ? h("a", { href: page.link("history") }, verdict.effects.length ? `Next: add ${verdict.effects.join(", ")}` : "Next: the history") : null);
+}
+
+/** While a diagnosis works: which effects are tried, as it tells. */
+function trials(page) {
+  const whole = h("section", { "aria-live": "off" });
+  page.onJobs(() => {
+    const job = page.working();
+    if (!job || !["diagnose", "auto"].includes(job.what)) {
+      whole.replaceChildren();
+      return;
+    }
+    const lines = page.lines.get(job.number) ?? [];
+    const tried = lines.map((line) => /^(effect|law|refining effect) (\d+) of (\d+), ([\w.]+)(?:; best so far (\w+))?/.exec(line)).filter(Boolean);
+    const last = tried.at(-1);
+    if (!last) {
+      whole.replaceChildren(h("p", { class: "loading" }, `${job.now || "Beginning"} …`));
+      return;
+    }
+    const [, kind, at, of] = last;
+    const best = tried.findLast((one) => one[5])?.[5];
+    whole.replaceChildren(
+      h("h2", {}, kind === "law" ? "Laws are tried" : "Effects are tried"),
+      bars("progress", [{ name: `${at} of ${of}`, value: Number(at), strong: true, text: last[4] }], { most: Number(of) }),
+      best ? h("p", {}, "Best so far: ", h("strong", {}, best)) : null);
+  });
+  return whole;
+}
+
+function evidence(verdict) {
+  const rows = verdict.ranking.filter((row) => Number.isFinite(row.z_holdout));
+  const before = verdict.before ?? Math.max(...verdict.sites.map((one) => one.before ?? 0), ...rows.map((row) => row.z_holdout), 1);
+  const log = (value) => Math.log10(Math.max(value, 1) * 1.02);
+  const parts = [];
+  if (rows.length) {
+    parts.push(h("h2", {}, "The evidence"),
+      h("p", {}, "Error / noise (z) on held-out runs with each effect in the model, all parameters fitted again. Without any: ",
+        h("strong", {}, z(before)), "."),
+      bars("z with each effect", rows.slice(0, 20).map((row) => ({
+        name: row.site && row.site !== "damper" ? `${row.effect} (${row.site})` : row.effect, value: log(row.z_holdout),
+        strong: verdict.effects.includes(row.effect), good: row.z_holdout <= 1.1 && row.gain > 0.02,
+        text: z(row.z_holdout), title: row.refined ? "searched at length" : "short search: it gains too little",
+      })), { edge: log(before), most: log(Math.max(before, 2)) }),
+      h("p", { class: "soft small" }, "Logarithmic, from z = 1 on the left. Green line: the model as it is. Blue: named by the verdict."));
+  }
+  if (verdict.laws.length) parts.push(table("The laws", verdict.laws_header, verdict.laws, [2, 3, 4, 5, 6, 7]));
+  if (verdict.limits.length) {
+    const most = Math.max(...verdict.limit_shares.filter((one) => one !== null), 0) * 100;
+    parts.push(h("h2", {}, "How large each effect may still be"),
+      most ? bars("share of the force that each effect may still have", verdict.limits.map((row, k) => ({
+        name: row[0], value: verdict.limit_shares[k] === null ? null : 100 * verdict.limit_shares[k],
+        text: row[2] === "-" ? "–" : row[2],
+      })), { most }) : null,
+      table("Limits at 95 %", ["effect", "still possible (95 %)", "of the force", "to be named from, about"], verdict.limits, []),
+      verdict.limits_notes.map((text) => h("p", { class: "soft small" }, text)));
+  }
+  if (verdict.untestable.length) parts.push(h("h2", {}, "Not testable with these runs"), h("p", {}, verdict.untestable.join(", "), "."));
+  return parts;
+}
+
+const LIMITS = [
+  ["stroke", "Stroke", "20 mm"],
+  ["speed", "Speed", "200 mm/s"],
+  ["force", "Force", "2 kN"],
+  ["duration", "Duration", "12 s"],
+];
+
+function plans(page, found, verdict) {
+  const inputs = LIMITS.map(([name, title, hint]) => h("label", { class: "field", style: { width: "8rem" } }, title,
+    h("input", { type: "text", name, placeholder: hint, maxlength: "20" })));
+  const go = h("button", { type: "submit" }, "Plan the next tests");
+  const form = h("form", { class: "act" }, inputs, go);
+  form.addEventListener("submit", (event) => {
+    event.preventDefault();
+    const options = Object.fromEntries([...new FormData(form)].filter(([, text]) => text.trim()));
+    page.run("plan", options);
+  });
+  page.onJobs(() => (go.disabled = Boolean(page.working()) || !verdict));
+  return [
+    h("h2", {}, "The next tests"),
+    verdict?.separating ? h("p", {}, verdict.separating) : null,
+    h("p", { class: "soft" }, "Motions and commands within the rig's limits that would settle what is open; without limits, what the runs have done."),
+    form,
+    found.plans.toReversed().map((plan) => plan.error ? wrong(plan.name, plan.error) : drawn(page, plan)),
+  ];
+}
+
+function drawn(page, plan) {
+  return h("section", {}, h("h3", {}, plan.name),
+    h("p", {}, "The files are under ", h("a", { href: page.link("hand_on") }, "Hand on"), "."),
+    h("div", { class: "grid" }, plan.runs.map((run) => {
+      const [[name, motion], ...rest] = Object.entries(run.channels);
+      const [factor, unit] = name === "displacement" ? shown("m") : [1, "m/s2"];
+      return h("figure", {}, h("h3", {}, `${run.name} (${run.role === "holdout" ? "held out" : "training"})`),
+        new Plot("low", `${name} of ${run.name} over time`, (p) => {
+          p.axes([run.time[0], run.time.at(-1)], extent([motion], 0.05, factor), rest.length ? null : "time [s]", unit);
+          p.line(run.time, motion, "blue", { fy: factor });
+        }).canvas,
+        rest.map(([drive, values]) => new Plot("low", `${drive} of ${run.name} over time`, (p) => {
+          p.axes([run.time[0], run.time.at(-1)], extent([values]), "time [s]", drive === "current" ? "A" : "V");
+          p.line(run.time, values, "purple");
+        }).canvas),
+        h("figcaption", {}, run.about));
+    })), key(["blue", "motion"], ["purple", "command"]));
+}
+

@@ -1,0 +1,90 @@
+"""View 4, What is missing: the verdict with its evidence, limits, and the next tests."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..compare.names import site_name
+from ..diagnose.law_text import HEADER, law_table
+from ..diagnose.verdict_text import (
+    HEADINGS,
+    LIMITS_NOTES,
+    about,
+    drive_of,
+    limit_rows,
+    sentences,
+    separating,
+    untestable,
+)
+from ..errors import BristleError
+from ..plan.folder import read_plan
+from ..study.study import Study
+from .data_view import thinned
+
+
+def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what view 4 shows of a study.
+
+    Parameters
+    ----------
+    folder : of the study
+    arguments : none are taken
+
+    Raises
+    ------
+    StudyError
+        If a file of the study is wrong.
+    """
+    study = Study(folder)
+    verdict = study.verdict()
+    told = {"verdict": None} if verdict is None else {"verdict": shown(verdict)}
+    return {**told, "plans": [_plan(one) for one in sorted(folder.glob("plan*")) if one.is_dir()]}
+
+
+def shown(verdict: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a verdict as the page shows it; z of the model before is that of its worst site."""
+    findings = verdict.get("findings") or []
+    drive = drive_of(verdict)
+    return {
+        "kind": verdict["kind"], "heading": HEADINGS[str(verdict["kind"])],
+        "sentences": sentences(verdict), "effects": list(verdict.get("effects") or []),
+        "about": {str(one): about(str(one), drive) for one in verdict.get("effects") or []},
+        "alternatives": list(verdict.get("alternatives") or []),
+        "before": max((one["z_holdout_before"] for one in findings), default=None),
+        "sites": [
+            {
+                "name": site_name(one["site"]), "kind": one.get("kind"),
+                "before": one.get("z_holdout_before"),
+            }
+            for one in findings if len(findings) > 1
+        ],
+        "ranking": verdict.get("ranking") or [], "limits": limit_rows(verdict),
+        "limit_shares": [
+            one.get("share") for found in findings for one in found.get("limits") or []
+        ],
+        "limits_notes": list(LIMITS_NOTES), "untestable": untestable(verdict),
+        "separating": separating(verdict), "notes": list(verdict.get("notes") or []),
+        "laws": law_table(verdict["laws"]) if verdict.get("laws") else [], "laws_header": HEADER,
+    }  # fmt: skip
+
+
+def _plan(folder: Path) -> dict[str, Any]:
+    """Return the tests of a plan: what each is, and its motion and command over time."""
+    try:
+        found = read_plan(folder)
+    except BristleError as error:
+        return {"name": folder.name, "error": str(error), "runs": []}
+    runs = []
+    for run in found.runs:
+        rows = thinned(np.asarray(run.time), run.signals)
+        runs.append(
+            {
+                "name": run.name, "role": run.role, "about": run.about, "time": run.time[rows],
+                "channels": {name: values[rows] for name, values in run.signals.items()},
+            }
+        )  # fmt: skip
+    return {"name": folder.name, "error": "", "runs": runs}

@@ -1,0 +1,107 @@
+"""The process that answers views: it imports what is heavy, and reads studies.
+
+It is apart from the server so that the server starts at once and stays small, and so that an effect
+of a user's own, once consented to, can hang no page: the server ends a worker that takes too long.
+Requests come as lines of JSON on stdin; an answer is a line of JSON with its length, and its bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from ..errors import BristleError, TrustError
+
+VIEWS = {
+    "check": "check_view",
+    "columns": "columns_view",
+    "data": "data_view",
+    "errors": "errors_view",
+    "fit": "fit_view",
+    "history": "history_view",
+    "scenarios": "scenarios_view",
+    "simulate": "simulate_view",
+    "verdict": "verdict_view",
+}
+"""Modules with `answer(folder, arguments)`, which returns what `packing.pack` takes."""
+
+AHEAD = ("check_view", "fit_view", "errors_view", "verdict_view", "history_view")
+"""Modules that are imported behind the first answer, before anybody asks for them."""
+
+Answered = tuple[dict[str, Any], bytes]
+
+
+def answer(view: str, folder: Path, arguments: Mapping[str, Any]) -> Answered:
+    """Return what is told of an answer, and its bytes.
+
+    Parameters
+    ----------
+    view : one of `VIEWS`
+    folder : of the study, or with the studies
+    arguments : what the page asks for
+    """
+    from ..physics.user import unload_effects
+    from .packing import pack
+
+    try:
+        unload_effects()  # those of the study that was asked for before
+        found: Callable[[Path, Mapping[str, Any]], Any] = import_module(
+            f"{__package__}.{VIEWS[view]}"
+        ).answer
+        return {"ok": True}, pack(found(folder, arguments))
+    except TrustError as error:
+        told = {"kind": "TrustError", "file": str(error.path), "text": error.text}
+        return {"ok": False, "error": str(error), **told}, b""
+    except BristleError as error:
+        return {"ok": False, "error": str(error), "kind": type(error).__name__}, b""
+    except Exception as error:
+        traceback.print_exc()
+        said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        return {"ok": False, "error": f"an unexpected error ({said}).", "kind": "unexpected"}, b""
+
+
+def serve(requests: BinaryIO, answers: BinaryIO) -> None:
+    """Answer requests until there are no more."""
+    import_module(f"{__package__}.data_view")
+    for number, line in enumerate(requests):
+        asked = json.loads(line)
+        head, body = answer(asked["view"], Path(asked["folder"]), asked["arguments"])
+        head |= {"bytes": len(body), "memory": memory()}
+        answers.write(json.dumps(head).encode() + b"\n")
+        answers.write(body)
+        answers.flush()
+        if number == 0:
+            threading.Thread(target=_import_ahead, daemon=True).start()
+
+
+def _import_ahead() -> None:
+    for name in AHEAD:
+        import_module(f"{__package__}.{name}")
+
+
+def memory() -> int:
+    """Return the memory [bytes] that this process has taken at the most, 0 where nobody tells."""
+    if sys.platform == "win32":
+        return 0
+    import resource
+
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else 1024 * most
+
+
+def main() -> None:
+    """Answer on the real stdout, which nothing else may write to."""
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    serve(sys.stdin.buffer, answers)
+
+
+if __name__ == "__main__":
+    main()

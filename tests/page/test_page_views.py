@@ -1,0 +1,174 @@
+"""What views show is what the commands compute."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from study.made import bench_run, write, write_runs
+
+import bristle
+from bristle.data.model_value import Value
+from bristle.errors import ScenarioError, StudyError
+from bristle.page import (
+    check_view,
+    columns_view,
+    data_view,
+    errors_view,
+    fit_view,
+    history_view,
+    scenarios_view,
+    simulate_view,
+    verdict_view,
+)
+from bristle.page.packing import pack, unpack
+from bristle.page.worker import VIEWS, answer
+from bristle.study import Study, create_study
+from bristle.study.comparison import compare_study
+from bristle.study.data_check import check_data
+
+SCENARIO = "bench_sine_bingham"
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("views")
+    files = write_runs(folder / "lab", 3, seconds=4.0)
+    columns = bench_run(9, seconds=4.0)
+    columns["F [N]"] = np.clip(columns["F [N]"], -3.0, 3.0)  # a load cell at the end of its range
+    create_study(
+        folder / "rig", [*files, write(folder / "lab" / "cut.csv", columns)], law="bingham"
+    )
+    return folder
+
+
+def test_every_view_of_the_worker_is_a_module_that_answers(home: Path) -> None:
+    for view in ("data", "check", "fit", "errors", "history", "verdict"):
+        told, body = answer(view, home / "rig", {})
+        assert told["ok"], told
+        assert unpack(body)
+    assert {"columns", "scenarios", "simulate"} <= set(VIEWS)
+
+
+def test_what_is_wrong_is_told_in_the_words_of_the_commands(home: Path) -> None:
+    told, body = answer("data", home / "gone", {})
+    assert (told["ok"], told["kind"], body) == (False, "StudyError", b"")
+    assert "no study" in told["error"]
+
+
+def test_view_1_has_the_runs_and_findings_of_the_data_check(home: Path) -> None:
+    shown, found = data_view.answer(home / "rig", {}), check_data(Study(home / "rig"))
+    assert {run["name"] for run in shown["runs"]} == {run.name for run in found.runs}
+    check = check_view.answer(home / "rig", {})
+    assert check["ok"] == found.ok
+    assert {one["text"] for one in check["findings"]} >= {
+        f"{one.run}: {one.text}" for one in found.findings if one.kind == "clipping"
+    }
+    (cut,) = check["clipped"]
+    assert (cut["run"], cut["channel"]) == ("cut", "force")
+    run = next(one for one in found.runs if one.name == "cut")
+    for begin, end in cut["spans"]:
+        inside = (run.time >= begin) & (run.time <= end)
+        assert np.all(np.abs(run["force"][inside]) == np.abs(run["force"]).max())
+    assert cut["spans"]
+
+
+def test_a_thinned_trace_keeps_every_extreme() -> None:
+    generator = np.random.default_rng(1)
+    time, y = np.arange(50_000) / 500.0, generator.standard_normal(50_000)
+    y[31_234] = 9.0
+    rows = data_view.thinned(time, {"y": y})
+    assert len(rows) <= data_view.POINTS + 2
+    assert y[rows].max() == y.max()
+    assert y[rows].min() == y.min()
+    assert np.all(np.diff(rows) > 0)
+
+
+def test_view_3_has_the_samples_of_the_comparison(home: Path) -> None:
+    shown = unpack(pack(errors_view.answer(home / "rig", {"role": "train"})))
+    found = compare_study(Study(home / "rig"), role="train")
+    assert shown["z"] == pytest.approx(found.z)
+    assert shown["sentences"] == list(found.sentences)
+    for row, one in zip(shown["runs"], found.predictions, strict=True):
+        assert row["normalised"] == pytest.approx(one.normalised, rel=1e-5)
+        assert len(row["time"]) == len(row["measured"]) == len(row["normalised"])
+        assert row["measured"] - row["predicted"] == pytest.approx(one.residual, abs=1e-5)
+
+
+def test_view_3_opens_no_test_run(home: Path) -> None:
+    with pytest.raises(StudyError, match="holdout"):
+        errors_view.answer(home / "rig", {"role": "test"})
+
+
+def test_view_2_has_values_with_half_of_their_intervals(home: Path, tmp_path: Path) -> None:
+    shown = fit_view.answer(home / "rig", {})
+    assert not shown["identified"]
+    assert {row["how"] for row in shown["parameters"]} == {"assumed"}
+    model = Study(home / "rig").model()
+    known = model.with_values({"f_c": 1.5}, {"f_c": 0.1})
+    assert isinstance(known.parameters["f_c"], Value)
+    (row,) = [row for row in fit_view.rows_of(known, {}) if row["name"] == "f_c"]
+    assert (row["value"], row["half"], row["how"]) == (1.5, pytest.approx(0.196), "identified")
+    held = fit_view.rows_of(known, {"parameters": {"f_c": {"how": "not identified"}}})
+    assert [row["half"] for row in held if row["name"] == "f_c"] == [None]
+
+
+def test_view_4_says_that_nothing_was_diagnosed(home: Path) -> None:
+    assert verdict_view.answer(home / "rig", {}) == {"verdict": None, "plans": []}
+
+
+def test_view_5_has_the_steps_and_what_can_be_added(home: Path) -> None:
+    shown = history_view.answer(home / "rig", {})
+    assert [step["what"] for step in shown["steps"]] == ["begin with bingham"]
+    assert "gas_spring" in {one["name"] for one in shown["can_add"]}
+    assert any(text.startswith("bristle study new") for text in shown["commands"])
+
+
+def test_dropped_files_are_told_apart_with_reasons(tmp_path: Path) -> None:
+    write(tmp_path / "run.csv", bench_run(1, seconds=2.0))
+    (tmp_path / "words.csv").write_text("a,b\nx,y\n")
+    shown = columns_view.answer(tmp_path, {})
+    wrong = [one for one in shown["files"] if one["error"]]
+    assert [one["name"] for one in wrong] == ["words.csv"]
+    assert str(tmp_path) not in wrong[0]["error"]
+    force = next(one for one in shown["columns"] if one["channel"] == "force")
+    assert (force["text"], force["guessed_unit"], force["sign"]) == ("F [N]", "N", 1)
+    assert force["reason"]
+
+
+def test_a_slider_gives_what_the_run_gives(home: Path) -> None:
+    values = {"voltage.level": 5.0}
+    shown = simulate_view.answer(home, {"scenario": SCENARIO, "values": values, "about": True})
+    frame = bristle.run(SCENARIO, values, engine="compiled")
+    for one in shown["outputs"]:
+        assert one["peak"] == pytest.approx(float(frame[one["name"]].abs().max()), rel=1e-12)
+    assert shown["command"] == f"bristle run {SCENARIO} --engine compiled --set voltage.level=5"
+    assert any(slider["name"] == "voltage.level" for slider in shown["sliders"])
+    assert all(one["low"] < one["high"] for one in shown["sliders"])
+
+
+def test_the_damper_of_a_study_takes_the_place_of_the_scenarios(home: Path) -> None:
+    study = Study(home / "rig")
+    assert "rig" in scenarios_view.answer(home, {})["studies"]
+    given = simulate_view.damper_of(home, SCENARIO, "rig")
+    assert given["damper.fmu"] == "BinghamDamper"
+    assert given["damper.f_c"] == study.model().values()["f_c"]
+    shown = simulate_view.answer(home, {"scenario": SCENARIO, "study": "rig"})
+    assert "--set damper.fmu=BinghamDamper" in shown["command"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"scenario": "gone"}, "gone"),
+        ({"scenario": "../x"}, "no stock scenario"),
+        ({"scenario": SCENARIO, "values": {"damper.gone": 1.0}}, "gone"),
+        ({"scenario": SCENARIO, "values": []}, "NAME to number"),
+    ],
+)
+def test_a_scenario_that_cannot_run_says_why(
+    home: Path, asked: dict[str, object], words: str
+) -> None:
+    with pytest.raises(ScenarioError, match=words):
+        simulate_view.answer(home, asked)
