@@ -113,6 +113,12 @@ def case_of(scenario: Scenario, output: str) -> Case:
             f"{building} where its force acts; a limit is computed for one damper at one place."
         )
     v_max = float(law.constants.v_max)
+    if v_max <= 0.0:
+        limit = law.drive.limit
+        raise ScenarioError(
+            f"{scenario.file} [components.{damper}]: {limit} = {v_max:g} leaves nothing to choose; "
+            f"{law.drive.largest:g} {law.drive.unit} is usual."
+        )
     ports = [slave.vars[index].name for index in slave._inputs]
     pushed = next(p for p in ports if system.source_of.get((building, p)) == (damper, "force"))
     felt = [system.source_of[damper, name][1] for name in ("displacement", "velocity")]

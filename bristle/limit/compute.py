@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ScenarioError
+from ..errors import RunError, ScenarioError
 from ..findings import unknown
 from ..progress import tell
 from ..scenario.scenario import Scenario, load_scenario
@@ -20,7 +20,7 @@ from ..simulate.coupled import simulate
 from ..simulate.run import run
 from .bound import FASTER, bound_of, largest_force
 from .case import Case, case_of
-from .free_voltage import write_scenario
+from .free_voltage import refuse_folder, write_scenario
 from .preview import foreseen
 from .problem import Problem
 from .search import descended, levelled, value_of
@@ -183,12 +183,16 @@ def limit(
     """
     began = clock.monotonic()
     seen = _checked(statistic, previews, starts)
+    if out is not None:
+        refuse_folder(Path(out))
     loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
     case = case_of(loaded, output)
     tell("compiling the laws, once")
     whole = Problem(case)
     levels = np.linspace(0.0, case.v_max, LEVELS).tolist()
     constant = {V: value_of(whole.respond(whole.level(V)), statistic) for V in levels}
+    if not np.isfinite([*constant.values()]).all():
+        raise RunError(f"{loaded.file}: {output} is not finite at some constant {case.command}.")
     best = min(constant, key=lambda V: constant[V])
     last = _window(whole, best) if statistic == "peak" else whole.last
     problem, found = _searched_from_all(whole, last, statistic, best, starts)

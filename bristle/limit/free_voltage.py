@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,21 @@ Array = NDArray[np.float64]
 
 VOLTAGE_FILE, SCENARIO_FILE = "voltage.csv", "limit.toml"
 _NAME = "limit_voltage"
+
+
+def refuse_folder(folder: Path) -> None:
+    """Refuse a folder that cannot be written to, before the work for it is done.
+
+    Raises
+    ------
+    RunError
+        With exit code 2.
+    """
+    there = next(path for path in (folder.absolute(), *folder.absolute().parents) if path.exists())
+    if not there.is_dir():
+        raise not_usable(f"{there}: is a file; a limit goes into a folder.")
+    if not os.access(there, os.W_OK):
+        raise not_usable(f"{there}: cannot be written to; name another folder.")
 
 
 def write_scenario(case: Case, time: Array, voltage: Array, folder: Path) -> Scenario:

@@ -177,7 +177,12 @@ def test_the_largest_force_is_that_of_sliding_at_the_worst_speed() -> None:
         ([PULSE, "--preview", "-1"], "0 to 10 s is right"),
         ([PULSE, "--preview", "nan"], "0 to 10 s is right"),
         ([PULSE, "--set", "structure.duffing.on=true"], "nonlinear"),
-        ([PULSE, "--set", "run.stop=0.004"], "too short"),
+        ([PULSE, "--set", "run.stop=0.04"], "too short"),
+        ([PULSE, "--set", "ground.amplitude=0"], "the ground does not move"),
+        ([PULSE, "--set", "structure.extra_force=1"], "acts besides the damper"),
+        ([PULSE, "--out", __file__], "is a file"),
+        ([PULSE, "--set", "damper.v_max=0"], "leaves nothing to choose"),
+        (["nosuch"], "no scenario file"),
     ],
 )
 def test_what_a_limit_is_refused_for(
