@@ -31,7 +31,7 @@ SIMULATE = (
     {"ssp"},
     {"scenario", "conformance", "design"},
     {"simulate"},
-    {"batch", "web"},
+    {"batch", "limit", "web"},
 )
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
 ROOF = (

@@ -1,0 +1,127 @@
+"""Compute the least peak or RMS that any voltage of a scenario's damper could reach.
+
+The ground motion is known in advance; the damper does what it can do at its velocity between no and
+its largest voltage. No controller comes below it: what lies between a controller and the limit is
+what there is to gain.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..quantity import plain
+from ._common import add_overrides
+from ._consent import add_trust
+
+if TYPE_CHECKING:
+    from ..limit import Limit
+
+HELP = "compute how far any control of a scenario's damper could lower a peak or RMS"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of `bristle limit`."""
+    parser.add_argument(
+        "scenario",
+        nargs="?",
+        default="el_centro_0p6g_constant_voltage",
+        metavar="SCENARIO",
+        help="file or stock scenario with one damper; else El Centro 0.6 g with a LuGre damper",
+    )
+    parser.add_argument(
+        "--output",
+        default="structure.floor2_acceleration_absolute",
+        metavar="NAME",
+        help="output of the structure; else the second floor's absolute acceleration",
+    )
+    parser.add_argument(
+        "--statistic", choices=("peak", "rms"), default="peak", help="statistic to minimise"
+    )
+    parser.add_argument(
+        "--preview",
+        nargs="*",
+        type=float,
+        default=[0.0, 0.1, 0.5],
+        metavar="S",
+        help="times [s] that a receding horizon sees ahead; none: no such runs; else 0 0.1 0.5",
+    )
+    parser.add_argument(
+        "--starts", type=int, default=3, metavar="N", help="starts of the search; else 3"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FOLDER",
+        help="where voltage, scenario, results and picture go; else results/limit/SCENARIO/",
+    )
+    parser.add_argument("--no-figure", action="store_true", help="draw nothing")
+    add_overrides(parser, "scenario", "ground.peak=3.924")
+    add_trust(parser)
+    parser.add_argument("--json", action="store_true", help="print the answer as JSON")
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Compute, write voltage, scenario, results and picture, print what was found."""
+    from ..limit import limit
+    from ..scenario.naming import run_name
+    from ..scenario.scenario import load_scenario, parse_overrides
+
+    overrides = parse_overrides(arguments.overrides)
+    scenario = load_scenario(arguments.scenario, overrides)
+    folder = arguments.out or Path("results", "limit", run_name(scenario.file, overrides))
+    found = limit(
+        scenario,
+        output=arguments.output,
+        statistic=arguments.statistic,
+        previews=arguments.preview,
+        starts=arguments.starts,
+        out=folder,
+    )
+    files = [folder / name for name in ("voltage.csv", "limit.toml", "results.csv")]
+    if not arguments.no_figure:
+        from ..limit.picture import draw_limit
+
+        files.append(folder / "limit.png")
+        draw_limit(found).save(files[-1], dpi=160)
+    if arguments.json:
+        import json
+
+        print(json.dumps(_answer(found, files), indent=2, allow_nan=False))
+    else:
+        _print(found, files)
+    return 0
+
+
+def _answer(found: Limit, files: list[Path]) -> dict[str, Any]:
+    return {
+        "title": found.title,
+        "output": found.output,
+        "statistic": found.statistic,
+        "unit": found.unit,
+        "limit": found.value,
+        "bound": found.bound,
+        "most_force": found.most_force,
+        "searched": found.searched,
+        "sure": found.sure,
+        "starts": [vars(start) for start in found.starts],
+        "previews": [{"ahead": s, "value": v} for s, v in found.previews.items()],
+        "constant": [{"voltage": V, "value": v} for V, v in found.constant.items()],
+        "as_it_is": found.as_it_is,
+        "seconds": round(found.seconds, 1),
+        "files": [str(path.absolute()) for path in files],
+    }
+
+
+def _print(found: Limit, files: list[Path]) -> None:
+    from ..limit.text import compared, confidence
+
+    print(found.title)
+    print(f"{found.statistic} of {found.output} [{found.unit}]")
+    for name, value, said in compared(found):
+        print(f"  {name:40}{plain(value, 4):>8}  {said}".rstrip())
+    for text in confidence(found):
+        print(text)
+    for path in files:
+        print(f"  {path}")

@@ -1,0 +1,320 @@
+"""The least peak or RMS that any voltage of a scenario's damper reaches, and how sure that is."""
+
+from __future__ import annotations
+
+import tempfile
+import time as clock
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RunError, ScenarioError
+from ..findings import unknown
+from ..progress import tell
+from ..scenario.scenario import Scenario, load_scenario
+from ..simulate.coupled import simulate
+from ..simulate.run import run
+from .bound import FASTER, bound_of, largest_force
+from .case import Case, case_of
+from .free_voltage import refuse_folder, write_scenario
+from .preview import foreseen
+from .problem import Problem
+from .search import descended, levelled, value_of
+from .text import AGREE, TRUST
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..simulate.frame import Results
+
+Array = NDArray[np.float64]
+
+OUTPUT = "structure.floor2_acceleration_absolute"
+PREVIEWS = (0.0, 0.1, 0.5)
+"""Times [s] for which a receding horizon sees the ground motion ahead."""
+NODES_PER_PERIOD = 80
+"""Nodes of the voltage in a period of the first mode, about."""
+LEVELS = 9
+"""Constant voltages that are compared."""
+STATISTICS = ("peak", "rms")
+QUIET = 0.35
+"""Share of its peak under the best constant voltage that an output has fallen to for good where the
+search's window ends, two periods later; it is the whole motion where the rest then counts."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """A search: where it began, in words, the value there, and the one that it found."""
+
+    name: str
+    before: float
+    value: float
+
+
+@dataclass(frozen=True)
+class Limit:
+    """The least peak or RMS of an output that a damper's voltage reaches, the motion known.
+
+    Attributes
+    ----------
+    title : str
+        Of the scenario.
+    output, statistic, unit : str
+        What is judged: "component.port", "peak" or "rms", its unit.
+    value : float
+        What the scenario's run by the coupled engine under `voltage` has.
+    searched : float
+        What the search's own computation has under it.
+    starts : tuple of Start
+        The best one first.
+    bound : float or None
+        No force up to `most_force` gives less; None where none is known.
+    most_force : float
+        Largest force of the damper [N] up to twice the speed that it has here.
+    previews : dict
+        Time seen ahead [s] to the value that a receding horizon reaches.
+    constant : dict
+        Constant voltage [V] to value.
+    as_it_is : float
+        Value of the scenario with what commands its damper.
+    time, voltage : (n,) arrays
+        The history that reaches the limit [s, V], linear between.
+    results : Results
+        Of that run.
+    seconds : float
+    """
+
+    title: str
+    output: str
+    statistic: str
+    unit: str
+    value: float
+    searched: float
+    starts: tuple[Start, ...]
+    bound: float | None
+    most_force: float
+    previews: dict[float, float]
+    constant: dict[float, float]
+    as_it_is: float
+    time: Array = field(repr=False)
+    voltage: Array = field(repr=False)
+    command: str
+    command_unit: str
+    results: Results = field(repr=False)
+    seconds: float
+
+    @property
+    def agreeing(self) -> int:
+        """How many starts found a value within 2 % of the least."""
+        least = self.starts[0].value
+        return sum(start.value <= (1.0 + AGREE) * least for start in self.starts)
+
+    @property
+    def sure(self) -> bool:
+        """Whether two starts agree and the coupled engine confirms the value."""
+        return self.agreeing > 1 and abs(self.value / self.searched - 1.0) <= TRUST
+
+    @property
+    def best_constant(self) -> tuple[float, float]:
+        """The best of the constant voltages [V], and its value."""
+        return min(self.constant.items(), key=lambda one: one[1])
+
+    def plot(self) -> Figure:
+        """Return its picture as a figure."""
+        from .picture import draw_limit
+
+        return draw_limit(self).figure
+
+
+def limit(
+    scenario: str | Path | Scenario,
+    overrides: Mapping[str, object] | None = None,
+    *,
+    output: str = OUTPUT,
+    statistic: str = "peak",
+    previews: Iterable[float] = PREVIEWS,
+    starts: int = 3,
+    out: str | Path | None = None,
+) -> Limit:
+    """Return the least peak or RMS of an output that any voltage of the damper reaches.
+
+    The ground motion is known in advance, and the force is what the damper gives at its velocity
+    with a voltage between 0 and its largest.
+
+    Parameters
+    ----------
+    scenario : path or Scenario
+        With one structure without effects, one damper, and a ground motion. What commands the
+        damper is left out of account.
+    overrides : mapping, optional
+        Values in place of the scenario's, as for `bristle.run`.
+    output : str
+        An output of the structure, "component.port".
+    statistic : str
+        "peak" (of its size) or "rms".
+    previews : iterable of float
+        Times [s], for each of which a receding horizon that sees so far ahead is run as well.
+    starts : int
+        How many voltages the search begins with.
+    out : path, optional
+        Folder for the voltage, a scenario that plays it, and its results.
+
+    Raises
+    ------
+    ScenarioError
+        If the scenario does not suit, or an argument is out of place.
+    RunError
+        If a run fails, or the folder cannot be written.
+
+    Returns
+    -------
+    Limit
+
+    Examples
+    --------
+    >>> from bristle.limit import limit
+    >>> found = limit("half_sine_pulse", {"run.stop": 1.0})  # doctest: +SKIP
+    >>> found.bound < found.value <= min(found.constant.values())  # doctest: +SKIP
+    True
+    """
+    began = clock.monotonic()
+    seen = _checked(statistic, previews, starts)
+    if out is not None:
+        refuse_folder(Path(out))
+    loaded = scenario if isinstance(scenario, Scenario) else load_scenario(scenario, overrides)
+    case = case_of(loaded, output)
+    tell("compiling the laws, once")
+    whole = Problem(case)
+    levels = np.linspace(0.0, case.v_max, LEVELS).tolist()
+    constant = {V: value_of(whole.respond(whole.level(V)), statistic) for V in levels}
+    if not np.isfinite([*constant.values()]).all():
+        raise RunError(f"{loaded.file}: {output} is not finite at some constant {case.command}.")
+    best = min(constant, key=lambda V: constant[V])
+    last = _window(whole, best) if statistic == "peak" else whole.last
+    problem, found = _searched_from_all(whole, last, statistic, best, starts)
+    if not _in_window(problem, whole, found[0][1]):
+        problem, found = _searched_from_all(whole, whole.last, statistic, best, starts)
+    searched, voltage = found[0][0].value, found[0][1]
+    ahead = {s: _seen_ahead(problem, whole, s, best, searched, statistic) for s in seen}
+    bound, most = _bound(problem, whole, voltage, statistic)
+    results = _played(case, voltage, out)
+    return Limit(
+        loaded.title, output, statistic, case.unit, value_of(results[output].to_numpy(), statistic),
+        searched, tuple(start for start, _ in found), bound, most, ahead, constant,
+        value_of(simulate(loaded)[output], statistic), case.time, voltage, case.command,
+        case.command_unit, results, clock.monotonic() - began,
+    )  # fmt: skip
+
+
+def _checked(statistic: str, previews: Iterable[float], starts: int) -> list[float]:
+    if statistic not in STATISTICS:
+        raise ScenarioError(unknown("statistic", statistic, STATISTICS))
+    if starts < 1:
+        raise ScenarioError(f"{starts} starts: 1 or more is right; 3 is usual.")
+    seen = sorted(previews)
+    for seconds in seen:
+        if not 0.0 <= seconds <= 10.0:
+            raise ScenarioError(f"a preview of {seconds:g} s: 0 to 10 s is right.")
+    return seen
+
+
+def _window(whole: Problem, voltage: float) -> int:
+    """Return the instant behind which nothing large happens under a constant voltage [V]."""
+    case, size = whole.case, np.abs(whole.respond(whole.level(voltage)))
+    large = np.flatnonzero(size > QUIET * size.max())
+    end = int(large[-1]) if len(large) else 0
+    return min(end + round(2.0 / (case.frequency * case.plant.h)), len(case.ground) - 1)
+
+
+def _searched_from_all(
+    whole: Problem, last: int, statistic: str, rest: float, starts: int
+) -> tuple[Problem, list[tuple[Start, Array]]]:
+    """Search up to an instant from all starts; return that problem, and what came out, best first.
+
+    Parameters
+    ----------
+    whole : Problem of the whole motion
+    last : instant
+    statistic : "peak" or "rms"
+    rest : voltage behind that instant, and the first start [V]
+    starts : how many
+    """
+    case = whole.case
+    every = max(1, round(1.0 / (case.frequency * NODES_PER_PERIOD * case.plant.h)))
+    problem = Problem(case, every, last)
+    found = [
+        _searched(problem, whole, name, values, statistic, rest)
+        for name, values in _begins(problem, rest, starts).items()
+    ]
+    return problem, sorted(found, key=lambda one: one[0].value)
+
+
+def _in_window(problem: Problem, whole: Problem, voltage: Array) -> bool:
+    """Return whether the peak under a voltage (N + 1,) lies within the window."""
+    return int(np.abs(whole.respond(voltage)).argmax()) <= problem.last
+
+
+def _begins(problem: Problem, best: float, count: int) -> dict[str, Array]:
+    """Return where searches begin, by name: constant voltages, then random ones."""
+    n, v_max = len(problem.nodes), problem.case.v_max
+    known = {f"{V:g} {problem.case.command_unit}": V for V in (best, 0.125 * v_max, v_max)}
+    begins = {f"constant {name}": np.full(n, V) for name, V in known.items()}
+    for seed in range(1, count + 1):
+        random = np.random.default_rng(seed).uniform(0.0, v_max, n)
+        begins[f"random {seed}"] = random
+    return dict([*begins.items()][:count])
+
+
+def _searched(
+    problem: Problem, whole: Problem, name: str, values: Array, statistic: str, rest: float
+) -> tuple[Start, Array]:
+    """Search from voltages (n,) at the nodes; return what came out, and the voltage (N + 1,)."""
+    tell(f"searching from {name}")
+    before = value_of(whole.respond(_continued(problem, values, rest)), statistic)
+    values = descended(problem, values, statistic)
+    if statistic == "peak":
+        values = levelled(problem, values)[0]
+    voltage = _continued(problem, values, rest)
+    return Start(name, before, value_of(whole.respond(voltage), statistic)), voltage
+
+
+def _continued(problem: Problem, values: Array, rest: float) -> Array:
+    """Return the voltage at all instants of a case: behind the window it is `rest` [V]."""
+    tail = np.full(len(problem.case.ground) - 1 - problem.last, rest)
+    return np.append(problem.between(values), tail)
+
+
+def _seen_ahead(
+    problem: Problem, whole: Problem, seconds: float, rest: float, least: float, statistic: str
+) -> float:
+    """Return what a receding horizon reaches; the cost is never told by less than 2 % of least."""
+    tell(f"a receding horizon that sees {seconds:g} s ahead")
+    voltage = foreseen(problem, seconds, rest, 0.02 * least, statistic)
+    tail = np.full(len(problem.case.ground) - 1 - problem.last, rest)
+    return value_of(whole.respond(np.append(voltage, tail)), statistic)
+
+
+def _bound(
+    problem: Problem, whole: Problem, voltage: Array, statistic: str
+) -> tuple[float | None, float]:
+    """Return the lower bound, None where effects of the damper allow none; the largest force."""
+    tell("a lower bound")
+    case, course = problem.case, whole.course
+    whole.respond(voltage)
+    if not case.plain:
+        return None, float(np.abs(course.force).max())
+    speed = float(np.abs(course.x @ case.plant.velocity).max())
+    most = max(largest_force(case, FASTER * speed), float(np.abs(course.force).max()))
+    return bound_of(problem, statistic, most), most
+
+
+def _played(case: Case, voltage: Array, out: str | Path | None) -> Results:
+    """Return the results of the scenario under a voltage, run by the coupled engine."""
+    if out is not None:
+        return run(write_scenario(case, case.time, voltage, Path(out)), engine="compiled", out=out)
+    with tempfile.TemporaryDirectory() as folder:
+        return run(write_scenario(case, case.time, voltage, Path(folder)), engine="compiled")

@@ -1,0 +1,71 @@
+"""A limit as a picture: the responses, the voltage that reaches it, and what others reach."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..draw.style import BLUE, GREY, INK, PALE, VERMILION, Page, look
+from ..quantity import plain
+from .text import compared
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from .compute import Limit
+
+_BAR = 0.26
+"""Height of a bar with the gap to the next [in]."""
+
+
+def draw_limit(found: Limit) -> Page:
+    """Return the picture of a limit, drawn and not yet written."""
+    (at, best), unit = found.best_constant, found.command_unit
+    what = {"rms": "RMS"}.get(found.statistic, found.statistic)
+    shown = found.unit.replace("s2", "s²")
+    title = (
+        f"The limit of the {what} is {plain(found.value)} {shown}: "
+        f"{100 * (1 - found.value / best):.0f} % below the best constant {found.command}"
+    )
+    subtitle = (
+        f"{found.title}. {what[0].upper() + what[1:]} of {found.output}; the limit knows the "
+        f"ground motion in advance. {found.agreeing} of {len(found.starts)} starts agree."
+    )
+    rows = compared(found)
+    page = Page(8.6, 4.6 + _BAR * len(rows), title, subtitle)
+    with look():
+        grid = page.grid(3, 1, left=0.7, height_ratios=(1.6, 1.0, _BAR * len(rows)))
+        response = page.figure.add_subplot(grid[0, 0])
+        history = found.results[found.output]
+        response.plot(history.index, history, color=BLUE, linewidth=0.9)
+        for level in (-best, best):
+            response.axhline(level, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
+        response.set_title(
+            f"Response at the limit [{shown}]; dashed: {what} at constant {at:g} {unit}"
+        )
+        voltage = page.figure.add_subplot(grid[1, 0], sharex=response)
+        voltage.plot(found.time, found.voltage, color=VERMILION, linewidth=0.7)
+        voltage.set_title(f"{found.command.capitalize()} that reaches it [{unit}]")
+        voltage.set_xlabel("time [s]", loc="right", labelpad=0)
+        beside = page.grid(3, 1, left=2.6, height_ratios=(1.6, 1.0, _BAR * len(rows)))
+        bars = page.figure.add_subplot(beside[2, 0])
+        _bars(bars, rows, shown)
+    return page
+
+
+def _bars(axes: Axes, rows: list[tuple[str, float, str]], unit: str) -> None:
+    """Draw what is compared as bars, in its order, the value beside each."""
+    places = range(len(rows))
+    colours = [PALE] * len(rows)
+    for place, (name, _, _) in enumerate(rows):
+        if name.startswith("receding"):
+            colours[place] = GREY
+        elif name.startswith("limit"):
+            colours[place] = BLUE
+    axes.barh(places, [value for _, value, _ in rows], color=colours, height=0.72)
+    for place, (_, value, said) in enumerate(rows):
+        text = f" {plain(value)}" + (f"   {said}" if said else "")
+        axes.text(value, place, text, va="center", fontsize=8, color=INK)
+    axes.set_yticks(places, [name for name, _, _ in rows], fontsize=8)
+    axes.invert_yaxis()
+    axes.set_xlim(0.0, 1.45 * max(value for _, value, _ in rows))
+    axes.set_xlabel(unit, loc="right", labelpad=0)
