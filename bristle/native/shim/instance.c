@@ -60,6 +60,7 @@ int slave_reset(Slave *slave) {
     slave->mode = INSTANTIATED;
     slave->stale = slave->unbuilt = 1;
     slave->fresh = slave->warnings = 0;
+    slave->blamed = -1;
     slave->time = 0.0;
     return 1;
 }
@@ -109,7 +110,7 @@ static int inputs_are_finite(const Slave *slave) {
     return 1;
 }
 
-static int outputs_are_finite(const Slave *slave, Text *wrong) {
+static int outputs_are_finite(Slave *slave, Text *wrong) {
     const double *outputs = slave->values + component.outputs_at;
     double sum = 0.0;
     for (int i = 0; i < component.outputs; i++) sum += outputs[i];
@@ -117,6 +118,7 @@ static int outputs_are_finite(const Slave *slave, Text *wrong) {
     const char *between = "not finite: ";
     for (int i = 0; i < component.outputs; i++) {
         if (isfinite(outputs[i])) continue;
+        if (*between != ',') slave_blame(slave, component.variables[component.outputs_at + i].name);
         text_add(wrong, between);
         text_add(wrong, component.variables[component.outputs_at + i].name);
         between = ", ";
@@ -147,6 +149,7 @@ void slave_follow(Slave *slave, int final) {
     Text wrong;
     int right = 1;
     slave->stale = 0;
+    slave->blamed = -1;
     if (slave->values[component.fault] != 0.0 || slave->mode == TERMINATED) return;
     text_clear(&wrong);
     hold_outputs(slave);
@@ -160,6 +163,7 @@ void slave_follow(Slave *slave, int final) {
     for (int i = 0; i < component.outputs; i++)
         slave->values[component.outputs_at + i] = final ? 0.0 : slave->held[i];
     if (final) slave_stop(slave, BAD_PARAMETER, wrong.at);
+    slave->blamed = -1; /* else this is no fault yet */
 }
 
 /* Move the model over one step. */
@@ -187,6 +191,7 @@ static int advance(Slave *slave, double time, double dt, Text *wrong) {
 Status slave_step(Slave *slave, double time, double dt) {
     Text wrong;
     text_clear(&wrong);
+    slave->blamed = -1;
     if (slave->values[component.fault] != 0.0) return FAILED;
     if (slave->mode != STEPPING)
         return slave_stop(slave, WRONG_MODE,
@@ -201,6 +206,7 @@ Status slave_step(Slave *slave, double time, double dt) {
     }
     for (int i = component.inputs_at; i < component.inputs_at + component.inputs; i++) {
         if (isfinite(slave->values[i])) continue;
+        slave_blame(slave, component.variables[i].name);
         text_add(&wrong, component.variables[i].name);
         text_add(&wrong, " = ");
         text_repr(&wrong, slave->values[i]);

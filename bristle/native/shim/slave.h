@@ -32,7 +32,8 @@ typedef struct Slave {
     char **texts;         /* of Strings */
     unsigned char *given; /* whether the host has set it */
     int mode, stale, unbuilt;
-    int fresh; /* outputs are as the step has left them */
+    int fresh;  /* outputs are as the step has left them */
+    int blamed; /* the output that tells the fault of a part as well, below 0: none */
     double time;
     double discretised; /* length of the step that `store` is prepared for, 0: none */
     uint64_t warned[MOST_WARNINGS]; /* digests of the warnings that were said */
@@ -66,6 +67,7 @@ int slave_call(Slave *slave, int call, double time, double dt, Row new_state, Ro
                int64_t *code);
 
 /* messages.c: faults and warnings */
+void slave_blame(Slave *slave, const char *name); /* the next fault is that of a variable's part */
 Status slave_stop(Slave *slave, int fault, const char *why);
 void slave_warn(Slave *slave, const char *text);
 
