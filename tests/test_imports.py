@@ -31,7 +31,7 @@ SIMULATE = (
     {"ssp"},
     {"scenario", "conformance", "design"},
     {"simulate"},
-    {"batch", "web"},
+    {"batch", "web", "composite"},
 )
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
 ROOF = ({"study"}, {"bridge"}, {"plan"}, {"example"}, {"report"}, {"paper"}, {"cli"})
