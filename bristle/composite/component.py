@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from string import Formatter
-from types import SimpleNamespace
-from typing import Any
+from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
 from pythonfmu import DefaultExperiment
 
 from bristle.composite import functions, rows
 from bristle.composite.assembly import Assembly
+from bristle.composite.state import fit_records
 from bristle.fmu.component import STEP_LENGTH, ComponentSlave, Played
 
 
 class Composite(ComponentSlave):
     """A whole scenario as one component."""
 
-    functions = functions
-    in_place = True
+    functions: ClassVar[Any] = functions
+    in_place: ClassVar[bool] = True
 
     def declare(self) -> None:
         """Declare inputs, then the outputs of all parts, then their parameters."""
@@ -78,7 +78,7 @@ class Composite(ComponentSlave):
             for code, text in slave.texts.items():
                 found[rows.coded(code, k)] = f"{part}: {_named_for(part, text)}"
             if self.assembly.kind(part) == rows.DAMPER:
-                found[rows.UNSETTLED - rows.PER_PART * (k + 1)] = (
+                found[rows.coded(rows.UNSETTLED, k)] = (
                     f"{part}: force and motion do not agree. A shorter step or parameters within "
                     "their bounds would be right."
                 )
@@ -94,10 +94,10 @@ class Composite(ComponentSlave):
         """Return what the build fixes."""
         return self.assembly.bake()
 
-    def flat_functions(self) -> SimpleNamespace:
+    def flat_functions(self) -> Any:
         """Return the functions, fitted to the laws and effects that are registered."""
-        functions.fit_records()
-        return SimpleNamespace(**{name: getattr(functions, name) for name in functions.FLAT})
+        fit_records()
+        return functions
 
     def played(self) -> list[Played]:
         """Return from what the signals of all sources are read."""

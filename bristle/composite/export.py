@@ -49,7 +49,9 @@ def plan_of(
     inputs: Iterable[str] = (),
 ) -> Plan:
     """Return what to build; parameters and errors are those of `export_composite`."""
-    file, chosen, named = resolve_scenario(scenario), dict(overrides or {}), list(inputs)
+    file, named = resolve_scenario(scenario), list(inputs)
+    given = (overrides or {}).items()
+    chosen = {key: str(value) if isinstance(value, Path) else value for key, value in given}
     assembly = Assembly(file, chosen, named)
     name = re.sub(r"[^A-Za-z0-9_]", "_", run_name(file, chosen))
     if not name[0].isalpha():

@@ -8,23 +8,11 @@ out in records by `simulate.layout` and moved by `simulate.time_loop`.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-from ..component import controller, damper, sensors, source, structure
+from ..component import structure
 from ..physics.linear import Row, copy
-from ..physics.rows import place, row
-from ..simulate import records
-from ..simulate.layout import (
-    is_whole,
-    lay_controller,
-    lay_damper,
-    lay_matrices,
-    lay_sampled,
-    lay_sensors,
-    lay_source,
-    lay_structure,
-)
-from ..simulate.pushed import couple, room
+from ..physics.rows import row
+from ..simulate.layout import is_whole, lay_matrices
+from ..simulate.pushed import couple
 from ..simulate.time_loop import (
     INLINE,
     LEAST_FORCE,
@@ -36,152 +24,57 @@ from ..simulate.time_loop import (
     update,
 )
 from ..simulate.time_loop import sample as take_samples
+from .parts import lay_memory, lay_part, take_inputs, take_measured, take_values
 from .rows import (
-    CONTROLLER,
     DAMPER,
-    DAMPERS,
-    FIRST_PARAMETER,
-    FIRST_PART,
     FIRST_STORE,
     GENERAL,
-    GIVEN,
     HEADER,
     HELD,
     KIND,
     LONGEST,
-    MEASURES,
     MOST_SUBSTEPS,
     NUMBER,
     PARTS,
-    PER_PART,
-    PLAYED,
-    SAMPLED,
     SHOWN,
     SIGNALS,
     SLOTS,
-    SOURCE,
-    SOURCES,
     STRUCTURE,
-    STRUCTURES,
     SUBSTEPS,
     TOO_LONG,
     UNSETTLED,
-    VALUE_AT,
-    VALUE_OF,
-    VALUES,
     WHOLE,
     Constants,
     H,
     about,
     bind,
+    coded,
     discretise,
-    part_setup,
-    part_sizes,
-    scale_part,
     scale_samples,
     setup,
-    store_size,
-    values_of,
 )
+from .state import BASE, COUNT, ORIGIN, SCALE, SUBSTEP, Opened, opened, sizes
 
 __all__ = [
-    "FLAT", "INLINED", "bind", "constants", "discretise", "fit_records", "output", "scale_samples",
-    "setup", "sizes", "start", "step",
+    "INLINED", "bind", "constants", "discretise", "output", "scale_samples", "setup", "sizes",
+    "start", "step",
 ]  # fmt: skip
 
-FLAT = tuple(name for name in __all__ if name not in ("FLAT", "fit_records"))
-"""What the compiler takes of them."""
-
-ORIGIN, BASE, COUNT, SUBSTEP, SCALE = range(5)
-NUMBERS = 8
-"""What the state begins with: the begin of the run [s]; substeps count from the time `BASE` [s] on,
-each of so many seconds; the largest force so far [N]. Behind them the signals, the inputs at the
-last step, and the records and the memory of the time loop."""
-
-INLINED = (*INLINE, "functions.opened", "rows.about", "rows.values_of")
+INLINED = (*INLINE, "state.opened", "rows.about", "rows.values_of")
 """What becomes part of its caller: that of the time loop, and what returns rows."""
 
-SOURCE_RECORD: Any = None
-DAMPER_RECORD: Any = None
-STRUCTURE_RECORD: Any = None
-SAMPLED_RECORD: Any = None
-SOURCE_SIZE = DAMPER_SIZE = STRUCTURE_SIZE = SAMPLED_SIZE = 0
-
-damper_constants, damper_output = damper.constants, damper.output
-structure_constants, source_constants = structure.constants, source.constants
-controller_constants, sensors_constants = controller.constants, sensors.constants
-
-
-def fit_records() -> None:
-    """Fit the records to the laws and effects that are registered: before functions are used."""
-    made = {
-        "SOURCE": records.source_record(), "DAMPER": records.damper_record(),
-        "STRUCTURE": records.structure_record(), "SAMPLED": records.sampled_record(),
-    }  # fmt: skip
-    for name, record in made.items():
-        globals()[f"{name}_RECORD"] = record
-        globals()[f"{name}_SIZE"] = record.itemsize // 8
-
-
-class Opened(NamedTuple):
-    """The state of a whole scenario, apart."""
-
-    signals: Any
-    kept: Any
-    sources: Any
-    dampers: Any
-    structures: Any
-    sampled: Any
-    memory: Any
-
-
-def opened(state: Row, baked: Row) -> Opened:
-    """Return the parts of a state; in compiled code they are views."""
-    general = row(baked, GENERAL)
-    a = NUMBERS + len(row(baked, SIGNALS))
-    b = a + len(row(baked, SLOTS))
-    c = b + int(general[SOURCES]) * SOURCE_SIZE
-    d = c + int(general[DAMPERS]) * DAMPER_SIZE
-    e = d + int(general[STRUCTURES]) * STRUCTURE_SIZE
-    f = e + int(general[SAMPLED]) * SAMPLED_SIZE
-    return Opened(
-        state[NUMBERS:a], state[a:b], state[b:c].view(SOURCE_RECORD),
-        state[c:d].view(DAMPER_RECORD), state[d:e].view(STRUCTURE_RECORD),
-        state[e:f].view(SAMPLED_RECORD), state[f:],
-    )  # fmt: skip
+structure_constants = structure.constants
 
 
 def constants(baked: Row, store: Row, times: Row, samples: Row) -> Constants:
-    """Return what `start`, `step` and `output` take."""
-    return Constants(baked, store, times, samples)
-
-
-def sizes(values: Row, baked: Row, counts: Row) -> int:
-    """Fill in how many floats constants, state, outputs and work take.
+    """Return what `start`, `step` and `output` take.
 
     Parameters
     ----------
-    values, baked : as in `rows.setup`
-    counts : (4,) filled
-
-    Returns
-    -------
-    int
-        0.
+    baked, store : as in `rows.setup`
+    times, samples : as in `rows.scale_samples`
     """
-    general = row(baked, GENERAL)
-    dampers, inputs = int(general[DAMPERS]), len(row(baked, SLOTS))
-    state = NUMBERS + len(row(baked, SIGNALS)) + inputs + dampers * DAMPER_SIZE
-    state += int(general[SOURCES]) * SOURCE_SIZE + int(general[SAMPLED]) * SAMPLED_SIZE
-    state += int(general[STRUCTURES]) * STRUCTURE_SIZE
-    store, most = store_size(values, baked, counts)
-    for k in range(int(general[PARTS])):
-        if int(about(baked, k)[KIND]) >= CONTROLLER:
-            part_sizes(k, values[int(about(baked, k)[FIRST_PARAMETER]) :], baked, counts)
-            state += int(counts[1]) + int(counts[3])
-    counts[0], counts[1], counts[2] = store, state, len(row(baked, SHOWN))
-    counts[3] = state + inputs + most + room(dampers)
-    return 0
+    return Constants(baked, store, times, samples)
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
@@ -223,105 +116,6 @@ def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work
     take_samples(sampled, (run.dampers, run.structures), time, time, h, run.signals)
     show_outputs(c, run.signals, outputs)
     return 0
-
-
-def lay_part(k: int, c: Constants, run: Opened, h: float, work: Row) -> None:
-    """Lay part k out in its record.
-
-    Parameters
-    ----------
-    k : number of the part
-    c : Constants
-    run : the state, apart
-    h : substep [s]
-    work : room to work
-    """
-    part, wiring = about(c.baked, k), row(c.baked, FIRST_PART + 3 * k + 1)
-    kind, i = int(part[KIND]), int(part[NUMBER])
-    store, first = row(c.store, FIRST_STORE + 2 * k), row(c.store, FIRST_STORE + 2 * k + 1)
-    if kind == SOURCE:
-        lay_played(k, c, run)
-    elif kind == DAMPER:
-        lay_damper(run.dampers[i], damper_constants(store), first, wiring)
-    elif kind == STRUCTURE:
-        lay_structure(run.structures[i], structure_constants(store), first, wiring)
-    elif kind == CONTROLLER:
-        r, law, at = (
-            run.sampled[i],
-            controller_constants(store),
-            place(c.store, FIRST_STORE + 2 * k),
-        )
-        lay_sampled(r, law.period, wiring, h)
-        lay_controller(r, law)
-        r["A"], r["B"] = at + place(store, 1), at + place(store, 2)
-        r["W"], r["C"] = at + place(store, 3), at + place(store, 4)
-    else:
-        r = run.sampled[i]
-        lay_sampled(r, sensors_constants(store).period, wiring, h)
-        lay_sensors(r, sensors_constants(store))
-
-
-def lay_memory(c: Constants, run: Opened, work: Row) -> None:
-    """Lay out what sampled parts remember, one behind the other.
-
-    Parameters
-    ----------
-    c : Constants
-    run : the state, apart
-    work : room to work
-    """
-    at = 0
-    for k in range(int(row(c.baked, GENERAL)[PARTS])):
-        part = about(c.baked, k)
-        if int(part[KIND]) >= CONTROLLER:
-            part_sizes(k, values_of(k, c.baked, c.store), c.baked, work[0:4])
-            states, spare = int(work[1]), int(work[3])
-            r, first = run.sampled[int(part[NUMBER])], row(c.store, FIRST_STORE + 2 * k + 1)
-            copy(first, 0, run.memory, at, states)
-            r["state"], r["work"], r["end"] = at, at + states, at + states + spare
-            at += states + spare
-
-
-def lay_played(k: int, c: Constants, run: Opened) -> None:
-    """Lay part k, a source, out in its record."""
-    part, wiring = about(c.baked, k), row(c.baked, FIRST_PART + 3 * k + 1)
-    store, j = row(c.store, FIRST_STORE + 2 * k), int(part[PLAYED])
-    law = source_constants(store, row(c.times, j), row(c.samples, j))
-    lay_source(run.sources[int(part[NUMBER])], law, int(wiring[0]), place(c.times, j))
-
-
-def take_values(inputs: Row, c: Constants, run: Opened) -> int:
-    """Set up the sources again whose values inputs stand for; return 0 or the code of a part."""
-    places, parts, at = row(c.baked, VALUE_AT), row(c.baked, VALUE_OF), place(c.store, VALUES)
-    for j in range(len(places)):
-        if places[j] < 0.0:
-            continue
-        k = int(parts[j])
-        if c.store[at + int(places[j])] != inputs[j]:
-            c.store[at + int(places[j])] = inputs[j]
-            store, first = row(c.store, FIRST_STORE + 2 * k), row(c.store, FIRST_STORE + 2 * k + 1)
-            code = part_setup(k, first, c.baked, c.store, store, first)
-            if code >= 0:
-                code = scale_part(k, c.times, c.samples, c.baked, c.store)
-            if code < 0:
-                return code
-        lay_played(k, c, run)
-    return 0
-
-
-def take_measured(c: Constants, run: Opened) -> None:
-    """Let dampers whose acceleration is an input take it for measured once a host has set it."""
-    dampers, given = row(c.baked, MEASURES), row(c.store, GIVEN)
-    for j in range(len(dampers)):
-        if dampers[j] >= 0.0:
-            run.dampers[int(dampers[j])]["measured"] = given[j] != 0.0
-
-
-def take_inputs(inputs: Row, c: Constants, run: Opened) -> None:
-    """Write the inputs into the signals, and keep them."""
-    slots = row(c.baked, SLOTS)
-    for j in range(len(slots)):
-        run.signals[int(slots[j])] = run.kept[j] = inputs[j]
 
 
 def step(
@@ -398,7 +192,7 @@ def unsettled(damper: int, c: Constants) -> int:
     for k in range(int(row(c.baked, GENERAL)[PARTS])):
         part = about(c.baked, k)
         if int(part[KIND]) == DAMPER and int(part[NUMBER]) == damper:
-            return UNSETTLED - PER_PART * (k + 1)
+            return coded(UNSETTLED, k)
     return UNSETTLED
 
 
@@ -451,19 +245,19 @@ def output(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, wor
     int
         0, or the code of a part.
     """
-    for i in range(len(state)):
-        work[i] = state[i]
-    run = opened(work[0 : len(state)], c.baked)
-    changed = False
+    kept, changed = opened(state, c.baked).kept, False
     for j in range(len(inputs)):
-        changed = changed or inputs[j] != run.kept[j]
-    if changed:
-        code = take_values(inputs, c, run)
-        if code < 0:
-            return code
-        take_measured(c, run)
-        take_inputs(inputs, c, run)
-        played = run.sources, c.times, c.samples
-        update(played, (run.dampers, run.structures), time, run.signals)
+        changed = changed or inputs[j] != kept[j]
+    if not changed:
+        show_outputs(c, opened(state, c.baked).signals, outputs)
+        return 0
+    copy(state, 0, work, 0, len(state))
+    run = opened(work[0 : len(state)], c.baked)
+    code = take_values(inputs, c, run)
+    if code < 0:
+        return code
+    take_measured(c, run)
+    take_inputs(inputs, c, run)
+    update((run.sources, c.times, c.samples), (run.dampers, run.structures), time, run.signals)
     show_outputs(c, run.signals, outputs)
     return 0

@@ -51,8 +51,8 @@ MOST_SUBSTEPS = 1_000_000
 TOO_LONG = -1
 """Why a step cannot be taken: it holds more than `MOST_SUBSTEPS`."""
 
-UNSETTLED = -PER_PART + 1
-"""What is added to a part's codes where its force and motion did not agree."""
+UNSETTLED = 1 - PER_PART
+"""The code of a damper whose force and motion did not agree."""
 
 WHOLE = 1e-6
 """Share of a sample period by which the end of a substep may miss an instant."""
@@ -77,7 +77,7 @@ class Constants(NamedTuple):
 
 
 def about(baked: Row, k: int) -> Row:
-    """Return the row `ABOUT` part k; in compiled code it is a view."""
+    """Return the row about part k, see `KIND`; in compiled code it is a view."""
     return row(baked, FIRST_PART + 3 * k)
 
 
@@ -269,7 +269,14 @@ def scale_samples(times: Row, samples: Row, baked: Row, store: Row) -> int:
 
 
 def scale_part(k: int, times: Row, samples: Row, baked: Row, store: Row) -> int:
-    """Do so for part k, if it is a source; all is as in `scale_samples`."""
+    """Do so for part k, if it is a source.
+
+    Parameters
+    ----------
+    k : number of the part
+    times, samples, baked, store
+        As in `scale_samples`, and what is returned too.
+    """
     part = about(baked, k)
     if int(part[KIND]) != SOURCE:
         return 0

@@ -148,7 +148,7 @@ def sharing(dampers: Any, structures: Any, where: int, work: Row) -> float:
         for j in range(m):
             matrix[i * m + j] /= values[i] * values[j]
     symmetric_eigenvalues(m, matrix, values)
-    most = values[0]
+    most: float = values[0]
     for i in range(m):
         most = max(most, values[i])
     least = most
@@ -187,7 +187,14 @@ def symmetric_eigenvalues(n: int, a: Row, values: Row) -> None:
 
 
 def rotate(n: int, a: Row, p: int, q: int) -> None:
-    """Turn a symmetric matrix (n, n) in place so that its entry (p, q) becomes 0."""
+    """Turn a symmetric matrix in place so that an entry becomes 0.
+
+    Parameters
+    ----------
+    n : size
+    a : (n, n) flat, changed in place
+    p, q : row and column of the entry, p < q
+    """
     if a[p * n + q] == 0.0:
         return
     theta = (a[q * n + q] - a[p * n + p]) / (2.0 * a[p * n + q])

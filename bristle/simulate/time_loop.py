@@ -184,7 +184,20 @@ def drive(driven: Any, share: float, s: Any) -> None:
 def agree(
     dampers: Any, structures: Any, t: float, h: float, scale: float, s: Any
 ) -> tuple[int, int, float]:
-    """Sweep over structures and dampers until motion and forces agree, as `substep` returns."""
+    """Sweep over structures and dampers until motion and forces agree.
+
+    Parameters
+    ----------
+    dampers, structures : arrays of records, see `records`
+    t, h : end of the substep and its length [s]
+    scale : largest force so far [N]
+    s : (n,) signals, changed in place
+
+    Returns
+    -------
+    tuple
+        As `substep`.
+    """
     sweep, change, most = 0, inf, most_sweeps(structures)
     while change > TOLERANCE * scale and sweep < most:
         for i in range(len(structures)):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import shutil
 import subprocess
 from ctypes import c_void_p
@@ -153,7 +154,7 @@ def test_a_parameter_has_the_effect_that_it_has_in_the_scenario() -> None:
 
 
 def test_a_record_of_ones_own_is_played_and_comes_along(tmp_path: Path) -> None:
-    rows = "".join(f"{0.02 * k!r},{np.sin(0.3 * k)!r}\n" for k in range(60))
+    rows = "".join(f"{0.02 * k!r},{math.sin(0.3 * k)!r}\n" for k in range(60))
     quake = tmp_path / "quake.csv"
     quake.write_text("time [s],acceleration [m/s2]\n" + rows)
     right = simulate(load_scenario(PASSIVE, {"ground.record": str(quake), "run.stop": 1.0}))
@@ -379,11 +380,41 @@ def test_the_command_writes_it(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert one.difference(one.rows(100, 0.002), right) <= EQUAL
 
 
-def test_effects_of_a_users_own_are_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+HOUSE = """schema = 1
+title = "a house"
+[run]
+stop = 0.5
+step = 0.002
+[components.ground]
+fmu = "SignalSource"
+parameters = {{ kind = "half_sine", amplitude = 2.0, duration = 0.2 }}
+[components.damper]
+{damper}
+[components.structure]
+fmu = "Structure"
+[connections]
+"structure.ground_acceleration" = "ground.value"
+"structure.damper_force" = "damper.force"
+"damper.displacement" = "structure.base_displacement"
+"damper.velocity" = "structure.base_velocity"
+"""
+OWN = """fmu = "LuGreDamper"
+effects = ["my_effect.py"]
+parameters = { "my_effect.on" = true, "my_effect.f_s" = 1.5, voltage = 3.0 }
+"""
+
+
+def test_a_chosen_form_of_the_command_is_in_it(tmp_path: Path) -> None:
+    file = tmp_path / "bent.toml"
+    bent = 'law = "lugre"\ncommand = "quadratic"\nparameters = { voltage = 3.0 }'
+    file.write_text(HOUSE.format(damper=bent))
+    assert compared(file) <= EQUAL
+
+
+def test_effects_of_a_users_own_are_in_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["effects", "new", "my_effect"]) == 0
-    changed = {
-        "damper.effects": [str(tmp_path / "my_effect.py")], "damper.my_effect.on": True,
-        "damper.my_effect.f_s": 1.5, "run.stop": 0.5,
-    }  # fmt: skip
-    assert compared(HALF_SINE, changed) <= EQUAL
+    (tmp_path / "effect.toml").write_text(HOUSE.format(damper=OWN))
+    assert compared(tmp_path / "effect.toml") <= EQUAL
