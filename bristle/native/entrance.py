@@ -68,7 +68,8 @@ _DISCRETISE = """if call == 5:
         return 0
 """
 _UNPACK = "times, samples = row(times, 0), row(samples, 0)"
-"""A host packs the samples of each signal that a component plays; most play one."""
+"""A host packs the samples of each signal that a component plays. What plays several finds its own,
+and what it bakes says where; its `scale_samples` asks for that."""
 
 _OUTSIDE = (
     "acos asin atan atan2 cbrt ceil cos cosh erf erfc exp exp2 expm1 fabs floor fmax fmin fmod "
@@ -100,11 +101,11 @@ def entrance_of(functions: Any, sampled: bool = False) -> FunctionType:
     found = {one: _part(functions, one) for one in (*NEEDED, *OPTIONAL)}
     names = {one: ", ".join(signature(found[one]).parameters) for one in _NAMED if found[one]}
     scale, discretise = names.get("scale_samples"), names.get("discretise")
-    one = scale and "baked" not in signature(found["scale_samples"]).parameters
+    several = scale and "baked" in signature(found["scale_samples"]).parameters
     text = _SOURCE.format(
         rows=", ".join(ROWS),
         begin=_BEGIN_CLOCK if sampled else _SCALE.format(names=scale) if scale else "pass",
-        unpack=_UNPACK if one else "pass",
+        unpack=_UNPACK if scale and not several else "pass",
         constants=names["constants"],
         discretise=_DISCRETISE.format(names=discretise) if discretise else "pass",
         bind="bind(given, store)" if found["bind"] else "pass",

@@ -86,8 +86,8 @@ class {name}(Effect):
 OVERFLOWS = {
     "growing": ("p.k * exp(q.x / p.d)", 10.0, "OverflowError: math range error"),
     "bounded": ("p.k / (1.0 + exp(q.x / p.d))", 10.0, "OverflowError: math range error"),
-    "rooted": ("p.k * sqrt(0.5 - q.x)", 10.0, "ValueError: math domain error"),
-    "divided": ("p.k / (1.0 - q.x)", 1.0, "ZeroDivisionError: float division by zero"),
+    "rooted": ("p.k * sqrt(50.0 * p.d - q.x)", 10.0, "ValueError: math domain error"),
+    "divided": ("p.k / (100.0 * p.d - q.x)", 1.0, "ZeroDivisionError: float division by zero"),
 }
 """Effects that Python refuses at a displacement [m], and what it says."""
 
