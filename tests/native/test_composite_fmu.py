@@ -411,9 +411,7 @@ def test_a_chosen_form_of_the_command_is_in_it(tmp_path: Path) -> None:
     assert compared(file) <= EQUAL
 
 
-def test_effects_of_a_users_own_are_in_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_effects_of_a_users_own_are_in_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["effects", "new", "my_effect"]) == 0
     (tmp_path / "effect.toml").write_text(HOUSE.format(damper=OWN))
