@@ -13,6 +13,7 @@ from scipy.signal import lsim
 from bristle import run
 from bristle.fmu import catalogue
 from bristle.physics.building import Building, read_building
+from bristle.physics.device import Device
 from bristle.scenario.library import driven_mass
 from bristle.scenario.scenario import check_scenario, load_scenario
 from bristle.scenario.stock import copy_scenario
