@@ -31,7 +31,7 @@ SIMULATE = (
     {"ssp"},
     {"scenario", "conformance", "design"},
     {"simulate"},
-    {"batch", "limit", "web"},
+    {"batch", "limit", "web", "composite"},
 )
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
 ROOF = (

@@ -1,7 +1,8 @@
-"""Write a study's present model as an FMU and a scenario that uses it; a scenario as a web page.
+"""Write a study's present model as an FMU, with a scenario; a scenario as one FMU or a web page.
 
-A study's values are baked into the FMU. `--web` writes a scenario of built-in components, or that
-of a study, as a WebAssembly module, a loader and a page with sliders, which needs no server.
+A study's values are baked into the FMU. `--native --as-one` writes a scenario of built-in
+components as one FMU: its parts are solved together, as by the engine `compiled`. `--web` writes
+it, or a study's, as a WebAssembly module, a loader and a page with sliders, which needs no server.
 """
 
 from __future__ import annotations
@@ -15,15 +16,30 @@ from ._common import add_overrides
 from ._consent import add_trust
 from ._native import add_native, builder
 
-HELP = "write a study's model as an FMU; or a scenario, or a study, as a web page"
+HELP = "write a study's model as an FMU; or a scenario as one FMU, or as a web page"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle export`."""
-    text = "the study; with --web also a scenario file, or the name of a scenario or component"
+    text = (
+        "the study; with --as-one a scenario file, or the name of a scenario; with --web a study, "
+        "that, or the name of a component"
+    )
     parser.add_argument("what", metavar="FOLDER", help=text)
     parser.add_argument(
-        "--out", type=Path, metavar="DIR", help="where to write; else export/ in the study"
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="where to write; else export/ in the study, with --as-one the current folder",
+    )
+    text = "write the whole scenario as one FMU, with --native"
+    parser.add_argument("--as-one", action="store_true", help=text)
+    text = (
+        "a port, or a number of a source, that becomes an input, with --as-one: "
+        "--input structure.ground_acceleration"
+    )
+    parser.add_argument(
+        "--input", dest="inputs", action="append", default=[], metavar="PART.PORT", help=text
     )
     text = "write the scenario as a WebAssembly module with a page that computes it"
     parser.add_argument("--web", type=Path, metavar="DIR", help=text)
@@ -38,9 +54,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Export; say what was written, and what was left out."""
     if arguments.web is not None:
+        if arguments.as_one or arguments.inputs:
+            raise ScenarioError("--as-one and --input are for an FMU, --web is for a page.")
         return _web(arguments)
-    if arguments.slider or arguments.overrides:
-        raise StudyError("--slider and --set belong to --web, which writes a page with sliders.")
+    if arguments.slider:
+        raise StudyError("--slider belongs to --web, which writes a page with sliders.")
+    if arguments.as_one:
+        return _as_one(arguments)
+    if arguments.overrides or arguments.inputs:
+        raise StudyError(
+            "--set and --input are for a scenario: with --native --as-one it becomes one FMU. A "
+            "study has its values in its model."
+        )
     from ..bridge.export import export_study
     from ..study.study import Study
 
@@ -62,6 +87,35 @@ def main(arguments: argparse.Namespace) -> int:
     print(f"Run it:  {command('run', found.scenario)}")
     for note in found.notes:
         print(f"{note[:1].upper()}{note[1:]}")
+    return 0
+
+
+def _as_one(arguments: argparse.Namespace) -> int:
+    """Write a scenario as one FMU; say what it has."""
+    from ..composite.export import export_composite
+    from ..fmu.description import read_description
+    from ..scenario.scenario import parse_overrides
+
+    if not arguments.native:
+        raise ScenarioError("--as-one goes with --native: the parts are solved by compiled code.")
+    path = export_composite(
+        arguments.what, arguments.out or Path(), builder(arguments),
+        parse_overrides(arguments.overrides), arguments.inputs,
+    )  # fmt: skip
+    about = read_description(path, any_platform=True)
+    inputs = [f"{v.name} [{v.unit}]" if v.unit else v.name for v in about.of("input")]
+    counts = {one: len(about.of(one)) for one in ("output", "parameter")}
+    if arguments.json:
+        import json
+
+        answer = {"file": str(path.absolute()), "guid": about.guid}
+        named = {"inputs": [v.name for v in about.of("input")], **counts}
+        print(json.dumps({**answer, **named}, indent=2))
+        return 0
+    print(f"{path}: built, guid {about.guid}")
+    print(f"  inputs: {', '.join(inputs) or 'none'}")
+    print(f"  {counts['output']} outputs, {counts['parameter']} parameters:  ", end="")
+    print(command("list", "ports", path))
     return 0
 
 

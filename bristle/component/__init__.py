@@ -27,11 +27,15 @@ and where there is a need for it
     discretise(dt, store, work)
         Fill in what the length of the step [s] implies: before `constants`, and before a step whose
         length differs from that of the last one.
+    scale_samples(times, samples, store)
+        Take over what the samples of a signal imply: once they are there, after `setup`.
 
-`values` are the parameters in their order: a whole number or a switch as a float, a text that is
-one of its `words` as the index of the word, -1 where it is none of them, any other text as 0;
-`given` holds 1 for each input that a host has set, else 0; `baked` is what a build fixes, as the
-module's `bake` lays it down in plain Python; `store`, `state` and work come with zeros in them.
+`constants`, `discretise` and `scale_samples` are called by the names of what they take; any of the
+rows may be among it. `values` are the parameters in their order: a whole number or a switch as a
+float, a text that is one of its `words` as the index of the word, -1 where it is none of them, any
+other text as 0; `given` holds 1 for each input that a host has set, else 0; `baked` is what a build
+fixes, as the module's `bake` lays it down in plain Python; `store`, `state` and work come with
+zeros in them.
 
 Each returns a code: 0; above 0 what the component warns of; below 0 why it cannot go on. The text
 belongs to the component's class. `state` and `new_state`, `before` and `now`, `outputs` and `work`

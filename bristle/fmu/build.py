@@ -24,7 +24,7 @@ from typing import Any
 from ..errors import BuildError
 from ..resources import fmus_folder
 from ..trust import require
-from . import catalogue
+from . import catalogue, modules
 from .plan import CAPABILITIES, PACKAGE, library_files
 from .plan import Plan as Plan
 from .plan import plan as plan
@@ -145,6 +145,7 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
     for name, path in what.files.items():
         extra.append(Path(shutil.copyfile(path, folder / name)))
     out = folder / "out"
+    modules.LOCK.acquire()  # building imports the component
     before = list(sys.path)
     try:
         return Path(
@@ -158,8 +159,8 @@ def _build_loose(what: Plan, guid: str, folder: Path) -> Path:
         ) from error
     finally:
         sys.path[:] = before
-        for module in [name for name in sys.modules if digest in name]:
-            del sys.modules[module]
+        modules.forget(lambda name, _: digest in name)
+        modules.LOCK.release()
 
 
 def _write_renamed(text: str, target: Path, package: str) -> None:

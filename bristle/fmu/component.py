@@ -5,7 +5,7 @@ See `bristle.component` for the functions. The texts of their codes live in the 
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple, Optional
 
 from ..physics.drive import VOLTAGE, declared_for, states_for, text_for, unit_for
 from ..physics.effect import Effect, Parameter, effects_of
@@ -58,6 +58,28 @@ class EffectSlave(Slave):
         }
 
 
+class Reading(NamedTuple):
+    """A parameter, a text, that samples are read from where another one is a certain word.
+
+    Without a `chooser` it always is.
+    """
+
+    parameter: str
+    chooser: str = ""
+    word: str = ""
+
+
+class Played(NamedTuple):
+    """What samples of a signal are read from: a CSV, or TIME:VALUE pairs; None: never from that.
+
+    The CSV's header is `header`; None: `time [s]` and any other.
+    """
+
+    file: Optional[Reading]  # noqa: UP045 (read by Python 3.9)
+    pairs: Optional[Reading]  # noqa: UP045
+    header: Optional[str]  # noqa: UP045
+
+
 STEP_LENGTH = "step_length"
 """What a text calls the length of the step [s]."""
 
@@ -84,6 +106,8 @@ class ComponentSlave(EffectSlave):
     texts: ClassVar[dict[int, str]] = {}
     warns_first: ClassVar[dict[int, int]] = {}
     hidden: ClassVar[int] = 0
+    in_place: ClassVar[bool] = False
+    """Whether a step moves the state on where it lies, as no step is made twice."""
 
     def bake(self) -> list[float]:
         """Return what the build fixes, as the component's `setup` takes it."""
@@ -114,9 +138,13 @@ class ComponentSlave(EffectSlave):
         """Return 1 for each input that the host has set, else 0."""
         return [1.0 if index in self._set else 0.0 for index in self._inputs]
 
-    def samples(self) -> tuple[list[float], list[float]]:
-        """Return times [s] and values of what the component plays, from its parameters."""
-        return [], []
+    def played(self) -> list[Played]:
+        """Return from what the samples of each signal that the component plays are read."""
+        return []
+
+    def bundled(self) -> list[str]:
+        """Return the names of files that came with the component; others are paths."""
+        return []
 
     def setup(self) -> tuple[Any, list[float], int]:
         """Return constants, state and size of work; raise what is wrong with the parameters."""
@@ -172,6 +200,11 @@ class ComponentSlave(EffectSlave):
         if code:
             self.tell(code, self.time, 0.0)
         self._values[self._shown_first : self._shown_after] = self._given[: self._count]
+
+    def part_of(self, code: int) -> str:
+        """Return the output that tells the fault of the part that a code is about; "": there is no
+        part."""
+        return ""
 
     def tell(self, code: int, time: float, step: float) -> None:
         """Warn of what a code says, or raise it; texts may name the `STEP_LENGTH` [s] as well."""

@@ -47,6 +47,7 @@ class SampledSlave(ComponentSlave):
     """A component that samples `MEASURED` at t = 0, h, 2h ... and holds its outputs in between."""
 
     changes = "discrete"
+    in_place = True
     texts: ClassVar[dict[int, str]] = _CLOCK_TEXTS
     warns_first: ClassVar[dict[int, int]] = {clock.TOO_MANY_SAMPLES: clock.LONG_STEP}
 

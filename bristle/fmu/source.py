@@ -2,25 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple, Optional
+from typing import Any, ClassVar, Optional
 
 from ..component import source
 from ..physics.record import read_two_column
 from ..physics.signals import KINDS, PARAMETERS, read_steps
-from .component import ComponentSlave
+from .component import ComponentSlave, Played, Reading
 
 _output = source.output
-
-
-class Reading(NamedTuple):
-    """A parameter, a text, that samples are read from where another one is a certain word.
-
-    Without a `chooser` it always is.
-    """
-
-    parameter: str
-    chooser: str = ""
-    word: str = ""
 
 
 class SourceSlave(ComponentSlave):
@@ -35,11 +24,11 @@ class SourceSlave(ComponentSlave):
     pairs_of: ClassVar[Optional[Reading]] = None  # noqa: UP045
     header: ClassVar[Optional[str]] = None  # noqa: UP045
 
-    def bundled(self) -> list[str]:
-        """Return the names of files that came with the component; others are paths."""
-        return []
+    def played(self) -> list[Played]:
+        return [Played(self.file_of, self.pairs_of, self.header)]
 
     def samples(self) -> tuple[list[float], list[float]]:
+        """Return times [s] and values of what the component plays, from its parameters."""
         if self.file_of and self._is_read(self.file_of):
             name = self[self.file_of.parameter]
             file = self.resource(f"{name}.csv") if name in self.bundled() else name

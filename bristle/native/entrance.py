@@ -19,6 +19,7 @@ import numpy as np
 from ..component.clock import ORIGIN
 from ..errors import BuildError
 from ..jit import RefusedError, library_text
+from ..physics.rows import row
 from .c_text import c_text
 
 NEEDED = ("sizes", "setup", "constants", "start", "step", "output")
@@ -27,7 +28,11 @@ OPTIONAL = ("bind", "follow", "discretise", "scale_samples")
 """Functions that it may have."""
 
 INLINE = ("rows.row",)
-"""Callees that must become part of their callers: they return rows."""
+"""Callees that must become part of their callers: they return rows. Functions name their own as
+`INLINED`."""
+
+_NAMED = ("constants", "scale_samples", "discretise")
+"""Functions that are called by the names of their parameters: see `ROWS`."""
 
 NAME = "bristle_entrance"
 ROWS = (
@@ -41,10 +46,12 @@ def entrance(call, time, dt, {rows}):
         return sizes(values, baked, work)
     if call == 1:
         code = setup(values, given, baked, store, state)
+        {unpack}
         {begin}
         return code
     {discretise}
     {bind}
+    {unpack}
     c = constants({constants})
     {follow}
     if call == 2:
@@ -56,11 +63,14 @@ def entrance(call, time, dt, {rows}):
 
 _BEGIN_CLOCK = f"state[{ORIGIN}] = time"
 """Until the first sample is taken, the clock of a sampled component begins with the instance."""
-_SCALE = "code = code if code < 0 else scale_samples(times, samples, store)"
+_SCALE = "code = code if code < 0 else scale_samples({names})"
 _DISCRETISE = """if call == 5:
-        discretise(dt, store, work)
+        discretise({names})
         return 0
 """
+_UNPACK = "times, samples = row(times, 0), row(samples, 0)"
+"""A host packs the samples of each signal that a component plays. What plays several finds its own,
+and what it bakes says where; its `scale_samples` asks for that."""
 
 _OUTSIDE = (
     "acos asin atan atan2 cbrt ceil cos cosh erf erfc exp exp2 expm1 fabs floor fmax fmin fmod "
@@ -90,15 +100,19 @@ def entrance_of(functions: Any, sampled: bool = False) -> FunctionType:
     if missing:
         raise BuildError(f"{name} has no flat {', '.join(missing)}: it runs in Python alone.")
     found = {one: _part(functions, one) for one in (*NEEDED, *OPTIONAL)}
+    names = {one: ", ".join(signature(found[one]).parameters) for one in _NAMED if found[one]}
+    scale, discretise = names.get("scale_samples"), names.get("discretise")
+    several = scale and "baked" in signature(found["scale_samples"]).parameters
     text = _SOURCE.format(
         rows=", ".join(ROWS),
-        begin=_BEGIN_CLOCK if sampled else _SCALE if found["scale_samples"] else "pass",
-        constants=", ".join(signature(found["constants"]).parameters),
-        discretise=_DISCRETISE if found["discretise"] else "pass",
+        begin=_BEGIN_CLOCK if sampled else _SCALE.format(names=scale) if scale else "pass",
+        unpack=_UNPACK if scale and not several else "pass",
+        constants=names["constants"],
+        discretise=_DISCRETISE.format(names=discretise) if discretise else "pass",
         bind="bind(given, store)" if found["bind"] else "pass",
         follow="follow(now, c)" if found["follow"] else "pass",
     )
-    namespace = {one: function for one, function in found.items() if function}
+    namespace = {"row": row, **{name: function for name, function in found.items() if function}}
     exec(compile(text, f"<entrance of {name}>", "exec"), namespace)
     entrance: FunctionType = namespace["entrance"]
     entrance.__module__ = name
@@ -126,7 +140,8 @@ def functions_in_c(functions: Any, sampled: bool = False, files: Sequence[Path] 
     """
     examples = (0, 0.0, 0.0, *[np.zeros(0)] * len(ROWS))
     try:
-        text, root = library_text(entrance_of(functions, sampled), examples, INLINE)
+        inlined = (*INLINE, *getattr(functions, "INLINED", ()))
+        text, root = library_text(entrance_of(functions, sampled), examples, inlined)
         return c_text(plain_text(text, root))
     except RefusedError as error:
         raise BuildError(refusal(str(error), [path.resolve() for path in files])) from error

@@ -7,9 +7,7 @@ from string import Formatter
 
 from ..component import HELD
 from ..errors import BuildError
-from ..fmu.component import STEP_LENGTH, ComponentSlave
-from ..fmu.controller import SampledSlave
-from ..fmu.source import Reading
+from ..fmu.component import STEP_LENGTH, ComponentSlave, Played, Reading
 
 _KINDS = {"Real": "REAL", "Integer": "INTEGER", "Boolean": "BOOLEAN", "String": "STRING"}
 _CAUSALITIES = {"input": "INPUT", "output": "OUTPUT", "parameter": "PARAMETER"}
@@ -23,7 +21,11 @@ _TABLES = """\
 }};
 
 {pieces}static const Meaning meanings[] = {{
-{meanings}    {{0, 0, 0}},
+{meanings}    {{0, 0, -1, 0}},
+}};
+
+static const Signal signals[] = {{
+{signals}    {{{{-1, -1, ""}}, {{-1, -1, ""}}, 0}},
 }};
 
 static const char *const bundled[] = {{{bundled}0}};
@@ -47,10 +49,9 @@ const Component component = {{
     .baked_size = {baked_size},
     .in_place = {in_place},
     .discretises = {discretises},
-    .file = {file},
-    .pairs = {pairs},
+    .signals = signals,
+    .played = {played},
     .bundled = bundled,
-    .header = {header},
 }};
 """
 
@@ -82,7 +83,8 @@ def tables(slave: ComponentSlave, guid: str) -> str:
     for k, (code, text) in enumerate(sorted(slave.texts.items())):
         pieces.append(f"static const Piece pieces_{k}[] = {{\n{_pieces(text, names)}\n}};\n\n")
         first = slave.warns_first.get(code, 0)
-        meanings.append(f"    {{{code}, {first}, pieces_{k}}},\n")
+        part = names.get(slave.part_of(code), -1)
+        meanings.append(f"    {{{code}, {first}, {part}, pieces_{k}}},\n")
     inputs_at, inputs = _span(slave, slave._inputs)
     outputs_at, outputs = _span(slave, slave._outputs)
     return _TABLES.format(
@@ -100,12 +102,11 @@ def tables(slave: ComponentSlave, guid: str) -> str:
         outputs_at=outputs_at,
         outputs=outputs,
         baked_size=len(baked),
-        file=_choice(getattr(slave, "file_of", None), names),
-        pairs=_choice(getattr(slave, "pairs_of", None), names),
-        bundled="".join(f"{quoted(one)}, " for one in getattr(slave, "bundled", list)()),
-        header=quoted(header) if (header := getattr(slave, "header", None)) else "0",
+        signals="".join(_signal(one, names) for one in slave.played()),
+        played=len(slave.played()),
+        bundled="".join(f"{quoted(one)}, " for one in slave.bundled()),
         discretises=int(hasattr(slave.flat_functions(), "discretise")),
-        in_place=int(isinstance(slave, SampledSlave)),
+        in_place=int(slave.in_place),
     )
 
 
@@ -130,6 +131,12 @@ def _variable(slave: ComponentSlave, index: int, has_words: bool) -> str:
 def _words(slave: ComponentSlave, index: int) -> str:
     """Return the words that a String chooses from, as C has them; "" where it is any text."""
     return ", ".join(quoted(word) for word in slave._words.get(index, ()))
+
+
+def _signal(one: Played, names: dict[str, int]) -> str:
+    """Return from what the samples of a signal are read."""
+    header = quoted(one.header) if one.header else "0"
+    return f"    {{{_choice(one.file, names)}, {_choice(one.pairs, names)}, {header}}},\n"
 
 
 def _choice(reading: Reading | None, names: dict[str, int]) -> str:

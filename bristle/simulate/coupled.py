@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
-from math import ceil, isfinite
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..jit import compiled
 from ..physics import damper, structure
 from ..scenario.scenario import Scenario
 from . import time_loop
-from .clocks import are_whole
+from .layout import substeps_in
 from .system import System
 
 LONGEST_SUBSTEP = 2e-4
@@ -105,9 +105,7 @@ def substeps_of(scenario: Scenario, system: System, longest: float = LONGEST_SUB
     scenario, system : what runs, and its numbers
     longest : longest substep [s]
     """
-    step, periods = scenario.step, system.periods()
-    least = max(1, ceil(step / longest - 1e-9))
-    return next((n for n in range(least, 4 * least) if are_whole(periods, step / n)), least)
+    return substeps_in(scenario.step, longest, system.periods())
 
 
 def compiled_loop(clocked: bool = False) -> Callable[..., tuple[int, int, int]]:

@@ -53,8 +53,8 @@ def damper_record() -> np.dtype[np.void]:
 
     smooth, smooth_1, smooth_2 are the force without friction at the ends of the last substeps;
     found, tried, excess belong to the sweeps; `jumps` says that its voltage has. `sharing` dampers
-    bring what they push of structure `on_structure` (-1: none) to rest together; `holding` is the
-    slot of the force that would hold it.
+    bring what they push of structure `on_structure` (-1: none) to rest together, each between
+    levels `lower` and `upper`; `holding` is the slot of the force that would hold it.
     """
     size, effects = damper.SLOTS.z_size, len(damper.SLOTS.effects)
     states = size + damper_component.REMEMBERED
@@ -62,7 +62,7 @@ def damper_record() -> np.dtype[np.void]:
     return np.dtype(
         [
             *((name, _INT) for name in ("law", "n_moving", "n_own", "first")),
-            *((name, _INT) for name in ("on_structure", "holding")),
+            *((name, _INT) for name in ("on_structure", "holding", "lower", "upper")),
             *((name, _FLOAT) for name in ("v_max", "stroke", "moving_mass", "sharing", *forces)),
             *((name, _FLAG) for name in ("active", "advances", "signed", "lags")),
             *((name, _FLAG) for name in ("measured", "jumps")),

@@ -18,6 +18,7 @@ from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
 
 from ..errors import FmuError, RunError
+from ..fmu import modules
 from ..fmu.archive import extract, library_member, platform_folder
 from ..fmu.description import Description, Value, Variable
 from ..interrupt import Interrupt
@@ -81,11 +82,14 @@ class Unpacked:
     def close(self) -> None:
         """Remove the folder and what FMUs written in Python left in this interpreter."""
         inside = self._folder.name + os.sep
-        sys.path[:] = [entry for entry in sys.path if not entry.startswith(inside)]
-        for name, module in list(sys.modules.items()):
-            if str(getattr(module, "__file__", None) or "").startswith(inside):
-                del sys.modules[name]
+        with modules.LOCK:
+            sys.path[:] = [entry for entry in sys.path if not entry.startswith(inside)]
+            modules.forget(lambda _, one: _file_of(one).startswith(inside))
         self._folder.cleanup()
+
+
+def _file_of(module: object) -> str:
+    return str(getattr(module, "__file__", None) or "")
 
 
 class Instance:
@@ -121,7 +125,7 @@ class Instance:
         self._listen = listen
         self._key = _register(self)
         # A KeyboardInterrupt in an FMU written in Python would be told as that FMU's failure.
-        with Interrupt() as interrupt:
+        with Interrupt() as interrupt, modules.LOCK:
             self.library = self._load(folder)
             try:
                 self.library.instantiate()

@@ -9,16 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..component import controller, damper, sensors, source, structure
-from ..component.devices import DEVICE_FORCES
 from ..data import ground_motion_file
 from ..errors import ScenarioError
 from ..fmu import catalogue
 from ..fmu.slave import Slave
+from ..physics.device import GROUND
 from ..physics.signals import CONSTANT
 from ..scenario.scenario import Component, Scenario
 from . import records
 from .clocks import Clocks
-from .pushed import pushed_by, sharing, velocity_per_force
+from .layout import NOWHERE, lay_damper, lay_source, lay_structure
+from .pushed import couple, pushed_by, room
 
 Array = NDArray[Any]
 Port = tuple[str, str]
@@ -125,8 +126,9 @@ class System:
 
     def coupled(self, h: float) -> tuple[Array, Array]:
         """Return dampers and structures for substeps of h [s]."""
-        structures = self._structures(h)
-        return self._dampers(structures, h), structures
+        structures, dampers = self._structures(h), self._dampers()
+        couple(dampers, structures, h, np.zeros(room(len(dampers))))
+        return dampers, structures
 
     def periods(self) -> list[float]:
         """Return the sample periods [s] of the components that have a clock."""
@@ -134,8 +136,9 @@ class System:
 
     def sampled(self, h: float) -> tuple[Array, Array, Array]:
         """Return sampled components, their constants and memory for substeps of h [s]."""
-        slaves = {name: self.slaves[name] for name in self.names["sampled"]}
-        clocks = Clocks(slaves, lambda *port: self.slots[port], h)
+        names = self.names["sampled"]
+        wirings = [self.wiring(name) for name in names]
+        clocks = Clocks([self.slaves[name] for name in names], wirings, h)
         return clocks.records, clocks.constants, clocks.memory
 
     def sources(self) -> tuple[Array, Array, Array]:
@@ -146,63 +149,49 @@ class System:
         times: list[float] = []
         samples: list[float] = []
         for record, (name, c) in zip(found, changing.items(), strict=True):
-            record["first"], record["begin"] = self._first(name), len(times)
+            lay_source(record, c, self._first(name), len(times))
             times.extend(c.times)
             samples.extend(c.samples)
-            record["end"] = len(times)
-            for field in ("kind", "scale", "delay", "rated"):
-                record[field] = getattr(c, field)
-            _fill(record, p=c.p)
         return found, np.array(times), np.array(samples)
 
-    def _dampers(self, structures: Array, h: float) -> Array:
-        """Return the dampers; one that sticks does so with the structure that it pushes."""
+    def _dampers(self) -> Array:
         names = self.names["damper"]
         found = np.zeros(len(names), records.damper_record())
-        buildings = {name: self.slaves[name].building for name in self.names["structure"]}
-        pushed = [pushed_by(name, buildings, self.source_of, self.slots) for name in names]
-        signs = [self.slaves[name].constants.setup.signed for name in names]
-        sticking = [at for at, signed in zip(pushed, signs, strict=True) if at and signed]
-        for record, name, at in zip(found, names, pushed, strict=True):
-            c, state = self.slaves[name].constants, self.slaves[name].state
-            _copy(record, c.setup, ("law", "n_moving", "n_own"))
-            _copy(record, c.setup, ("active", "advances", "signed", "lags"))
-            _copy(record, c, ("v_max", "stroke"))
-            own = c.setup
-            _fill(record, state=state, new_state=state, p=own.p, on=own.on, moving=own.moving)
-            record["inputs"], record["first"] = self._inputs(name), self._first(name)
-            given = (name, "acceleration") in self.source_of
-            record["measured"] = c.measured or given
-            record["on_structure"], record["sharing"] = -1, 1.0
-            if at:
-                there = structures[at.structure]
-                gain = velocity_per_force(there, at.device, at.device)
-                beside = [other.device for other in sticking if other.structure == at.structure]
-                record["on_structure"], record["holding"] = at.structure, at.holding
-                record["sharing"] = sharing(there, beside)
-                record["moving_mass"] = -h / (gain * record["sharing"])
+        for record, name in zip(found, names, strict=True):
+            slave = self.slaves[name]
+            lay_damper(record, slave.constants, slave.state, self.wiring(name))
         return found
 
     def _structures(self, h: float) -> Array:
         names = self.names["structure"]
         found = np.zeros(len(names), records.structure_record())
         for record, name in zip(found, names, strict=True):
-            c, state = self.slaves[name].constants_of(h), self.slaves[name].state
-            _copy(record, c, ("n", "mass", "h", "active", "touches", "isolated"))
-            _fill(
-                record, stiffnesses=c.stiffnesses, m_inverse=c.m_inverse, damping=c.damping,
-                stiffness=c.stiffness, phi=c.phi, held=c.held, ramp=c.ramp, p=c.p, on=c.on,
-                state=state, new_state=state,
-            )  # fmt: skip
-            inputs = self._inputs(name)
-            _fill(record, inputs=inputs[:DEVICE_FORCES], forces=inputs[DEVICE_FORCES:], ends=c.ends)
-            record["first"], record["devices"] = self._first(name), c.devices
-            record["n_states"], record["followed"] = len(state), self._followed(name)
-            for field, port in (("friction", "damper_force"), ("extra_friction", "extra_force")):
-                record[field] = self._friction_at(name, port)
-            for k, device in enumerate(self.slaves[name].building.devices):
-                record["frictions"][k] = self._friction_at(name, device.ports.force)
+            slave = self.slaves[name]
+            lay_structure(record, slave.constants_of(h), slave.state, self.wiring(name))
         return found
+
+    # -- where the signals of a component are, as `layout` takes it
+
+    def wiring(self, name: str) -> list[float]:
+        """Return where the signals of a component are, and what they are to the others."""
+        if name in self.names["source"]:
+            return [self._first(name)]
+        if name in self.names["sampled"]:
+            return [self._first(name), *self._inputs(name)]
+        if name in self.names["damper"]:
+            return [self._first(name), *self._pushed(name), *self._inputs(name)]
+        inputs, devices = self._inputs(name), self.slaves[name].building.devices
+        frictions = [self._friction_at(name, device.ports.force) for device in devices]
+        first = [self._friction_at(name, port) for port in ("damper_force", "extra_force")]
+        return [self._first(name), self._followed(name), *first, *inputs, *frictions]
+
+    def _pushed(self, name: str) -> list[float]:
+        buildings = {one: self.slaves[one].building for one in self.names["structure"]}
+        at = pushed_by(name, buildings, self.source_of, self.slots)
+        measured = (name, "acceleration") in self.source_of
+        if at is None:
+            return [NOWHERE, NOWHERE, measured, GROUND, GROUND]
+        return [at.structure, at.holding, measured, at.device.lower, at.device.upper]
 
     def _friction_at(self, structure: str, port: str) -> int:
         """Return the slot of the friction in a force on a structure; the last one is none."""
@@ -213,18 +202,15 @@ class System:
     def _followed(self, structure: str) -> bool:
         """Return whether a component reads more of a structure than displacement and velocity."""
         read = {port for name, port in self.source_of.values() if name == structure}
+        building = self.slaves[structure].building
         motion = {
             f"{level}_{what}"
-            for level in self._levels(structure)
+            for level in building.levels()
             for what in ("displacement", "velocity")
         }
-        for device in self.slaves[structure].building.devices:
+        for device in building.devices:
             motion |= {device.ports.displacement, device.ports.velocity}
         return bool(read - motion)
-
-    def _levels(self, structure: str) -> list[str]:
-        levels: list[str] = self.slaves[structure].building.levels()
-        return levels
 
 
 def kind_of(component: Component, scenario: Scenario) -> str:
@@ -273,15 +259,3 @@ def configured(component: Component, scenario: Scenario) -> Slave:
             f"{', '.join(following)}, which is not compiled. Run it with the engine fmu."
         )
     return slave
-
-
-def _copy(record: Any, constants: Any, fields: tuple[str, ...]) -> None:
-    """Copy numbers of a component's constants."""
-    for field in fields:
-        record[field] = getattr(constants, field)
-
-
-def _fill(record: Any, **values: Any) -> None:
-    """Write sequences to the begin of array fields."""
-    for name, value in values.items():
-        record[name][: len(value)] = value

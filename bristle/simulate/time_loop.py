@@ -19,7 +19,15 @@ from math import floor, inf, isfinite
 from typing import Any
 
 from ..component import clock, controller, damper, sensors, source, structure
-from ..component.damper import FORCE, FRICTION, HOLDING_FORCE, LAST_STEP, VOLTAGE, VOLTAGE_AT_END
+from ..component.damper import (
+    ACCELERATION,
+    FORCE,
+    FRICTION,
+    HOLDING_FORCE,
+    LAST_STEP,
+    VOLTAGE,
+    VOLTAGE_AT_END,
+)
 from ..component.devices import DAMPER_FORCE, DEVICE_FORCES, EXTRA_FORCE
 from ..control.switching import limited
 from ..physics.inputs import Setup
@@ -42,8 +50,12 @@ TOLERANCE = 1e-6
 
 MAX_SWEEPS = 40
 
+LEAST_FORCE = 1e-9
+"""Size [N] of the largest force so far, before there is one."""
+
 INLINE = (
     *("time_loop.play", "time_loop.start", "time_loop.begin", "time_loop.move"),
+    *("time_loop.substep", "time_loop.drive", "time_loop.agree", "time_loop.most_sweeps"),
     *("time_loop.correct", "time_loop.accept", "time_loop.gather"),
     *("time_loop.gather_forces", "time_loop.damper_constants", "time_loop.structure_constants"),
     *("damper.step", "damper.stick_force", "switching.limited"),
@@ -85,37 +97,21 @@ def integrate(
         damper whose force and motion did not agree, which ends the loop before the next row (-1:
         none); the number of sweeps.
     """
-    (rows, substeps, h), (dampers, structures) = span, coupled
-    scale, sweeps, most = 1e-9, 0, MAX_SWEEPS
-    for i in range(len(structures)):  # friction at several places takes longer to agree
-        most += MAX_SWEEPS * structures[i].devices
-    play(sources, 0.0, s)
-    start(dampers, structures, h, s)
-    sample(sampled, coupled, 0, h, s)
+    (rows, substeps, h), (_, structures) = span, coupled
+    scale, sweeps = LEAST_FORCE, 0
+    driven = outputs[:0], table[0, :0], table[0, :0]  # sources alone move a scenario
+    begin_run(sources, coupled, 0.0, h, s)
+    sample(sampled, coupled, 0.0, 0.0, h, s)
     for j in range(len(outputs)):
         table[0, j] = s[outputs[j]]
     for row in range(rows):
         for k in range(substeps):
-            at = row * substeps + k + 1
-            begin(dampers, structures, s)
-            play(sources, at * h, s)
-            sweep, change = 0, inf
-            while change > TOLERANCE * scale and sweep < most:
-                for i in range(len(structures)):
-                    move(structures[i], (at * h - h, h, sweep), s)
-                change = 0.0
-                for i in range(len(dampers)):
-                    change = max(change, correct(dampers[i], (at * h - h, h, sweep), s))
-                    scale = max(scale, abs(dampers[i].found))
-                sweep += 1
-            sweeps += sweep
-            if change > TOLERANCE * scale:
-                worst = 0
-                for i in range(len(dampers)):
-                    worst = i if abs(dampers[i].excess) == change else worst
-                return row + 1, worst, sweeps
-            accept(dampers, structures, s)
-            sample(sampled, coupled, at, h, s)
+            t = (row * substeps + k + 1) * h
+            unsettled, taken, scale = substep(sources, coupled, driven, (t, h, 1.0), scale, s)
+            sweeps += taken
+            if unsettled >= 0:
+                return row + 1, unsettled, sweeps
+            sample(sampled, coupled, 0.0, t, h, s)
         for i in range(len(structures)):
             show(structures[i], structures[i].state, s)
         total = 0.0
@@ -125,6 +121,106 @@ def integrate(
         if not isfinite(total):
             return row + 2, -1, sweeps
     return rows + 1, -1, sweeps
+
+
+def begin_run(sources: Any, coupled: Any, t: float, h: float, s: Any) -> None:
+    """Bring the signals to the begin of a run; the first samples are taken next.
+
+    Parameters
+    ----------
+    sources, coupled : as in `integrate`
+    t, h : begin and length of the first substep [s]
+    s : (n,) signals with their start values, changed in place
+    """
+    dampers, structures = coupled
+    play(sources, t, s)
+    start(dampers, structures, h, s)
+
+
+def substep(
+    sources: Any, coupled: Any, driven: Any, clock: Any, scale: float, s: Any
+) -> tuple[int, int, float]:
+    """Take all that moves in time over one substep; `sample` comes next.
+
+    Parameters
+    ----------
+    sources, coupled : as in `integrate`
+    driven : tuple of arrays
+        Slots (d,) of the signals that are given from outside, and their values (d,) at the begin
+        and at the end of the communication step, between which they are linear.
+    clock : tuple
+        End of the substep [s], its length [s], and the share of the communication step that has
+        passed then [1].
+    scale : largest force so far [N]
+    s : (n,) signals, changed in place
+
+    Returns
+    -------
+    tuple
+        The damper whose force and motion did not agree (-1: none), the number of sweeps, and the
+        largest force so far [N].
+    """
+    dampers, structures = coupled
+    t, h, share = clock
+    begin(dampers, structures, s)
+    play(sources, t, s)
+    drive(driven, share, s)
+    unsettled, sweeps, scale = agree(dampers, structures, t, h, scale, s)
+    if unsettled < 0:
+        accept(dampers, structures, s)
+    return unsettled, sweeps, scale
+
+
+def drive(driven: Any, share: float, s: Any) -> None:
+    """Write what is given from outside into the signals, see `substep`."""
+    slots, before, now = driven
+    for j in range(len(slots)):
+        value = now[j]
+        if share < 1.0:
+            value = before[j] + share * (now[j] - before[j])
+        s[int(slots[j])] = value
+
+
+def agree(
+    dampers: Any, structures: Any, t: float, h: float, scale: float, s: Any
+) -> tuple[int, int, float]:
+    """Sweep over structures and dampers until motion and forces agree.
+
+    Parameters
+    ----------
+    dampers, structures : arrays of records, see `records`
+    t, h : end of the substep and its length [s]
+    scale : largest force so far [N]
+    s : (n,) signals, changed in place
+
+    Returns
+    -------
+    tuple
+        As `substep`.
+    """
+    sweep, change, most = 0, inf, most_sweeps(structures)
+    while change > TOLERANCE * scale and sweep < most:
+        for i in range(len(structures)):
+            move(structures[i], (t - h, h, sweep), s)
+        change = 0.0
+        for i in range(len(dampers)):
+            change = max(change, correct(dampers[i], (t - h, h, sweep), s))
+            scale = max(scale, abs(dampers[i].found))
+        sweep += 1
+    worst = -1
+    if change > TOLERANCE * scale:
+        worst = 0
+        for i in range(len(dampers)):
+            worst = i if abs(dampers[i].excess) == change else worst
+    return worst, sweep, scale
+
+
+def most_sweeps(structures: Any) -> int:
+    """Return how many sweeps a substep takes at most: friction at several places takes longer."""
+    most = MAX_SWEEPS
+    for i in range(len(structures)):
+        most += MAX_SWEEPS * structures[i].devices
+    return most
 
 
 def play(sources: Any, t: float, s: Any) -> None:
@@ -235,17 +331,17 @@ def accept(dampers: Any, structures: Any, s: Any) -> None:
         d.smooth = d.found - s[d.first + FRICTION]
 
 
-def idle(sampled: Any, coupled: Any, at: int, h: float, s: Any) -> None:
+def idle(sampled: Any, coupled: Any, origin: float, t: float, h: float, s: Any) -> None:
     """Do nothing, in place of `sample` where nothing has a clock: the loop compiles sooner.
 
     Parameters
     ----------
-    sampled, coupled, at, h, s
+    sampled, coupled, origin, t, h, s
         As in `sample`.
     """
 
 
-def sample(sampled: Any, coupled: Any, at: int, h: float, s: Any) -> None:
+def sample(sampled: Any, coupled: Any, origin: float, t: float, h: float, s: Any) -> None:
     """Let the components act whose instant a substep reaches; the forces follow.
 
     Components measure the motion and the dampers' forces with the voltages before, in the order of
@@ -254,7 +350,8 @@ def sample(sampled: Any, coupled: Any, at: int, h: float, s: Any) -> None:
     Parameters
     ----------
     sampled, coupled : tuples of arrays, as in `integrate`
-    at : number of the substep that has ended, 0 at the begin
+    origin : begin of the run [s]: the time of sample 0
+    t : end of the substep [s], `origin` at the begin
     h : length of a substep [s]
     s : (n,) signals, each in its own unit, changed in place
     """
@@ -262,7 +359,7 @@ def sample(sampled: Any, coupled: Any, at: int, h: float, s: Any) -> None:
     some = False
     for i in range(len(records)):
         c = records[i]
-        some = some or not c.aligned or floor(at * h / c.period + ROUNDING) >= c.coming
+        some = some or not c.aligned or floor((t - origin) / c.period + ROUNDING) >= c.coming
     if not some:
         return
     for i in range(len(structures)):
@@ -271,23 +368,24 @@ def sample(sampled: Any, coupled: Any, at: int, h: float, s: Any) -> None:
         c = records[i]
         gather(c.inputs, s, c.now)
         if c.senses:
-            take_readings(c, at, h, memory, s)
+            take_readings(c, origin, t, h, memory, s)
         else:
-            take_command(c, at, h, constants, memory, s)
-        c.coming = floor(at * h / c.period + ROUNDING) + 1
+            take_command(c, origin, t, h, constants, memory, s)
+        c.coming = floor((t - origin) / c.period + ROUNDING) + 1
         for j in range(len(c.inputs)):
             c.before[j] = c.now[j]
     respond(dampers, structures, s)
 
 
-def take_command(c: Any, at: int, h: float, constants: Any, memory: Any, s: Any) -> None:
+def take_command(
+    c: Any, origin: float, t: float, h: float, constants: Any, memory: Any, s: Any
+) -> None:
     """Let a controller act at the end of a substep.
 
     Parameters
     ----------
     c : record of the controller, see `records.sampled_record`
-    at : number of the substep that has ended, 0 at the begin
-    h : length of a substep [s]
+    origin, t, h : as in `sample`
     constants, memory : flat matrices of all controllers; states and room to work of all clocks
     s : (n,) signals, each in its own unit, changed in place
     """
@@ -299,21 +397,20 @@ def take_command(c: Any, at: int, h: float, constants: Any, memory: Any, s: Any)
         c.p[:], c.still, c.least_slope, c.gain, c.integral_corner,
     )  # fmt: skip
     state, work = memory[c.state : c.work], memory[c.work : c.end]
-    if at == 0:
-        controller_start(0.0, c.now[:], law, state, s[c.first :], work)
+    if t == origin:
+        controller_start(origin, c.now[:], law, state, s[c.first :], work)
     else:
-        span = (at * h - h, h, 0)
+        span = (t - h, h, 0)
         controller_step(span, c.before[:], c.now[:], law, state, state, s[c.first :], work)
 
 
-def take_readings(c: Any, at: int, h: float, memory: Any, s: Any) -> None:
+def take_readings(c: Any, origin: float, t: float, h: float, memory: Any, s: Any) -> None:
     """Let sensors act at the end of a substep.
 
     Parameters
     ----------
     c : record of the sensors, see `records.sampled_record`
-    at : number of the substep that has ended, 0 at the begin
-    h : length of a substep [s]
+    origin, t, h : as in `sample`
     memory : states and room to work of all components with clocks
     s : (n,) signals, each in its own unit, changed in place
     """
@@ -322,10 +419,10 @@ def take_readings(c: Any, at: int, h: float, memory: Any, s: Any) -> None:
         c.corner[:], c.share[:], c.length[:], c.ring[:],
     )  # fmt: skip
     state, work = memory[c.state : c.work], memory[c.work : c.end]
-    if at == 0:
-        sensors_start(0.0, c.now[:], law, state, s[c.first :], work)
+    if t == origin:
+        sensors_start(origin, c.now[:], law, state, s[c.first :], work)
     else:
-        span = (at * h - h, h, 0)
+        span = (t - h, h, 0)
         sensors_step(span, c.before[:], c.now[:], law, state, state, s[c.first :], work)
 
 
@@ -358,6 +455,39 @@ def respond(dampers: Any, structures: Any, s: Any) -> None:
             break
         for i in range(len(structures)):
             show(structures[i], structures[i].state, s)
+
+
+def update(sources: Any, coupled: Any, t: float, s: Any) -> None:
+    """Let forces and accelerations follow signals that are given from outside, the motion held.
+
+    Where a damper is given the acceleration, force and acceleration follow each other as in
+    `start`.
+
+    Parameters
+    ----------
+    sources, coupled : as in `integrate`
+    t : s
+    s : (n,) signals, each in its own unit, changed in place
+    """
+    dampers, structures = coupled
+    play(sources, t, s)
+    for i in range(len(dampers)):
+        dampers[i].jumps = False
+    for _ in range(3):
+        for i in range(len(structures)):
+            show(structures[i], structures[i].state, s)
+        for i in range(len(dampers)):
+            d = dampers[i]
+            for j in range(len(d.inputs)):
+                follows = j != HOLDING_FORCE and (j != ACCELERATION or d.measured)
+                if follows and s[d.inputs[j]] != d.now[j]:
+                    d.jumps = True
+            if not d.jumps:
+                continue
+            gather(d.inputs, s, d.now)
+            shown = s[d.first :]
+            d.now[HOLDING_FORCE] = shown[FORCE]
+            damper_output(0.0, d.now[:], damper_constants(d), d.state[:], shown, d.work[:])
 
 
 def show(b: Any, state: Any, s: Any) -> None:

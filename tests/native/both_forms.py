@@ -51,7 +51,7 @@ class Native:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.about = read_description(path)
-        self.folder = extract(path, folder() / f"{path.stem}_unpacked")
+        self.folder = extract(path, folder() / f"{path.parent.name}_{path.stem}_unpacked")
         file = self.folder / library_member(self.about.identifier)
         self.library = Library(file, BlackBox(folder() / "box"))
         self.messages = self.library.messages

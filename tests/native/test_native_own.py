@@ -49,3 +49,78 @@ def test_a_law_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     what = plan("OwnMyLawDamper")
     assert what.laws
     assert difference(what, f_c=2.0) <= 1e-12
+
+
+GROWING = '''
+"""An effect whose exponential overflows."""
+
+from math import exp, sqrt
+
+from bristle.physics.effect import Effect, Parameter
+
+
+class {name}(Effect):
+    """{title}: an exponential of the displacement.
+
+        F = {formula}
+
+    Leaves out everything else.
+    """
+
+    name = "{key}"
+    sites = ("damper",)
+    needs = ("x",)
+    passive = False
+    zero_at_rest = False
+    source = "made for a test"
+    expect = "a force that depends on displacement"
+    parameters = {{
+        "k": Parameter(0.5, "N", (-10.0, 10.0), "size"),
+        "d": Parameter(0.01, "m", (0.005, 1.0), "travel over which it grows"),
+    }}
+
+    @staticmethod
+    def force(q, z, p):
+        return {source}
+'''
+OVERFLOWS = {
+    "growing": ("p.k * exp(q.x / p.d)", 10.0, "OverflowError: math range error"),
+    "bounded": ("p.k / (1.0 + exp(q.x / p.d))", 10.0, "OverflowError: math range error"),
+    "rooted": ("p.k * sqrt(50.0 * p.d - q.x)", 10.0, "ValueError: math domain error"),
+    "divided": ("p.k / (100.0 * p.d - q.x)", 1.0, "ZeroDivisionError: float division by zero"),
+}
+"""Effects that Python refuses at a displacement [m], and what it says."""
+
+
+def test_what_python_refuses_is_infinite_natively_and_a_fault_once_an_output_is(
+    tmp_path: Path,
+) -> None:
+    files = []
+    for key, (source, _, _) in OVERFLOWS.items():
+        file = tmp_path / f"{key}.py"
+        title = key.capitalize()
+        named = {"key": key, "name": title, "title": title, "formula": "..."}
+        file.write_text(GROWING.format(source=source, **named))
+        files.append(file)
+    what = plan("LuGreDamper", name="Overflowing", effects=files)
+    form = Native(build(what, folder() / "own", [here()]))
+    for key, (_, far, says) in OVERFLOWS.items():
+        pair = Both(form, component_of(what), **{f"{key}.on": True})
+        pair.begin()
+        pair.set("displacement", 0.01)
+        assert pair.step(0.0, 0.002) == (True, 0)
+        mine, other = pair.shown()
+        assert mine == other
+        pair.set("displacement", far)
+        stops = key != "bounded"  # 1 / (1 + inf) is 0
+        assert pair.step(0.002, 0.002) == (False, 3 if stops else 0)
+        assert pair.faults() == (4, 4 if stops else 0)
+        told, natively = pair.said()
+        assert says in told[-1]
+        if stops:
+            assert "fault 4, a state or output is not finite" in natively[-1]
+            assert "not finite: force" in natively[-1]
+            assert pair.shown()[1] == other  # held
+        else:
+            assert natively == []
+        pair.end()

@@ -14,6 +14,7 @@ import fmpy
 import pytest
 from both_forms import folder, needs_zig
 
+from bristle.composite.export import plan_of
 from bristle.fmu import catalogue
 from bristle.fmu.archive import extract
 from bristle.fmu.description import read_description
@@ -41,14 +42,16 @@ FAR = [
 ]
 CASES = [(name, False) for name in catalogue.component_names()]
 CASES += [(name, True) for name in ("LuGreDamper", "BinghamDamper", "Structure")]
+CASES += [("el_centro_0p6g_lpv_sensors", False)]  # a whole scenario
 
 pytestmark = [needs_zig, pytest.mark.slow]
 
 
 @cache
 def unpacked(name: str) -> Path:
-    """Return a component's FMU for all platforms, unpacked."""
-    path = build(plan(name), folder() / "all", list(PLATFORMS.values()))
+    """Return the FMU of a component, or of a whole scenario, for all platforms, unpacked."""
+    what = plan(name) if name in catalogue.component_names() else plan_of(name)
+    path = build(what, folder() / "all", list(PLATFORMS.values()))
     return extract(path, folder() / "all" / name)
 
 

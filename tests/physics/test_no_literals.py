@@ -32,7 +32,7 @@ ELSEWHERE = {
     ("diagnose/building_sensors.py", "delay"): "a kind of sensor fault",
     ("component/sensors.py", "delay"): "a property of an instrument",
     ("simulate/records.py", "delay"): "a field of the engine's record: a source's parameter",
-    ("simulate/system.py", "delay"): "a field of the engine's record: a source's parameter",
+    ("simulate/layout.py", "delay"): "a field of the engine's record: a source's parameter",
 }
 """Files in which such a word means something else, and what."""
 

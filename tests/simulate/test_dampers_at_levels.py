@@ -13,13 +13,14 @@ from scipy.signal import lsim
 from bristle import run
 from bristle.fmu import catalogue
 from bristle.physics.building import Building, read_building
+from bristle.physics.device import Device
 from bristle.scenario.library import driven_mass
 from bristle.scenario.scenario import check_scenario, load_scenario
 from bristle.scenario.stock import copy_scenario
 from bristle.simulate.coupled import simulate
 from bristle.simulate.nodes import make_nodes
 from bristle.simulate.power import bond_names
-from bristle.simulate.pushed import sharing
+from bristle.simulate.pushed import room, sharing
 
 STOCK = "dampers_at_two_levels"
 BUILDING = """
@@ -165,11 +166,20 @@ def test_dampers_at_one_place_share_and_others_by_how_they_move_each_other() -> 
     held[n:, :n] = -0.001 * M_inverse
     record = {"n": n, "held": held.ravel()}
     first, brace = building.device(""), building.device("brace")
-    assert sharing(record, []) == 1.0
-    assert sharing(record, [first] * 3) == 3.0
+
+    def shared(*devices: Device) -> float:
+        """Return by how much each holds less, of so many dampers that stick."""
+        dampers = [
+            {"on_structure": 0, "signed": True, "lower": one.lower, "upper": one.upper}
+            for one in devices
+        ]
+        return sharing(dampers, [record], 0, [0.0] * room(len(dampers)))
+
+    assert shared() == 1.0
+    assert shared(first, first, first) == 3.0
     # Eigenvalues 1 - r and 1 + r, their mean 1; two on either place double it.
-    assert sharing(record, [first, brace]) == pytest.approx(1.0)
-    assert sharing(record, [first, first, brace, brace]) == pytest.approx(2.0)
+    assert shared(first, brace) == pytest.approx(1.0)
+    assert shared(first, first, brace, brace) == pytest.approx(2.0)
 
 
 # -- what check finds

@@ -32,6 +32,7 @@ enum { NO_VALUE = -1, STEP_LENGTH = -2 };
 typedef struct {
     int64_t code;
     int64_t first; /* code of a warning that comes before, 0: none */
+    int fault;     /* the Integer output of the part that it is about, below 0: none */
     const Piece *pieces;
 } Meaning;
 
@@ -41,6 +42,12 @@ typedef struct {
     int chooser;      /* below 0: it is always read */
     const char *word;
 } Choice;
+
+/* A signal that is played. */
+typedef struct {
+    Choice file, pairs; /* what its samples are read from */
+    const char *header; /* which a file must have; NULL: `time [s]` and another */
+} Signal;
 
 typedef struct {
     const char *name, *guid;
@@ -54,9 +61,9 @@ typedef struct {
     int64_t baked_size;
     int discretises;               /* what the step's length implies is computed once for it */
     int in_place;                  /* a step moves the state on where it lies */
-    Choice file, pairs;            /* what a signal is read from */
+    const Signal *signals;
+    int played;                    /* how many signals there are */
     const char *const *bundled;    /* files among the resources, NULL behind the last */
-    const char *header;            /* which such a file must have; NULL: `time [s]` and another */
 } Component;
 
 extern const Component component;
@@ -79,8 +86,8 @@ int bristle_entrance(
     ROW_WORDS, /* parameters */
     ROW_WORDS, /* given: per input whether a host has set it */
     ROW_WORDS, /* baked */
-    ROW_WORDS, /* times of samples */
-    ROW_WORDS, /* samples */
+    ROW_WORDS, /* times of the samples of each signal, behind their number */
+    ROW_WORDS, /* samples, likewise */
     ROW_WORDS, /* store */
     ROW_WORDS, /* state */
     ROW_WORDS, /* new state */

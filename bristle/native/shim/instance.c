@@ -63,6 +63,7 @@ int slave_reset(Slave *slave) {
     slave->stale = slave->unbuilt = 1;
     memset(slave->slopes, 0, (size_t)component.inputs * sizeof *slave->slopes);
     slave->sloping = slave->warnings = 0;
+    slave->blamed = -1;
     slave->time = 0.0;
     return 1;
 }
@@ -131,7 +132,7 @@ static int inputs_are_finite(const Slave *slave) {
     return 1;
 }
 
-static int outputs_are_finite(const Slave *slave, Text *wrong) {
+static int outputs_are_finite(Slave *slave, Text *wrong) {
     const double *outputs = slave->values + component.outputs_at;
     double sum = 0.0;
     for (int i = 0; i < component.outputs; i++) sum += outputs[i];
@@ -139,6 +140,7 @@ static int outputs_are_finite(const Slave *slave, Text *wrong) {
     const char *between = "not finite: ";
     for (int i = 0; i < component.outputs; i++) {
         if (isfinite(outputs[i])) continue;
+        if (*between != ',') slave_blame(slave, component.variables[component.outputs_at + i].name);
         text_add(wrong, between);
         text_add(wrong, component.variables[component.outputs_at + i].name);
         between = ", ";
@@ -165,6 +167,7 @@ void slave_follow(Slave *slave, int final) {
     Text wrong;
     int right = 1;
     slave->stale = 0;
+    slave->blamed = -1;
     if (slave->values[component.fault] != 0.0 || slave->mode == TERMINATED) return;
     text_clear(&wrong);
     hold_outputs(slave);
@@ -178,6 +181,7 @@ void slave_follow(Slave *slave, int final) {
     for (int i = 0; i < component.outputs; i++)
         slave->values[component.outputs_at + i] = final ? 0.0 : slave->held[i];
     if (final) slave_stop(slave, BAD_PARAMETER, wrong.at);
+    slave->blamed = -1; /* else this is no fault yet */
 }
 
 /* Move the model over one step. */
@@ -204,12 +208,13 @@ static int advance(Slave *slave, double time, double dt, Text *wrong) {
 }
 
 /* Whether all inputs are finite over a step; what is not is said. */
-static int step_is_finite(const Slave *slave, double dt, Text *wrong) {
+static int step_is_finite(Slave *slave, double dt, Text *wrong) {
     for (int i = 0; i < component.inputs; i++) {
         double value = slave->values[component.inputs_at + i], slope = slave->slopes[i];
         double change = slope != 0.0 ? slope * dt : 0.0;
         if (isfinite(value + change)) continue;
         int of_slope = isfinite(value) && !isfinite(slope);
+        slave_blame(slave, component.variables[component.inputs_at + i].name);
         if (of_slope) text_add(wrong, "the derivative of ");
         text_add(wrong, component.variables[component.inputs_at + i].name);
         text_add(wrong, " = ");
@@ -223,6 +228,7 @@ static int step_is_finite(const Slave *slave, double dt, Text *wrong) {
 Status slave_step(Slave *slave, double time, double dt) {
     Text wrong;
     text_clear(&wrong);
+    slave->blamed = -1;
     if (slave->values[component.fault] != 0.0) return FAILED;
     if (slave->mode != STEPPING)
         return slave_stop(slave, WRONG_MODE,

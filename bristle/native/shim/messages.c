@@ -13,10 +13,22 @@ static const char *const FAULTS[] = {
     "a parameter or record is wrong",
 };
 
+void slave_blame(Slave *slave, const char *name) {
+    const char *dot = strchr(name, '.');
+    slave->blamed = -1;
+    for (int i = 0; dot && i < component.count; i++) {
+        const Variable *v = &component.variables[i];
+        if (v->causality == OUTPUT && v->kind == INTEGER &&
+            strncmp(v->name, name, (size_t)(dot - name) + 1) == 0)
+            slave->blamed = i;
+    }
+}
+
 Status slave_stop(Slave *slave, int fault, const char *why) {
     if (slave->values[component.fault] == 0.0) {
         Text text;
         slave->values[component.fault] = fault;
+        if (slave->blamed >= 0) slave->values[slave->blamed] = fault;
         text_clear(&text);
         text_add(&text, slave->name);
         text_add(&text, ": fault ");
@@ -111,5 +123,6 @@ int slave_answer(Slave *slave, int called, int64_t code, double dt, Text *wrong)
         warn_of(slave, meaning, dt);
     else
         explain(slave, meaning, dt, wrong);
+    if (code < 0) slave->blamed = meaning->fault;
     return code > 0;
 }

@@ -13,13 +13,14 @@ static void add_repr(Text *text, int kind, double value) {
         text_repr(text, value);
 }
 
-static int check_parameters(const Slave *slave, Text *wrong) {
+static int check_parameters(Slave *slave, Text *wrong) {
     for (int i = 0; i < component.count; i++) {
         const Variable *v = &component.variables[i];
         if (v->causality != PARAMETER || (v->kind != REAL && v->kind != INTEGER)) continue;
         double value = slave->values[i];
         int finite = isfinite(value);
         if (finite && value >= v->low && value <= v->high) continue;
+        slave_blame(slave, v->name);
         text_add(wrong, v->name);
         text_add(wrong, " = ");
         add_repr(wrong, v->kind, value);

@@ -53,7 +53,8 @@ static int is_chosen(const Slave *slave, const Choice *choice) {
            (choice->chooser < 0 || strcmp(slave->texts[choice->chooser], choice->word) == 0);
 }
 
-static int read_file(const Slave *slave, const char *named, Samples *samples, Text *wrong) {
+static int read_file(const Slave *slave, const char *header, const char *named, Samples *samples,
+                     Text *wrong) {
     char path[4096], found[4096];
     for (const char *const *one = component.bundled; *one; one++) {
         if (strcmp(*one, named) != 0) continue;
@@ -65,33 +66,70 @@ static int read_file(const Slave *slave, const char *named, Samples *samples, Te
         found[used++] = '/';
         memcpy(found + used, named, more);
         memcpy(found + used + more, ".csv", 5);
-        return read_two_column(found, component.header, samples, wrong);
+        return read_two_column(found, header, samples, wrong);
     }
-    return read_two_column(named, component.header, samples, wrong);
+    return read_two_column(named, header, samples, wrong);
+}
+
+/* Name the part of a whole scenario that a parameter belongs to, as PART.PARAMETER says. */
+static void name_part(Slave *slave, const Choice *choice, Text *wrong) {
+    const char *name = component.variables[choice->parameter].name, *dot = strchr(name, '.');
+    char part[128];
+    size_t count = dot ? (size_t)(dot - name) : 0;
+    if (count == 0 || count >= sizeof part) return;
+    memcpy(part, name, count);
+    part[count] = 0;
+    slave_blame(slave, name);
+    text_add(wrong, part);
+    text_add(wrong, ": ");
+}
+
+static int read_signal(Slave *slave, const Signal *signal, Samples *samples, Text *wrong) {
+    int filed = is_chosen(slave, &signal->file), right = 0;
+    const Choice *choice = filed ? &signal->file : &signal->pairs;
+    if (!is_chosen(slave, choice)) {
+        if (samples_keep(samples, 0.0, 0.0, 0)) return 1; /* a signal without samples */
+        text_add(wrong, "out of memory.");
+        return 0;
+    }
+    name_part(slave, choice, wrong);
+    if (filed)
+        right = read_file(slave, signal->header, slave->texts[choice->parameter], samples, wrong);
+    else
+        right = read_pairs(slave->texts[choice->parameter], samples, wrong);
+    if (right) text_clear(wrong);
+    return right;
+}
+
+/* Write each signal's numbers behind how many they are. */
+static void pack(double *to, size_t count, const double *from) {
+    *to = (double)count;
+    if (count) memcpy(to + 1, from, count * sizeof *to);
 }
 
 int read_samples(Slave *slave, Text *wrong) {
-    Samples samples = {0};
-    int right = 1;
-    if (is_chosen(slave, &component.file))
-        right = read_file(slave, slave->texts[component.file.parameter], &samples, wrong);
-    else if (is_chosen(slave, &component.pairs))
-        right = read_pairs(slave->texts[component.pairs.parameter], &samples, wrong);
-    else
-        right = samples_keep(&samples, 0.0, 0.0, 0); /* a signal without samples */
-    double *memory = right ? calloc(2 * (samples.count + 1), sizeof *memory) : 0;
+    size_t all = (size_t)component.played, size = 0, used = 0;
+    Samples *samples = calloc(all + 1, sizeof *samples);
+    double *memory = 0;
+    int right = samples != 0;
+    for (size_t i = 0; right && i < all; i++) {
+        right = read_signal(slave, &component.signals[i], &samples[i], wrong);
+        size += samples[i].count + 1;
+    }
+    if (right) memory = calloc(2 * (size + 1), sizeof *memory);
     if (!memory && wrong->used == 0) text_add(wrong, "out of memory.");
+    for (size_t i = 0; memory && i < all; i++) {
+        pack(memory + used, samples[i].count, samples[i].times);
+        pack(memory + size + 1 + used, samples[i].count, samples[i].values);
+        used += samples[i].count + 1;
+    }
     if (memory) {
-        size_t size = samples.count * sizeof *memory;
         free(slave->sampled);
         slave->sampled = memory;
-        slave->times = (Row){memory, (int64_t)samples.count};
-        slave->samples = (Row){memory + samples.count + 1, (int64_t)samples.count};
-        if (size) {
-            memcpy(slave->times.at, samples.times, size);
-            memcpy(slave->samples.at, samples.values, size);
-        }
+        slave->times = (Row){memory, (int64_t)size};
+        slave->samples = (Row){memory + size + 1, (int64_t)size};
     }
-    samples_free(&samples);
+    for (size_t i = 0; samples && i < all; i++) samples_free(&samples[i]);
+    free(samples);
     return memory != 0;
 }

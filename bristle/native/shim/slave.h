@@ -34,6 +34,7 @@ typedef struct Slave {
     double *slopes;       /* of the inputs over the next steps, in their unit per second */
     int sloping;          /* whether one of them is not 0 */
     int mode, stale, unbuilt;
+    int blamed; /* the output that tells the fault of a part as well, below 0: none */
     double time;
     double discretised; /* length of the step that `store` is prepared for, 0: none */
     uint64_t warned[MOST_WARNINGS]; /* digests of the warnings that were said */
@@ -68,6 +69,7 @@ int slave_call(Slave *slave, int call, double time, double dt, Row new_state, Ro
                int64_t *code);
 
 /* messages.c: faults and warnings */
+void slave_blame(Slave *slave, const char *name); /* the next fault is that of a variable's part */
 Status slave_stop(Slave *slave, int fault, const char *why);
 void slave_warn(Slave *slave, const char *text);
 
