@@ -10,6 +10,7 @@ import numpy as np
 from bristle.fmu import catalogue
 from bristle.fmu.component import ComponentSlave
 from bristle.fmu.controller import SampledSlave
+from bristle.fmu.source import SourceSlave
 from bristle.jit import compiled
 
 STEPS = (5e-4, 5e-4, 2e-3, 2e-3, 7e-4, 0.011)
@@ -79,7 +80,8 @@ class Arrays:
         self.call = entry(functions)
         self.values, self.baked = np.array(slave.flat_values()), np.array(slave.bake())
         self.given = np.zeros(len(slave._inputs))
-        self.samples = [np.array(row) for row in slave.samples()]
+        played = slave.samples() if isinstance(slave, SourceSlave) else ([], [])
+        self.samples = [np.array(row) for row in played]
         counts = np.zeros(4)
         self.store = self.state = self.new = self.before = self.outputs = np.zeros(0)
         self.work = counts

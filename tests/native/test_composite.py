@@ -167,7 +167,6 @@ def test_a_scenario_with_a_foreign_fmu_is_refused_in_one_message(
     [
         (["--as-one"], ScenarioError, "--as-one goes with --native"),
         (["--native", "--input", "ground.factor"], StudyError, "--native --as-one"),
-        (["--native", "--fmi", "3"], StudyError, "--native --as-one"),
         (["--web", "page", "--as-one"], ScenarioError, "--web is for a page"),
         (["--native", "--as-one", "--platform", "os2"], BuildError, 'no platform is named "os2"'),
     ],
