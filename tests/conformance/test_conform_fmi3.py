@@ -139,7 +139,17 @@ def test_a_native_fmu_conforms_and_keeps_the_rules_for_faults() -> None:
 
 
 @pytest.mark.skipif(not REFERENCE.exists(), reason="the Reference-FMUs are not at hand")
-@pytest.mark.parametrize("name", ["BouncingBall", "Dahlquist", "Feedthrough", "Stair", "VanDerPol"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Feedthrough",
+        "Stair",
+        *(
+            pytest.param(one, marks=pytest.mark.slow)
+            for one in ("BouncingBall", "Dahlquist", "VanDerPol")
+        ),
+    ],
+)
 def test_the_reference_fmus_violate_nothing_but_lack_robustness(name: str) -> None:
     report = conform(REFERENCE / f"{name}.fmu", timeout=2.0)
     assert report.conforms, report.to_text()

@@ -9,7 +9,10 @@ from bristle.identify.fit import identify
 from tests.identify.truths import hidden_case, true_case
 
 
-@pytest.mark.parametrize(("law", "other"), [("bingham", "bench_2kN"), ("lugre", "bench_10N")])
+@pytest.mark.parametrize(
+    ("law", "other"),
+    [pytest.param("bingham", "bench_2kN", marks=pytest.mark.slow), ("lugre", "bench_10N")],
+)
 def test_runs_of_two_rigs_are_named(law, other):
     first, _, truth = true_case(3, law)
     second, _, _ = true_case(4, law, other)
