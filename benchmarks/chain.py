@@ -101,13 +101,13 @@ def _calls_of(
     step = (component, real(0.0), real(0.002), ctypes.c_int.from_param(1))
     found: list[tuple[Callable[..., int], tuple[object, ...], tuple[object, ...]]] = []
     for name, ports, kind in (
-        ("fmi2SetReal", [INPUT], ctypes.c_double),
-        ("fmi2DoStep", [], None),
-        ("fmi2GetReal", outputs, ctypes.c_double),
-        ("fmi2GetInteger", ["fault"], ctypes.c_int),
+        ("SetReal", [INPUT], ctypes.c_double),
+        ("DoStep", [], None),
+        ("GetReal", outputs, ctypes.c_double),
+        ("GetInteger", ["fault"], ctypes.c_int),
     ):
         if kind is None:
-            found.append((instance.function(name), step, ()))
+            found.append((instance.library.function(name), step, ()))
             continue
         references = (ctypes.c_uint * len(ports))(*(variables[p].reference for p in ports))
         values = (kind * len(ports))()
@@ -115,5 +115,5 @@ def _calls_of(
             ctypes.c_void_p.from_param(ctypes.addressof(a)) for a in (references, values)
         )
         arguments = (component, first, ctypes.c_size_t.from_param(len(ports)), second)
-        found.append((instance.function(name), arguments, (references, values)))
+        found.append((instance.library.function(name), arguments, (references, values)))
     return found
