@@ -14,6 +14,7 @@ from ._consent import add_trust
 
 if TYPE_CHECKING:
     import pandas as pd
+    from rich.table import Table
 
 HELP = "run a scenario and draw what happens"
 
@@ -162,7 +163,6 @@ def _print_json(frame: pd.DataFrame, written: dict[str, Path], trouble: str) -> 
 
 
 def _print_plain(frame: pd.DataFrame, written: dict[str, Path]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     from ..simulate.summary import summarise
@@ -180,16 +180,25 @@ def _print_plain(frame: pd.DataFrame, written: dict[str, Path]) -> None:
         table.add_row(
             row.name, plain(row.peak, 5), plain(row.time_of_peak, 4), plain(row.rms, 5), unit
         )
-    Console(highlight=False).print(table)
+    _print_table(table)
     _print_errors(frame)
     print(f"{len(frame)} rows in {made['wall_time']:.2f} s")
     for path in written.values():
         print(f"  {path}")
 
 
+def _print_table(table: Table) -> None:
+    """Print a table without the blanks that fill its last column."""
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    with console.capture() as captured:
+        console.print(table)
+    print("\n".join(line.rstrip() for line in captured.get().splitlines()))
+
+
 def _print_errors(frame: pd.DataFrame) -> None:
     """Print the coupling error where it was estimated, else the energy that the coupling makes."""
-    from rich.console import Console
     from rich.table import Table
 
     from ..simulate.summary import judged_by
@@ -214,5 +223,5 @@ def _print_errors(frame: pd.DataFrame) -> None:
         shares = (plain(100.0 * error[key], 2) for key in ("along", "peak", "rms"))
         order = f"{error['order']:.1f}" + ("" if error["worth"] else ", no use")
         table.add_row(name, *shares, order)
-    Console(highlight=False).print(table)
+    _print_table(table)
     print("The other outputs do not depend on the step.")

@@ -17,6 +17,10 @@ _BAR = 0.26
 """Height of a bar with the gap to the next [in]."""
 
 
+_LETTER = 0.0125
+"""Width of a letter beside a bar, as a share of the axes."""
+
+
 def draw_limit(found: Limit) -> Page:
     """Return the picture of a limit, drawn and not yet written."""
     (at, best), unit = found.best_constant, found.command_unit
@@ -62,10 +66,12 @@ def _bars(axes: Axes, rows: list[tuple[str, float, str]], unit: str) -> None:
         elif name.startswith("limit"):
             colours[place] = BLUE
     axes.barh(places, [value for _, value, _ in rows], color=colours, height=0.72)
+    reach = 0.0  # such that every text ends within the axes
     for place, (_, value, said) in enumerate(rows):
         text = f" {plain(value)}" + (f"   {said}" if said else "")
         axes.text(value, place, text, va="center", fontsize=8, color=INK)
+        reach = max(reach, value / (1.0 - _LETTER * len(text)))
     axes.set_yticks(places, [name for name, _, _ in rows], fontsize=8)
     axes.invert_yaxis()
-    axes.set_xlim(0.0, 1.45 * max(value for _, value, _ in rows))
+    axes.set_xlim(0.0, reach)
     axes.set_xlabel(unit, loc="right", labelpad=0)

@@ -32,8 +32,8 @@ def version() -> str:
     """
     if importlib.util.find_spec("ziglang") is None:
         raise BuildError(
-            "native FMUs are compiled by zig, which is not installed: "
-            "`pip install bristle[native]` is right. Python FMUs need none."
+            "what runs without Python, a native FMU or a page with sliders, is compiled by zig, "
+            "which is not installed: `pip install bristle[native]` is right."
         )
     return importlib.metadata.version("ziglang")
 
