@@ -179,7 +179,10 @@ def test_the_master_gives_the_same_rows(tmp_path: Path) -> None:
         rows.append(bristle.run(file))
     assert list(rows[0].columns) == list(rows[1].columns)
     assert rows[0].dtypes.equals(rows[1].dtypes)
-    assert np.array_equal(rows[0].to_numpy(), rows[1].to_numpy())
+    # Only FMI 2.0 has input derivatives, which the master uses where they save a call: its rows
+    # differ by rounding.
+    two, three = (one.to_numpy() for one in rows)
+    assert np.max(np.abs(two - three) / np.maximum(np.max(np.abs(two), axis=0), 1e-12)) < 1e-12
     assert rows[0]["motion.displacement"].abs().max() > 0.005
 
 
@@ -222,7 +225,10 @@ def test_closed_loops_give_the_same_rows(stem: str, monkeypatch: pytest.MonkeyPa
         monkeypatch.setattr(native_build, "ensure", partial(ensure, fmi=fmi))
         rows.append(execute(file, {"run.stop": 2.0}, "fmu", Output(None), False, fmus="native"))
     assert list(rows[0].columns) == list(rows[1].columns)
-    assert np.array_equal(rows[0].to_numpy(), rows[1].to_numpy())
+    # Only FMI 2.0 has input derivatives, which the master uses where they save a call: its rows
+    # differ by rounding.
+    two, three = (one.to_numpy() for one in rows)
+    assert np.max(np.abs(two - three) / np.maximum(np.max(np.abs(two), axis=0), 1e-12)) < 1e-12
 
 
 @pytest.mark.slow
