@@ -17,7 +17,6 @@ from ..physics.building import frequencies
 from ..physics.damper import work_size
 from ..physics.inputs import Setup
 from ..scenario.scenario import Scenario
-from ..simulate.rows import make_columns
 from ..simulate.system import System
 from .response import Plant
 
@@ -98,20 +97,51 @@ def case_of(scenario: Scenario, output: str) -> Case:
     system = System(scenario)
     building, damper = (_only(system, kind, scenario) for kind in ("structure", "damper"))
     slave, law = system.slaves[building], system.slaves[damper]
+    _refuse_effects(slave, scenario, building)
+    unit = _unit_of(output, scenario, system, building)
+    if system.coupled(scenario.step)[0][0]["on_structure"] < 0:
+        raise ScenarioError(
+            f"{scenario.file} [components.{damper}]: must feel the motion of the place at "
+            f"{building} where its force acts; a limit is computed for one damper at one place."
+        )
+    v_max = _largest(law, scenario, damper)
+    ports = [slave.vars[index].name for index in slave._inputs]
+    pushed = next(p for p in ports if system.source_of.get((building, p)) == (damper, "force"))
+    felt = [system.source_of[damper, name][1] for name in ("displacement", "velocity")]
+    _refuse_other_forces(scenario, system, building, pushed)
+    setup, command = _compilable(law.constants.setup), law.vars[law._inputs[2]]
+    frequency = frequencies(slave.building)[0]
+    h = _step(scenario, frequency) / (FINER if setup.signed else 1)
+    return Case(
+        scenario, building, damper, command.name, output, unit,
+        _plant(slave, h, ports.index(pushed), felt, output.partition(".")[2], bool(setup.signed)),
+        setup, _ground(system, building, h, scenario),
+        np.array(law.state[: len(law.state) - REMEMBERED]), v_max,
+        scenario.component(damper).description.variables[command.name].unit or "", frequency,
+        np.linalg.inv(np.reshape(slave.constants.m_inverse, (slave.constants.n, -1))),
+        np.reshape(slave.constants.stiffness, (slave.constants.n, -1)), not setup.active,
+    )  # fmt: skip
+
+
+def _refuse_effects(slave: Any, scenario: Scenario, building: str) -> None:
     if slave.constants.active:
         raise ScenarioError(
             f"{scenario.file} [components.{building}]: effects make the structure nonlinear; a "
             "limit is computed for a linear one. Switch them off."
         )
+
+
+def _unit_of(output: str, scenario: Scenario, system: System, building: str) -> str:
+    """Return the unit of an output of the structure."""
     if output not in system.outputs or not output.startswith(f"{building}."):
         known = [name for name in system.outputs if name.startswith(f"{building}.")]
         raise ScenarioError(f"{scenario.file}: {unknown('output', output, known)}")
-    record = system.coupled(scenario.step)[0][0]
-    if record["on_structure"] < 0:
-        raise ScenarioError(
-            f"{scenario.file} [components.{damper}]: must feel the motion of the place at "
-            f"{building} where its force acts; a limit is computed for one damper at one place."
-        )
+    found = scenario.component(building).description.variables[output.partition(".")[2]]
+    return found.unit or ""
+
+
+def _largest(law: Any, scenario: Scenario, damper: str) -> float:
+    """Return the largest command, in its own unit."""
     v_max = float(law.constants.v_max)
     if v_max <= 0.0:
         limit = law.drive.limit
@@ -119,32 +149,17 @@ def case_of(scenario: Scenario, output: str) -> Case:
             f"{scenario.file} [components.{damper}]: {limit} = {v_max:g} leaves nothing to choose; "
             f"{law.drive.largest:g} {law.drive.unit} is usual."
         )
-    ports = [slave.vars[index].name for index in slave._inputs]
-    pushed = next(p for p in ports if system.source_of.get((building, p)) == (damper, "force"))
-    felt = [system.source_of[damper, name][1] for name in ("displacement", "velocity")]
-    _refuse_other_forces(scenario, system, building, pushed)
-    own = law.constants.setup
-    setup = own._replace(
-        p=np.array(own.p, dtype=np.float64),
-        on=np.array([bool(switch) for switch in own.on], dtype=np.int8),
-        moving=np.array(own.moving, dtype=np.int64),
+    return v_max
+
+
+def _compilable(setup: Any) -> Setup:
+    """Return a damper's setup as arrays."""
+    given: Setup = setup._replace(
+        p=np.array(setup.p, dtype=np.float64),
+        on=np.array([bool(switch) for switch in setup.on], dtype=np.int8),
+        moving=np.array(setup.moving, dtype=np.int64),
     )
-    frequency = frequencies(slave.building)[0]
-    h = _step(scenario, frequency) / (FINER if own.signed else 1)
-    columns = {
-        c.name: c
-        for c in make_columns(scenario, {p.name: p.description for p in scenario.components})
-    }
-    command = law.vars[law._inputs[2]]
-    return Case(
-        scenario, building, damper, command.name, output, columns[output].unit or "",
-        _plant(slave, h, ports.index(pushed), felt, output.partition(".")[2], bool(own.signed)),
-        setup, _ground(system, building, h, scenario),
-        np.array(law.state[: len(law.state) - REMEMBERED]), v_max,
-        scenario.component(damper).description.variables[command.name].unit or "", frequency,
-        np.linalg.inv(np.reshape(slave.constants.m_inverse, (slave.constants.n, -1))),
-        np.reshape(slave.constants.stiffness, (slave.constants.n, -1)), not own.active,
-    )  # fmt: skip
+    return given
 
 
 def _only(system: System, kind: str, scenario: Scenario) -> str:
@@ -204,47 +219,56 @@ def _ground(system: System, building: str, h: float, scenario: Scenario) -> Arra
 
 def _plant(slave: Any, h: float, port: int, felt: list[str], output: str, signed: bool) -> Plant:
     """Return the matrices of a structure, found by trying each state and input in turn."""
-    c: StructureConstants = slave.constants_of(h)._replace(linear=True)
-    m, names = 2 * c.n, [slave.vars[index].name for index in slave._outputs]
-    count = len(slave._inputs)
-
-    def stepped(state: int, at: int, end: int) -> Array:
-        """Return the motion after a step: one state is 1, or one input at one end of it."""
-        given = [[0.0] * count, [0.0] * count]
-        begin, after = [0.0] * len(slave.state), [0.0] * len(slave.state)
-        if state >= 0:
-            begin[state] = 1.0
-        else:
-            given[end][at] = 1.0
-        outputs, work = [0.0] * len(names), [0.0] * structure.room(c.n)
-        structure.step((0.0, h, 0), given[0], given[1], c, begin, after, outputs, work)
-        return np.array(after[:m])
-
-    def shown(state: int, at: int) -> Array:
-        """Return the outputs at an instant: one state is 1, or one input."""
-        given, begin = [0.0] * count, [0.0] * len(slave.state)
-        if state >= 0:
-            begin[state] = 1.0
-        else:
-            given[at] = 1.0
-        outputs, work = [0.0] * len(names), [0.0] * structure.room(c.n)
-        structure.settle(c, begin, work)
-        structure.show_motion(c, begin, outputs)
-        structure.output(0.0, given, c, begin, outputs, work)
-        return np.array(outputs)
-
-    rows = np.array([shown(j, 0) for j in range(m)]).T
+    tried = _Tried(slave, h)
+    m, names = tried.states, [slave.vars[index].name for index in slave._outputs]
+    rows = np.array([tried.shown(j, 0) for j in range(m)]).T
     displacement, velocity = rows[names.index(felt[0])], rows[names.index(felt[1])]
-    force_0, force_1 = stepped(-1, port, 0), stepped(-1, port, 1)
+    force_0, force_1 = tried.stepped(-1, port, 0), tried.stepped(-1, port, 1)
     if signed:  # friction that sticks is held at its new value, as the coupled engine has it
         force_0, force_1 = np.zeros(m), force_0 + force_1
     at = names.index(output)
     gain = float(velocity @ (force_0 + force_1))
     return Plant(
-        h, np.array([stepped(j, 0, 0) for j in range(m)]).T.copy(), stepped(-1, 0, 0),
-        stepped(-1, 0, 1), force_0, force_1, displacement.copy(), velocity.copy(),
-        rows[at].copy(), float(shown(-1, port)[at]), float(shown(-1, 0)[at]), -h / gain,
+        h, np.array([tried.stepped(j, 0, 0) for j in range(m)]).T.copy(), tried.stepped(-1, 0, 0),
+        tried.stepped(-1, 0, 1), force_0, force_1, displacement.copy(), velocity.copy(),
+        rows[at].copy(), float(tried.shown(-1, port)[at]), float(tried.shown(-1, 0)[at]), -h / gain,
     )  # fmt: skip
+
+
+class _Tried:
+    """A linear structure, one state or one input of which is 1 and all else 0."""
+
+    def __init__(self, slave: Any, h: float) -> None:
+        self._slave, self._h = slave, h
+        self._c: StructureConstants = slave.constants_of(h)._replace(linear=True)
+        self.states = 2 * self._c.n
+
+    def stepped(self, state: int, at: int, end: int) -> Array:
+        """Return the motion after a step: of a state, or of an input (-1) at one end of it."""
+        c, count = self._c, len(self._slave._inputs)
+        given = [[0.0] * count, [0.0] * count]
+        begin, after = [0.0] * len(self._slave.state), [0.0] * len(self._slave.state)
+        if state >= 0:
+            begin[state] = 1.0
+        else:
+            given[end][at] = 1.0
+        outputs, work = [0.0] * len(self._slave._outputs), [0.0] * structure.room(c.n)
+        structure.step((0.0, self._h, 0), given[0], given[1], c, begin, after, outputs, work)
+        return np.array(after[: self.states])
+
+    def shown(self, state: int, at: int) -> Array:
+        """Return the outputs at an instant: of a state, or of an input (-1)."""
+        c, given = self._c, [0.0] * len(self._slave._inputs)
+        begin = [0.0] * len(self._slave.state)
+        if state >= 0:
+            begin[state] = 1.0
+        else:
+            given[at] = 1.0
+        outputs, work = [0.0] * len(self._slave._outputs), [0.0] * structure.room(c.n)
+        structure.settle(c, begin, work)
+        structure.show_motion(c, begin, outputs)
+        structure.output(0.0, given, c, begin, outputs, work)
+        return np.array(outputs)
 
 
 def room(case: Case) -> int:

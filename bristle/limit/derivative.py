@@ -74,32 +74,33 @@ def slopes(
         base = damper_end(setup, plant.h, plant.mass, u, energy, z0, z1, work)
         for i in range(q):
             rows[1 + i, TRIED] = z1[active[i]]
-        for j in range(STATES + q):
-            if j == TRIED:
-                continue
-            if j < STATES:
-                kept = u[j]
-                u[j] += eps[j]
-            else:
-                kept = z0[active[j - STATES]]
-                z0[active[j - STATES]] += eps[j]
-            rows[0, j] = (
-                damper_end(setup, plant.h, plant.mass, u, energy, z0, z1, work) - base
-            ) / eps[j]
+        for at in range(1, STATES + q + 1):
+            j = (TRIED + at) % (STATES + q)  # the last is TRIED, whose column holds the base
+            moved, slot = (u, j) if j < STATES else (z0, active[j - STATES])
+            kept = moved[slot]
+            moved[slot] += eps[j]
+            found = damper_end(setup, plant.h, plant.mass, u, energy, z0, z1, work)
+            moved[slot] = kept
+            rows[0, j] = (found - base) / eps[j]
             for i in range(q):
                 rows[1 + i, j] = (z1[active[i]] - rows[1 + i, TRIED]) / eps[j]
-            if j < STATES:
-                u[j] = kept
-            else:
-                z0[active[j - STATES]] = kept
-        kept = u[TRIED]
-        u[TRIED] += eps[TRIED]
-        rows[0, TRIED] = (
-            damper_end(setup, plant.h, plant.mass, u, energy, z0, z1, work) - base
-        ) / eps[TRIED]
-        for i in range(q):
-            rows[1 + i, TRIED] = (z1[active[i]] - rows[1 + i, TRIED]) / eps[TRIED]
-        u[TRIED] = kept
+
+
+def carried(rows: Any, by_z: Any, column: int) -> float:
+    """Return what one cause does by way of the states at the end of a step.
+
+    Parameters
+    ----------
+    rows : (1 + q, 7 + q) array
+        A step's entry of `Gradient.table`.
+    by_z : (q,) array
+        What the states at its end do to the sum.
+    column : X_0 ... of the cause
+    """
+    total = 0.0
+    for i in range(len(by_z)):
+        total += rows[1 + i, column] * by_z[i]
+    return total
 
 
 def pull_back(plant: Any, weights: Any, first: int, last: int, gradient: Gradient) -> None:
@@ -113,16 +114,12 @@ def pull_back(plant: Any, weights: Any, first: int, last: int, gradient: Gradien
     gradient : Gradient; `by_voltage` is filled
     """
     table, room, by_voltage = gradient.table, gradient.room, gradient.by_voltage
-    for k in range(len(by_voltage)):
-        by_voltage[k] = 0.0
+    by_voltage[:] = 0.0
     m, q = len(plant.phi), len(table[0]) - 1
     by_x, new_x = room[0, :m], room[1, :m]
     by_z, new_z = room[0, m : m + q], room[1, m : m + q]
     x_1, v_1 = dot(plant.displacement, plant.force_1), dot(plant.velocity, plant.force_1)
-    for i in range(m):
-        by_x[i] = 0.0
-    for i in range(q):
-        by_z[i] = 0.0
+    room[0] = 0.0
     by_f = 0.0
     for k in range(last - 1, first - 1, -1):
         w, rows = weights[k + 1], table[k]
@@ -130,36 +127,23 @@ def pull_back(plant: Any, weights: Any, first: int, last: int, gradient: Gradien
             by_f += w * plant.by_force
             for i in range(m):
                 by_x[i] += w * plant.output[i]
-        total = by_f + dot(plant.force_1, by_x)
-        bent_x, bent_v = 0.0, 0.0
-        for i in range(q):
-            bent_x += rows[1 + i, X_1] * by_z[i]
-            bent_v += rows[1 + i, V_1] * by_z[i]
-            total += rows[1 + i, TRIED] * by_z[i]
+        bent_x, bent_v = carried(rows, by_z, X_1), carried(rows, by_z, V_1)
+        total = by_f + dot(plant.force_1, by_x) + carried(rows, by_z, TRIED)
         total += x_1 * bent_x + v_1 * bent_v
         total /= 1.0 - rows[0, TRIED] - x_1 * rows[0, X_1] - v_1 * rows[0, V_1]
         x_1_by, v_1_by = bent_x + rows[0, X_1] * total, bent_v + rows[0, V_1] * total
         for i in range(m):
             by_x[i] += plant.displacement[i] * x_1_by + plant.velocity[i] * v_1_by
-        x_by, v_by = rows[0, X_0] * total, rows[0, V_0] * total
-        low, high = rows[0, VOLTAGE_0] * total, rows[0, VOLTAGE_1] * total
-        for i in range(q):
-            x_by += rows[1 + i, X_0] * by_z[i]
-            v_by += rows[1 + i, V_0] * by_z[i]
-            low += rows[1 + i, VOLTAGE_0] * by_z[i]
-            high += rows[1 + i, VOLTAGE_1] * by_z[i]
-        by_voltage[k] += low
-        by_voltage[k + 1] += high
+        x_by = rows[0, X_0] * total + carried(rows, by_z, X_0)
+        v_by = rows[0, V_0] * total + carried(rows, by_z, V_0)
+        by_voltage[k] += rows[0, VOLTAGE_0] * total + carried(rows, by_z, VOLTAGE_0)
+        by_voltage[k + 1] += rows[0, VOLTAGE_1] * total + carried(rows, by_z, VOLTAGE_1)
         for j in range(q):
-            sum_z = rows[0, STATES + j] * total
-            for i in range(q):
-                sum_z += rows[1 + i, STATES + j] * by_z[i]
-            new_z[j] = sum_z
+            new_z[j] = rows[0, STATES + j] * total + carried(rows, by_z, STATES + j)
         for j in range(m):
-            sum_x = plant.displacement[j] * x_by + plant.velocity[j] * v_by
+            new_x[j] = plant.displacement[j] * x_by + plant.velocity[j] * v_by
             for i in range(m):
-                sum_x += plant.phi[i, j] * by_x[i]
-            new_x[j] = sum_x
+                new_x[j] += plant.phi[i, j] * by_x[i]
         by_f = dot(plant.force_0, by_x)
         for i in range(m):
             by_x[i] = new_x[i]

@@ -112,6 +112,41 @@ def start(plant: Any, setup: Any, voltage: Any, course: Course) -> None:
     course.force[0] = force_at(setup, now, course.z[0], course.work)[0]
 
 
+def settled_force(
+    plant: Any, setup: Any, course: Course, k: int, scale: float, u: Any
+) -> float:  # fmt: skip
+    """Correct a step's force until motion and force agree; return it [N].
+
+    Parameters
+    ----------
+    plant, setup : Plant, Setup
+    course : Course; the damper's states at instant k + 1 are filled
+    k : the step's number
+    scale : largest force so far [N]
+    u : (7,) motion as if no force acted at the end, and the force that is tried first
+    """
+    x_1, v_1 = dot(plant.displacement, plant.force_1), dot(plant.velocity, plant.force_1)
+    x, v, tried = u[X_1], u[V_1], u[TRIED]
+    tried_before, excess_before = 0.0, 0.0
+    found: float = tried
+    for sweep in range(SWEEPS):
+        u[X_1], u[V_1], u[TRIED] = x + x_1 * tried, v + v_1 * tried, tried
+        found = damper_end(
+            setup, plant.h, plant.mass, u, course.energy[k], course.z[k], course.z[k + 1],
+            course.work,
+        )  # fmt: skip
+        excess = found - tried
+        scale = max(scale, abs(found))
+        if abs(excess) <= AGREED * scale:
+            break
+        slope = -1.0
+        if sweep > 0 and tried != tried_before:
+            slope = min((excess - excess_before) / (tried - tried_before), -0.5)
+        tried_before, excess_before = tried, excess
+        tried -= excess / slope
+    return found
+
+
 def respond(
     plant: Any, setup: Any, ground: Any, voltage: Any, first: int, last: int, course: Course,
     u: Any,
@@ -127,7 +162,6 @@ def respond(
     u : (7,) room to work
     """
     m = len(plant.phi)
-    x_1, v_1 = dot(plant.displacement, plant.force_1), dot(plant.velocity, plant.force_1)
     scale = 1e-12
     for k in range(first, last):
         before, after = course.x[k], course.x[k + 1]
@@ -138,23 +172,11 @@ def respond(
             for j in range(m):
                 total += plant.phi[i, j] * before[j]
             after[i] = total
-        x, v = dot(plant.displacement, after), dot(plant.velocity, after)
         u[X_0], u[V_0] = dot(plant.displacement, before), dot(plant.velocity, before)
-        u[VOLTAGE_0], u[VOLTAGE_1] = voltage[k], voltage[k + 1]
-        tried, tried_before, excess_before = f0, 0.0, 0.0
-        z0, z1 = course.z[k], course.z[k + 1]
-        for sweep in range(SWEEPS):
-            u[X_1], u[V_1], u[TRIED] = x + x_1 * tried, v + v_1 * tried, tried
-            found = damper_end(setup, plant.h, plant.mass, u, course.energy[k], z0, z1, course.work)
-            excess = found - tried
-            scale = max(scale, abs(found))
-            if abs(excess) <= AGREED * scale:
-                break
-            slope = -1.0
-            if sweep > 0 and tried != tried_before:
-                slope = min((excess - excess_before) / (tried - tried_before), -0.5)
-            tried_before, excess_before = tried, excess
-            tried -= excess / slope
+        u[X_1], u[V_1] = dot(plant.displacement, after), dot(plant.velocity, after)
+        u[VOLTAGE_0], u[VOLTAGE_1], u[TRIED] = voltage[k], voltage[k + 1], f0
+        found = settled_force(plant, setup, course, k, scale, u)
+        scale = max(scale, abs(found))
         for i in range(m):
             after[i] += plant.force_1[i] * found
         course.force[k + 1] = found

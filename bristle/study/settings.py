@@ -105,18 +105,7 @@ def read_settings(path: Path) -> Settings:
     device = toml.text((), data, "device")
     if device and rig == RIGS[0]:
         toml.error(("device",), 'device goes with rig = "structure": it is one of a building\'s.')
-    law = toml.text((), data, "law")
-    if law not in ("", ALL):
-        toml.error(
-            ("law",),
-            f'law = "{law}"; "all" seeks the law. Without this line that of model.toml is kept.',
-        )
-    cut_off = toml.number((), data, "cut_off")
-    if cut_off is not None and cut_off < 0.0:
-        toml.error(("cut_off",), f"cut_off = {cut_off} Hz; 0 for none, or a positive number.")
-    rate = toml.number((), data, "rate")
-    if rate is not None and rate < 0.0:
-        toml.error(("rate",), f"rate = {rate} Hz; 0 for none, or a positive number.")
+    law, cut_off, rate = _law(toml), _hertz(toml, "cut_off"), _hertz(toml, "rate")
     mask = data.get("mask", False)
     if not isinstance(mask, bool):
         toml.error(("mask",), f"mask = {written(mask)}; true or false is right.")
@@ -147,6 +136,24 @@ def read_settings(path: Path) -> Settings:
         rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded, extra=extra,
         device=device,
     )  # fmt: skip
+
+
+def _law(toml: Toml) -> str:
+    law: str = toml.text((), toml.data, "law")
+    if law not in ("", ALL):
+        toml.error(
+            ("law",),
+            f'law = "{law}"; "all" seeks the law. Without this line that of model.toml is kept.',
+        )
+    return law
+
+
+def _hertz(toml: Toml, key: str) -> float | None:
+    """Return a frequency, None if it is not given."""
+    given: float | None = toml.number((), toml.data, key)
+    if given is not None and given < 0.0:
+        toml.error((key,), f"{key} = {given} Hz; 0 for none, or a positive number.")
+    return given
 
 
 def only_device(folder: Path) -> str:
