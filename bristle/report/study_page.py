@@ -217,7 +217,8 @@ def _before_after(content: Content) -> str:
     loops = html.figure(
         png(loops_page(content.before, content.now, names)),
         f"Force loops, measured and predicted; {z}{short_z(content.now.z)} now",
-        "Loops of the held-out run that was worst, measured (black) and predicted (blue).",
+        "Single cycles of held-out runs by the level of the command, else by speed: measured "
+        "(black), predicted (blue), and the band in which 95 % of a true model's samples would be.",
     )
     page = maps_page(content.before, content.now, names)
     maps = ""
