@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
+from ..data.labels import label_text
 from ..draw.cycles import by_level, cycles, steady
 from ..draw.style import BLUE, GREY, INK, short_z, zero_lines
 from ..identify.search import z_scale
@@ -44,9 +45,10 @@ class OneCycle(NamedTuple):
 
 
 def chosen_cycles(predictions: Sequence[RunPrediction], most: int = MOST) -> list[OneCycle]:
-    """Return one cycle in each range of the command, or of speed where no command varies.
+    """Return one cycle in each range of the command.
 
-    Nothing where displacement and velocity are not known.
+    Where no command varies, of a number that is known of whole runs, such as their temperature or
+    frequency; where none is, of speed. Nothing where displacement and velocity are not known.
 
     Parameters
     ----------
@@ -119,6 +121,11 @@ def _level(predictions: Sequence[RunPrediction]) -> tuple[str, Any]:
                 return f"{plain(rounded, 2)} {unit}"
 
             return drive, level
+    for name in predictions[0].labels:  # what is known of whole runs, such as a temperature
+        known = [one.labels.get(name, "") for one in predictions if name in one.coordinates]
+        numbers = [one for one in known if not isinstance(one, str)]
+        if len(numbers) == len(predictions) and max(numbers) > min(numbers):
+            return name, lambda value, name=name: f"{name} {label_text(name, value)}"
     return "speed", lambda value: f"up to {quantity(value, 'm/s', 2)}"
 
 

@@ -37,14 +37,14 @@ def draw_evidence(verdict: Mapping[str, Any]) -> Page | None:
     None where it holds none.
     """
     findings = [one for one in verdict.get("findings") or [] if "z_holdout_before" in one]
-    if not findings:
-        return None
-    at = max(findings, key=lambda one: float(one["z_holdout_before"]))
+    at = max(findings, key=lambda one: float(one["z_holdout_before"]), default=verdict)
     rows = [
         (str(row["effect"]), float(row["z_holdout"]))
         for row in verdict.get("ranking") or []
-        if row.get("site", at["site"]) == at["site"] and row.get("z_holdout") is not None
+        if row.get("z_holdout") is not None and row.get("site") == at.get("site", row.get("site"))
     ][:MOST]
+    if at.get("z_holdout_before") is None:
+        return None
     if not rows:
         return None
     named, before = verdict.get("effects") or [], float(at["z_holdout_before"])

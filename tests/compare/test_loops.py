@@ -65,6 +65,16 @@ def test_cycles_are_told_by_the_command_and_by_speed_where_it_does_not_vary():
     assert [one.text for one in still] == ["up to 130 mm/s"]  # 10 mm at 2 Hz is 126 mm/s
 
 
+def test_where_the_command_is_held_cycles_are_told_by_the_temperature_of_their_runs():
+    runs = []
+    for temperature in (20.0, 60.0):
+        one = made(np.full_like(TIME, 3.0), labels={"temperature": temperature})
+        one.coordinates["temperature"] = np.full_like(TIME, temperature)
+        runs.append(one)
+    texts = [one.text for one in chosen_cycles(runs)]
+    assert texts == ["temperature 20 °C", "temperature 60 °C"]
+
+
 def test_a_level_that_moves_within_a_cycle_is_told_as_a_range():
     (one,) = chosen_cycles([made(TIME)], most=1)
     low, high = (float(part) for part in one.text.removesuffix(" V").split(" to "))
