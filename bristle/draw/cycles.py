@@ -74,9 +74,22 @@ def by_level(found: Sequence[Cycle], most: int = 4) -> list[Cycle]:
         place = min(place, most - 1)
         if place not in chosen or worth > chosen[place][0]:
             chosen[place] = worth, one
-    largest = max(one.travel for _, one in chosen.values())
+    most_travel = max(one.travel for _, one in chosen.values())
     told = [chosen[place][1] for place in sorted(chosen)]
-    return [one for one in told if one.travel >= 0.1 * largest]
+    return [one for one in told if one.travel >= 0.1 * most_travel]
+
+
+def largest(x: Array, v: Array) -> slice | None:
+    """Return the samples of the cycle of the largest travel; None where there is none.
+
+    Parameters
+    ----------
+    x, v : displacement and velocity (n,), evenly spaced in time
+    """
+    if not (np.isfinite(x).all() and np.isfinite(v).all()):
+        return None
+    found = cycles([(x, v, np.zeros(len(x)))])
+    return max(found, key=lambda one: one.travel).part if found else None
 
 
 def steady(one: Cycle, found: Sequence[Cycle]) -> bool:

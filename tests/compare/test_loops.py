@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from bristle.compare.loops import chosen_cycles, draw_cycle, ribbon, under
 from bristle.compare.prediction import RunPrediction
-from bristle.draw.cycles import by_level, cycles, steady
+from bristle.draw.cycles import by_level, cycles, largest, steady
 
 DT = 1e-3  # s
 TIME = np.arange(0.0, 4.0, DT)
@@ -36,6 +36,15 @@ def test_a_sine_of_two_hertz_has_two_cycles_a_second_each_of_twice_its_amplitude
     assert len(found) == 7
     assert {one.end - one.begin for one in found} <= {499, 500, 501}
     assert all(one.travel == pytest.approx(2.0, rel=1e-4) for one in found)
+
+
+def test_the_largest_cycle_of_a_growing_motion_is_its_last_one():
+    x, v = sine()
+    part = largest(x * (1.0 + TIME), v * (1.0 + TIME))
+    assert part is not None
+    assert TIME[part.stop - 1] == pytest.approx(3.875, abs=0.02)  # the last turn before 4 s
+    assert largest(x * np.nan, v) is None
+    assert largest(TIME, np.ones_like(TIME)) is None
 
 
 def test_noise_about_rest_is_no_reversal():
