@@ -114,3 +114,19 @@ def quantity(
 def short_z(z: float) -> str:
     """Return z as text, with the digits that tell it from 1."""
     return f"{z:.2f}" if z < 10.0 else plain(z)
+
+
+def with_interval(value: float, std: float | None) -> tuple[str, str]:
+    """Return a value with the digits that its interval leaves, and the interval: "± 12"."""
+    if std is None or not isfinite(std) or std <= 0.0:
+        return plain(value, 5), "-"
+    half = 1.96 * std
+    size = max(abs(value), half)
+    power = 3 * floor(log10(size) / 3.0) if not 1e-3 <= size < 1e5 else 0
+    scaled, width = value / 10.0**power, half / 10.0**power
+    digits = 1 - floor(log10(width))
+    places = max(digits, 0)
+    tail = times_ten(power) if power else ""
+    texts = (f"{round(one, digits):.{places}f}".replace("-", "\u2212") for one in (scaled, width))
+    number_text, wide = texts
+    return f"{number_text}{tail}", f"± {wide}{tail}"

@@ -7,6 +7,7 @@ as files.
 from __future__ import annotations
 
 import os
+import re
 import sys
 import textwrap
 from functools import cache
@@ -23,6 +24,8 @@ from reference import api_page
 from tables import table as _table
 
 from bristle.cli.effects import tell
+from bristle.data.equation import formulas
+from bristle.draw.mathml import formula_html
 from bristle.fmu import catalogue
 from bristle.physics import effects as _registered  # noqa: F401  (importing registers them)
 from bristle.physics.effect import EFFECTS
@@ -36,12 +39,26 @@ if TYPE_CHECKING:
 
 SECTIONS = ("components", "effects", "laws")
 
-LIVE = "el_centro_lugre_passive"
-"""The scenario that a reader of docs/web.md moves."""
-SLIDERS = {
-    "ground.factor": (0.0, 1.0), "voltage.level": (0.0, 8.0), "damper.sigma_a": (100.0, 2000.0),
-    "damper.sigma_2": (0.0, 300.0), "damper.v_n": (0.005, 0.08),
+LIVE: dict[str, tuple[str, dict[str, tuple[float, float]]]] = {
+    "live": (
+        "el_centro_lugre_passive",
+        {
+            "ground.factor": (0.0, 1.0), "voltage.level": (0.0, 8.0),
+            "damper.sigma_a": (100.0, 2000.0), "damper.sigma_2": (0.0, 300.0),
+            "damper.v_n": (0.005, 0.08),
+        },
+    ),
+    "live_damper": (
+        "bench_sine_lugre",
+        {
+            "voltage.level": (0.0, 8.0), "rod.amplitude": (0.001, 0.012),
+            "rod.frequency": (0.5, 4.0), "damper.sigma_a": (100.0, 2000.0),
+            "damper.sigma_2": (0.0, 300.0), "damper.v_n": (0.005, 0.08),
+            "damper.a_0": (100.0, 3000.0),
+        },
+    ),
 }  # fmt: skip
+"""Scenarios that a reader moves, with their sliders, by the folder of the page that runs them."""
 
 
 def pages() -> dict[str, str]:
@@ -254,11 +271,28 @@ def _of_effects(described: Description) -> list[str]:
 
 
 def _formula(text: str) -> str:
-    """Return a docstring's text as Markdown, its formula an indented block."""
+    """Return a docstring's text as Markdown, its formulas set by the browser (MathML)."""
     first, _, rest = text.strip("\n").partition("\n")
     if first.startswith(" "):  # an effect's text, which begins with its formula
-        return text.strip("\n")
-    return f"{first}\n{textwrap.dedent(rest)}".strip("\n")
+        first, rest = "", text.strip("\n")
+    lines = [first, *textwrap.dedent(rest).splitlines()]
+    about, _, formula = first.partition(": ")
+    if "=" in formula:
+        set_ = [formula_html(one) for one in formulas(first)]
+        lines[:1] = [f"{about}:", "", *set_, ""]
+    block = [k for k, line in enumerate(lines) if line.startswith("    ")]
+    if block and any("=" in lines[k] for k in block):
+        told = [piece for k in block for piece in _pieces(lines[k].strip())]
+        lines[block[0] : block[-1] + 1] = told
+    return "\n".join(lines).strip("\n")
+
+
+def _pieces(line: str) -> list[str]:
+    """Return the formulas of a line of a docstring set, and the prose between them, a line each."""
+    return [
+        f"{formula_html(one)}\n" if "=" in one else f"{one}\n"
+        for one in re.split(r"[,;]\s{2,}", line)
+    ]
 
 
 def _named(names: tuple[str, ...]) -> str:
@@ -299,23 +333,24 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
 
 
 def on_post_build(config: MkDocsConfig) -> None:
-    """Put the page of a scenario beside the others (a hook of mkdocs).
+    """Put the pages of scenarios that a reader moves beside the others (a hook of mkdocs).
 
-    With DOCS_WITHOUT_LIVE in the environment nothing is compiled for it.
+    With DOCS_WITHOUT_LIVE in the environment nothing is compiled for them.
     """
     from bristle.draw.html import page
     from bristle.errors import BuildError
     from bristle.web.export import export_web
 
-    folder = Path(config.site_dir) / "live"
-    try:
-        if os.environ.get("DOCS_WITHOUT_LIVE"):
-            raise BuildError("DOCS_WITHOUT_LIVE is set.")
-        export_web(LIVE, folder, SLIDERS)
-    except BuildError as error:
-        folder.mkdir(parents=True, exist_ok=True)
-        text = f"<p>Not made with this copy of the documentation: {escape(str(error))}</p>"
-        (folder / "index.html").write_text(page("Not made", [text], ""), encoding="utf-8")
+    for name, (scenario, sliders) in LIVE.items():
+        folder = Path(config.site_dir) / name
+        try:
+            if os.environ.get("DOCS_WITHOUT_LIVE"):
+                raise BuildError("DOCS_WITHOUT_LIVE is set.")
+            export_web(scenario, folder, sliders)
+        except BuildError as error:
+            folder.mkdir(parents=True, exist_ok=True)
+            text = f"<p>Not made with this copy of the documentation: {escape(str(error))}</p>"
+            (folder / "index.html").write_text(page("Not made", [text], ""), encoding="utf-8")
 
 
 def _fill(entries: list[dict[str, Any]], made: list[str]) -> None:

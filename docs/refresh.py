@@ -1,6 +1,6 @@
 """Writes anew what the README and the pages show: figures, and the output of every command.
 
-python docs/refresh.py [figures] [pages]   both by default; takes some minutes
+python docs/refresh.py [figures] [gallery] [pages]   all by default; takes some minutes
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import tempfile
 from pathlib import Path
 
 import first_picture
+import gallery
 import snippets
 
 ROOT = snippets.ROOT
@@ -54,8 +55,8 @@ def pages() -> None:
 
 
 if __name__ == "__main__":
-    wanted = sys.argv[1:] or ["figures", "pages"]
-    if not set(wanted) <= {"figures", "pages"}:
+    wanted = sys.argv[1:] or ["figures", "gallery", "pages"]
+    if not set(wanted) <= {"figures", "gallery", "pages"}:
         sys.exit(__doc__)
     for task in wanted:
-        {"figures": figures, "pages": pages}[task]()
+        {"figures": figures, "gallery": gallery.make, "pages": pages}[task]()

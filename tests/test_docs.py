@@ -15,6 +15,8 @@ import pytest
 
 import bristle
 from bristle.cli import build_parser
+from bristle.data.equation import formulas
+from bristle.draw.mathml import formula_html
 from bristle.fmu import catalogue
 from bristle.paper.figures import paper_figures
 from bristle.physics.effect import EFFECTS
@@ -138,7 +140,11 @@ def test_every_effect_has_a_page_with_text_parameters_and_source() -> None:
         assert effect.expect[1:] in text
         body = generate.tell(effect)["text"]
         assert len(body) > 60
-        assert body in text
+        prose = [line for line in body.splitlines() if line and not line.startswith("    ")]
+        assert all(line in text for line in prose)
+        set_ = formulas(effect.__doc__ or "")
+        assert set_
+        assert all(formula_html(one) in text for one in set_)
         for parameter, about in effect.parameters.items():
             assert f"| `{name}.{parameter}` | {about.value:g} |" in text
 
@@ -218,6 +224,17 @@ def test_every_figure_is_in_the_gallery() -> None:
         assert f"bristle figures {name}" in text
         assert f"(figures/{name}.png)" in text
         assert (DOCS / "figures" / f"{name}.png").is_file()
+
+
+def test_the_gallery_shows_what_its_commands_write() -> None:
+    gallery, text = load("gallery"), (DOCS / "gallery.md").read_text(encoding="utf-8")
+    for one in (*gallery.BENCH, *gallery.BUILDING):
+        assert f"    bristle {one.command}\n" in text
+        if one.picture:
+            assert f"figures/{one.name}.png" in text
+            assert (DOCS / "figures" / f"{one.name}.png").is_file()
+    shown = re.findall(r"figures/(gallery-[\w-]+)\.png", text)
+    assert sorted(shown) == sorted(path.stem for path in (DOCS / "figures").glob("gallery-*.png"))
 
 
 def test_the_citation_names_this_version_and_the_paper() -> None:

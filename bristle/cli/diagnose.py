@@ -39,7 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(arguments: argparse.Namespace) -> int:
-    """Diagnose, write verdict.json, print the verdict with its evidence."""
+    """Diagnose, write verdict.json and the picture, print the verdict with its evidence."""
+    from ..draw.style import png
     from ..study.learning import diagnose_study, verdict_of
     from ..study.study import Study
 
@@ -48,10 +49,15 @@ def main(arguments: argparse.Namespace) -> int:
         study, law=arguments.law, profile=arguments.limits, write=not arguments.dry_run
     )
     verdict = verdict_of(study, found)
+    picture = None
+    if not arguments.dry_run:
+        picture = study.write_report("diagnose.png", png(found.plot()))
     if arguments.json:
         print(json.dumps(verdict, indent=2, ensure_ascii=False))
     else:
         print(text(verdict, arguments.folder))
+        if picture:
+            print(f"Picture: {picture}")
     return 0
 
 

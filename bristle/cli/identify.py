@@ -69,7 +69,9 @@ def main(arguments: argparse.Namespace) -> int:
         from . import _building
 
         return _building.main(arguments)
+    from ..draw.style import png
     from ..progress import Progress
+    from ..study.budget_picture import draw_budget
     from ..study.fit_picture import identify_png
     from ..study.identification import STAGES, identify_study
     from ..study.study import Study
@@ -86,9 +88,12 @@ def main(arguments: argparse.Namespace) -> int:
             write=not arguments.dry_run,
             show=progress.show,
         )
-    picture = None
+    picture = budget = None
     if not arguments.dry_run:
         picture = study.write_report("identify.png", identify_png(found))
+        budget = draw_budget(found.holdout or found.train, found.at.model)
+        if budget is not None:
+            study.write_report("force_budget.png", png(budget, 110))
         study.write_report("identify.json", _as_json(found.as_dict()) + "\n")
     if arguments.json:
         place = str(picture.absolute()) if picture else None
@@ -97,6 +102,8 @@ def main(arguments: argparse.Namespace) -> int:
     print(text(found, arguments.folder))
     if picture:
         print(f"Picture: {picture}")
+        if budget is not None:
+            print(f"What makes the force: {picture.with_name('force_budget.png')}")
     return 0
 
 
@@ -108,6 +115,7 @@ def _as_json(answer: dict[str, Any]) -> str:
 
 def text(found: Identified, folder: Path) -> str:
     """Return the tables as text."""
+    from ..data.equation import equations
     from ..physics.forms import shown_law, split_form
 
     title = " + ".join([shown_law(found.model.law), *found.model.effects])
@@ -119,6 +127,8 @@ def text(found: Identified, folder: Path) -> str:
             f"  Knots of the command: {', '.join(map(plain, knots))} {unit}. [1] is the value at "
             "the first one, each other the rise from the knot before."
         )
+    if told := equations(found.model):
+        lines += ["", *(f"  {one.numbers}" for one in told), "  In SI units."]
     if found.unidentified:
         lines += ["", f"The data do not identify: {', '.join(found.unidentified)}."]
     lines += ["", *_errors(found)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from ._consent import add_trust
@@ -22,6 +23,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     text = "add sliders for the model's numbers, computed in the page (needs bristle[native])"
     parser.add_argument("--what-if", action="store_true", help=text)
+    parser.add_argument(
+        "--static", action="store_true",
+        help="leave out the pictures in which samples can be chosen, and with them all scripts",
+    )  # fmt: skip
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
@@ -29,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Write the report; print where it is."""
     from ..data.files import write_whole
+    from ..page.embedded import linked_section
     from ..report.study_content import gather
     from ..report.study_page import render
     from ..study.staircase import Staircase
@@ -36,6 +42,8 @@ def main(arguments: argparse.Namespace) -> int:
 
     study = Study(arguments.folder)
     content = gather(study, open_test=not arguments.keep_test_closed, what_if=arguments.what_if)
+    if content.now is not None and not arguments.static:
+        content = replace(content, linked=linked_section(content.now))
     page = render(content)
     if arguments.out is None:
         file = study.write_report("report.html", page)

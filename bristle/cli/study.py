@@ -217,9 +217,9 @@ def _print_new(created: Created) -> None:
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    from ..draw.data_check import data_check_png
+    from ..draw.style import png
     from ..progress import Progress
-    from ..study.data_check import Place, check_data, place_of_damper
+    from ..study.data_check import check_data
     from ..study.study import Study
 
     if arguments.action == _OLD:
@@ -241,9 +241,7 @@ def _check(arguments: argparse.Namespace) -> int:
         if not arguments.json:
             _print_corrections(found)
         found = check_data(study)
-    place = place_of_damper(study, found.runs) if study.settings.has_building else Place()
-    seen = [place.seen(run) for run in found.runs]
-    picture = study.write_report("data_check.png", data_check_png(seen, place.level))
+    picture = study.write_report("data_check.png", png(found.page(), 110))
     if arguments.json:
         import json
 

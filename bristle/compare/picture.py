@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ..draw.style import Page, look
-from ..quantity import plain
+from ..draw.style import GREY, Page, look
+from ..quantity import plain, scale
+from .loops import OVERS, OneCycle, chosen_cycles, draw_loops
 from .names import name_of
 from .panels import (
     draw_error,
@@ -24,25 +26,29 @@ if TYPE_CHECKING:
 
 _HISTORY, _PANELS = 3.1, 3.2
 """Heights of the history with its error, and of a row of two panels [in]."""
+LOOPS = 4.6
+"""Height of two rows of loops of single cycles [in]."""
 
 
 def draw_comparison(comparison: Comparison, title: str = "") -> Page:
     """Return the figure of a comparison, drawn and not yet written.
 
     Panels: z at every site of a building; the worst stretch of the worst run, measured and
-    predicted, with the error under it; the loops of that run; the error along the two most telling
-    coordinates; its spectrum against that of the noise; z in classes of speed and command.
+    predicted, with the error under it; loops of single cycles by the level of the command, or the
+    loops of that run where it has no cycles; the error along the two most telling coordinates; its
+    spectrum against that of the noise; z in classes of speed and command.
     """
     prediction = comparison.worst
     window = worst_window(prediction)
+    cycles = chosen_cycles(comparison.predictions)
     loops = [name for name in ("displacement", "velocity") if name in prediction.coordinates]
     telling = telling_patterns(comparison)
     first = telling[0] if comparison.second else None
-    rows = [bool(loops), bool(telling), True]
+    rows = [bool(loops) and not cycles, bool(telling), True]
     with look():
         sites = comparison.sites
         begin = sites_height(len(sites)) if sites else 0.0
-        height = begin + _HISTORY + _PANELS * sum(rows)
+        height = begin + _HISTORY + LOOPS * bool(cycles) + _PANELS * sum(rows)
         page = Page(9.6, height, title or headline(comparison), " ".join(comparison.sentences))
         if sites:
             above = page.grid(1, 1, top=0.35, bottom=height - begin + 0.5, left=1.35, right=2.9)
@@ -57,7 +63,10 @@ def draw_comparison(comparison: Comparison, title: str = "") -> Page:
         upper.tick_params(labelbottom=False)
         draw_error(lower, prediction, window)
         at = begin + _HISTORY
-        if loops:
+        if cycles:
+            loop_panels(page, at, cycles)
+            at += LOOPS
+        elif loops:
             _row(page, at, [lambda axes, o=one: draw_loop(axes, prediction, o) for one in loops])
             at += _PANELS
         if telling:
@@ -70,6 +79,36 @@ def draw_comparison(comparison: Comparison, title: str = "") -> Page:
             last.append(lambda axes: draw_regimes(axes, comparison))
         _row(page, at, last)
     return page
+
+
+def loop_panels(page: Page, top: float, cycles: Sequence[OneCycle], name: str = "") -> None:
+    """Draw loops of single cycles over velocity and displacement, `LOOPS` high, into a page.
+
+    Parameters
+    ----------
+    page : where to draw
+    top : from the upper edge of the room for panels [in]
+    cycles : those that are shown side by side
+    name : of the model, "" where there is one alone
+    """
+    inner, one = page.height - page.head - page.foot, cycles[0].prediction
+    grid = page.grid(
+        len(OVERS), len(cycles), top=top + 0.55, bottom=inner - top - LOOPS + 0.5, row_gap=0.5,
+        column_gap=0.2,
+    )  # fmt: skip
+    rows = {
+        over: [page.figure.add_subplot(grid[row, column]) for column in range(len(cycles))]
+        for row, over in enumerate(OVERS)
+    }
+    size = max(float(abs(each.prediction.measured[each.part]).max()) for each in cycles)
+    force = scale(one.unit, size)
+    draw_loops(rows, cycles, force=force)
+    page.figure.text(
+        0.65 / page.width, (page.foot + inner - top - 0.14) / page.height,
+        f"{f'{name}: ' if name else ''}{one.quantity.replace('_', ' ')} [{force[1]}] in single "
+        "cycles, measured (black) and model (blue). Band: 95 % of a true model's samples.",
+        fontsize=9, color=GREY, va="center",
+    )  # fmt: skip
 
 
 def _row(page: Page, top: float, draws: list) -> None:  # type: ignore[type-arg]

@@ -53,6 +53,10 @@ class RigComparer:
             return compare_predictions(self._predictions(here), seen=self.seen, role=self.role)
         return compare_sites(self._everywhere(model), self.site, seen=self.seen, role=self.role)
 
+    def damper(self, model: Model) -> SiteModel | None:
+        """Return the damper and the part of a model that predicts it; None where it is no site."""
+        return self._models(model).get(DAMPER)
+
     def _models(self, model: Model) -> SiteModels:
         """Return what predicts the runs; that of the last model is kept: lines take long."""
         if self._last is None or self._last[0] != model:

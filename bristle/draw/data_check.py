@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import io
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,77 +10,116 @@ from ..data.channels import DRIVE
 from ..data.checks.motion import velocity_of_run
 from ..data.measurement import Measurement
 from ..data.table import Array
+from .style import BLUE, GREY, VERMILION, Page, look
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _SCALES = {"m": (1e3, "mm"), "m/s": (1e3, "mm/s")}
-_SHOWN = 4000  # samples per line: more are not seen
+_SHOWN = 12000  # samples per line: more are not seen
 _ROWS = 8
+_TIME = "time, runs one after the other [s]"
+_NAMES = 12
+"""Part of the width that the name of a run takes: names of shorter runs are left out."""
 
 
-def data_check_png(runs: list[Measurement], level: str = "") -> bytes:
-    """Return a PNG: the channels of the longest run, and force over motion in all runs."""
-    from matplotlib.figure import Figure
+def draw_data_check(runs: list[Measurement], level: str = "") -> Page:
+    """Return the picture of a data check, drawn and not yet written.
 
-    longest = max(runs, key=lambda run: run.duration)
-    channels = _rows(longest)
+    Parameters
+    ----------
+    runs : one or more
+    level : what stands before the damper's displacement and velocity in a building, "" on a bench
+    """
+    channels = _rows(runs)
     forced = [run for run in runs if "force" in run.channels]
-    figure = Figure(figsize=(12.0, 1.6 * max(len(channels), 3) + 0.6), layout="constrained")
-    # Parts of their own: the loops' titles would open gaps between the channels.
-    parts: Any = figure.subfigures(1, 2, width_ratios=[2, 1]) if forced else [figure]
-    first = None
-    for row, channel in enumerate(channels):
-        axes = parts[0].add_subplot(len(channels), 1, row + 1, sharex=first)
-        first = first or axes
-        _line(axes, longest, channel)
-        last = row == len(channels) - 1
-        axes.tick_params(labelbottom=last)
-        axes.set_xlabel("time [s]" if last else "")
-    assert first is not None
-    first.set_title(f"{longest.name}: {longest.sampling.rate:.4g} Hz, {longest.duration:.4g} s")
-    if forced:
-        over = ("velocity", "displacement")[: len(channels)]
-        for row, one in enumerate(over):
-            _loops(parts[1].add_subplot(len(over), 1, row + 1), forced, level, one)
-    file = io.BytesIO()
-    figure.savefig(file, format="png", dpi=110)
-    return file.getvalue()
+    with look():
+        height = max(1.15 * len(channels), 4.6 if forced else 2.0) + 0.3
+        page = Page(12.0, height, _heading(runs), _subtitle(runs))
+        side = 4.3 if forced else 0.25
+        grid = page.grid(
+            len(channels), 1, top=0.62, bottom=0.45, left=0.7, right=side, row_gap=0.36
+        )
+        first = None
+        for row, channel in enumerate(channels):
+            axes = page.figure.add_subplot(grid[row, 0], sharex=first)
+            first = first or axes
+            _strip(axes, runs, channel, named=row == 0)
+            last = row == len(channels) - 1
+            axes.tick_params(labelbottom=last)
+            if last:
+                axes.set_xlabel(_TIME if len(runs) > 1 else "time [s]", loc="right", labelpad=0)
+        if forced:
+            over = ("velocity", "displacement")[: max(len(channels), 1)]
+            grid = page.grid(len(over), 1, top=0.62, bottom=0.5, left=8.45, right=0.4, row_gap=0.75)
+            for row, one in enumerate(over):
+                _loops(page.figure.add_subplot(grid[row, 0]), forced, level, one)
+    return page
 
 
-def _rows(run: Measurement) -> list[str]:
+def _heading(runs: list[Measurement]) -> str:
+    total = sum(run.duration for run in runs)
+    return f"{len(runs)} run{'s' * (len(runs) > 1)}, {total:.4g} s together"
+
+
+def _subtitle(runs: list[Measurement]) -> str:
+    rates = sorted({round(run.sampling.rate, 3) for run in runs})
+    told = f"{rates[0]:.4g}" if len(rates) == 1 else f"{rates[0]:.4g} to {rates[-1]:.4g}"
+    gaps = any(not run.measured.all() for run in runs)
+    marked = " Red: not measured, filled in." if gaps else ""
+    return f"All runs, one after the other; {told} Hz.{marked}"
+
+
+def _rows(runs: list[Measurement]) -> list[str]:
     """Return the channels to show, the damper's first."""
+    there = dict.fromkeys(channel for run in runs for channel in run.channels)
     first = ["ground_acceleration", "displacement", "velocity", "acceleration", "force", *DRIVE]
     first += [f"base_{one}" for one in ("displacement", "velocity", "acceleration_absolute")]
-    named = [channel for channel in first if channel in run.channels]
-    return [*named, *(channel for channel in run.channels if channel not in named)][:_ROWS]
+    named = [channel for channel in first if channel in there]
+    return [*named, *(channel for channel in there if channel not in named)][:_ROWS]
 
 
-def _line(axes, run: Measurement, channel: str) -> None:  # type: ignore[no-untyped-def]
-    factor, unit = _SCALES.get(run.units[channel], (1.0, run.units[channel]))
-    every = max(1, len(run.time) // _SHOWN)
-    axes.plot(run.time[::every], factor * run[channel][::every], lw=0.7)
-    missing = ~run.measured
-    if missing.any():
-        axes.plot(run.time[missing], factor * run[channel][missing], ".", ms=3, color="tab:red")
-    axes.set_ylabel(f"{channel.replace('_', ' ')}\n[{unit}]", fontsize=8)
-    axes.grid(alpha=0.3)
+def _strip(axes: Axes, runs: list[Measurement], channel: str, *, named: bool) -> None:
+    """Draw a channel of all runs, one after the other; above them their names where asked."""
+    unit_si = next(run.units[channel] for run in runs if channel in run.channels)
+    factor, unit = _SCALES.get(unit_si, (1.0, unit_si))
+    total, begin = sum(run.duration for run in runs), 0.0
+    every = max(1, sum(len(run.time) for run in runs) // _SHOWN)
+    for run in runs:
+        time = begin + run.time - run.time[0]
+        if channel in run.channels:
+            axes.plot(time[::every], factor * run[channel][::every], lw=0.7, color=BLUE)
+            missing = ~run.measured
+            axes.plot(time[missing], factor * run[channel][missing], ".", ms=3, color=VERMILION)
+        if begin > 0.0:
+            axes.axvline(begin, color=GREY, lw=0.7)
+        if named and run.duration > total / _NAMES:
+            axes.annotate(
+                run.name, (begin, 1.0), (2, 20), xycoords=axes.get_xaxis_transform(),
+                textcoords="offset points", fontsize=8, color=GREY,
+            )  # fmt: skip
+        begin += run.duration
+    axes.set_xlim(0.0, max(total, 1e-9))
+    axes.set_title(f"{channel.replace('_', ' ')} [{unit}]", fontsize=9)
 
 
-def _loops(axes, runs: list[Measurement], level: str, over: str) -> None:  # type: ignore[no-untyped-def]
+def _loops(axes: Axes, runs: list[Measurement], level: str, over: str) -> None:
     """Draw force over velocity or displacement, coloured by the voltage where there is one."""
     x, force, drive = _gathered(runs, level, over)
     if not len(x):
         axes.set_axis_off()
         return
     unit = "mm/s" if over == "velocity" else "mm"
-    dots = {"s": 1.5, "alpha": 0.6, "lw": 0}
+    dots: dict[str, Any] = {"s": 1.5, "alpha": 0.6, "lw": 0}
     if len(drive) == len(x) and np.ptp(drive) > 0.0:
         points = axes.scatter(1e3 * x, force, c=drive, cmap="viridis", **dots)
-        axes.figure.colorbar(points, ax=axes, label=_drive_label(runs))
+        bar: Any = axes.figure.colorbar(points, ax=axes, pad=0.03, aspect=25)
+        bar.set_label(_drive_label(runs), fontsize=8.5)
+        bar.outline.set_visible(False)
     else:
-        axes.scatter(1e3 * x, force, **dots)
+        axes.scatter(1e3 * x, force, color=BLUE, **dots)
     axes.set_xlabel(f"{over} [{unit}]")
-    axes.set_ylabel("force [N]")
-    axes.set_title(f"force over {over}, {len(runs)} run{'s' * (len(runs) > 1)}", fontsize=9)
-    axes.grid(alpha=0.3)
+    axes.set_title(f"force [N] over {over}", fontsize=9)
 
 
 def _drive_label(runs: list[Measurement]) -> str:
@@ -100,7 +138,7 @@ def _gathered(runs: list[Measurement], level: str, over: str) -> tuple[Array, Ar
             x = run.channels.get(f"{level}_displacement" if level else "displacement")
         if x is None:
             continue
-        every = max(1, len(x) * len(runs) // (3 * _SHOWN))
+        every = max(1, len(x) * len(runs) // _SHOWN)
         xs.append(x[::every])
         forces.append(run["force"][::every])
         drive = next((run[one] for one in DRIVE if one in run.channels), None)

@@ -7,10 +7,13 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from pathlib import Path
 
+from .mathml import formula_html as formula
+
 __all__ = [
     "CSS",
     "escape",
     "figure",
+    "formula",
     "fragment",
     "items",
     "page",
@@ -21,6 +24,9 @@ __all__ = [
 ]
 
 CSS = Path(__file__).with_name("page.css").read_text(encoding="utf-8")
+
+_NARROW = 3
+"""Columns up to which a table fits on the screen of a telephone."""
 
 _NOTEBOOK = (
     ".bristle p { max-width: 46rem; margin: .3rem 0; } "
@@ -49,7 +55,7 @@ def page(title: str, body: Iterable[str], foot: str) -> str:
             "<head>",
             '<meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            '<meta name="color-scheme" content="light">',
+            '<meta name="color-scheme" content="light dark">',
             f"<title>{escape(title)}</title>",
             f"<style>{CSS}</style>",
             "</head>",
@@ -106,11 +112,18 @@ def table(
     """
     right, bold = set(numbers), set(strong)
 
+    several = len(header) > _NARROW
+
     def cell(kind: str, i: int, text: str) -> str:
         mark = ' class="n"' if i in right else ""
+        if kind == "th":
+            mark += ' scope="col"'
+        elif several:  # where rows stand below each other, each value says what it is
+            mark += f' data-of="{escape(header[i])}"'
         return f"<{kind}{mark}>{escape(text)}</{kind}>"
 
-    lines = ['<div class="scroll">', "<table>", "<thead><tr>"]
+    kind = ' class="wide"' if several else ""
+    lines = ['<div class="scroll">', f"<table{kind}>", "<thead><tr>"]
     lines.append("".join(cell("th", i, text) for i, text in enumerate(header)))
     lines.append("</tr></thead>")
     lines.append("<tbody>")

@@ -1,4 +1,4 @@
-"""Values of several candidates side by side, over the band that noise explains."""
+"""Values of several candidates as bars, over the band that noise explains."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 
 ROW = 0.27
 """Height of a candidate's row [in]."""
+_SHORT = 0.05
+"""Distance of a value from 1 below which its bar would not be seen: a dot is."""
 
 
 def draw_ranking(
@@ -23,14 +25,14 @@ def draw_ranking(
     *,
     band: tuple[float, float] = (0.9, 1.1),
 ) -> None:
-    """Draw what each candidate leaves of a value, from above.
+    """Draw what each candidate leaves of a value: a bar from what noise explains to the value.
 
     Parameters
     ----------
     axes : where to draw
     names : of the candidates
     values : one per candidate, positive
-    before : the value without any candidate; each row begins there
+    before : the value without any candidate, a line
     strong : names that are drawn in colour
     band : the values that noise explains
     """
@@ -39,8 +41,10 @@ def draw_ranking(
     axes.axvline(before, color=GREY, lw=0.9, linestyle=(0, (3, 2)))
     for row, (name, value) in enumerate(zip(names, values, strict=True)):
         colour = BLUE if name in strong else PALE
-        axes.plot([before, value], [row, row], color=colour, lw=1.6)
-        axes.plot([value], [row], "o", ms=6.0, color=colour)
+        if abs(value - 1.0) < _SHORT:
+            axes.plot([value], [row], "o", ms=5.0, color=colour)
+        else:
+            axes.barh(row, value - 1.0, left=1.0, height=0.62, color=colour)
         axes.text(
             1.02, row, short_z(value), transform=axes.get_yaxis_transform(), va="center",
             fontsize=8.5, color=INK if name in strong else GREY,

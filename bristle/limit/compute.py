@@ -129,6 +129,11 @@ class Limit:
 
         return draw_limit(self).figure
 
+    def _repr_html_(self) -> str:
+        from .notebook import limit_html
+
+        return limit_html(self)
+
 
 def limit(
     scenario: str | Path | Scenario,

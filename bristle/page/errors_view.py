@@ -41,14 +41,10 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
         raise StudyError(f'role "{role}"; "holdout" or "train" is right.')
     study = Study(folder)
     found = compare_study(study, role=role)
-    samples = sum(len(one.measured) for one in found.predictions)
-    every = -(-samples // MOST)
     return {
-        "role": role, "sentences": list(found.sentences), "z": found.z,
-        "interval": list(found.z_interval), "right": found.right, "quantity": found.quantity,
-        "unit": found.unit, "site": site_name(found.site) if found.site else "",
-        "every": every, "drive": found.drive.name, "drive_unit": found.drive.unit,
-        "runs": [_run(one, found, every) for one in found.predictions],
+        "role": role, "sentences": list(found.sentences), "interval": list(found.z_interval),
+        "right": found.right,
+        **linked(found),
         "patterns": [_pattern(one, found) for one in found.patterns[:PATTERNS]],
         "spectrum": {
             "frequency": found.spectrum.frequency, "residual": found.spectrum.residual,
@@ -57,6 +53,24 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
         "sites": [
             {"name": site_name(one.site), "z": one.z, "fails": one.fails} for one in found.sites
         ],
+    }  # fmt: skip
+
+
+def linked(found: Comparison, most: int = MOST) -> dict[str, Any]:
+    """Return what the linked pictures show of a comparison.
+
+    Parameters
+    ----------
+    found : what is compared
+    most : samples of all runs at the most
+    """
+    samples = sum(len(one.measured) for one in found.predictions)
+    every = max(1, -(-samples // most))
+    return {
+        "z": found.z, "quantity": found.quantity, "unit": found.unit,
+        "site": site_name(found.site) if found.site else "", "every": every,
+        "drive": found.drive.name, "drive_unit": found.drive.unit,
+        "runs": [_run(one, found, every) for one in found.predictions],
     }  # fmt: skip
 
 

@@ -237,7 +237,12 @@ class Law:
     @classmethod
     def yield_parameters(cls) -> tuple[str, ...]:
         """Return the linear parameters that the yield force is made of."""
-        return tuple(n for n in cls.linear() if _moves(cls, n, ("limit", "yielding")))
+        return cls.linear_in(("limit", "yielding"))
+
+    @classmethod
+    def linear_in(cls, hooks: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the linear parameters that the forces of some hooks are made of."""
+        return tuple(n for n in cls.linear() if _moves(cls, n, hooks))
 
     @classmethod
     def sliding_states(cls, values: Mapping[str, float], v: float, V: float) -> Any:

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from ..compare.comparison import Comparison
     from ..compare.rig import RigComparer
     from ..data.model import StudyModel
+    from ..identify.rig_fit import SiteModel
     from ..study.history import Step
     from ..study.study import Study
 
@@ -23,7 +24,9 @@ class Content:
 
     `now` is the present model on held-out runs, `before` the model before the last effect that was
     added, `test` the present one on the test runs; None where there is none. `trouble` says why the
-    model could not be compared. `what_if` is the section with sliders, "" without.
+    model could not be compared. `what_if` is the section with sliders and `linked` that of
+    pictures in which samples can be chosen, "" without; `damper` the damper with what predicts it,
+    None where the model could not be compared.
     """
 
     study: Study
@@ -38,6 +41,8 @@ class Content:
     trouble: str
     test: Comparison | None = None
     what_if: str = ""
+    linked: str = ""
+    damper: SiteModel | None = None
 
 
 def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Content:
@@ -54,13 +59,13 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
     moved = what_if_section(study) if what_if else ""  # first: it may lack its compiler
     model, steps = study.model(to_show=True), tuple(study.steps())
     runs = study.runs()
-    now = before = test = None
+    now = before = test = damper = None
     trouble, added = "", ""
     found = history_steps(steps)
     try:
         study.model()  # raises where the code of an effect waits for consent
         against = comparer(study)
-        now = against.compare(as_model(model))
+        now, damper = against.compare(as_model(model)), against.damper(as_model(model))
         for step in reversed(steps):
             gone = set(read_model(study.history.model_file(step.number), study.folder).effects)
             if step.number == 0 or not gone <= set(model.effects):
@@ -77,7 +82,7 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
         trouble = str(error)
     return Content(
         study, model, study.verdict(), steps, tuple(found), now, before, added, runs.notes, trouble,
-        test, moved,
+        test, moved, damper=damper,
     )  # fmt: skip
 
 

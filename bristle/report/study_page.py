@@ -17,6 +17,7 @@ from ..study.run_file import TEST
 from .reproduce import commands
 from .study_content import Content, gather
 from .study_curves import curves_section
+from .study_model import model_section
 from .study_plan import plan_section
 from .study_tables import data_table, data_words, parameter_table, run_errors
 from .study_verdict import untold_section, verdict_section
@@ -56,7 +57,9 @@ def render(content: Content) -> str:
         curves_section(study, content.model.effects),
         content.what_if,
         _where(content),
+        content.linked,
         _on_test_runs(content),
+        model_section(content),
         _parameters(content),
         _data(content),
         untold_section(content.verdict),
@@ -217,7 +220,8 @@ def _before_after(content: Content) -> str:
     loops = html.figure(
         png(loops_page(content.before, content.now, names)),
         f"Force loops, measured and predicted; {z}{short_z(content.now.z)} now",
-        "Loops of the held-out run that was worst, measured (black) and predicted (blue).",
+        "Single cycles of held-out runs by the level of the command, else by speed: measured "
+        "(black), predicted (blue), and the band in which 95 % of a true model's samples would be.",
     )
     page = maps_page(content.before, content.now, names)
     maps = ""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..compare.loops import OneCycle, chosen_cycles, under
 from ..compare.names import name_of
 from ..compare.panels import (
     draw_loop,
@@ -15,7 +17,7 @@ from ..compare.panels import (
     draw_spectrum,
     residual_map,
 )
-from ..compare.picture import telling_patterns
+from ..compare.picture import LOOPS, loop_panels, telling_patterns
 from ..draw.style import Page, look, short_z
 
 if TYPE_CHECKING:
@@ -25,10 +27,16 @@ _WIDTH = 9.2
 
 
 def loops_page(before: Comparison | None, now: Comparison, names: tuple[str, str]) -> Page:
-    """Return loops of the run that was worst: before and after the last added effect."""
-    chosen = before.worst.name if before else now.worst.name
+    """Return loops before and after the last added effect: single cycles by the command's level.
+
+    Of a run without cycles all of its loops are drawn.
+    """
     both = [one for one in (before, now) if one is not None]
     labels = names if before else names[1:]
+    shown = chosen_cycles(now.predictions)
+    if shown:
+        return _cycles_page(both, labels, shown)
+    chosen = before.worst.name if before else now.worst.name
     with look():
         page = Page(_WIDTH, 3.0 * len(both) + 0.1, "")
         grid = page.grid(len(both), 2, top=0.4, bottom=0.5, row_gap=0.9, column_gap=0.75)
@@ -46,6 +54,17 @@ def loops_page(before: Comparison | None, now: Comparison, names: tuple[str, str
                 else:
                     axes.set_title(f"over {along}; z = {short_z(z)} on {prediction.name}")
         return page
+
+
+def _cycles_page(
+    both: Sequence[Comparison], labels: Sequence[str], shown: Sequence[OneCycle]
+) -> Page:
+    """Return the same cycles under each of several models, over velocity and displacement."""
+    with look():
+        page = Page(_WIDTH, (LOOPS + 0.1) * len(both), "")
+        for row, (one, name) in enumerate(zip(both, labels, strict=True)):
+            loop_panels(page, (LOOPS + 0.1) * row, under(shown, one.predictions), name)
+    return page
 
 
 def maps_page(before: Comparison | None, now: Comparison, names: tuple[str, str]) -> Page | None:

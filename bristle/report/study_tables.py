@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import floor, isfinite, log10
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..compare.tables import run_table
 from ..data.labels import label_text
-from ..draw.style import MINUS, percent
-from ..quantity import plain, quantity, times_ten
+from ..draw.style import percent
+from ..quantity import plain, quantity
+from ..quantity import with_interval as with_interval
 from ..study.reading import name_of_run
 from ..study.run_file import TEST
 
@@ -55,22 +55,6 @@ def parameter_table(model: StudyModel) -> tuple[list[str], list[list[str]], list
     if silent:
         notes.append(f"Not identified by these data: {', '.join(silent)}.")
     return header, rows, notes
-
-
-def with_interval(value: float, std: float | None) -> tuple[str, str]:
-    """Return a value with the digits that its interval leaves, and the interval: "± 12"."""
-    if std is None or not isfinite(std) or std <= 0.0:
-        return plain(value, 5), "-"
-    half = 1.96 * std
-    size = max(abs(value), half)
-    power = 3 * floor(log10(size) / 3.0) if not 1e-3 <= size < 1e5 else 0
-    scaled, width = value / 10.0**power, half / 10.0**power
-    digits = 1 - floor(log10(width))
-    places = max(digits, 0)
-    tail = times_ten(power) if power else ""
-    texts = (f"{round(one, digits):.{places}f}".replace("-", MINUS) for one in (scaled, width))
-    number_text, wide = texts
-    return f"{number_text}{tail}", f"± {wide}{tail}"
 
 
 def _at_bound(value: Value) -> bool:

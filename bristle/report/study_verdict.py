@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from ..data.channels import channel_unit, is_channel
 from ..diagnose.law_text import HEADER, TABLE_NOTE, law_table
+from ..diagnose.picture import draw_evidence
 from ..diagnose.verdict_text import (
     HEADINGS,
     LIMITS,
@@ -17,6 +18,7 @@ from ..diagnose.verdict_text import (
     untestable,
 )
 from ..draw import html
+from ..draw.style import png
 from ..findings import command
 from ..physics.drive import text_for
 from ..physics.effect import EFFECTS
@@ -57,6 +59,14 @@ def verdict_section(verdict: Verdict | None, name: str) -> str:
                 "that no fit has seen decide.", kind="soft",
             )
         )  # fmt: skip
+        bars = draw_evidence(verdict or {})
+        if bars is not None:
+            told = ", ".join(f"{effect} {z}" for effect, z, _ in cells)
+            caption = (
+                "What each effect leaves of error / noise (z) on held-out runs. Blue: what the "
+                "verdict names. Green: the noise floor."
+            )
+            inner.append(html.figure(png(bars), f"z with each effect: {told}", caption))
         inner.append(html.table(header, cells, numbers=(1, 2), strong=strong))
     inner.append(html.paragraphs(noise_floor(verdict), kind="soft"))
     return "\n".join(part for part in inner if part)

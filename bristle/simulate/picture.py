@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..draw.cycles import largest
 from ..draw.style import BLUE, COLOURS, GREY, PALE, VERMILION, Page, label, look, zero_lines
 from .summary import by_component, foreign, judged_by, reals
 
@@ -174,10 +175,8 @@ class _Run:
             axes.margins(x=0.0, y=0.2)
             if len(time) > 1:
                 axes.set_xlim(time[0], time[-1])
-            words = f"{' ' if unit else ''}{unit} at {{time:.4g}} s" + (
-                self._of_stroke() if stroke else ""
-            )
-            _mark_peak(axes, time, values, words)
+            words = f"{' ' if unit else ''}{unit} at {{time:.4g}} s"
+            _mark_peak(axes, time, values, words + (self._of_stroke() if stroke else ""))
 
         return draw
 
@@ -249,8 +248,13 @@ class _Run:
             for number, (damper, source) in enumerate(pairs):
                 across, unit = self._shown(source)
                 force, force_unit = self._shown(f"{damper}.force")
-                colour = COLOURS[number % len(COLOURS)]
-                axes.plot(across, force, color=colour, linewidth=0.6, label=damper)
+                colour, cycle = COLOURS[number % len(COLOURS)], self._largest_cycle(damper)
+                thin = PALE if cycle else colour
+                name = None if cycle else damper
+                axes.plot(across, force, color=thin, linewidth=0.6, label=name)
+                if cycle:
+                    axes.plot(across[cycle], force[cycle], color=colour, lw=1.5, label=damper)
+                    axes.set_title("thick: the largest cycle", loc="right", fontsize=8, color=GREY)
                 axes.set_xlabel(motion + _bracketed(unit))
                 axes.set_title(f"Damper force{_bracketed(force_unit)} over {motion}")
                 if len(pairs) == 1:
@@ -260,6 +264,12 @@ class _Run:
                 axes.legend(labelcolor="linecolor")
 
         return draw
+
+    def _largest_cycle(self, damper: str) -> slice | None:
+        """Return the samples of a damper's largest cycle: all of an earthquake are a tangle."""
+        motion = [self.wires().get(f"{damper}.{name}", "") for name in _MOTIONS]
+        known = all(name in self.frame for name in motion)
+        return largest(*(self.frame[name].to_numpy() for name in motion)) if known else None
 
     def _shown(self, name: str) -> tuple[Array, str]:
         """Return an output as it is shown, and its unit ("" without one)."""

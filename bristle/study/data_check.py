@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
-from typing import Any
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -31,16 +31,37 @@ from .rig import building_of
 from .run_file import TEST
 from .study import Study
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from ..draw.style import Page
+
 _HEADINGS = {"error": "Errors", "warning": "Warnings", "note": "Notes"}
 
 
 @dataclass(frozen=True)
 class DataCheck:
-    """What is found, worst first, and what each run excites."""
+    """What is found, worst first, and what each run excites; `place` is where the damper sits."""
 
     findings: tuple[Finding, ...]
     excitations: tuple[Excitation, ...]
     runs: tuple[Measurement, ...]
+    place: Place = field(default_factory=lambda: Place())
+
+    def page(self) -> Page:
+        """Return the picture of all runs, drawn and not yet written."""
+        from ..draw.data_check import draw_data_check
+
+        return draw_data_check([self.place.seen(run) for run in self.runs], self.place.level)
+
+    def plot(self) -> Figure:
+        """Return the figure: the channels of all runs over time, and force over motion."""
+        return self.page().figure
+
+    def _repr_html_(self) -> str:
+        from .notebook import data_check_html
+
+        return data_check_html(self)
 
     @property
     def ok(self) -> bool:
@@ -183,7 +204,7 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
         findings += _unmeasured(runs.all, at_damper)
     findings = [_milder(finding, runs.all) for finding in findings]
     ordered = [finding for level in _HEADINGS for finding in findings if finding.level == level]
-    return DataCheck(tuple(ordered), tuple(excitations), tuple(every))
+    return DataCheck(tuple(ordered), tuple(excitations), tuple(every), at_damper)
 
 
 @dataclass(frozen=True)

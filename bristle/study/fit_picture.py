@@ -4,49 +4,53 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from ..draw.style import BLUE, INK, Page, look, percent, png, short_z
-from ..identify.fit import Model, Problem, Run
-from ..identify.table import low_pass
+from ..compare.loops import chosen_cycles
+from ..compare.panels import draw_error, draw_history, worst_window
+from ..compare.picture import LOOPS, loop_panels
+from ..compare.prediction import run_predictions
+from ..draw.style import Page, look, percent, png, short_z
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
     from .identified import Identified
 
-_RUNS = 3
-_SHOWN = 5000  # samples per line: more are not seen
-_ROW = 2.6
-"""Height of a run's row [in]."""
-_KILO = 2e3
-"""Range of a force [N] above which it is shown in kN."""
+_RUNS = 6
+"""Runs that cycles are sought in."""
+_HISTORY = 3.1
+"""Height of a force over time with its residual [in]."""
+_SAMPLES = 1200
+"""Samples of a history: more are not told apart."""
 
 
 def identify_png(found: Identified) -> bytes:
-    """Return a PNG: force over velocity, displacement and time, of up to three judged runs."""
+    """Return a PNG: loops of single cycles by the command's level, and the force over time."""
     return png(draw_identified(found), 110)
 
 
 def draw_identified(found: Identified) -> Page:
-    """Return the figure of up to three judged runs, drawn and not yet written."""
+    """Return the figure of the judged runs, drawn and not yet written.
+
+    Loops of one cycle per level of the command, the force over time where it is worst, and its
+    residual beneath; runs that were held out where there are any.
+    """
     problem, role = (found.holdout, "held out") if found.holdout else (found.train, "training")
-    runs = problem.runs[:_RUNS]
+    predictions = run_predictions(problem.of(problem.runs[:_RUNS]), found.at.model)
+    cycles = chosen_cycles(predictions)
+    worst = max(predictions, key=lambda one: float((one.normalised**2).mean()))
+    window = worst_window(worst, _SAMPLES)
     with look():
-        page = Page(11.0, _ROW * len(runs), *_headings(found))
-        grid = page.grid(
-            len(runs), 3, top=0.4, bottom=0.45, row_gap=0.8, column_gap=0.65,
-            width_ratios=[1.0, 1.0, 1.6],
-        )  # fmt: skip
-        for row, run in enumerate(runs):
-            panels = [page.figure.add_subplot(grid[row, column]) for column in range(3)]
-            _row(panels, problem, found.at.model, run, found.cutoff)
-            panels[0].set_title(f"{run.name} ({role})")
-            panels[0].set_ylabel(f"force [{_scale(run)[0]}]")
+        above = LOOPS * bool(cycles)
+        page = Page(9.6, above + _HISTORY, *_headings(found, role))
+        if cycles:
+            loop_panels(page, 0.0, cycles)
+        grid = page.grid(2, 1, top=above + 0.35, bottom=0.45, row_gap=0.4, height_ratios=[1.6, 1.0])
+        upper = page.figure.add_subplot(grid[0, 0])
+        draw_history(upper, worst, window)
+        draw_error(page.figure.add_subplot(grid[1, 0], sharex=upper), worst, window)
+        upper.tick_params(labelbottom=False)
     return page
 
 
-def _headings(found: Identified) -> tuple[str, str]:
+def _headings(found: Identified, role: str) -> tuple[str, str]:
     z = found.after.get("z_holdout", found.after["z_train"])
     share = found.after.get("share_holdout", found.after["share_train"])
     low = f" below {found.cutoff:g} Hz" if found.cutoff else ""
@@ -54,34 +58,8 @@ def _headings(found: Identified) -> tuple[str, str]:
     site = found.at.site
     what = site.quantity[:1].upper() + site.quantity[1:]
     worst = " at the worst site" if site.shown else ""
+    runs = "runs held out" if role == "held out" else "training runs"
     return (
-        f"{law}: error {percent(share)} of the force, z = {short_z(z)}{worst}",
-        f"{what}, measured and predicted{low}. z is error / noise; a true model has 1.",
+        f"{law}: error {percent(share)} of the force{low}, z = {short_z(z)}{worst}",
+        f"{what} in {runs}, measured and predicted. z is error / noise; a true model has 1.",
     )
-
-
-def _scale(run: Run) -> tuple[str, float]:
-    """Return the unit that a run's force is shown in, and the factor to it from N."""
-    return ("kN", 1e-3) if np.ptp(run.force) > _KILO else ("N", 1.0)
-
-
-def _row(panels: list[Axes], problem: Problem, model: Model, run: Run, cutoff: float) -> None:
-    _, factor = _scale(run)
-    measured = factor * low_pass(run.force, run.dt, cutoff)
-    predicted = factor * low_pass(problem.predict(model, run), run.dt, cutoff)
-    every = max(1, len(measured) // _SHOWN)
-    axes = (1e3 * run.v, "velocity [mm/s]"), (1e3 * run.x, "displacement [mm]")
-    for panel, (along, label) in zip(panels, axes, strict=False):
-        panel.plot(along[::every], measured[::every], color=INK, linewidth=1.3, alpha=0.75)
-        panel.plot(along[::every], predicted[::every], color=BLUE, linewidth=0.8)
-        panel.set_xlabel(label)
-    time = np.arange(len(measured)) * run.dt
-    part = slice(0, min(len(time), int(3.0 / run.dt) + 1))
-    panels[2].plot(time[part], measured[part], color=INK, label="measured", linewidth=1.6)
-    panels[2].plot(time[part], predicted[part], color=BLUE, label="predicted", linewidth=0.9)
-    panels[2].set_xlabel("time [s]")
-    panels[2].margins(x=0.0)
-    panels[2].legend(
-        loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, labelcolor="linecolor",
-        borderaxespad=0.15,
-    )  # fmt: skip

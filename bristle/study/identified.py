@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..data.model import StudyModel
 from ..diagnose.law_trials import LawTrial
 from ..diagnose.law_verdict import rows_of
+from ..errors import StudyError
 from ..identify.fit import Fit, Problem
 from ..identify.rig_fit import SiteModel
 from ..identify.table import LawError
@@ -87,10 +88,25 @@ class Identified:
         return self.fit.unidentified
 
     def plot(self) -> Figure:
-        """Return the figure: force measured and predicted over velocity, displacement and time."""
+        """Return the figure: loops of single cycles, the force over time, and its residual."""
         from .fit_picture import draw_identified
 
         return draw_identified(self).figure
+
+    def plot_budget(self) -> Figure:
+        """Return the figure of the force budget: what the law's parts and the effects make of it.
+
+        Raises
+        ------
+        StudyError
+            If the site that is shown is no damper.
+        """
+        from .budget_picture import draw_budget
+
+        page = draw_budget(self.holdout or self.train, self.at.model)
+        if page is None:
+            raise StudyError(f"{self.at.site.name}: only a damper has a force budget.")
+        return page.figure
 
     def _repr_html_(self) -> str:
         from .notebook import identified_html

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..data.checks.finding import grouped, sentence
 from ..draw import html
 from ..draw.figure import DPI
 from ..draw.style import Page, percent, png, short_z
@@ -14,8 +15,21 @@ from .staircase import history_steps
 from .staircase_picture import staircase_page
 
 if TYPE_CHECKING:
+    from .data_check import DataCheck
     from .identified import Identified
     from .study import Study
+
+
+def data_check_html(found: DataCheck) -> str:
+    """Return a data check as HTML: its findings, worst first, and the picture of all runs."""
+    rows = [[one.level, sentence(one, runs), one.do] for one, runs in grouped(found.findings)]
+    title = "The data can be used" if found.ok else "Mend the data first"
+    return html.fragment(
+        title,
+        html.table(["", "finding", "what to do"], rows),
+        html.figure(png(found.page(), DPI), "All runs: channels over time, force over motion"),
+    )
+
 
 _HELD = ("exponent", "mass", "which")
 

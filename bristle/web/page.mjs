@@ -2,11 +2,8 @@
 
 import { Scenario, bytesOf } from "./bristle.mjs";
 
-const SOFT = "#5b6770";
-const LINE = "#dfe4e8";
-const BEFORE = "#a3adb5";
-const NOW = "#0072b2";
-const MEASURED = "#1f2933";
+/** Colours by the names that the page's style gives them: light and dark. */
+const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
 const part = (id) => document.getElementById(id);
 
@@ -57,8 +54,8 @@ function draw(canvas, curves, xName, yName, tightX) {
   const px = (x) => left + ((x - x0) / (x1 - x0)) * (width - left - right);
   const py = (y) => height - bottom - ((y - y0) / (y1 - y0)) * (height - top - bottom);
   c.font = '12px "Segoe UI", "Helvetica Neue", Helvetica, Arial, sans-serif';
-  c.fillStyle = SOFT;
-  c.strokeStyle = LINE;
+  c.fillStyle = themed("soft");
+  c.strokeStyle = themed("line");
   c.lineWidth = 1;
   c.textAlign = "center";
   c.textBaseline = "top";
@@ -108,6 +105,7 @@ class Page {
     this.addSliders();
     for (const [id, name] of Object.entries(this.first())) this.addChoice(id, name);
     window.addEventListener("resize", () => this.show());
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show());
     part("back").addEventListener("click", () => this.back());
     this.show();
   }
@@ -120,7 +118,7 @@ class Page {
     const moved = like("base_displacement", "displacement", ".value") ?? names[0];
     const force = like(".force") ?? names[names.length - 1];
     const compared = Object.keys(this.measured)[0];
-    return { first: compared ?? top ?? moved, second: moved, across: moved, along: force };
+    return { first: compared ?? top ?? force, second: moved, across: moved, along: force };
   }
 
   addChoice(id, chosen) {
@@ -192,8 +190,8 @@ class Page {
     const unit = (port) => (this.units[port] && this.units[port] !== "1" ? this.units[port] : "");
     const name = (port) => (unit(port) ? `${port} [${unit(port)}]` : port);
     const runs = [
-      [this.before, BEFORE],
-      [this.now, NOW],
+      [this.before, themed("mark")],
+      [this.now, themed("blue")],
     ];
     for (const id of ["first", "second"]) {
       const port = part(id).value;
@@ -215,7 +213,7 @@ class Page {
   /** Returns the measured curve of an output over x, if there is one. */
   beside(port, x) {
     const name = this.measured[port];
-    return name ? [{ x, y: this.before.column(name), colour: MEASURED }] : [];
+    return name ? [{ x, y: this.before.column(name), colour: themed("ink") }] : [];
   }
 
   /** Says how far outputs are from what was measured. */

@@ -228,6 +228,9 @@ def test_the_voltage_reaches_the_limit_through_fmus(pulse: tuple[Limit, Path]) -
     written = bristle.load_results(folder)
     assert float(written[Y].abs().max()) == pytest.approx(found.value, rel=1e-9)
     assert found.plot().axes
+    shown = found._repr_html_()
+    assert "limit: any voltage, motion known" in shown
+    assert "data:image/png;base64," in shown
 
 
 @pytest.mark.slow

@@ -69,7 +69,7 @@ def test_the_rigs_form_is_found_with_intervals_that_hold(
     found = bristle.identify(rig[0], "bingham", holdout=rig[1], command="all")
     assert [row.form for row in found.forms] == ["linear", "quadratic", "table"]
     judged = {row.form: row.judged for row in found.forms}
-    assert all(f"<td>{form}</td>" in found._repr_html_() for form in judged)
+    assert all(f">{form}</td>" in found._repr_html_() for form in judged)
     assert found.model.law == "bingham"
     assert judged["quadratic"] < judged["table"] < 0.5 * judged["linear"]
     bent = bristle.identify(rig[0], "bingham", holdout=rig[1], command="quadratic")

@@ -25,6 +25,7 @@ from bristle.errors import (
     RunError,
     StudyError,
 )
+from bristle.study.data_check import check_data
 
 NAMED = {"time": "s", "displacement": "m", "velocity": "m/s", "force": "N", "voltage": "V"}
 
@@ -315,6 +316,7 @@ def shown(found, study, files, tmp_path_factory):
         "diagnosis": bristle.diagnose([files[0], files[2]], found, holdout=files[1]),
         "no verdict": nothing,
         "study": bristle.Study(study.folder),
+        "data check": check_data(bristle.Study(study.folder)),
         "fresh study": bristle.Study.create(fresh, files, law="bingham"),
         "ensemble": bristle.ensemble("el_centro_damper_and_building", runs=3, workers=1),
         "lqg": bristle.design({"kind": "lqg"}),
@@ -324,7 +326,7 @@ def shown(found, study, files, tmp_path_factory):
 
 KINDS = (
     "results", "identified", "with kilonewtons", "comparison", "diagnosis", "no verdict", "study",
-    "fresh study", "ensemble", "lqg", "hinf",
+    "data check", "fresh study", "ensemble", "lqg", "hinf",
 )  # fmt: skip
 
 
@@ -336,6 +338,13 @@ def test_a_notebook_shows_a_table_and_a_picture(shown, kind):
     assert "script" not in page.tags
 
 
+def test_the_force_budget_is_drawn_with_a_bar_for_each_part(found):
+    figure = found.plot_budget()
+    names = [label.get_text() for label in figure.axes[-1].get_yticklabels()]
+    assert names[0] in ("yield", "viscous")
+    assert [*found.model.effects] == names[len(names) - len(found.model.effects) :]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_plot_returns_a_figure_that_nobody_else_holds(shown, kind):
     figure = shown[kind].plot()
@@ -345,7 +354,7 @@ def test_plot_returns_a_figure_that_nobody_else_holds(shown, kind):
         assert sys.modules["matplotlib.pyplot"].get_fignums() == []
     if kind != "ensemble":  # its right column has one label for all, below
         for axes in figure.axes:  # what is drawn says what it is
-            assert axes.get_title("left") or axes.get_xlabel()
+            assert axes.get_title("left") or axes.get_xlabel() or axes.get_ylabel()
 
 
 def test_names_of_a_user_are_escaped(shown):

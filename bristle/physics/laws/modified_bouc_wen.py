@@ -77,9 +77,9 @@ def series_rate(q, z, p):
 class ModifiedBoucWen(Law):
     """Modified Bouc-Wen damper: a Bouc-Wen element in series with a dashpot, and an accumulator.
 
-        f  = alpha z + c_0 u + k_0 d + k_1 x + f_0  =  c_1 y' + k_1 x + f_0
+        f  = alpha z + C_0 u + k_0 d + k_1 x + f_0  =  C_1 y' + k_1 x + f_0
         z' = u - rho^2 (sigma |u| z |z| + (1 - sigma) u z^2),   d = x - y,   u = d'
-        alpha = (f_c + f_v w) rho,  c_0 + c_v w,  c_1 + c_1v w,   w' = eta (V - w)
+        alpha = (f_c + f_v w) rho,  C_0 = c_0 + c_v w,  C_1 = c_1 + c_1v w,  w' = eta (V - w)
 
     Spencer et al. (1997), eqs. 5 to 10, with n = 2: alpha_a = f_c rho, alpha_b = f_v rho, the
     accumulator k_1 (x - x_0) with f_0 = -k_1 x_0, and the hysteresis in the normal form that
