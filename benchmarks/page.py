@@ -142,7 +142,7 @@ def _brushes(page: Page) -> list[float]:
 def _slides(page: Page, address: str) -> list[float]:
     """Return the milliseconds from a moved slider until the scenario is drawn anew."""
     page.evaluate("location.hash = '#/rig/simulate'")
-    page.get_by_label(re.compile("voltage.level")).wait_for(timeout=600_000)
+    page.wait_for_selector("[data-engine]", timeout=600_000)  # else the server computes the first
     act: Any = """
     async () => {
       const one = window.bristleSimulation;

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -52,6 +53,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SHARE",
         help="find the step at which this error stays below a share of the peaks, e.g. 0.2%%",
     )
+    parser.add_argument(
+        "--spectrum",
+        action="store_true",
+        help="write the response spectra of ground and floors, 5 %% damped, as spectrum.csv",
+    )
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -84,12 +90,10 @@ def main(arguments: argparse.Namespace) -> int:
         frame, trouble = error.frame, str(error)
         code = 1 if isinstance(error, IncompleteRunError) else 130
     written = {"results": folder / f"results.{output.format}", "log": folder / "log"}
-    if not arguments.no_figure and code != 130:  # whoever presses Ctrl-C waits for nothing more
-        from ..simulate.picture import run_figure
-
+    for name, make in _further(arguments) if code != 130 else ():  # Ctrl-C waits for nothing more
         try:
-            run_figure(frame, folder / "figure.png")
-            written["figure"] = folder / "figure.png"
+            make(frame, folder / name)
+            written[name.partition(".")[0]] = folder / name
         except RunError as error:  # the results are there all the same
             code, trouble = code or 1, "\n".join(filter(None, (trouble, str(error))))
     if arguments.json:
@@ -100,6 +104,22 @@ def main(arguments: argparse.Namespace) -> int:
         kind = "RunError: " if code == 1 else ""
         print(f"{kind}{trouble}", file=sys.stderr)
     return code
+
+
+def _further(
+    arguments: argparse.Namespace,
+) -> list[tuple[str, Callable[[pd.DataFrame, Path], None]]]:
+    """Return the files that are made of the results, and what makes each."""
+    found: list[tuple[str, Callable[[pd.DataFrame, Path], None]]] = []
+    if not arguments.no_figure:
+        from ..simulate.picture import run_figure
+
+        found.append(("figure.png", run_figure))
+    if arguments.spectrum:
+        from ..simulate.spectra import FILE, write_spectra
+
+        found.append((FILE, write_spectra))
+    return found
 
 
 def _step_for(

@@ -14,7 +14,7 @@ from typing import Any
 
 from .. import __version__
 from ..errors import BristleError, StudyError
-from .answers import Answers, stamp
+from .answers import Answers, Compiling, stamp
 from .commands import COMMANDS, UPLOADS, batch_name, file_name, order_of
 from .consent import consent, waiting_texts
 from .files import files_of, is_given, kind_of
@@ -58,6 +58,7 @@ class App:
         self.first = folder.name if is_study else ""
         self.jobs = Jobs(self.home)
         self.answers = Answers()
+        self._compiling = Compiling()
         self._routes: list[tuple[str, re.Pattern[str], Handler]] = [
             (method, re.compile(pattern), handler)
             for method, pattern, handler in (
@@ -74,7 +75,8 @@ class App:
                 ("GET", "/api/jobs/([0-9]+)", self._job),
                 ("POST", "/api/jobs/([0-9]+)/cancel", self._cancel),
                 ("GET", "/api/scenarios", self._scenarios),
-                ("POST", "/api/simulate", self._simulate),
+                ("POST", "/api/(simulate|numbers|spectrum)", self._simulate),
+                ("GET", "/api/module", self._module),
             )
         ]
 
@@ -85,6 +87,7 @@ class App:
     def close(self) -> None:
         """End the worker, and interrupt the commands that are at work."""
         self.answers.close()
+        self._compiling.close()
         self.jobs.close()
 
     def route(self, method: str, path: str) -> tuple[Handler, tuple[str, ...]]:
@@ -201,7 +204,11 @@ class App:
         return Answer(self.answers.get("scenarios", self.home, {}, keep=False), PACKED)
 
     def _simulate(self, request: Request) -> Answer:
-        return Answer(self.answers.get("simulate", self.home, request.json(), keep=False), PACKED)
+        view = request.parts[0]
+        return Answer(self.answers.get(view, self.home, request.json(), keep=False), PACKED)
+
+    def _module(self, request: Request) -> Answer:
+        return Answer(self._compiling.get(self.home), "application/wasm")
 
 
 def _is_study(folder: Path) -> bool:

@@ -195,6 +195,15 @@ def _auto(study: str, options: Options) -> list[str]:
     return ["study", "auto", study, *_flags(options, "learn")]
 
 
+def _export_ssp(study: str, options: Options) -> list[str]:
+    """Return the command that packs a scenario which `bristle export` wrote."""
+    file = file_name(options.get("scenario"), "the scenario")
+    stem, dot, ending = file.rpartition(".")
+    if ending != "toml" or not stem:
+        raise RequestError(f"scenario: {written(file)}; a .toml file of export/ is right.")
+    return ["export-ssp", f"{study}/export/{file}", f"--out={study}/export/{stem}{dot}ssp"]
+
+
 def _simple(*before: str) -> Callable[[str, Options], list[str]]:
     """Return the function of a command that takes the study alone."""
     return lambda study, options: [*before, study]
@@ -210,6 +219,7 @@ COMMANDS: dict[str, Callable[[str, Options], list[str]]] = {
     "diagnose": _diagnose,
     "example": _example,
     "export": _simple("export"),
+    "export_ssp": _export_ssp,
     "identify": _identify,
     "learn": _simple("learn"),
     "new": _new,

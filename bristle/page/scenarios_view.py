@@ -1,4 +1,4 @@
-"""View 7, Simulate: the scenarios that can be moved, and the studies with a damper for them."""
+"""View 7, Simulate: scenarios that can be moved, studies with a damper for them, ground motions."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from ..scenario.scenario import stock_scenarios
+from .asked import records
 
 
 def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the stock scenarios by name, and the studies.
+    """Return the stock scenarios by name, the studies, and the ground motions.
 
     Parameters
     ----------
@@ -21,4 +22,5 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "scenarios": [file.stem for file in stock_scenarios()],
         "studies": [name for name in studies if not name.startswith(".")],
+        "records": records(folder),
     }

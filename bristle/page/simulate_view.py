@@ -1,24 +1,24 @@
-"""View 7, Simulate: a scenario's sliders, and its run by the coupled engine."""
+"""View 7, Simulate: a scenario's sliders, its run by the coupled engine, its numbers for a page."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..errors import ScenarioError
-from ..findings import command
-from ..fmu.catalogue import component_of_law
-from ..physics.drive import VOLTAGE
-from ..physics.effect import EFFECTS
-from ..physics.laws import LAWS
-from ..scenario.scenario import Component, Scenario, load_scenario, stock_scenarios
+from ..data.response_spectrum import DAMPING
+from ..scenario.scenario import Component, Scenario
 from ..simulate.coupled import simulate
-from ..study.study import Study
-from ..web.export import offered
-from .commands import file_name
+from ..simulate.spectra import accelerations, spectra
+from ..web.export import Shown, described, offered
+from ..web.numbers import Numbers
+from .asked import Asked, asked_for
+from .controls import controls, stock_file
 
 SLIDERS = 12
 ROWS = 20_000
@@ -31,21 +31,16 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     Parameters
     ----------
     folder : that holds studies
-    arguments : `scenario` the name of a stock one; `values` of parameters by name; `study` whose
-        damper takes the place of the scenario's, "" for its own; `about` whether to tell sliders
+    arguments : as for `asked_for`; `about` whether to tell sliders and controls
 
     Raises
     ------
-    ScenarioError
-        If there is none, a value is not right, or it has parts that are not compiled.
+    ScenarioError, RecordError
+        If there is none of a name, a value is not right, or it has parts that are not compiled.
     """
-    name = str(arguments.get("scenario", ""))
-    values = arguments.get("values", {})
-    if not isinstance(values, Mapping):
-        raise ScenarioError("values: NAME to number is right.")
-    overrides: dict[str, Any] = {**damper_of(folder, name, arguments.get("study")), **values}
-    scenario = load_scenario(_file(name), overrides)
-    columns = simulate(scenario)
+    asked = asked_for(folder, arguments)
+    scenario = asked.load()
+    columns = _columns(asked)
     every = -(-len(columns["time"]) // ROWS)
     outputs = [
         {
@@ -55,71 +50,67 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
         for name, column in columns.items()
         if name != "time" and column.dtype.kind == "f"
     ]  # fmt: skip
-    words = [word for key, one in overrides.items() for word in ("--set", f"{key}={_text(one)}")]
-    found = {
+    found: dict[str, Any] = {
         "time": columns["time"][::every], "outputs": outputs, "every": every,
-        "command": command("run", name, "--engine", "compiled", *words),
+        "command": asked.run(),
     }  # fmt: skip
     if arguments.get("about"):
-        found |= {"title": scenario.title, "sliders": _sliders(scenario)}
+        name = str(arguments.get("scenario", ""))
+        found |= {
+            "title": scenario.title, "sliders": _sliders(scenario),
+            "controls": list(controls(name)), "accelerations": accelerations(columns),
+            "rows": ROWS, "damping": DAMPING,
+        }  # fmt: skip
     return found
 
 
-def _file(name: str) -> Path:
-    """Return the file of a stock scenario."""
-    for file in stock_scenarios():
-        if file.stem == name:
-            return file
-    raise ScenarioError(f'no stock scenario is named "{name}".')
-
-
-def _text(value: object) -> str:
-    """Return a value as --set takes it."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return f"{value:.6g}" if isinstance(value, int | float) else str(value)
-
-
-def damper_of(folder: Path, scenario: str, study: object) -> dict[str, Any]:
-    """Return what makes the damper of a scenario that of a study, as overrides.
+def numbers(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a page needs to run a scenario itself, with the module that `web.module` makes.
 
     Parameters
     ----------
-    folder : that holds studies
-    scenario : the name of a stock one
-    study : the name of the study, "" or None for the scenario's own damper
+    folder, arguments : as for `answer`; sliders are those of `answer` that the module can move
 
     Raises
     ------
-    ScenarioError
-        If the scenario has no damper, or the study's cannot act in it.
+    ScenarioError, RecordError
+        As `answer`.
     """
-    if not study:
-        return {}
-    opened = Study(folder / file_name(study, "the study"))
-    model = opened.model()
-    here = model.at("damper", not opened.settings.has_building)
-    own = [name for name in here.effects if EFFECTS[name].own]
-    if model.drive != VOLTAGE.name or own or LAWS[model.base_law].own:
-        why = ", ".join(own) or (
-            f"a {model.drive}" if model.drive != VOLTAGE.name else f"the law {model.law}"
-        )
-        raise ScenarioError(
-            f"{study}: its damper has {why}, which the stock scenarios do not know. Export it:  "
-            f"{command('export', str(study))}"
-        )
-    dampers = [one.name for one in load_scenario(_file(scenario)).components if is_damper(one)]
-    if not dampers:
-        raise ScenarioError(f"{scenario} has no damper whose place that of {study} could take.")
-    place = dampers[0]
-    values = {f"{place}.{name}": float(f"{value:.6g}") for name, value in here.values().items()}
-    switches = {f"{place}.{name}.on": True for name in here.effects}
-    return {f"{place}.fmu": component_of_law(model.base_law), **switches, **values}
+    asked = asked_for(folder, {**arguments, "values": {}})
+    sliders = {one["name"]: (one["low"], one["high"]) for one in _sliders(asked.load())}
+    return described(Numbers(stock_file(asked.scenario), asked.given()), shown=Shown(sliders))
 
 
-def is_damper(component: Component) -> bool:
-    """Return whether a component of a scenario is a damper."""
-    return component.made_of().endswith("Damper")
+def spectrum(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the response spectra of a run's ground and floors.
+
+    Parameters
+    ----------
+    folder, arguments : as for `answer`
+
+    Raises
+    ------
+    ScenarioError, RecordError
+        As `answer`.
+    RunError
+        If no output is an acceleration of ground or floor.
+    """
+    asked = asked_for(folder, arguments)
+    found = spectra(_columns(asked), asked.load().step)
+    return {
+        "period": found.pop("period"), "of": found,
+        "command": asked.run("--spectrum"),
+    }  # fmt: skip
+
+
+def _columns(asked: Asked) -> dict[str, NDArray[Any]]:
+    """Return the columns of a run; those of the last ones are kept, for their spectra."""
+    return _run(asked.folder, asked.scenario, json.dumps(dict(asked.overrides)))
+
+
+@lru_cache(maxsize=2)
+def _run(folder: Path, scenario: str, overrides: str) -> dict[str, NDArray[Any]]:
+    return simulate(Asked(folder, scenario, json.loads(overrides)).load())
 
 
 def _unit(scenario: Scenario, name: str) -> str:

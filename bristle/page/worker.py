@@ -26,11 +26,16 @@ VIEWS = {
     "errors": "errors_view",
     "fit": "fit_view",
     "history": "history_view",
+    "module": "module_view",
+    "numbers": "simulate_view.numbers",
     "scenarios": "scenarios_view",
     "simulate": "simulate_view",
+    "spectrum": "simulate_view.spectrum",
     "verdict": "verdict_view",
 }
-"""Modules with `answer(folder, arguments)`, which returns what `packing.pack` takes."""
+"""Modules with `answer(folder, arguments)`, or another function that is named.
+
+It returns bytes, or what `packing.pack` takes."""
 
 AHEAD = ("check_view", "fit_view", "errors_view", "verdict_view", "history_view")
 """Modules that are imported behind the first answer, before anybody asks for them."""
@@ -52,10 +57,8 @@ def answer(view: str, folder: Path, arguments: Mapping[str, Any]) -> Answered:
 
     try:
         unload_effects()  # those of the study that was asked for before
-        found: Callable[[Path, Mapping[str, Any]], Any] = import_module(
-            f"{__package__}.{VIEWS[view]}"
-        ).answer
-        return {"ok": True}, pack(found(folder, arguments))
+        found = function_of(view)(folder, arguments)
+        return {"ok": True}, found if isinstance(found, bytes) else pack(found)
     except TrustError as error:
         told = {"kind": "TrustError", "file": str(error.path), "text": error.text}
         return {"ok": False, "error": str(error), **told}, b""
@@ -65,6 +68,15 @@ def answer(view: str, folder: Path, arguments: Mapping[str, Any]) -> Answered:
         traceback.print_exc()
         said = " ".join(f"{type(error).__name__}: {error}".split())[:200]
         return {"ok": False, "error": f"an unexpected error ({said}).", "kind": "unexpected"}, b""
+
+
+def function_of(view: str) -> Callable[[Path, Mapping[str, Any]], Any]:
+    """Return what answers a view."""
+    name, _, function = VIEWS[view].partition(".")
+    found: Callable[[Path, Mapping[str, Any]], Any] = getattr(
+        import_module(f"{__package__}.{name}"), function or "answer"
+    )
+    return found
 
 
 def serve(requests: BinaryIO, answers: BinaryIO) -> None:

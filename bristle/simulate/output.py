@@ -1,4 +1,4 @@
-"""The folder of a run: results.csv or results.parquet, figure.png and log; nothing else."""
+"""The folder of a run: results.csv or results.parquet, figure.png, spectrum.csv and log."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 FORMATS = ("csv", "parquet")
-_OURS = ("results.csv", "results.parquet", "figure.png", "log")
+_OURS = ("results.csv", "results.parquet", "figure.png", "spectrum.csv", "log")
 
 
 class Output:
@@ -64,7 +64,7 @@ class Output:
         """Write the first rows and log remarks; from now on there is a file that can be read."""
         if self.folder is None:
             return
-        for name in _OURS[:3]:
+        for name in _OURS[:4]:
             if name != "results.csv" or self.format != "csv":  # that one is replaced at once
                 try:
                     (self.folder / name).unlink(missing_ok=True)

@@ -35,11 +35,12 @@ _FOOT = "Made by bristle."
 class Shown(NamedTuple):
     """What a page offers beside what its scenario says.
 
-    `sliders` are the numbers that it moves where they can be moved, else it has its own choice;
-    `measured` maps outputs to those that hold their measured values.
+    `sliders` are the numbers that it moves where they can be moved, with the values between which
+    they move if it is a mapping; else it has its own choice. `measured` maps outputs to those that
+    hold their measured values.
     """
 
-    sliders: Sequence[str] = ()
+    sliders: Sequence[str] | Mapping[str, Range] = ()
     measured: Mapping[str, str] = MappingProxyType({})
 
 
@@ -88,7 +89,9 @@ def export_web(
 
 
 def chosen(
-    numbers: Numbers, sliders: Mapping[str, Range] | None, among: Sequence[str] = ()
+    numbers: Numbers,
+    sliders: Mapping[str, Range] | None,
+    among: Sequence[str] | Mapping[str, Range] = (),
 ) -> list[Slider]:
     """Return the sliders that are named, else those of the numbers offered, or of the scenario's.
 
@@ -99,7 +102,8 @@ def chosen(
     """
     found: list[Slider] = []
     names = among or offered(numbers.scenario)
-    for name, (low, high) in (sliders or dict.fromkeys(names, _ANY)).items():
+    ranges = names if isinstance(names, Mapping) else dict.fromkeys(names, _ANY)
+    for name, (low, high) in (sliders or ranges).items():
         try:
             one = numbers.slider(name, low, high)
             _check_apart(one, found)

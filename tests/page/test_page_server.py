@@ -11,6 +11,7 @@ import socket
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -103,6 +104,10 @@ def test_a_name_that_is_no_study_is_refused(client: Client, name: str, view: str
         ("example", "rig", {"rig": "house"}, "bench"),
         ("example", "rig", {"rig": "bench", "seed": -1}, "seed"),
         ("roles", "rig", {"train": "run_1"}, "train"),
+        ("export_ssp", "rig", {}, "scenario"),
+        ("export_ssp", "rig", {"scenario": "../bench.toml"}, "scenario"),
+        ("export_ssp", "rig", {"scenario": "-o.toml"}, "scenario"),
+        ("export_ssp", "rig", {"scenario": "bench.fmu"}, "toml"),
     ],
 )
 def test_what_is_no_command_is_refused(
@@ -280,6 +285,17 @@ def test_a_file_of_200_mb_is_read_in_another_process(client: Client, home: Path)
     assert [one["channel"] for one in found["columns"]] == ["displacement", "force"]
     assert max(len(one["values"]) for one in found["columns"]) < 5000
     shutil.rmtree(home / "uploads" / "large")
+
+
+@pytest.mark.slow
+def test_a_study_is_handed_on_as_a_package(client: Client, home: Path) -> None:
+    assert client.run("export", "rig")["state"] == "done"
+    job = client.run("export_ssp", "rig", scenario="bench.toml")
+    assert job["state"] == "done", job
+    assert job["command"] == "bristle export-ssp rig/export/bench.toml --out=rig/export/bench.ssp"
+    assert zipfile.is_zipfile(home / "rig" / "export" / "bench.ssp")
+    names = [one["name"] for one in client.get("/api/studies/rig/files").json["files"]]
+    assert "export/bench.ssp" in names
 
 
 def test_roles_are_written_by_a_command(client: Client, home: Path) -> None:

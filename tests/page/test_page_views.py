@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from study.made import bench_run, write, write_runs
 
-import bristle
 from bristle.data.model_value import Value
-from bristle.errors import ScenarioError, StudyError
+from bristle.errors import StudyError
 from bristle.page import (
     check_view,
     columns_view,
@@ -18,17 +17,13 @@ from bristle.page import (
     errors_view,
     fit_view,
     history_view,
-    scenarios_view,
-    simulate_view,
     verdict_view,
 )
 from bristle.page.packing import pack, unpack
-from bristle.page.worker import VIEWS, answer
+from bristle.page.worker import VIEWS, answer, function_of
 from bristle.study import Study, create_study
 from bristle.study.comparison import compare_study
 from bristle.study.data_check import check_data
-
-SCENARIO = "bench_sine_bingham"
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +44,7 @@ def test_every_view_of_the_worker_is_a_module_that_answers(home: Path) -> None:
         assert told["ok"], told
         assert unpack(body)
     assert {"columns", "scenarios", "simulate"} <= set(VIEWS)
+    assert all(callable(function_of(view)) for view in VIEWS)
 
 
 def test_what_is_wrong_is_told_in_the_words_of_the_commands(home: Path) -> None:
@@ -135,40 +131,3 @@ def test_dropped_files_are_told_apart_with_reasons(tmp_path: Path) -> None:
     force = next(one for one in shown["columns"] if one["channel"] == "force")
     assert (force["text"], force["guessed_unit"], force["sign"]) == ("F [N]", "N", 1)
     assert force["reason"]
-
-
-def test_a_slider_gives_what_the_run_gives(home: Path) -> None:
-    values = {"voltage.level": 5.0}
-    shown = simulate_view.answer(home, {"scenario": SCENARIO, "values": values, "about": True})
-    frame = bristle.run(SCENARIO, values, engine="compiled")
-    for one in shown["outputs"]:
-        assert one["peak"] == pytest.approx(float(frame[one["name"]].abs().max()), rel=1e-12)
-    assert shown["command"] == f"bristle run {SCENARIO} --engine compiled --set voltage.level=5"
-    assert any(slider["name"] == "voltage.level" for slider in shown["sliders"])
-    assert all(one["low"] < one["high"] for one in shown["sliders"])
-
-
-def test_the_damper_of_a_study_takes_the_place_of_the_scenarios(home: Path) -> None:
-    study = Study(home / "rig")
-    assert "rig" in scenarios_view.answer(home, {})["studies"]
-    given = simulate_view.damper_of(home, SCENARIO, "rig")
-    assert given["damper.fmu"] == "BinghamDamper"
-    assert given["damper.f_c"] == study.model().values()["f_c"]
-    shown = simulate_view.answer(home, {"scenario": SCENARIO, "study": "rig"})
-    assert "--set damper.fmu=BinghamDamper" in shown["command"]
-
-
-@pytest.mark.parametrize(
-    ("asked", "words"),
-    [
-        ({"scenario": "gone"}, "gone"),
-        ({"scenario": "../x"}, "no stock scenario"),
-        ({"scenario": SCENARIO, "values": {"damper.gone": 1.0}}, "gone"),
-        ({"scenario": SCENARIO, "values": []}, "NAME to number"),
-    ],
-)
-def test_a_scenario_that_cannot_run_says_why(
-    home: Path, asked: dict[str, object], words: str
-) -> None:
-    with pytest.raises(ScenarioError, match=words):
-        simulate_view.answer(home, asked)

@@ -1,6 +1,9 @@
 // Pictures of lines, dots and cells on a canvas, with axes, and stretches that are brushed.
 
 import { number } from "./dom.mjs";
+import { decades, marks } from "./scale.mjs";
+
+export { extent } from "./scale.mjs";
 
 const LEFT = 58;
 const RIGHT = 12;
@@ -20,35 +23,6 @@ export function colour(name) {
     colours.set(name, getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim());
   }
   return colours.get(name);
-}
-
-/** Returns marks of an axis that are round numbers. */
-export function marks(low, high, wanted) {
-  const rough = (high - low) / wanted;
-  if (!(rough > 0) || !Number.isFinite(rough)) return [];
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((k) => k * power).find((one) => one >= rough * 0.999);
-  const found = [];
-  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) found.push(k * step);
-  return found;
-}
-
-/** Returns [low, high] of arrays with some room around. */
-export function extent(arrays, room = 0.05, factor = 1) {
-  let low = Infinity;
-  let high = -Infinity;
-  for (const array of arrays) {
-    for (let k = 0; k < array.length; k++) {
-      const value = array[k];
-      if (value < low) low = value;
-      if (value > high) high = value;
-    }
-  }
-  if (!Number.isFinite(low)) return [-1, 1];
-  low *= factor;
-  high *= factor;
-  if (!(high > low)) return [low - 1, high + 1];
-  return [low - room * (high - low), high + room * (high - low)];
 }
 
 /**
@@ -98,8 +72,11 @@ export class Plot {
     this.drawing(this);
   }
 
-  /** Sets the ranges and draws axes with round marks. Ranges and names are those that are read. */
-  axes([x0, x1], [y0, y1], xName, yName) {
+  /**
+   * Sets the ranges and draws axes with round marks. Ranges and names are those that are read; of an
+   * axis that is `logX` or `logY` they are powers of ten, as is what is drawn on it.
+   */
+  axes([x0, x1], [y0, y1], xName, yName, { logX = false, logY = false } = {}) {
     const [width, height] = this.size;
     Object.assign(this, { x0, x1, y0, y1 });
     this.box = [LEFT, TOP, width - RIGHT, height - (xName === null ? 14 : BOTTOM)];
@@ -111,24 +88,25 @@ export class Plot {
     c.lineWidth = 1;
     c.textAlign = "center";
     c.textBaseline = "top";
-    for (const x of marks(x0, x1, Math.max(4, Math.round((right - left) / 90)))) {
+    const ticks = (log, low, high, wanted) => (log ? decades(low, high, wanted) : marks(low, high, wanted));
+    for (const x of ticks(logX, x0, x1, Math.max(4, Math.round((right - left) / 90)))) {
       const px = Math.round(this.px(x)) + 0.5;
       c.beginPath();
       c.moveTo(px, top);
       c.lineTo(px, bottom);
       c.stroke();
-      if (xName !== null) c.fillText(number(x, 6), px, bottom + 4);
+      if (xName !== null) c.fillText(number(logX ? 10 ** x : x, 6), px, bottom + 4);
     }
     if (xName) c.fillText(xName, 0.5 * (left + right), height - 15);
     c.textAlign = "right";
     c.textBaseline = "middle";
-    for (const y of marks(y0, y1, Math.max(3, Math.round((bottom - top) / 36)))) {
+    for (const y of ticks(logY, y0, y1, Math.max(3, Math.round((bottom - top) / 36)))) {
       const py = Math.round(this.py(y)) + 0.5;
       c.beginPath();
       c.moveTo(left, py);
       c.lineTo(right, py);
       c.stroke();
-      c.fillText(number(y, 4), left - 5, py);
+      c.fillText(number(logY ? 10 ** y : y, 4), left - 5, py);
     }
     c.translate(11, 0.5 * (top + bottom));
     c.rotate(-Math.PI / 2);
@@ -165,11 +143,12 @@ export class Plot {
   }
 
   /** Draws a line through points; fx and fy bring them into the units of the axes. */
-  line(x, y, name, { width = 1.2, fx = 1, fy = 1, from = 0, to = x.length, breaks = null } = {}) {
+  line(x, y, name, { width = 1.2, fx = 1, fy = 1, from = 0, to = x.length, breaks = null, dash = null } = {}) {
     this.clipped((c) => {
       c.strokeStyle = colour(name);
       c.lineWidth = width;
       c.lineJoin = "round";
+      if (dash) c.setLineDash(dash);
       c.beginPath();
       const [sx, ox, sy, oy] = this.scales(fx, fy);
       let pen = false;

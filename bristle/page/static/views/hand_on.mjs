@@ -1,23 +1,27 @@
-// View 6, Hand on: report, FMU and scenario, and all files of the study to download.
+// View 6, Hand on: report, FMU and scenario, SSP package, and all files of the study to download.
 
 import { download, get } from "../api.mjs";
 import { bytes, h, say, table, wrong } from "../dom.mjs";
 
 const GROUPS = [
   ["reports/", "Reports"],
-  ["export/", "FMU and scenario"],
+  ["export/", "FMU, scenario and package"],
   ["plan", "Next tests"],
   ["", "The study itself"],
 ];
 
 export async function show(page) {
   const { files } = await get(page.path("files"));
-  page.same(`bristle report ${page.study}`, `bristle export ${page.study}`);
   const trouble = h("div", {});
   const report = h("button", { type: "button", class: "main", onclick: () => page.run("report") }, "Write the report");
   const fmu = h("button", { type: "button", class: "main", onclick: () => page.run("export") }, "Export the damper as an FMU");
+  const scenario = files.map((file) => /^export\/([^/]+\.toml)$/.exec(file.name)?.[1]).find(Boolean);
+  page.same(`bristle report ${page.study}`, `bristle export ${page.study}`,
+    ...(scenario ? [`bristle export-ssp ${page.study}/export/${scenario}`] : []));
+  const ssp = h("button", { type: "button", class: scenario ? "main" : null, onclick: () => page.run("export_ssp", { scenario }) }, "Pack it as SSP");
   page.onJobs(() => {
     report.disabled = fmu.disabled = Boolean(page.working());
+    ssp.disabled = report.disabled || !scenario;
   });
   const take = async (name, button) => {
     button.disabled = true;
@@ -43,6 +47,9 @@ export async function show(page) {
         h("p", {}, "One HTML file that opens offline: verdict and evidence, loops, parameters with intervals, the commands that repeat it."), report),
       h("li", { class: "card" }, h("h3", {}, "FMU and scenario"),
         h("p", {}, "The damper with the identified values, for any FMI tool, and a scenario that applies a measured motion to it."), fmu),
+      h("li", { class: "card" }, h("h3", {}, "SSP package"),
+        h("p", {}, scenario ? `The scenario ${scenario} with its FMUs in one file, for OMSimulator, libcosim and others; with the error to expect there.`
+          : "The scenario with its FMUs in one file, for other tools. Export the FMU first: its scenario is what is packed."), ssp),
       h("li", { class: "card" }, h("h3", {}, "In a building"),
         h("p", {}, "The damper with these values in a building under an earthquake."), h("a", { href: page.link("simulate"), onclick: () => (page.damper = page.study) }, "Simulate it"))),
     trouble,

@@ -1,0 +1,224 @@
+"""View 7: what a page asks for is a run of a stock scenario, by the command that it shows."""
+
+from __future__ import annotations
+
+import importlib.util
+import itertools
+import shlex
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from page.served import page_on
+from study.made import write_runs
+
+import bristle
+from bristle.data import read_ground_motion
+from bristle.errors import BristleError, BuildError, RecordError, RunError, ScenarioError
+from bristle.native import zig
+from bristle.page import answers, module_view, scenarios_view, simulate_view
+from bristle.page.asked import LONGEST, asked_for, damper_of
+from bristle.page.controls import controls, stock_file
+from bristle.page.packing import unpack
+from bristle.scenario.scenario import load_scenario, parse_overrides, stock_scenarios
+from bristle.simulate.spectra import spectra
+from bristle.study import Study, create_study
+
+BENCH = "bench_sine_bingham"
+PASSIVE = "el_centro_lugre_passive"
+RECORD = "uploads/record-1/motion.csv"
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("simulated")
+    create_study(folder / "rig", write_runs(folder / "lab", 3, seconds=3.0), law="bingham")
+    file = folder / RECORD
+    file.parent.mkdir(parents=True)
+    time = np.arange(0.0, 41.4, 0.02)
+    columns = np.column_stack([time, 0.3 * np.sin(6.0 * time)])
+    np.savetxt(file, columns, delimiter=",", header="time [s],acceleration [g]", comments="")
+    (folder / "uploads" / "record-1" / "words.csv").write_text("a,b\nx,y\n")
+    return folder
+
+
+def overrides_of(command: str) -> dict[str, Any]:
+    words = shlex.split(command)
+    return parse_overrides([b for a, b in itertools.pairwise(words) if a == "--set"])
+
+
+def test_a_slider_gives_what_the_run_gives(home: Path) -> None:
+    values = {"voltage.level": 5.0}
+    shown = simulate_view.answer(home, {"scenario": BENCH, "values": values, "about": True})
+    frame = bristle.run(BENCH, values, engine="compiled")
+    for one in shown["outputs"]:
+        assert one["peak"] == pytest.approx(float(frame[one["name"]].abs().max()), rel=1e-12)
+    assert shown["command"] == f"bristle run {BENCH} --engine compiled --set voltage.level=5"
+    assert any(slider["name"] == "voltage.level" for slider in shown["sliders"])
+    assert all(one["low"] < one["high"] for one in shown["sliders"])
+
+
+def test_the_damper_of_a_study_takes_the_place_of_the_scenarios(home: Path) -> None:
+    study = Study(home / "rig")
+    assert "rig" in scenarios_view.answer(home, {})["studies"]
+    given = damper_of(home, BENCH, "rig")
+    assert given["damper.fmu"] == "BinghamDamper"
+    assert given["damper.f_c"] == study.model().values()["f_c"]
+    shown = simulate_view.answer(home, {"scenario": BENCH, "study": "rig"})
+    assert "--set damper.fmu=BinghamDamper" in shown["command"]
+
+
+def test_every_control_is_a_scenario_with_the_same_ground_building_and_damper() -> None:
+    own = load_scenario(PASSIVE)
+    known = controls(PASSIVE)
+    assert {"ConstantVoltage", "ClippedOptimal", "HinfInverse", "Lpv", "Skyhook"} <= set(known)
+    for control, (name, overrides) in known.items():
+        other = load_scenario(name, overrides)
+        assert control in {one.fmu for one in other.components}
+        for part in ("ground", "structure", "damper"):
+            mine, its = own.component(part), other.component(part)
+            assert (mine.fmu, mine.parameters) == (its.fmu, its.parameters), control
+        assert own.stop == other.stop
+
+
+def test_another_intensity_goes_with_the_control() -> None:
+    name = "el_centro_0p2g_constant_voltage"
+    scenario, overrides = controls(name)["Lpv"]
+    peak = load_scenario(name).component("ground").parameters["peak"]
+    assert load_scenario(scenario, overrides).component("ground").parameters["peak"] == peak
+
+
+@pytest.mark.parametrize("name", [file.stem for file in stock_scenarios()])
+def test_controls_of_every_scenario_can_be_loaded(name: str) -> None:
+    for scenario, overrides in controls(name).values():
+        load_scenario(stock_file(scenario), overrides)
+
+
+def test_a_dropped_record_is_the_ground_motion_of_the_run(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert RECORD in scenarios_view.answer(home, {})["records"]
+    asked = asked_for(home, {"scenario": PASSIVE, "record": RECORD})
+    loaded = asked.load()
+    assert Path(str(loaded.component("ground").parameters["record"])) == home / RECORD
+    assert loaded.stop == 42.0  # to the end of the motion
+    monkeypatch.chdir(home)  # the command is for the folder of the studies
+    again = load_scenario(PASSIVE, overrides_of(asked.run()))
+    assert again.component("ground").parameters == loaded.component("ground").parameters
+    assert again.stop == loaded.stop
+    motion = read_ground_motion(RECORD, home)
+    assert motion.peak == pytest.approx(0.3 * 9.80665, rel=1e-3)
+
+
+def test_a_long_record_does_not_stretch_the_run_without_end(home: Path) -> None:
+    file = home / "uploads" / "record-1" / "long.csv"
+    rows = "".join(f"{k},{k % 2}\n" for k in range(round(2 * LONGEST)))
+    file.write_text(f"time [s],acceleration [m/s2]\n{rows}")
+    asked = asked_for(home, {"scenario": PASSIVE, "record": "uploads/record-1/long.csv"})
+    assert asked.overrides["run.stop"] == LONGEST
+
+
+def test_the_spectrum_is_that_of_the_rows_of_the_run(home: Path) -> None:
+    wanted = {"scenario": "half_sine_pulse", "values": {}}
+    shown = simulate_view.spectrum(home, wanted)
+    frame = bristle.run("half_sine_pulse", engine="compiled")
+    columns = {str(name): frame[name].to_numpy() for name in frame}
+    right = spectra(columns, float(frame.index[1]))
+    assert set(shown["of"]) == set(right) - {"period"}
+    for name, values in shown["of"].items():
+        assert values == pytest.approx(right[name], rel=1e-9)
+    assert shown["command"] == "bristle run half_sine_pulse --engine compiled --spectrum"
+    with pytest.raises(RunError, match="no output is an acceleration"):
+        simulate_view.spectrum(home, {"scenario": BENCH})
+
+
+def test_the_page_gets_the_numbers_of_the_same_run_and_of_its_sliders(home: Path) -> None:
+    wanted = {"scenario": PASSIVE, "study": "rig"}
+    shown = simulate_view.answer(home, {**wanted, "about": True})
+    given = simulate_view.numbers(home, wanted)
+    assert given["rows"] + 1 == len(shown["time"]) * shown["every"]
+    assert [one["name"] for one in given["outputs"]] == [one["name"] for one in shown["outputs"]]
+    there = {one["name"]: one for one in shown["sliders"]}
+    assert "voltage.level" in {one["name"] for one in given["sliders"]} <= set(there)
+    for one in given["sliders"]:
+        assert (one["low"], one["high"]) == (there[one["name"]]["low"], there[one["name"]]["high"])
+        assert one["value"] == there[one["name"]]["value"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"scenario": "gone"}, "gone"),
+        ({"scenario": "../x"}, "no stock scenario"),
+        ({"scenario": BENCH, "values": {"damper.gone": 1.0}}, "gone"),
+        ({"scenario": BENCH, "values": []}, "NAME to number"),
+        ({"scenario": PASSIVE, "control": "Lpx"}, 'Did you mean "Lpv"'),
+        ({"scenario": "no_damper", "control": "Lpv"}, "control"),
+        ({"scenario": "no_damper", "study": "rig"}, "no damper"),
+        ({"scenario": BENCH, "record": RECORD}, "no ground motion"),
+        ({"scenario": PASSIVE, "record": "uploads/record-1/gone.csv"}, "drop it again"),
+        ({"scenario": PASSIVE, "record": "../../etc/passwd"}, "no ground motion|dropped file"),
+        ({"scenario": PASSIVE, "record": "uploads/../x.csv"}, "batch"),
+        ({"scenario": PASSIVE, "record": "uploads/record-1/words.csv"}, "words.csv"),
+    ],
+)
+def test_a_scenario_that_cannot_run_says_why(
+    home: Path, asked: dict[str, object], words: str
+) -> None:
+    with pytest.raises(BristleError, match=words) as found:
+        simulate_view.answer(home, asked)
+    if asked.get("record") == "uploads/record-1/words.csv":
+        assert found.type is RecordError  # the readers' own words
+    elif "record" not in asked:
+        assert found.type is ScenarioError
+
+
+def test_without_zig_the_page_is_told_and_the_server_goes_on(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    zig.version.cache_clear()
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "ziglang" else find(name)
+    )
+    try:
+        with pytest.raises(BuildError, match=r"pip install bristle\[native\]"):
+            module_view.answer(home, {})
+    finally:
+        zig.version.cache_clear()
+
+
+def test_the_module_is_made_once_by_a_process_that_ends(
+    home: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[answers.Answers] = []
+
+    def get(self: answers.Answers, view: str, *_: object, **__: object) -> bytes:
+        made.append(self)
+        if len(made) == 1:
+            raise answers.ViewError({"error": "zig is not installed", "kind": "BuildError"})
+        return b"\0asm"
+
+    monkeypatch.setattr(answers.Answers, "get", get)
+    with page_on(home, start=False) as client:
+        refused = client.get("/api/module")
+        assert (refused.status, refused.error) == (422, "zig is not installed")
+        for _ in range(2):
+            found = client.get("/api/module")
+            assert (found.status, found.body) == (200, b"\0asm")
+            assert found.headers["Content-Type"] == "application/wasm"
+    assert len(made) == 2
+    assert all(one._closed for one in made)
+
+
+def test_runs_numbers_and_spectra_are_asked_for_over_http(home: Path) -> None:
+    with page_on(home, start=False) as client:
+        wanted = {"scenario": "half_sine_pulse", "values": {}}
+        for view, key in (("simulate", "outputs"), ("spectrum", "period"), ("numbers", "numbers")):
+            found = client.post(f"/api/{view}", wanted)
+            assert found.status == 200, found.body
+            assert key in unpack(found.body)
+        refused = client.post("/api/spectrum", {"scenario": BENCH})
+        assert refused.status == 422
+        assert "no output is an acceleration" in refused.error
