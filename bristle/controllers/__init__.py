@@ -9,12 +9,13 @@
     found.verdict, found.table
 
 choice, folder     what a user chooses, as text; the folder that scenarios lie in
-motions, site, dampers, entries    ground motions, building, damper, controllers
+motions, site, dampers, entry      ground motions, building, damper, controller
+entries            the controllers from what a user chose
 anew               designs made again for the building
 cells              the scenarios, run and measured; constant voltages
 robust, limits     the worst case over an ensemble; how far any control could go
 compare, result    the comparison and what came of it
-verdict, picture   in sentences, and as figures
+verdict, notes, tables, picture    in sentences, texts and figures
 """
 
 from __future__ import annotations

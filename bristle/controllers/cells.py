@@ -18,7 +18,7 @@ from ..scenario.scenario import load_scenario
 from ..simulate.coupled import simulate
 from ..simulate.run import run_quietly
 from .dampers import Damper
-from .entries import Entry, constant
+from .entry import Entry, constant
 from .folder import ENSEMBLES, SCENARIOS, Folder, Part, ensemble_text, plain_name, scenario_text
 from .motions import Motion
 from .site import CONTROLLER, DAMPER, GROUND, STRUCTURE, Site

@@ -17,12 +17,14 @@ from ..progress import tell
 from .cells import Bench, best_level, flat
 from .choice import Given
 from .dampers import DEFAULT, damper_from
-from .entries import BEST, OFF, ON, Entry, Maker, constant
+from .entries import Maker
+from .entry import BEST, OFF, ON, Entry, constant
 from .folder import Folder
 from .limits import Reached, limit_of, refuse_limit
 from .motions import Motion, motions_of
+from .notes import of_designs, of_engines
 from .result import ControllerComparison, Setting
-from .robust import Spread, unvaried, worst_of
+from .robust import Spread, tied, unvaried, varied, worst_of
 from .site import DAMPER, site_from
 
 if TYPE_CHECKING:
@@ -138,9 +140,10 @@ def compare_controllers(
         for motion in chosen:
             run.motion(motion)
         setting = Setting(
-            site, one, entries, chosen, judged, spread, None if out is None else Path(path)
-        )
-        notes = [*site.notes, *one.notes, *_of_designs(entries), *_of_engines(bench, entries)]
+            site, one, entries, chosen, judged, spread, None if out is None else Path(path),
+            "" if spread is None else varied(bench, entries, spread),
+        )  # fmt: skip
+        notes = [*site.notes, *one.notes, *of_designs(entries), *of_engines(bench, entries)]
         if spread is not None:
             notes += unvaried(bench, entries, spread)
         notes += [*run.notes, *bench.remarks]
@@ -225,7 +228,12 @@ class _Run:
     def _worst(self, motion: Motion, entry: Entry, spread: Spread) -> None:
         tell(f"{motion.name}: {entry.name}, {spread.members} members")
         most, failed = worst_of(
-            self.bench, motion, entry, self.frames[motion.name, entry.name], spread
+            self.bench,
+            motion,
+            entry,
+            self.frames[motion.name, entry.name],
+            spread,
+            not tied(self.bench, self.entries),
         )
         self.worsts.append(
             {"motion": motion.name, "controller": entry.name, "failed": failed, **most}
@@ -266,29 +274,6 @@ def _step(entries: list[Entry]) -> float:
 
     periods = [one.period for one in entries if one.period is not None]
     return min([STEP, *(period / ceil(period / STEP - 1e-9) for period in periods)])
-
-
-def _of_designs(entries: list[Entry]) -> list[str]:
-    """Say which designs were made by the comparison, and why."""
-    anew = [one.name for one in entries if one.anew]
-    if not anew:
-        return []
-    return [
-        f"{', '.join(anew)}: the library's designs belong to its own building and damper. New ones "
-        "were made for these, with the same weights brought to their size; a design file with "
-        "weights of your own may find better ones (bristle design)."
-    ]
-
-
-def _of_engines(bench: Bench, entries: list[Entry]) -> list[str]:
-    """Say where two engines stand side by side."""
-    stepped = [one.name for one in entries if bench.engine_of(one) == "fmu"]
-    if not stepped or len(stepped) == len(entries):
-        return []
-    return [
-        f"{', '.join(stepped)}: stepped as FMUs every {1e3 * bench.step:g} ms. The others are "
-        "solved as one system, without coupling error; the engine fmu steps all of them."
-    ]
 
 
 def _judged(bench: Bench, output: str, statistic: str) -> Output:

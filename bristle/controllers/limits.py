@@ -16,7 +16,7 @@ from ..limit.case import case_of
 from ..resources import cache_folder
 from ..scenario.scenario import load_scenario
 from .cells import Bench
-from .entries import LIMIT, ON, Entry, constant
+from .entry import LIMIT, ON, Entry, constant
 from .folder import ABOVE, FILES, LIMITS, Part, plain_name
 from .motions import Motion
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..draw.style import COLOURS, GREY, INK, PALE, Page, label, look
 from ..quantity import scale
 from .cells import best_level
-from .entries import BEST, LIMIT, OFF, ON
+from .entry import BEST, LIMIT, OFF, ON
 from .verdict import beside, what, winner
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..batch.plan import Output
 from ..errors import not_usable
 from .dampers import Damper
-from .entries import BEST, LIMIT, OFF, ON, Entry
+from .entry import BEST, LIMIT, OFF, ON, Entry
 from .limits import Reached
 from .motions import Motion
 from .robust import Spread
@@ -27,7 +27,8 @@ REFERENCES = (OFF, ON, BEST)
 class Setting:
     """What was compared: building, damper, controllers, motions, what is judged.
 
-    `folder` holds the scenarios, None where nothing was kept.
+    `folder` holds the scenarios, None where nothing was kept; `varied` says in words how members
+    differ, "" without.
     """
 
     site: Site
@@ -37,6 +38,7 @@ class Setting:
     judged: Output
     spread: Spread | None
     folder: Path | None
+    varied: str = ""
 
 
 @dataclass(frozen=True)

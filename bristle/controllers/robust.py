@@ -15,7 +15,7 @@ from ..fmu.controller import SAMPLE_PERIOD
 from ..physics.laws import LAWS
 from ..scenario.scenario import load_scenario
 from .cells import SEED, SENSORS, Bench
-from .entries import Entry
+from .entry import Entry
 from .folder import ENSEMBLES, FILES, Part, plain_name
 from .motions import Motion
 from .site import DAMPER, STRUCTURE
@@ -63,11 +63,14 @@ class Spread:
         if not (self.share or self.noise or self.delay):
             raise ScenarioError("--spread, --noise and --delay are 0: nothing varies.")
 
-    def text(self) -> str:
-        """Return in words what varies."""
+    def text(self, building: bool = True, damper: bool = True) -> str:
+        """Return in words what varies, where the building and the damper's law do or do not."""
         parts = []
-        if self.share:
-            parts.append(f"masses, stiffnesses and damper parameters within {self.share:.0%}")
+        what = [*(["masses", "stiffnesses"] * building), *(["damper parameters"] * damper)]
+        if self.share and what:
+            *before, last = what
+            listed = " and ".join([", ".join(before), last] if before else [last])
+            parts.append(f"{listed} within {self.share:.0%}")
         if self.noise:
             parts.append(f"sensor noise of {self.noise:.0%} of each signal")
         if self.delay:
@@ -76,7 +79,12 @@ class Spread:
 
 
 def worst_of(
-    bench: Bench, motion: Motion, entry: Entry, nominal: pd.DataFrame, spread: Spread
+    bench: Bench,
+    motion: Motion,
+    entry: Entry,
+    nominal: pd.DataFrame,
+    spread: Spread,
+    building: bool = True,
 ) -> tuple[dict[str, float], int]:
     """Return the largest of what is kept over a case and its members; how many members failed.
 
@@ -85,10 +93,11 @@ def worst_of(
     bench, motion, entry : the case
     nominal : its run
     spread : what varies
+    building : whether the building does
     """
     most = bench.measured(nominal)
     sensors = _sensors(bench, entry, nominal, spread)
-    vary = _varied(bench, entry, motion, spread)
+    vary = _varied(bench, entry, motion, spread, building)
     if sensors is not None:
         vary[f"{SENSORS}.seed"] = {"integers": [1, 10**6]}
         if spread.delay:
@@ -108,18 +117,31 @@ def worst_of(
     return most, failed
 
 
+def tied(bench: Bench, entries: list[Entry]) -> list[str]:
+    """Return the controllers with which no other building can be run: FMUs refuse it."""
+    return [one.name for one in entries if one.carries and bench.engine_of(one) == "fmu"]
+
+
+def varied(bench: Bench, entries: list[Entry], spread: Spread) -> str:
+    """Return in words what varies in a comparison."""
+    building = "masses" in bench.site.data and not tied(bench, entries)
+    return spread.text(building, bool(bench.damper.law))
+
+
 def unvaried(bench: Bench, entries: list[Entry], spread: Spread) -> list[str]:
-    """Return what cannot be varied, a sentence each."""
-    found = []
-    if spread.share and "masses" not in bench.site.data:
-        found.append("The building is given as matrices, which are not varied.")
-    for entry in entries:
-        if spread.share and entry.carries and bench.engine_of(entry) == "fmu":
-            found.append(
-                f"{entry.name} has a design for the building, and FMUs refuse another building: "
-                "only damper and sensors vary with it."
-            )
-    return found
+    """Return what is not varied, a sentence each."""
+    names = tied(bench, entries)
+    if not spread.share:
+        return []
+    if "masses" not in bench.site.data:
+        return ["The building is given as matrices, which are not varied."]
+    if not names:
+        return []
+    return [
+        f"{', '.join(names)}: the design belongs to the building, and FMUs refuse another one. So "
+        "masses and stiffnesses are not varied for any controller. With the engine compiled and "
+        "the controller's file in place of its FMU they are."
+    ]
 
 
 def _sensors(bench: Bench, entry: Entry, nominal: pd.DataFrame, spread: Spread) -> Part | None:
@@ -137,15 +159,17 @@ def _sensors(bench: Bench, entry: Entry, nominal: pd.DataFrame, spread: Spread) 
     return Part({"fmu": "Sensors"}, parameters)
 
 
-def _varied(bench: Bench, entry: Entry, motion: Motion, spread: Spread) -> dict[str, Any]:
+def _varied(
+    bench: Bench, entry: Entry, motion: Motion, spread: Spread, building: bool
+) -> dict[str, Any]:
     """Return what varies of building and damper, as an ensemble file has it."""
     found: dict[str, Any] = {}
     if not spread.share:
         return found
-    values = _numbers(bench.site.data)
+    values = _numbers(bench.site.data) if building else {}
     if bench.engine_of(entry) == "compiled":
         found = {f"{_BUILDING}.{name}": _around(value, spread) for name, value in values.items()}
-    elif values and not entry.carries:
+    elif values:
         found[_BUILDING] = {"each": _written(bench, motion, values, entry, spread)}
     if not bench.damper.law:
         return found
@@ -191,6 +215,3 @@ def _written(
         buildings.write(buildings.changed(structure, drawn), path)
         names.append(f"../../{FILES}/{path.name}")
     return names
-
-
-__all__ = ["Spread", "unvaried", "worst_of"]

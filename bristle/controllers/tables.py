@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..quantity import plain, scale
-from .entries import BEST, LIMIT
+from .entry import BEST, LIMIT
 from .result import REFERENCES
 from .site import DAMPER
 from .verdict import what

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..quantity import quantity
-from .entries import BEST, LIMIT
+from .entry import BEST, LIMIT
 
 if TYPE_CHECKING:
     from .result import ControllerComparison
@@ -140,7 +140,7 @@ def _robust(found: ControllerComparison, first: str) -> list[str]:
     same = worst(best) / fmean(found.worst_value(m, BEST) / found.value(m, BEST)
                                for m in found.motions)  # fmt: skip
     text = (
-        f"With {spread.text()} ({spread.members} members), the worst case of {first} lies "
+        f"With {found.setting.varied} ({spread.members} members), the worst case of {first} lies "
         f"{beside(own, 'its own value')}. "
     )
     text += f"{best} has the lowest worst case" if best != first else "Its worst case is the lowest"

@@ -6,7 +6,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from .. import __version__
-from ..controllers.entries import BEST, LIMIT
+from ..controllers.entry import BEST, LIMIT
 from ..controllers.folder import ENSEMBLES, SCENARIOS, plain_name
 from ..controllers.picture import draw_levels, draw_motion, draw_summary
 from ..controllers.tables import footnotes, header, lowest, rows
@@ -160,9 +160,9 @@ def _robust(found: ControllerComparison) -> str:
     return html.section(
         "The worst case",
         html.paragraphs(
-            f"{spread.members} members with {spread.text()}; the same buildings and dampers for "
-            "all controllers, which know nothing of them. The largest value of the case and its "
-            "members, and how far it lies above the case."
+            f"{spread.members} members with {found.setting.varied}; the same buildings and dampers "
+            "for all controllers, which know nothing of them. The largest value of the case and "
+            "its members, and how far it lies above the case."
         ),
         html.table(["", *found.motions], texts, range(1, 1 + len(found.motions))),
     )

@@ -17,10 +17,11 @@ from bristle.control.controller import read_controller
 from bristle.controllers import ControllerComparison, Spread, compare_controllers
 from bristle.controllers.anew import task_for
 from bristle.controllers.dampers import damper_from
-from bristle.controllers.entries import BEST, LIMIT, OFF, ON
+from bristle.controllers.entry import BEST, LIMIT, OFF, ON
 from bristle.controllers.folder import Folder, plain_name
 from bristle.controllers.site import site_from
 from bristle.design import design
+from bristle.fmu.build import build, plan
 from bristle.physics.building import PAPER
 from bristle.report.controllers_page import controllers_report
 
@@ -215,6 +216,20 @@ def test_a_controller_of_ones_own_is_stepped_as_an_fmu(
     )
     name = found.setting.judged.name
     assert again.value(again.motions[0], "again", name) == own[name]
+
+
+def test_an_fmu_with_a_design_keeps_the_building_for_all(tmp_path: Path) -> None:
+    fmu = build(plan("LqgClipped", name="MyLqg"), tmp_path)
+    found = compare_controllers(
+        ["el_centro_1940_ns,stop=1"], [str(fmu), "Skyhook"], grid=3, spread=Spread(2), workers=1,
+        out=tmp_path / "out",
+    )  # fmt: skip
+    assert any(note.startswith("MyLqg: the design belongs to the building") for note in found.notes)
+    assert found.setting.varied.startswith("damper parameters within 10 %")
+    for file in (tmp_path / "out" / "ensembles").rglob("*.toml"):
+        assert "structure.building" not in file.read_text()
+    assert found.worst is not None
+    assert (found.worst["failed"] == 0).all()
 
 
 def test_the_command_prints_tables_and_verdict(
