@@ -278,3 +278,21 @@ def test_the_limit_is_below_every_controller_and_is_kept() -> None:
     again = compare_controllers([motion], "Lpv", **given)  # type: ignore[arg-type]
     assert again.limits[name].kept
     assert again.value(name, LIMIT) == found.value(name, LIMIT)
+
+
+def test_the_papers_case_has_the_values_of_the_reference_calculation() -> None:
+    """Peaks of El Centro 0.6 g as the headings of the stock scenarios have them."""
+    found = compare_controllers(
+        ["el_centro,peak=0.6g,factor=0.45,stop=20"], ["HinfInverse", "Lpv"], grid=9, workers=1
+    )
+    (motion,) = found.motions
+    assert found.value(motion, "HinfInverse") == pytest.approx(6.958, rel=2e-3)
+    assert found.value(motion, "Lpv") == pytest.approx(6.353, rel=2e-3)
+    assert found.value(motion, "Lpv", "peak structure.base_displacement") == pytest.approx(
+        13.6e-3, rel=5e-3
+    )
+    table = [11.1, 9.57, 8.34, 7.17, 6.10, 5.99, 6.05, 6.21, 6.35]
+    levels = found.levels[motion][f"peak {found.setting.site.top}"]
+    assert levels.tolist() == pytest.approx(table, rel=3e-3)
+    best = found.table[found.table["controller"] == BEST]["level"]
+    assert best.tolist() == [5.0]
