@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .batch.execute import Ensemble as Ensemble
     from .batch.execute import ensemble as ensemble
     from .compare.comparison import Comparison as Comparison
+    from .controllers.compare import compare_controllers as compare_controllers
     from .data.measurement import Measurement as Measurement
     from .design import design as design
     from .design.result import DesignResult as DesignResult
@@ -57,6 +58,7 @@ _LAZY = {
     "Results": "simulate.frame",
     "Study": "study.study",
     "compare": "study.public",
+    "compare_controllers": "controllers.compare",
     "design": "design",
     "diagnose": "study.public",
     "ensemble": "batch.execute",
@@ -83,6 +85,7 @@ __all__ = [
     "Study",
     "__version__",
     "compare",
+    "compare_controllers",
     "design",
     "diagnose",
     "ensemble",

@@ -11,7 +11,8 @@ from typing import Any
 import bristle
 
 ORDER = (
-    "run", "load_results", "ensemble", "design", "identify", "compare", "diagnose", "plan", "Study",
+    "run", "load_results", "ensemble", "compare_controllers", "design", "identify", "compare",
+    "diagnose", "plan", "Study",
     "Results", "Ensemble", "DesignResult", "Identified", "Comparison", "Diagnosis", "Plan",
     "Measurement",
     "Effect", "Law", "Parameter", "BristleError",

@@ -32,6 +32,7 @@ SIMULATE = (
     {"scenario", "conformance", "design"},
     {"simulate"},
     {"batch", "limit", "web", "composite"},
+    {"controllers"},
 )
 MEASURE = ({"identify"}, {"compare"}, {"diagnose"})
 ROOF = (

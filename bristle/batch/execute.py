@@ -160,7 +160,7 @@ def ensemble(
         continued = sum(run < plan.runs for run in table.outcomes)
         left = [run for run in range(plan.runs) if run not in table.outcomes]
         try:
-            _go(plan, table, left, workers or _cores(), cluster, progress)
+            _go(plan, table, left, workers or cores(), cluster, progress)
         except RunError as error:
             raise RunError(f"{error} {_kept(table)}") from error
         except KeyboardInterrupt:
@@ -213,7 +213,7 @@ def _outcomes(
     return run_local(plan, left, min(workers, len(left)))
 
 
-def _cores() -> int:
+def cores() -> int:
     """Return how many cores this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

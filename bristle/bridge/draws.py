@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from ..data.model import StudyModel
 from ..errors import RunError
 from ..physics.drive import VOLTAGE
+from ..scenario.model_parts import Parameters, source_of, values_of
 from ..scenario.scenario import Scenario, load_scenario
 from ..simulate.coupled import simulate
 from .in_building import House, Shaking, loads, write_scenario, write_signals
-from .scenario_files import Parameters, part_text, source_of, values_of
+from .scenario_files import part_text
 
 Array = NDArray[np.float64]
 Columns = Mapping[str, Array]

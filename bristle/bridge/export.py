@@ -24,11 +24,12 @@ from ..physics.device import GROUND
 from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
 from ..physics.user import own_effects
+from ..scenario.model_parts import Parameters, source_of, values_of
 from ..study.rig import building_of
 from ..study.study import Study
 from . import on_bench
 from .in_building import House, Shaking, loads, shaking_of, write_scenario
-from .scenario_files import DamperText, Parameters, part_text, source_of, values_of
+from .scenario_files import DamperText, part_text
 
 Build = Callable[[Plan, Path], Path]
 

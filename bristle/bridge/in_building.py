@@ -23,7 +23,8 @@ from ..physics.drive import VOLTAGE, Drive, drive_named
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..physics.user import own_effects
-from .scenario_files import DamperText, Parameters, part_text, scenario_text, signal_file
+from ..scenario.model_parts import Parameters
+from .scenario_files import DamperText, part_text, scenario_text, signal_file
 
 Array = NDArray[np.float64]
 

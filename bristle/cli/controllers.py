@@ -1,4 +1,9 @@
-"""Run the paper's comparison of controllers: Tables IV and V, figures, a ledger of its claims."""
+"""Compare controllers: those of the paper, or your own on your building and ground motions.
+
+Without options the paper's comparison is run: Tables IV and V, figures, a ledger of its claims.
+With --motions and --controller any controllers are compared, beside constant voltages, on any
+building and damper: tables, a report, and a scenario of each case.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +13,14 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from . import _controllers
+
 if TYPE_CHECKING:
     import pandas as pd
 
     from ..paper.comparison.make import Report
 
-HELP = "run the paper's comparison of controllers and check its statements"
+HELP = "compare controllers: the paper's, or your own on your building and motions"
 
 _WIDTH = 14
 """Of a column of numbers."""
@@ -24,10 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         type=Path,
-        default=Path("results", "controllers"),
         metavar="FOLDER",
         help="where report, tables and figures go, in place of older ones; else "
-        "results/controllers/",
+        "results/controllers/, or results/comparison/BUILDING/ for your own",
     )
     parser.add_argument(
         "--newhall",
@@ -35,14 +41,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.AT2",
         help="record of Newhall Fire Station 360 deg, Northridge 1994; no package has it",
     )
+    _controllers.add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
 def main(arguments: argparse.Namespace) -> int:
     """Design, run, judge, draw and write; print tables and verdicts."""
+    if _controllers.asked(arguments):
+        return _controllers.main(arguments)
     from ..paper.comparison.make import make
 
-    report = make(arguments.out, arguments.newhall, progress=not arguments.json)
+    folder = arguments.out or Path("results", "controllers")
+    report = make(folder, arguments.newhall, progress=not arguments.json)
     if arguments.json:
         import json
 

@@ -27,7 +27,7 @@ OPEN_LOOP = (1e-3, 1e4)
 """Weighted response to the ground without control: gamma is of this size at most."""
 
 
-class _Reach(NamedTuple):
+class Reach(NamedTuple):
     """Peak gains of the plant: of the ground on the top level, of a command on top and drift."""
 
     ground: float
@@ -47,7 +47,7 @@ def implausible(task: Task) -> list[str]:
     list of str
         Empty where nothing looks unmeant.
     """
-    reach = _reach(task)
+    reach = reach_of(task)
     found = [
         *_sampling(task),
         *(_lqg(task, reach) if task.kind == "lqg" else _weights(task, reach)),
@@ -55,7 +55,7 @@ def implausible(task: Task) -> list[str]:
     return [*found, *(_scheduling(task) if task.kind == "lpv" else [])]
 
 
-def _reach(task: Task) -> _Reach:
+def reach_of(task: Task) -> Reach:
     """Return peak gains over frequency, per unit of command: N, or V for "lpv"."""
     s = structure(task.plant_building, stiffness=stiffness(task.damper), device=task.place)
     gain = 1.0
@@ -69,7 +69,7 @@ def _reach(task: Task) -> _Reach:
         )  # fmt: skip
         return float(hinf_norm(part))
 
-    return _Reach(peak(1, 0), gain * peak(0, 0), gain * peak(0, 1))
+    return Reach(peak(1, 0), gain * peak(0, 0), gain * peak(0, 1))
 
 
 def _sampling(task: Task) -> list[str]:
@@ -101,7 +101,7 @@ def _scheduling(task: Task) -> list[str]:
     return found
 
 
-def _weights(task: Task, reach: _Reach) -> list[str]:
+def _weights(task: Task, reach: Reach) -> list[str]:
     first = np.array([2.0 * pi * frequencies(task.building)[0]])
     unit = "1/V" if task.kind == "lpv" else "1/N"
     acceleration = float(np.abs(task.weights.acceleration.response(first))[0])
@@ -126,7 +126,7 @@ def _weights(task: Task, reach: _Reach) -> list[str]:
     return [*found, *_noise("weights", task.weights.noise, reach)]
 
 
-def _lqg(task: Task, reach: _Reach) -> list[str]:
+def _lqg(task: Task, reach: Reach) -> list[str]:
     w = task.lqg
     worth = w.acceleration * reach.command**2 + w.drift * reach.drift**2
     found = []
@@ -140,7 +140,7 @@ def _lqg(task: Task, reach: _Reach) -> list[str]:
     return [*found, *_noise("lqg", w.noise / w.ground, reach)]
 
 
-def _noise(where: str, noise: float, reach: _Reach) -> list[str]:
+def _noise(where: str, noise: float, reach: Reach) -> list[str]:
     low, high = (limit * reach.ground for limit in NOISE)
     if low <= noise <= high:
         return []

@@ -142,13 +142,13 @@ def check_carried(file: Path, building: Path | None) -> None:
     """
     from ..physics.building import paper_building, read_building
 
-    controller = _controller_in(file)
+    controller = controller_in(file)
     if controller is not None:
         on = read_building(building) if building else paper_building()
         controller.check_building(on, f"the design that {file.name} carries")
 
 
-def _controller_in(file: Path) -> Controller | None:
+def controller_in(file: Path) -> Controller | None:
     """Return the controller that an FMU carries; None where it carries none that can be read."""
     try:
         with zipfile.ZipFile(file) as archive:

@@ -1,0 +1,193 @@
+"""`bristle controllers` with a building, motions or controllers of one's own."""
+
+from __future__ import annotations
+
+import argparse
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ._consent import add_trust
+
+if TYPE_CHECKING:
+    from ..controllers.result import ControllerComparison
+
+OPTIONS = (
+    "building", "motions", "controller", "damper", "device", "output", "statistic", "grid",
+    "limit", "ensemble", "spread", "noise", "delay", "step", "engine", "fmus", "workers",
+)  # fmt: skip
+"""One of them, and the comparison is the user's own."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what a comparison of one's own takes."""
+    own = parser.add_argument_group("a comparison of your own")
+    own.add_argument(
+        "--motions", nargs="+", metavar="RECORD",
+        help="ground motions: names or files, with values: el_centro_1940_ns,peak=0.4g,factor=0.5",
+    )  # fmt: skip
+    own.add_argument(
+        "--controller", nargs="+", action="extend", metavar="WHAT",
+        help="stock names, files of `bristle design` (.json) or for it (.toml), components of your "
+        "own (.py), FMUs, with values: Skyhook,gain=80,label=mine",
+    )  # fmt: skip
+    own.add_argument("--building", metavar="FILE", help="building file; else the library's own")
+    own.add_argument(
+        "--damper", metavar="WHAT",
+        help="a component, a law, the folder of a study or a model.toml, an FMU, with values; "
+        "else LuGreDamper",
+    )  # fmt: skip
+    text = "device of the building that the controllers command; else the damper on the first level"
+    own.add_argument("--device", metavar="NAME", help=text)
+    text = "output that is judged; else the top level's absolute acceleration"
+    own.add_argument("--output", metavar="NAME", help=text)
+    own.add_argument("--statistic", choices=("peak", "rms"), help="its statistic; else peak")
+    text = "constant voltages that are tried; else 17"
+    own.add_argument("--grid", type=int, metavar="N", help=text)
+    own.add_argument(
+        "--limit", action="store_const", const=True,
+        help="compute how far any voltage could go under each motion: up to a minute each",
+    )  # fmt: skip
+    own.add_argument(
+        "--ensemble", type=int, metavar="N",
+        help="run each case with N buildings, dampers and sensors, for its worst case",
+    )  # fmt: skip
+    text = "how far masses, stiffnesses, damper parameters vary to either side; else 10%%"
+    own.add_argument("--spread", metavar="SHARE", help=text)
+    text = "noise of the sensors, a share of each signal's RMS; else 1%%"
+    own.add_argument("--noise", metavar="SHARE", help=text)
+    text = "longest delay of the sensors [s]; else 0.004"
+    own.add_argument("--delay", type=float, metavar="S", help=text)
+    text = "rows of the runs and step of FMUs [s]; else 0.002, or a share of a sample period"
+    own.add_argument("--step", type=float, metavar="S", help=text)
+    text = "solve what is built in (compiled), or step FMUs throughout (fmu)"
+    own.add_argument("--engine", choices=("compiled", "fmu"), help=text)
+    own.add_argument("--fmus", choices=("python", "native"), help="which FMUs are stepped")
+    own.add_argument("--workers", type=int, metavar="N", help="processes; else one per core")
+    own.add_argument("--no-figure", action="store_true", help="write tables alone, no report")
+    add_trust(parser)
+
+
+def asked(arguments: argparse.Namespace) -> bool:
+    """Return whether an option of a comparison of one's own is given."""
+    return any(getattr(arguments, name) is not None for name in OPTIONS)
+
+
+def main(arguments: argparse.Namespace) -> int:
+    """Compare, write scenarios, tables and report; print tables and verdict."""
+    from ..controllers import compare_controllers
+    from ..controllers.folder import plain_name
+    from ..errors import not_usable
+
+    if arguments.newhall is not None:
+        raise not_usable("--newhall is the paper's; --motions takes any record.")
+    name = Path(arguments.building).stem if arguments.building else "building"
+    folder: Path = arguments.out or Path("results", "comparison", plain_name(name))
+    given = {
+        key: value
+        for key in ("building", "damper", "device", "output", "statistic", "grid", "step",
+                    "engine", "fmus", "workers")
+        if (value := getattr(arguments, key)) is not None
+    }  # fmt: skip
+    found = compare_controllers(
+        arguments.motions or [], arguments.controller or [], **given,
+        limit=bool(arguments.limit), spread=_spread(arguments), out=folder,
+    )  # fmt: skip
+    files = found.write(folder)
+    if not arguments.no_figure:
+        from ..data.files import write_whole
+        from ..progress import tell
+        from ..report.controllers_page import controllers_report
+
+        tell("drawing")
+        files.insert(0, folder / "report.html")
+        write_whole(files[0], controllers_report(found))
+    if arguments.json:
+        import json
+
+        print(json.dumps(_answer(found, files), indent=2, allow_nan=False))
+    else:
+        _print(found, folder, files)
+    return 0
+
+
+def _spread(arguments: argparse.Namespace) -> Any:
+    """Return how far reality may lie from the case, None where nobody asks."""
+    from ..controllers import Spread
+
+    given = {
+        "share": _share("--spread", arguments.spread), "noise": _share("--noise", arguments.noise),
+        "members": arguments.ensemble, "delay": arguments.delay,
+    }  # fmt: skip
+    given = {name: value for name, value in given.items() if value is not None}
+    return Spread(**given) if given else None
+
+
+def _share(option: str, text: str | None) -> float | None:
+    """Return a share [1] from a text such as "10%" or "0.1"."""
+    from ..errors import not_usable
+
+    if text is None:
+        return None
+    try:
+        value = float(text.rstrip("% ")) / (100.0 if text.rstrip().endswith("%") else 1.0)
+    except ValueError:
+        value = float("nan")
+    if not (isfinite(value) and value >= 0.0):
+        raise not_usable(f"{option} {text!r}: a share, as 10% or 0.1, is right.")
+    return value
+
+
+def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
+    def rows(frame: Any) -> list[dict[str, Any]]:
+        return [
+            {key: None if value != value else value for key, value in row.items()}
+            for row in frame.to_dict(orient="records")
+        ]  # JSON has no NaN
+
+    judged = found.setting.judged
+    return {
+        "verdict": found.verdict,
+        "judged": {"output": judged.column, "statistic": judged.statistic, "unit": judged.unit},
+        "units": found.units,
+        "cases": rows(found.table),
+        "worst": None if found.worst is None else rows(found.worst),
+        "limits": {name: one._asdict() for name, one in found.limits.items()},
+        "notes": list(found.notes),
+        "seconds": round(found.seconds, 1),
+        "files": [str(path.absolute()) for path in files],
+    }
+
+
+def _print(found: ControllerComparison, folder: Path, files: list[Path]) -> None:
+    from ..controllers.tables import footnotes, header, rows
+
+    for motion in found.motions:
+        _print_table(motion, header(found)[1:], rows(found, motion))
+    for text in footnotes(found):
+        print(text)
+    print()
+    for text in found.verdict:
+        print(text)
+    for text in found.notes:
+        print(f"Note: {text}")
+    print(f"\n{len(found.table)} cases as scenarios in {folder / 'scenarios'}")
+    for path in files:
+        print(f"  {path}")
+
+
+def _print_table(title: str, titles: list[str], rows: list[list[str]]) -> None:
+    import textwrap
+    from itertools import zip_longest
+
+    wrapped = [textwrap.wrap(text, 12) for text in titles]
+    widths = [max(6, *(len(line) for line in lines)) + 2 for lines in wrapped]
+    first = max(len(row[0]) for row in rows) + 2
+    for line in zip_longest(*wrapped, fillvalue=""):
+        cells = "".join(f"{text:>{n}}" for text, n in zip(line, widths, strict=True))
+        print(f"{'':{first}}{cells}".rstrip())
+    print(title)
+    for name, *texts in rows:
+        cells = "".join(f"{text:>{n}}" for text, n in zip(texts, widths, strict=True))
+        print(f"  {name:{first - 2}}{cells}".rstrip())
+    print()

@@ -1,0 +1,224 @@
+"""Figures of a comparison of controllers: all motions at a glance, and each by itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..draw.style import COLOURS, GREY, INK, PALE, Page, label, look
+from ..quantity import scale
+from .cells import best_level
+from .entry import BEST, LIMIT, OFF, ON
+from .verdict import beside, what, winner
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.axes import Axes
+
+    from .result import ControllerComparison
+
+_MORE = ("#E69F00", "#56B4E9", "#8a4a78", "#5b6770")
+_MARKERS = "osD^vP<>"
+_ROW = 0.2
+"""Height of a controller's row in the summary [in]."""
+_LASTS = 16.0
+"""Longest part of a run that is shown [s]."""
+
+
+def colour_of(found: ControllerComparison, name: str) -> Any:
+    """Return the colour of a controller, the same in all figures."""
+    known = (*COLOURS, *_MORE)
+    return known[found.controllers.index(name) % len(known)]
+
+
+def draw_summary(found: ControllerComparison) -> Page:
+    """Return the figure of all motions: what is judged, over the best constant voltage.
+
+    A row per controller in each motion: a dot for the case, a line to its worst member, a bar for
+    the limit.
+    """
+    judged, names = found.setting.judged, found.controllers
+    wide = found.shares()
+    first = winner(found)
+    mean = float(wide[first].mean())
+    title = f"{first}: {what(found)} lies {beside(mean, 'the best constant voltage')}"
+    title += " on the mean" if len(found.motions) > 1 else ""
+    unit = judged.unit.replace("s2", "s²")
+    words = what(found)
+    said = [
+        f"{words[0].upper()}{words[1:]} as a share of that at the best constant voltage (dashed).",
+        "Grey: 0 V (open) and the largest voltage (full).",
+    ]
+    if found.worst is not None:
+        said.append("Line: to the worst member of the ensemble.")
+    if found.limits:
+        said.append("Black bar: the limit.")
+    height = _ROW * (len(names) + 1.4) * len(found.motions) + 0.9
+    page = Page(8.6, height, title, " ".join(said))
+    with look():
+        axes = page.figure.add_subplot(page.grid(1, 1, left=2.3, right=0.4, top=0.3)[0, 0])
+        left = 72.0 * 2.15
+        most, place, ticks = 100.0, 0.0, list[tuple[float, str]]()
+        for motion in found.motions:
+            top = place
+            own: Any = wide.loc[motion]
+            value = found.value(motion, BEST)
+            axes.annotate(
+                f"{motion} (100 %: {value:.3g} {unit})", (0.0, place - 0.95), (-left, 0),
+                xycoords=axes.get_yaxis_transform(), textcoords="offset points", fontsize=8.5,
+                color=INK, va="center", fontweight="bold", annotation_clip=False,
+            )  # fmt: skip
+            for name in names:
+                share = 100.0 * float(own[name])
+                worst = 100.0 * found.worst_value(motion, name) / value
+                colour = colour_of(found, name)
+                marker = _MARKERS[names.index(name) % len(_MARKERS)]
+                if np.isfinite(worst):
+                    axes.plot([share, worst], [place, place], color=colour, linewidth=1.4)
+                    axes.plot(worst, place, "|", color=colour, markersize=7, markeredgewidth=1.4)
+                    most = max(most, worst)
+                axes.plot(share, place, marker, color=colour, markersize=6)
+                ticks.append((place, name))
+                most = max(most, share)
+                place += 1.0
+            for reference, fill in ((OFF, "white"), (ON, GREY)):
+                share = 100.0 * float(own[reference])
+                axes.plot(share, top - 0.45, "o", color=GREY, markerfacecolor=fill, markersize=4.5,
+                          clip_on=True)  # fmt: skip
+            if motion in found.limits:
+                share = 100.0 * float(own[LIMIT])
+                axes.plot([share, share], [top - 0.5, place - 0.5], color=INK, linewidth=2.0)
+            place += 1.4
+        axes.axvline(100.0, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
+        axes.set_yticks([at for at, _ in ticks], [name for _, name in ticks], fontsize=8.5)
+        axes.tick_params(axis="y", length=0)
+        axes.grid(visible=False, axis="y")
+        axes.spines["left"].set_visible(False)
+        axes.set_ylim(place - 1.4, -1.4)
+        axes.set_xlim(0.0, 1.06 * min(most, 250.0))
+        axes.set_xlabel("% of the best constant voltage", loc="right", labelpad=1)
+    return page
+
+
+def draw_levels(found: ControllerComparison) -> Page:
+    """Return the figure of constant voltages: what is judged over the voltage, a panel a motion."""
+    judged = found.setting.judged
+    factor, unit = scale(judged.unit, float(found.table[judged.name].max()))
+    count = len(found.motions)
+    columns = min(3, count)
+    rows = -(-count // columns)
+    low = [best_level(found.levels[m], judged.name) for m in found.motions]
+    spread = f"{min(low):g} V" if min(low) == max(low) else f"{min(low):g} to {max(low):g} V"
+    page = Page(
+        8.6, 2.3 * rows + 0.2, f"The best constant voltage is {spread}",
+        f"Grey: {what(found)} [{unit.replace('s2', 's²')}] over a constant voltage; ring: the "
+        "lowest. Lines: the controllers" + ("; black: the limit." if found.limits else "."),
+    )  # fmt: skip
+    with look():
+        grid = page.grid(rows, columns, left=0.5, right=1.25, column_gap=1.3, row_gap=0.65)
+        for k, motion in enumerate(found.motions):
+            axes = page.figure.add_subplot(grid[k // columns, k % columns])
+            values = factor * found.levels[motion][judged.name]
+            volts = values.index.to_numpy()
+            axes.plot(volts, values, color=GREY, linewidth=1.6)
+            at = int(np.argmin(values.to_numpy()))
+            axes.plot(volts[at], values.iloc[at], "o", markersize=8, markerfacecolor="white",
+                      markeredgecolor=INK)  # fmt: skip
+            lines = {name: factor * found.value(motion, name) for name in found.controllers}
+            if motion in found.limits:
+                lines[LIMIT] = factor * found.value(motion, LIMIT)
+            for name, value in lines.items():
+                colour = INK if name == LIMIT else colour_of(found, name)
+                axes.axhline(value, color=colour, linewidth=1.1)
+            top = 1.06 * max(float(values.max()), *lines.values())
+            axes.set_ylim(0.0, top)
+            axes.set_xlim(0.0, float(volts[-1]))
+            for name, place in _apart(lines, 0.06 * top).items():
+                colour = INK if name == LIMIT else colour_of(found, name)
+                label(axes, name, float(volts[-1]), place, colour, xytext=(5, 0), va="center",
+                      fontsize=7)  # fmt: skip
+            axes.set_title(motion, fontsize=8.5)
+            if k // columns == rows - 1:
+                axes.set_xlabel("voltage [V]", loc="right", labelpad=0)
+    return page
+
+
+def _apart(values: dict[str, float], gap: float) -> dict[str, float]:
+    """Return places for labels at values, at least a gap apart, in their order."""
+    order = sorted(values, key=lambda name: values[name])
+    places: dict[str, float] = {}
+    last = -np.inf
+    for name in order:
+        last = max(values[name], last + gap)
+        places[name] = last
+    over = last - max(values.values())
+    return {name: place - 0.5 * over for name, place in places.items()}
+
+
+def draw_motion(found: ControllerComparison, motion: str) -> Page:
+    """Return the figure of a motion: response and voltage of each controller over time.
+
+    The response at the best constant voltage stands behind.
+    """
+    judged, names = found.setting.judged, [*found.controllers]
+    if motion in found.limits:
+        names.append(LIMIT)
+    behind = found.frames[motion, BEST][judged.column]
+    factor, unit = scale(judged.unit, float(np.abs(behind).max()))
+    shown = unit.replace("s2", "s²")
+    begin, end = strong_part(behind)
+    least = min(found.controllers, key=lambda name: found.value(motion, name))
+    title = (
+        f"{motion}: {what(found)} lowest with {least}, "
+        f"{beside(found.value(motion, least) / found.value(motion, BEST), 'the best constant')}"
+    )
+    subtitle = (
+        f"Left: {judged.column.partition('.')[2].replace('_', ' ')} [{shown}]; grey: at the best "
+        "constant voltage; dots: largest values. Right: voltage [V]."
+    )
+    page = Page(8.6, 1.05 * len(names) + 0.6, title, subtitle)
+    with look():
+        grid = page.grid(len(names), 2, left=0.5, column_gap=0.55, row_gap=0.34, top=0.3,
+                         bottom=0.4, width_ratios=(1.9, 1.0))  # fmt: skip
+        frames = {name: found.frames[motion, name] for name in names}
+        size = 1.25 * factor * max(float(np.abs(f[judged.column]).max()) for f in
+                                   [*frames.values(), found.frames[motion, BEST]])  # fmt: skip
+        for row, (name, frame) in enumerate(frames.items()):
+            colour = INK if name == LIMIT else colour_of(found, name)
+            axes = page.figure.add_subplot(grid[row, 0])
+            axes.plot(behind.loc[begin:end].index, factor * behind.loc[begin:end], color=PALE,
+                      linewidth=0.8)  # fmt: skip
+            part = factor * frame[judged.column].loc[begin:end]
+            axes.plot(part.index, part, color=colour, linewidth=0.9)
+            _mark(axes, part, colour)
+            axes.set_ylim(-size, size)
+            axes.set_title(name, color=colour, fontsize=9)
+            beside_it = page.figure.add_subplot(grid[row, 1])
+            volts = frame[found.outputs[-1].column].loc[begin:end]
+            beside_it.plot(volts.index, volts, color=colour, linewidth=0.7)
+            beside_it.set_ylim(-0.05 * found.setting.damper.most, 1.05 * found.setting.damper.most)
+            for panel in (axes, beside_it):
+                panel.set_xlim(begin, end)
+                panel.tick_params(labelbottom=row == len(names) - 1)
+                if row == len(names) - 1:
+                    panel.set_xlabel("time [s]", loc="right", labelpad=0)
+    return page
+
+
+def _mark(axes: Axes, values: pd.Series[Any], colour: Any) -> None:
+    """Mark the largest value of a history, with a number."""
+    sizes = np.abs(values.to_numpy())
+    place = int(np.argmax(sizes))
+    at, value = float(values.index.to_numpy()[place]), float(values.to_numpy()[place])
+    axes.plot(at, value, "o", color=colour, markersize=3.5)
+    label(axes, f"{sizes[place]:.3g}", at, value, colour, xytext=(5, 0), va="center", fontsize=7.5)
+
+
+def strong_part(history: pd.Series[Any]) -> tuple[float, float]:
+    """Return begin and end [s] of the part of a history in which most happens."""
+    energy = np.cumsum(np.square(history.to_numpy()))
+    time = history.index.to_numpy()
+    begin = float(time[int(np.searchsorted(energy, 0.005 * energy[-1]))])
+    begin = max(0.0, float(np.floor(begin - 0.5)))
+    return begin, min(float(time[-1]), begin + _LASTS)

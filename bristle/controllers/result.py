@@ -1,0 +1,196 @@
+"""What a comparison of controllers came to: its tables, and what they say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..batch.plan import Output
+from ..errors import not_usable
+from .dampers import Damper
+from .entry import BEST, LIMIT, OFF, ON, Entry
+from .limits import Reached
+from .motions import Motion
+from .robust import Spread
+from .site import Site
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+REFERENCES = (OFF, ON, BEST)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What was compared: building, damper, controllers, motions, what is judged.
+
+    `folder` holds the scenarios, None where nothing was kept; `varied` says in words how members
+    differ, "" without.
+    """
+
+    site: Site
+    damper: Damper
+    entries: list[Entry]
+    motions: list[Motion]
+    judged: Output
+    spread: Spread | None
+    folder: Path | None
+    varied: str = ""
+
+
+@dataclass(frozen=True)
+class ControllerComparison:
+    """Controllers under ground motions, beside constant voltages.
+
+    Attributes
+    ----------
+    setting : Setting
+        What was compared.
+    outputs : tuple of Output
+        What is kept of every run.
+    table : DataFrame
+        A row per motion and controller: motion, controller, engine, level (of a constant voltage
+        [V]), stroke (largest displacement over the damper's stroke [1]), and a column per output,
+        "peak structure.drift1", in SI units (`units`).
+    worst : DataFrame or None
+        Likewise the largest over each case and its members, and how many members failed.
+    levels : mapping
+        By motion: the same outputs at constant voltages, by the voltage [V].
+    limits : mapping
+        By motion what is known of its limit; empty where it was not asked for.
+    frames : mapping
+        By motion and controller the run, by time [s].
+    notes : tuple of str
+        What a reader has to know.
+    seconds : float
+    """
+
+    setting: Setting
+    outputs: tuple[Output, ...]
+    table: pd.DataFrame
+    worst: pd.DataFrame | None
+    levels: Mapping[str, pd.DataFrame] = field(repr=False)
+    limits: Mapping[str, Reached]
+    frames: Mapping[tuple[str, str], pd.DataFrame] = field(repr=False)
+    notes: tuple[str, ...]
+    seconds: float
+
+    @property
+    def motions(self) -> list[str]:
+        """The names of the motions."""
+        return [one.name for one in self.setting.motions]
+
+    @property
+    def controllers(self) -> list[str]:
+        """The names of the controllers, as they were given."""
+        return [one.name for one in self.setting.entries]
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each output by its name."""
+        return {one.name: one.unit for one in self.outputs}
+
+    @property
+    def verdict(self) -> list[str]:
+        """What the comparison says, a sentence each, the first one first."""
+        from .verdict import sentences
+
+        return sentences(self)
+
+    def value(self, motion: str, controller: str, output: str = "") -> float:
+        """Return what a case has of an output; else of the one that is judged."""
+        rows = self.table
+        row = rows[(rows["motion"] == motion) & (rows["controller"] == controller)]
+        return float(row[output or self.setting.judged.name].iloc[0])
+
+    def worst_value(self, motion: str, controller: str) -> float:
+        """Return the worst of what is judged of a case; NaN without members."""
+        if self.worst is None or controller == LIMIT:
+            return float("nan")
+        rows = self.worst
+        row = rows[(rows["motion"] == motion) & (rows["controller"] == controller)]
+        return float(row[self.setting.judged.name].iloc[0])
+
+    def shares(self, reference: str = BEST) -> pd.DataFrame:
+        """Return what is judged over that of a reference, by motion (rows) and controller.
+
+        Parameters
+        ----------
+        reference : "passive off", "passive on" or "best constant"
+        """
+        name = self.setting.judged.name
+        wide = self.table.pivot(index="motion", columns="controller", values=name)
+        order = list(dict.fromkeys(self.table["controller"]))
+        return wide.loc[self.motions, order].div(wide[reference].loc[self.motions], axis=0)
+
+    def quantities(self) -> pd.DataFrame:
+        """Return a row per motion, controller and output.
+
+        Columns motion, controller, output, unit, value, worst (NaN without members), and the value
+        over that of each reference: "over passive off" ...
+        """
+        import pandas as pd
+
+        worsts: dict[tuple[str, str], Any] = {}
+        if self.worst is not None:
+            worsts = {(row["motion"], row["controller"]): row
+                      for row in self.worst.to_dict(orient="records")}  # fmt: skip
+        cases = {(row["motion"], row["controller"]): row
+                 for row in self.table.to_dict(orient="records")}  # fmt: skip
+        rows = []
+        for (motion, controller), case in cases.items():
+            worst = worsts.get((motion, controller), {})
+            for one in self.outputs:
+                row = {
+                    "motion": motion, "controller": controller, "output": one.name,
+                    "unit": one.unit, "value": case[one.name],
+                    "worst": worst.get(one.name, float("nan")),
+                }  # fmt: skip
+                for reference in REFERENCES:
+                    other = cases[motion, reference][one.name]
+                    row[f"over {reference}"] = case[one.name] / other if other else float("nan")
+                rows.append(row)
+        return pd.DataFrame(rows)
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write the tables as CSV: comparison.csv and quantities.csv; return their paths.
+
+        Raises
+        ------
+        RunError
+            If they cannot be written, exit code 2.
+        """
+        folder = Path(folder)
+        titles = {n: f"{n} [{u}]" for n, u in {**self.units, "level": "V", "stroke": "1"}.items()}
+        frames = {
+            "comparison.csv": self.table.rename(columns=titles),
+            "quantities.csv": self.quantities(),
+        }
+        if self.worst is not None:
+            frames["worst.csv"] = self.worst.rename(columns=titles)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            for name, frame in frames.items():
+                frame.to_csv(folder / name, index=False, float_format="%.9g")
+        except OSError as error:
+            raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
+        return [folder / name for name in frames]
+
+    def plot(self) -> Figure:
+        """Return the figure of all motions: each controller beside the best constant voltage."""
+        from .picture import draw_summary
+
+        return draw_summary(self).figure
+
+    def _repr_html_(self) -> str:
+        from ..draw import html
+        from ..draw.style import png
+        from .picture import draw_summary
+
+        return html.fragment(
+            self.verdict[0], html.paragraphs(*self.verdict[1:]),
+            html.figure(png(draw_summary(self)), "controllers beside the best constant voltage"),
+        )  # fmt: skip

@@ -1,0 +1,189 @@
+"""The report of a comparison of controllers: one HTML file that needs nothing else."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+from .. import __version__
+from ..controllers.entry import BEST, LIMIT
+from ..controllers.folder import ENSEMBLES, SCENARIOS, plain_name
+from ..controllers.picture import draw_levels, draw_motion, draw_summary
+from ..controllers.tables import footnotes, header, lowest, rows
+from ..controllers.verdict import what
+from ..draw import html
+from ..draw.style import png
+from ..findings import command
+from ..quantity import plain, quantity
+
+if TYPE_CHECKING:
+    from ..controllers.result import ControllerComparison
+
+
+def controllers_report(found: ControllerComparison) -> str:
+    """Return a comparison of controllers as one HTML document."""
+    setting = found.setting
+    title = f"Controllers for {setting.site.building.name}"
+    first, *others = found.verdict
+    body = [
+        f"<h1>{escape(title)}</h1>",
+        html.paragraphs(
+            f"{len(found.controllers)} controllers of one damper, {setting.damper.name}, under "
+            f"{len(found.motions)} ground motions, beside constant voltages.", kind="soft",
+        ),
+        f'<div class="verdict" style="--tone: var(--blue)"><span class="kind">Verdict</span>\n'
+        f'<p class="say">{escape(first)}</p>\n{html.paragraphs(*others)}\n</div>',
+        html.figure(
+            png(draw_summary(found)), "controllers beside the best constant voltage",
+            f"All motions at a glance: {what(found)}.",
+        ),
+        _notes(found),
+        _setting(found),
+        *(_motion(found, name) for name in found.motions),
+        _constants(found),
+        _limits(found),
+        _robust(found),
+        _again(found),
+    ]  # fmt: skip
+    foot = (
+        f"bristle {escape(__version__)}. {len(found.table)} cases"
+        + (f", {setting.spread.members} members of each" if setting.spread else "")
+        + f", {len(found.motions) * len(next(iter(found.levels.values())))} runs at constant "
+        f"voltages in {found.seconds:.0f} s. RMS values are over the whole run."
+    )
+    return html.page(title, [part for part in body if part], foot)
+
+
+def _notes(found: ControllerComparison) -> str:
+    if not found.notes:
+        return ""
+    return html.section("What to know of it", html.items(found.notes))
+
+
+def _setting(found: ControllerComparison) -> str:
+    """Return what was compared: building, damper, motions, controllers."""
+    setting = found.setting
+    building, damper = setting.site.building, setting.damper
+    frequencies = ", ".join(f"{plain(f, 3)}" for f in setting.site.frequencies[:4])
+    more = " ..." if len(setting.site.frequencies) > 4 else ""
+    base = "isolated base" if building.isolated else "fixed base"
+    floors = building.size - building.isolated
+    place = setting.site.device.place(building.levels())
+    mass = quantity(sum(building.M[i][i] for i in range(building.size)), "kg")
+    law = f", law {damper.law}" if damper.law else ""
+    texts = [
+        f"{building.name}: {floors} floors on an {base}, {mass}, natural frequencies {frequencies}"
+        f"{more} Hz. The damper acts {place}: {damper.name}{law}, up to {damper.most:g} "
+        f"{damper.drive.unit}."
+    ]
+    motions = [
+        [m.name, f"{plain(m.peak, 3)} m/s²", f"{m.stop:g} s", m.source] for m in setting.motions
+    ]
+    entries = [[one.name, one.about, _settings(one.part.parameters)] for one in setting.entries]
+    return html.section(
+        "What was compared",
+        html.paragraphs(*texts),
+        html.table(["Ground motion", "peak as run", "run to", "source"], motions, [1, 2]),
+        html.table(["Controller", "what it is", "values"], entries),
+    )
+
+
+def _settings(values: dict[str, object]) -> str:
+    return ", ".join(f"{name} = {value}" for name, value in values.items())
+
+
+def _motion(found: ControllerComparison, motion: str) -> str:
+    texts = [[name.replace(" ", "\u00a0"), *row] for name, *row in rows(found, motion)]
+    return html.section(
+        motion,
+        html.table(
+            header(found), texts, range(1, len(header(found))),
+            [lowest(found, motion)],
+        ),
+        html.paragraphs(*footnotes(found), kind="soft"),
+        html.figure(png(draw_motion(found, motion)), f"responses under {motion}"),
+    )  # fmt: skip
+
+
+def _constants(found: ControllerComparison) -> str:
+    return html.section(
+        "Constant voltages",
+        html.figure(png(draw_levels(found)), "judged output over a constant voltage"),
+        html.paragraphs(
+            "The best constant voltage of a motion is the best of those that were run. Nobody "
+            "knows it before the motion: it is a strong comparison, not a controller.",
+            kind="soft",
+        ),
+    )  # fmt: skip
+
+
+def _limits(found: ControllerComparison) -> str:
+    if not found.limits:
+        return ""
+    unit = found.setting.judged.unit
+    texts = []
+    for motion, one in found.limits.items():
+        bound = "none known" if one.bound is None else quantity(one.bound, unit)
+        below = 100.0 * (1.0 - found.value(motion, LIMIT) / found.value(motion, BEST))
+        texts.append([
+            motion, quantity(found.value(motion, LIMIT), unit), f"{below:.0f} %",
+            f"{one.agreeing} of {one.starts}", bound, "yes" if one.sure else "no",
+        ])  # fmt: skip
+    titles = ["Ground motion", "limit", "below the best constant", "starts that agree",
+              "lower bound", "sure"]  # fmt: skip
+    return html.section(
+        "How far any control could go",
+        html.paragraphs(
+            "The least that any voltage of this damper reaches, the ground motion known in "
+            "advance. What lies between a controller and the limit is what there is to gain; most "
+            "of it is the price of not knowing the future."
+        ),
+        html.table(titles, texts, [1, 2, 3, 4]),
+    )
+
+
+def _robust(found: ControllerComparison) -> str:
+    """Return the worst cases over their members."""
+    spread = found.setting.spread
+    if spread is None or found.worst is None:
+        return ""
+    unit = found.setting.judged.unit
+    names = list(dict.fromkeys(found.worst["controller"]))
+    texts = []
+    for name in names:
+        row = [name]
+        for motion in found.motions:
+            worst = found.worst_value(motion, name)
+            more = 100.0 * (worst / found.value(motion, name) - 1.0)
+            row.append(f"{quantity(worst, unit)} (+{more:.0f} %)")
+        texts.append(row)
+    return html.section(
+        "The worst case",
+        html.paragraphs(
+            f"{spread.members} members with {found.setting.varied}; the same buildings and dampers "
+            "for all controllers, which know nothing of them. The largest value of the case and "
+            "its members, and how far it lies above the case."
+        ),
+        html.table(["", *found.motions], texts, range(1, 1 + len(found.motions))),
+    )
+
+
+def _again(found: ControllerComparison) -> str:
+    """Return how each case is run again."""
+    if found.setting.folder is None:
+        return ""
+    motion, entry = found.setting.motions[0], found.setting.entries[0]
+    own = f"{SCENARIOS}/{plain_name(motion.name)}/{plain_name(entry.name)}.toml"
+    engine = found.table[found.table["controller"] == entry.name]["engine"].iloc[0]
+    lines = [command("run", own, *(["--engine", "compiled"] if engine == "compiled" else []))]
+    if found.setting.spread is not None:
+        ensemble = f"{ENSEMBLES}/{plain_name(motion.name)}/{plain_name(entry.name)}.toml"
+        lines.append(command("ensemble", ensemble))
+    return html.section(
+        "Run it again",
+        html.paragraphs(
+            "Every case is a scenario in this folder, every worst case an ensemble; the files that "
+            "they read lie beside them. From the folder of this report:"
+        ),
+        f"<pre>{escape(chr(10).join(lines))}</pre>",
+    )
