@@ -171,6 +171,9 @@ def test_the_hour_on_an_example_from_its_making_to_a_running_fmu(tmp_path: Path)
         assert Study(home / "example_bench").verdict() is None
         page.get_by_role("button", name="Diagnose", exact=True).click()
         page.get_by_role("button", name="Cancel").wait_for()
+        page.get_by_role("heading", name=re.compile("What remains of the cost")).wait_for(
+            timeout=300_000
+        )
         page.reload()  # in the middle of a diagnosis
         page.get_by_role("button", name="Cancel").wait_for(timeout=60_000)
         other = page.context.new_page()
