@@ -110,6 +110,11 @@ def values_of(content: Mapping[str, Any]) -> dict[str, float]:
 def write_design(folder: Path, kind: object, values: object, building: str) -> str:
     """Write the next design file of a study; return its name.
 
+    Parameters
+    ----------
+    folder : of the study
+    kind, values, building : as for `content_of`
+
     Raises
     ------
     RequestError

@@ -65,7 +65,7 @@ class Design {
       event.preventDefault();
       try {
         const { name } = await post(page.path("design"), { kind: this.kind, values: this.values });
-        page.design = { study: page.study, name };
+        page.design = { study: page.study, name, kind: this.kind, values: { ...this.values } };
         page.editing = false;
         await page.run("design", { name });
       } catch (error) {
