@@ -19,6 +19,7 @@ from bristle.design import DesignResult, Task, design
 from bristle.design.margins import facts_of, grid_rows, margins
 from bristle.design.picture import draw_design
 from bristle.design.plant import Plant, StateSpace
+from bristle.design.responses import curves, task_curves
 from bristle.fmu.build import plan
 
 IMPROPER = "[weights]\ncommand = { numerator = [1, 2, 3], denominator = [1, 4] }"
@@ -59,7 +60,8 @@ def test_hinf_tells_gamma_norm_poles_and_margins(
     assert pole is not None
     assert float(pole[1]) == pytest.approx(-5.09, abs=0.04)
     assert sorted(path.name for path in here.iterdir()) == [
-        "houses", "my_hinf.json", "my_hinf.png", "my_hinf.toml", "my_lpv.toml",
+        "houses", "my_hinf.json", "my_hinf.png", "my_hinf.toml", "my_hinf_answer.json",
+        "my_lpv.toml",
     ]  # fmt: skip
     assert read_controller("my_hinf.json").title == "mine"
     assert (here / "my_hinf.png").read_bytes()[:4] == b"\x89PNG"
@@ -73,10 +75,29 @@ def test_lpv_as_json_goes_where_it_is_told(here: Path, capsys: pytest.CaptureFix
     assert told["rows"] == 61
     assert len(told["facts"]["norms"]) == 4
     assert max(told["facts"]["norms"]) <= told["facts"]["gamma"]
-    assert [Path(name).name for name in told["files"]] == ["mine.json", "mine.png"]
-    assert sorted(path.name for path in (here / "deep").iterdir()) == ["mine.json", "mine.png"]
+    names = ["mine.json", "mine_answer.json", "mine.png"]
+    assert [Path(name).name for name in told["files"]] == names
+    assert sorted(path.name for path in (here / "deep").iterdir()) == sorted(names)
     assert [entry["speed"] for entry in told["margins"]["speeds"]] == [0.0, 0.02, 0.08, 0.3]
+    kept = json.loads((here / "deep" / "mine_answer.json").read_text())
+    speeds = kept.pop("curves")["speeds"]
+    assert {**kept, "files": told["files"]} == told
+    assert [one["speed"] for one in speeds] == [0.0, 0.02, 0.08, 0.3]
+    for one in speeds:  # gamma bounds the weighted loop at every frequency
+        assert max(one["closed_loop"]) <= 1.001 * told["facts"]["gamma"]
     assert 0.0 < told["margins"]["modulus"] <= 1.0
+
+
+def test_what_a_task_weighs_is_known_before_its_design() -> None:
+    task = Task("hinf")
+    before, after = task_curves(task), curves(design(task))
+    (one,) = after["speeds"]
+    assert before["frequency"] == pytest.approx(after["frequency"])
+    assert before["acceleration_open"] == pytest.approx(one["acceleration_open"], rel=1e-9)
+    gamma = one["acceleration_bound"][0] * before["acceleration_weight"][0]
+    assert before["acceleration_weight"] * one["acceleration_bound"] == pytest.approx(gamma)
+    assert before["command_weight"] * one["command_bound"] == pytest.approx(gamma)
+    assert not curves(design(Task("lqg")))
 
 
 @pytest.mark.parametrize(

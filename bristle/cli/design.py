@@ -1,4 +1,7 @@
-"""Design a controller from a design file: verified, written as a controller file, drawn."""
+"""Design a controller from a design file: verified, written as a controller file, drawn.
+
+What was found, with the curves of the figure, stands beside it as NAME_answer.json.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE.json",
-        help="the controller file, with its figure; else the design file's name, here",
+        help="the controller file, its figure and answer beside it; else the design file's name",
     )
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
@@ -49,7 +52,7 @@ def main(arguments: argparse.Namespace) -> int:
         print(f"warning: {arguments.file}: {text}", file=sys.stderr, flush=True)
     result = design(task)
     answer = {**_answer(result), "warnings": warnings}
-    answer["files"] = [str(path.absolute()) for path in _write(result, out)]
+    answer["files"] = [str(path.absolute()) for path in _write(result, answer, out)]
     if arguments.json:
         import json
 
@@ -70,14 +73,20 @@ def _answer(result: DesignResult) -> dict[str, Any]:
     return answer
 
 
-def _write(result: DesignResult, out: Path) -> list[Path]:
-    """Write controller file and picture beside the target and rename them into place."""
+def _write(result: DesignResult, answer: dict[str, Any], out: Path) -> list[Path]:
+    """Write controller file, answer and picture beside the target, and rename them into place."""
+    import json
+
+    from ..design.responses import curves
     from ..errors import DesignError
 
     try:
         with tempfile.TemporaryDirectory(prefix=".bristle_", dir=out.absolute().parent) as folder:
             made = [Path(folder) / out.name]
             result.controller.save(made[0])
+            made.append(made[0].with_name(f"{out.stem}_answer.json"))
+            whole = {**answer, "curves": curves(result)}
+            made[-1].write_text(json.dumps(whole, allow_nan=False), encoding="utf-8")
             if result.plants:
                 from ..design.picture import draw_design
 

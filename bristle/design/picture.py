@@ -10,7 +10,7 @@ import numpy as np
 from ..draw.style import BLUE, GREY, INK, Page, look, ramp, zero_lines
 from ..quantity import tick
 from .margins import grid_rows
-from .responses import responses
+from .responses import omega_of, responses
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -61,7 +61,7 @@ def headline(result: DesignResult) -> str:
 
 def _loops(result: DesignResult) -> Page:
     rows = grid_rows(result)
-    shown = [responses(result, _omega(result), k) for k in rows]
+    shown = [responses(result, omega_of(result.task.building), k) for k in rows]
     colours = ramp(len(rows)) if len(rows) > 1 else [BLUE]
     subtitle = (
         "Solid: closed loop. Dashed: without control. Dotted: gamma over the weight, which the "
@@ -75,7 +75,7 @@ def _loops(result: DesignResult) -> Page:
         for i, (heading, without, closed, bound) in enumerate(_PANELS):
             axes = page.figure.add_subplot(grid[0, i])
             axes.set_title(heading.format(result.controller.command_unit))
-            _panel(axes, _omega(result), shown, colours, (without, closed, bound))
+            _panel(axes, omega_of(result.task.building), shown, colours, (without, closed, bound))
             if not bound:
                 axes.axhline(result.facts["gamma"], color=INK, linestyle=":", linewidth=1.0)
     return page
@@ -94,15 +94,6 @@ def _poles(result: DesignResult) -> Page:
         axes.set_xlabel("real part [1/s]")
         axes.set_ylabel("imaginary part [rad/s]")
     return page
-
-
-def _omega(result: DesignResult) -> Any:
-    """Return frequencies [rad/s] a decade beyond the building's on either side."""
-    from ..physics.building import frequencies
-
-    modes = 2.0 * np.pi * np.array(frequencies(result.task.building))
-    around = (modes[:, None] * (1.0 + np.linspace(-0.1, 0.1, 81))[None]).ravel()
-    return np.sort(np.concatenate([np.geomspace(modes[0] / 20, modes[-1] * 10, 600), around]))
 
 
 def _panel(

@@ -1,15 +1,19 @@
-"""Frequency responses for a report: loops, weights and controller."""
+"""Frequency responses for a report: loops, weights and controller; a task's before its design."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DesignError
+from ..physics.building import Building, frequencies
+from .margins import grid_rows
 from .norms import gains
-from .plant import Plant, StateSpace
+from .plant import Plant, StateSpace, structure
+from .sliding import stiffness
+from .task import Task
 
 if TYPE_CHECKING:
     from .result import DesignResult
@@ -62,6 +66,58 @@ def responses(result: DesignResult, omega: Array, row: int = 0) -> dict[str, Arr
         "controller": gains(K, omega),
         "acceleration_bound": gamma / np.abs(weights.acceleration.response(omega)),
         "command_bound": gamma / np.abs(weights.command.response(omega)),
+    }
+
+
+def omega_of(building: Building) -> Array:
+    """Return frequencies (k,) [rad/s] a decade beyond the building's, dense around each of them."""
+    modes = 2.0 * np.pi * np.array(frequencies(building))
+    around = (modes[:, None] * (1.0 + np.linspace(-0.1, 0.1, 81))[None]).ravel()
+    return np.sort(np.concatenate([np.geomspace(modes[0] / 20, modes[-1] * 10, 600), around]))
+
+
+def curves(result: DesignResult) -> dict[str, Any]:
+    """Return what the figure of a design shows, as plain lists; empty for LQG.
+
+    Returns
+    -------
+    dict
+        `frequency` (k,) [Hz], and `speeds`: for each speed of the grid [m/s] the gains (k,) of
+        `responses`.
+    """
+    if not result.plants:
+        return {}
+    omega = omega_of(result.task.building)
+    return {
+        "frequency": (omega / (2.0 * np.pi)).tolist(),
+        "speeds": [
+            {
+                "speed": float(result.speeds[row]),
+                **{name: one.tolist() for name, one in responses(result, omega, row).items()},
+            }
+            for row in grid_rows(result)
+        ],
+    }  # fmt: skip
+
+
+def task_curves(task: Task) -> dict[str, Array]:
+    """Return what a task weighs, before it is solved, at the frequencies of `omega_of`.
+
+    Returns
+    -------
+    dict of (k,) arrays
+        `frequency` [Hz]; `acceleration_open`: top floor per ground acceleration [1] without the
+        damper that is commanded, as of a design "hinf"; `acceleration_weight` [s2/m],
+        `command_weight` [1/N, 1/V]: sizes of the weights.
+    """
+    omega = omega_of(task.building)
+    s = structure(task.plant_building, stiffness=stiffness(task.damper), device=task.place)
+    ground = StateSpace(s.A, s.B[:, 1:2], s.C[:1], s.D[:1, 1:2])
+    return {
+        "frequency": omega / (2.0 * np.pi),
+        "acceleration_open": gains(ground, omega),
+        "acceleration_weight": np.abs(task.weights.acceleration.response(omega)),
+        "command_weight": np.abs(task.weights.command.response(omega)),
     }
 
 

@@ -204,7 +204,9 @@ def try_all(
         def look(name: str) -> Candidate:
             end = short_search(name, context, guesses[name], fewer)
             ends[name] = end.cost
-            count.done(name, f"best so far {min(dict(ends), key=lambda one: ends[one])}")
+            share = 100.0 * end.cost / context.cost if context.cost > 0.0 else 100.0
+            best = min(dict(ends), key=lambda one: ends[one])
+            count.done(name, f"{share:.3g} % of the cost remains; best so far {best}")
             return end
 
         found = list(pool.map(look, names))
@@ -216,7 +218,7 @@ def try_all(
         def finish(one: Candidate) -> Trial:
             if context.cost - one.cost >= least:
                 trial = judge(refine(one.model, train, LONG), train, held_out)
-                refined.done(one.model.effects[-1])
+                refined.done(one.model.effects[-1], f"z {trial.z:.3g} on held-out runs")
                 return trial
             return judge(one.model, train, held_out, (context.expected, there))
 

@@ -26,6 +26,9 @@ DEPENDS = ("study.toml", "model.toml", "verdict.json", "reports/identify.json")
 """Files of a study that its views show."""
 
 
+_DESIGNED = ("design/passive/passive.csv",)
+
+
 class ViewError(BristleError):
     """A view that cannot be shown; `told` is what the worker said."""
 
@@ -39,7 +42,7 @@ class ViewError(BristleError):
 def stamp(folder: Path) -> str:
     """Return a text that changes with a study's files and its history."""
     parts = []
-    for name in (*DEPENDS, "history", "history/undone", "reports", "export"):
+    for name in (*DEPENDS, "history", "history/undone", "reports", "export", "design", *_DESIGNED):
         with suppress(OSError):
             about = (folder / name).stat()
             parts.append(f"{name}:{about.st_mtime_ns}:{about.st_size}")

@@ -17,6 +17,7 @@ from ..errors import BristleError, StudyError
 from .answers import Answers, Compiling, stamp
 from .commands import COMMANDS, UPLOADS, batch_name, file_name, order_of
 from .consent import consent, waiting_texts
+from .designs import write_design
 from .files import files_of, is_given, kind_of
 from .jobs import Jobs
 from .message import PACKED, Answer, Handler, Request, RequestError, as_json
@@ -27,7 +28,7 @@ ROOM = 512 * 1024**2
 """Bytes that must be free on the disk beside an upload."""
 _PIECE = 1024**2
 
-OF_STUDY = ("data", "check", "fit", "errors", "verdict", "history")
+OF_STUDY = ("data", "check", "fit", "errors", "verdict", "history", "design", "loops")
 """Views of a study."""
 
 
@@ -69,6 +70,8 @@ class App:
                 ("GET", "/api/studies/([^/]+)/file", self._file),
                 ("GET", "/api/studies/([^/]+)/consent", self._waiting),
                 ("POST", "/api/studies/([^/]+)/consent", self._consent),
+                ("POST", "/api/studies/([^/]+)/weights", self._weights),
+                ("POST", "/api/studies/([^/]+)/design", self._design),
                 ("PUT", "/api/uploads/([^/]+)/(building/)?([^/]+)", self._upload),
                 ("GET", "/api/uploads/([^/]+)/columns", self._columns),
                 ("POST", "/api/jobs", self._start),
@@ -132,7 +135,7 @@ class App:
 
     def _view(self, request: Request) -> Answer:
         name, view = request.parts
-        arguments = {key: request.query[key] for key in ("role",) if key in request.query}
+        arguments = {key: request.query[key] for key in ("role", "name") if key in request.query}
         return Answer(self.answers.get(view, self.study(name), arguments), PACKED)
 
     def _files(self, request: Request) -> Answer:
@@ -154,6 +157,15 @@ class App:
         asked = request.json()
         consent(self.study(request.parts[0]), asked.get("file"), asked.get("digest"))
         return as_json({"ok": True})
+
+    def _weights(self, request: Request) -> Answer:
+        folder = self.study(request.parts[0])
+        return Answer(self.answers.get("weights", folder, request.json(), keep=False), PACKED)
+
+    def _design(self, request: Request) -> Answer:
+        folder, asked = self.study(request.parts[0]), request.json()
+        name = write_design(folder, asked.get("kind"), asked.get("values", {}), _building(folder))
+        return as_json({"name": name}, HTTPStatus.CREATED)
 
     def _upload(self, request: Request) -> Answer:
         batch, below, name = request.parts
@@ -213,6 +225,13 @@ class App:
 
 def _is_study(folder: Path) -> bool:
     return (folder / "study.toml").is_file() and not folder.name.startswith(".")
+
+
+def _building(folder: Path) -> str:
+    """Return the file of a study's building, as its model names it, "" where there is none."""
+    with suppress(OSError, ValueError), (folder / "model.toml").open("rb") as file:
+        return str(tomllib.load(file).get("building", ""))
+    return ""
 
 
 def _about(folder: Path) -> dict[str, Any]:

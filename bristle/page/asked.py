@@ -20,6 +20,8 @@ from ..study.study import Study
 from .commands import UPLOADS, batch_name, file_name
 from .controls import control_of, stock_file
 
+FILES = (".building", ".controller")
+"""How overrides end that name files; a ground motion has a name, or is a dropped file."""
 LONGEST = 120.0
 """Seconds of a run to which a longer ground motion stretches it at the most."""
 
@@ -35,7 +37,7 @@ class Asked:
     def given(self) -> dict[str, Any]:
         """Return the overrides as `load_scenario` takes them, wherever this process works."""
         return {
-            name: str(self.folder / value) if _is_upload(value) else value
+            name: str(self.folder / value) if _is_file(name, value) else value
             for name, value in self.overrides.items()
         }
 
@@ -45,8 +47,12 @@ class Asked:
 
     def run(self, *options: str) -> str:
         """Return the command that makes the same run, with options, in the folder of studies."""
-        sets = [w for key, one in self.overrides.items() for w in ("--set", f"{key}={_text(one)}")]
+        sets = [word for one in self.sets() for word in ("--set", one)]
         return command("run", self.scenario, "--engine", "compiled", *options, *sets)
+
+    def sets(self) -> list[str]:
+        """Return the overrides as --set takes them."""
+        return [f"{name}={_text(value)}" for name, value in self.overrides.items()]
 
 
 def asked_for(folder: Path, arguments: Mapping[str, Any]) -> Asked:
@@ -166,6 +172,11 @@ def _dropped(folder: Path, name: str) -> str:
     if not (folder / path).is_file():
         raise ScenarioError(f"{path.as_posix()}: this file is no longer there; drop it again.")
     return path.as_posix()
+
+
+def _is_file(name: str, value: object) -> bool:
+    """Return whether an override names a file in the folder of studies."""
+    return isinstance(value, str) and (_is_upload(value) or name.endswith(FILES))
 
 
 def _is_upload(value: object) -> bool:

@@ -13,10 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..findings import command, unknown, written
+from .designs import FOLDER as DESIGNS
+from .designs import INTENSITIES, design_name, kind_of_design
 from .message import RequestError
 
 _NAME = re.compile(r"\w[\w .+-]{0,79}")
 _WORD = re.compile(r"[A-Za-z][\w.]{0,79}")
+_SET = re.compile(r"[A-Za-z][\w.\[\]]{0,99}=\w[\w .+-]*(/\w[\w .+-]*)*|[\w.\[\]]{1,100}=-[\d.e+-]+")
 _BATCH = re.compile(r"[0-9a-z][0-9a-z-]{0,39}")
 
 Options = Mapping[str, Any]
@@ -195,6 +198,25 @@ def _auto(study: str, options: Options) -> list[str]:
     return ["study", "auto", study, *_flags(options, "learn")]
 
 
+def _design(study: str, options: Options) -> list[str]:
+    name = design_name(options.get("name"))
+    return ["design", kind_of_design(name), f"{study}/{DESIGNS}/{name}.toml",
+            f"--out={study}/{DESIGNS}/{name}.json"]  # fmt: skip
+
+
+def _passive(study: str, options: Options) -> list[str]:
+    """Return the command that finds the best constant voltage on the motions of a closed loop."""
+    sets = options.get("sets", [])
+    if not isinstance(sets, list) or not all(isinstance(one, str) for one in sets):
+        raise RequestError(f"sets: {written(sets)}; a list of NAME=VALUE is right.")
+    for one in sets:
+        if not _SET.fullmatch(one):
+            raise RequestError(f"sets: {written(one)}; NAME=VALUE is right.")
+    words = ["optimise", "passive", "--intensities", *(f"{one:g}" for one in INTENSITIES)]
+    words += ["--grid", "33", f"--out={study}/{DESIGNS}/passive", "--no-figure"]
+    return [*words, *(word for one in sets for word in ("--set", one))]
+
+
 def _export_ssp(study: str, options: Options) -> list[str]:
     """Return the command that packs a scenario which `bristle export` wrote."""
     file = file_name(options.get("scenario"), "the scenario")
@@ -216,6 +238,7 @@ COMMANDS: dict[str, Callable[[str, Options], list[str]]] = {
     "add": _add,
     "auto": _auto,
     "check": _check,
+    "design": _design,
     "diagnose": _diagnose,
     "example": _example,
     "export": _simple("export"),
@@ -223,6 +246,7 @@ COMMANDS: dict[str, Callable[[str, Options], list[str]]] = {
     "identify": _identify,
     "learn": _simple("learn"),
     "new": _new,
+    "passive": _passive,
     "plan": _plan,
     "report": _simple("report"),
     "reveal": _simple("example", "reveal"),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..compare.names import site_name
+from ..data.files import read_json
 from ..diagnose.law_text import HEADER, law_table
 from ..diagnose.verdict_text import (
     HEADINGS,
@@ -42,7 +43,35 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     study = Study(folder)
     verdict = study.verdict()
     told = {"verdict": None} if verdict is None else {"verdict": shown(verdict)}
-    return {**told, "plans": [_plan(one) for one in sorted(folder.glob("plan*")) if one.is_dir()]}
+    return {
+        **told, "learned": learned(study),
+        "plans": [_plan(one) for one in sorted(folder.glob("plan*")) if one.is_dir()],
+    }  # fmt: skip
+
+
+def learned(study: Study) -> list[dict[str, Any]]:
+    """Return the curves that were learned from a study's runs and whose effects it still has.
+
+    Each with the half of its 95 % interval and the closed form nearest to it, as `bristle learn`
+    left them in reports/; without numbers where what was learned is no curve.
+    """
+    found = []
+    for file in sorted(study.reports_folder.glob("*.json")):
+        if not (study.effects_folder / f"{file.stem}.py").is_file():
+            continue
+        told = read_json(file)
+        one: dict[str, Any] = {"name": file.stem, "sentences": list(told.get("sentences") or [])}
+        if told.get("forms"):
+            nearest = told.get("nearest") or {}
+            one |= {key: np.array(told[key], dtype=float) for key in ("knots", "values")}
+            one |= {
+                "half": 1.96 * np.array(told["std"], dtype=float), "along": told["along"],
+                "unit": told["unit"], "along_unit": told["along_unit"],
+                "form": told["forms"][0]["formula"],
+                "nearest": {key: np.array(values) for key, values in nearest.items()},
+            }  # fmt: skip
+        found.append(one)
+    return found
 
 
 def shown(verdict: Mapping[str, Any]) -> dict[str, Any]:

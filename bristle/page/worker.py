@@ -23,15 +23,18 @@ VIEWS = {
     "check": "check_view",
     "columns": "columns_view",
     "data": "data_view",
+    "design": "design_view",
     "errors": "errors_view",
     "fit": "fit_view",
     "history": "history_view",
+    "loops": "design_view.loops",
     "module": "module_view",
     "numbers": "simulate_view.numbers",
     "scenarios": "scenarios_view",
     "simulate": "simulate_view",
     "spectrum": "simulate_view.spectrum",
     "verdict": "verdict_view",
+    "weights": "design_view.weights",
 }
 """Modules with `answer(folder, arguments)`, or another function that is named.
 

@@ -10,6 +10,8 @@ from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..compare.names import site_name
 from ..diagnose.bench import BenchRuns
 from ..diagnose.equilibrium import BuildingRuns
@@ -33,6 +35,9 @@ from .rig import building_of
 from .study import Study
 
 Runs = BenchRuns | BuildingRuns
+
+DRAWN = 400
+"""Points of a closed form that a page draws."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +124,13 @@ class LearnedEffect:
             for name, value, unit in self.closed.formula.parameters
         ]
 
+    def _nearest(self, curve: Curve) -> dict[str, list[float]]:
+        """Return the best closed form along its signal, to draw it; empty where there is none."""
+        if not self.forms:
+            return {}
+        along = np.linspace(curve.knots[0], curve.knots[-1], DRAWN)
+        return {"along": along.tolist(), "values": self.forms[0].at(along).tolist()}
+
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
         found = self.found
@@ -140,6 +152,7 @@ class LearnedEffect:
                      "left": one.left}
                     for one in self.forms[:3]
                 ],
+                "nearest": self._nearest(curve),
                 "others": [
                     {"part": one.curve.part, "along": one.curve.along, "z": one.trial.z,
                      "z_train": one.trial.train}

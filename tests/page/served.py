@@ -6,7 +6,7 @@ import http.client
 import json
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -58,7 +58,8 @@ class Client:
                     connection.putheader(name, value)
             if data is not None and "Content-Length" not in known:
                 connection.putheader("Content-Length", str(len(data)))
-            connection.endheaders(data)
+            with suppress(BrokenPipeError):  # a body that is refused is not read to its end
+                connection.endheaders(data)
             answer = connection.getresponse()
             return Answered(answer.status, dict(answer.getheaders()), answer.read())
         finally:

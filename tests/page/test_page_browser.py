@@ -21,7 +21,7 @@ from study.made import write_runs
 from bristle.study import Study, create_study
 
 ROOT = Path(__file__).resolve().parents[2]
-VIEWS = ("home", "data", "fit", "errors", "verdict", "history", "hand_on", "simulate")
+VIEWS = ("home", "data", "fit", "errors", "verdict", "history", "hand_on", "simulate", "design")
 AXE = "axe-core@4.10.3"
 SERIOUS = ("serious", "critical")
 
@@ -171,6 +171,9 @@ def test_the_hour_on_an_example_from_its_making_to_a_running_fmu(tmp_path: Path)
         assert Study(home / "example_bench").verdict() is None
         page.get_by_role("button", name="Diagnose", exact=True).click()
         page.get_by_role("button", name="Cancel").wait_for()
+        page.get_by_role("heading", name=re.compile("What remains of the cost")).wait_for(
+            timeout=300_000
+        )
         page.reload()  # in the middle of a diagnosis
         page.get_by_role("button", name="Cancel").wait_for(timeout=60_000)
         other = page.context.new_page()
@@ -312,4 +315,25 @@ def test_the_page_and_the_server_compute_the_same(home: Path) -> None:
         assert found["rows"][0] == found["rows"][1] == 17501
         assert found["curves"] < 1e-6  # the server's curves are sent as 32-bit floats
         assert found["peaks"] < 1e-10
+        assert not seen.errors
+
+
+@pytest.mark.slow
+def test_weights_are_moved_solved_and_the_closed_loop_is_drawn(home: Path) -> None:
+    with page_on(home) as client, shots.chromium(400) as page:
+        seen = Watched(page, client)
+        page.goto(client.server.address.partition("#")[0] + "#/rig/design")
+        page.get_by_role("heading", name="Not solved yet").wait_for(timeout=120_000)
+        slider = page.locator(r"#weight-acceleration\.corner")
+        slider.focus()
+        page.keyboard.press("End")
+        assert "200 rad/s" in page.locator("form .slider").nth(1).inner_text()
+        page.keyboard.press("Home")
+        page.locator("form").get_by_text("1 rad/s", exact=True).wait_for()
+        seen.press("As it begins")
+        seen.press("Solve")
+        page.get_by_role("heading", name=re.compile(r"Gamma is 6\.0")).wait_for(timeout=120_000)
+        page.get_by_role("row", name=re.compile("0.6 g, damper.force")).wait_for(timeout=120_000)
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
+        assert (home / "rig" / "design" / "hinf_1.json").is_file()
         assert not seen.errors

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -111,7 +113,30 @@ def test_view_2_has_values_with_half_of_their_intervals(home: Path, tmp_path: Pa
 
 
 def test_view_4_says_that_nothing_was_diagnosed(home: Path) -> None:
-    assert verdict_view.answer(home / "rig", {}) == {"verdict": None, "plans": []}
+    assert verdict_view.answer(home / "rig", {}) == {
+        "verdict": None, "learned": [], "plans": [],
+    }  # fmt: skip
+
+
+def test_view_4_draws_what_was_learned_with_its_interval(home: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(home / "rig", tmp_path / "rig"))
+    (folder / "effects" / "learned_1.py").write_text("")
+    told = {
+        "name": "learned_1", "sentences": ["learned_1 is a curve."], "along": "displacement",
+        "unit": "N", "along_unit": "m", "knots": [-0.01, 0.0, 0.01], "values": [-1.0, 0.0, 1.0],
+        "std": [0.1, 0.05, 0.1], "forms": [{"formula": "c s", "name": "line"}],
+        "nearest": {"along": [-0.01, 0.01], "values": [-1.0, 1.0]},
+    }  # fmt: skip
+    (folder / "reports").mkdir(exist_ok=True)
+    (folder / "reports" / "learned_1.json").write_text(json.dumps(told))
+    (folder / "reports" / "gone.json").write_text(json.dumps(told))  # its effect was taken out
+    (one,) = unpack(pack(verdict_view.answer(folder, {})))["learned"]
+    assert (one["name"], one["form"]) == ("learned_1", "c s")
+    assert one["half"] == pytest.approx([0.196, 0.098, 0.196], rel=1e-6)
+    assert one["nearest"]["values"].tolist() == [-1.0, 1.0]
+    (folder / "reports" / "learned_1.json").write_text(json.dumps({**told, "forms": []}))
+    (one,) = verdict_view.answer(folder, {})["learned"]
+    assert "knots" not in one  # a mode is no curve
 
 
 def test_view_5_has_the_steps_and_what_can_be_added(home: Path) -> None:

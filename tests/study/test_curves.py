@@ -85,7 +85,13 @@ def test_a_learned_curve_is_an_effect_of_the_study(study, learned):
     assert "a spring of 300 N/m" in second
     # bristle made the file here: its text needs no consent, and the next one has another name.
     assert study.usable_effects() == []
-    assert json.loads(json.dumps(found.as_dict()))["forms"][0]["name"] == "line"
+    told = json.loads(json.dumps(found.as_dict()))
+    assert told["forms"][0]["name"] == "line"
+    ends = np.array(told["knots"])[[0, -1]]
+    assert np.array(told["nearest"]["along"])[[0, -1]] == pytest.approx(ends)
+    assert np.array(told["nearest"]["values"]) == pytest.approx(
+        found.forms[0].at(np.array(told["nearest"]["along"]))
+    )
     again = learn_effect(study)
     assert again.file is not None
     assert again.file.name == "learned_2.py"

@@ -13,10 +13,10 @@ const VIEWS = [
   ["history", "Add and compare"],
   ["hand_on", "Hand on"],
   ["simulate", "Simulate"],
+  ["design", "Design"],
 ];
 const AT_WORK = ["running", "cancelling"];
-const OFTEN = 600; // ms between two looks at work that is going on
-const SELDOM = 4000;
+const [OFTEN, SELDOM] = [600, 4000]; // ms between two looks, at work that is going on and else
 
 const part = (id) => document.getElementById(id);
 

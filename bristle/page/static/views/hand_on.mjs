@@ -6,6 +6,7 @@ import { bytes, h, say, table, wrong } from "../dom.mjs";
 const GROUPS = [
   ["reports/", "Reports"],
   ["export/", "FMU, scenario and package"],
+  ["design/", "Controllers"],
   ["plan", "Next tests"],
   ["", "The study itself"],
 ];

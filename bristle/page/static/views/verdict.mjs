@@ -15,6 +15,7 @@ export async function show(page) {
     orders(page, verdict),
     verdict ? evidence(verdict) : empty("Not diagnosed",
       "Diagnose puts every effect into the model, refits it, and judges each on the held-out runs. It names the effect that is missing, a few that the data cannot distinguish, or none."),
+    learned(found.learned),
     plans(page, found, verdict),
   ];
 }
@@ -43,7 +44,7 @@ function orders(page, verdict) {
     verdict ? h("a", { href: page.link("history") }, verdict.effects.length ? `Next: add ${verdict.effects.join(", ")}` : "Next: the history") : null);
 }
 
-/** While a diagnosis works: which effects are tried, as it tells. */
+/** While a diagnosis works: a bar for each effect that was tried, which falls as it explains more. */
 function trials(page) {
   const whole = h("section", { "aria-live": "off" });
   page.onJobs(() => {
@@ -52,21 +53,60 @@ function trials(page) {
       whole.replaceChildren();
       return;
     }
-    const lines = page.lines.get(job.number) ?? [];
-    const tried = lines.map((line) => /^(effect|law|refining effect) (\d+) of (\d+), ([\w.]+)(?:; best so far (\w+))?/.exec(line)).filter(Boolean);
-    const last = tried.at(-1);
-    if (!last) {
+    const tried = tell(page.lines.get(job.number) ?? []);
+    if (!tried.last) {
       whole.replaceChildren(h("p", { class: "loading" }, `${job.now || "Beginning"} …`));
       return;
     }
-    const [, kind, at, of] = last;
-    const best = tried.findLast((one) => one[5])?.[5];
+    const { last, rest, held } = tried;
+    const names = [...rest.keys()].sort((one, other) => rest.get(one) - rest.get(other));
     whole.replaceChildren(
-      h("h2", {}, kind === "law" ? "Laws are tried" : "Effects are tried"),
-      bars("progress", [{ name: `${at} of ${of}`, value: Number(at), strong: true, text: last[4] }], { most: Number(of) }),
-      best ? h("p", {}, "Best so far: ", h("strong", {}, best)) : null);
+      h("h2", {}, last.kind === "law" ? "Laws are tried" : "Effects are tried"),
+      bars("progress", [{ name: `${last.kind}, ${last.at} of ${last.of}`, value: Number(last.at), strong: true, text: last.name }], { most: Number(last.of) }),
+      names.length ? h("h3", {}, "What remains of the cost on the training runs with each effect") : null,
+      names.length ? bars("cost that remains with each effect", names.map((name, k) => ({
+        name, value: rest.get(name), strong: k === 0, text: held.has(name) ? `${rest.get(name)} % · z = ${held.get(name)} held out` : `${rest.get(name)} %`,
+      })), { most: 100, edge: 100 }) : null,
+      names.length ? h("p", { class: "soft small" }, "Green line: the model as it is. Blue: what remains least so far. Held-out runs decide.") : null);
   });
   return whole;
+}
+
+/** Returns what the lines of a diagnosis tell of the present search: cost that remains, z held out. */
+function tell(lines) {
+  const [rest, held] = [new Map(), new Map()];
+  let last = null;
+  for (const line of lines) {
+    const found = /^(effect|law|refining effect) (\d+) of (\d+), ([\w.]+)(?:; ([\d.e+-]+) % of the cost)?(?:; z ([\d.e+-]+))?/.exec(line);
+    if (!found) continue;
+    const [, kind, at, of, name, share, z] = found;
+    if (kind === "effect" && at === "1") for (const map of [rest, held]) map.clear(); // another search begins
+    if (share !== undefined) rest.set(name, Number(share));
+    if (z !== undefined) held.set(name, z);
+    last = { kind, at, of, name };
+  }
+  return { last, rest, held };
+}
+
+/** The curves that were learned: values with their 95 % interval, and the nearest closed form. */
+function learned(found) {
+  if (!found.length) return null;
+  return h("section", {}, h("h2", {}, "What was learned"), found.map((one) => {
+    if (!one.knots) return h("div", {}, h("h3", {}, one.name), one.sentences.map((text) => h("p", {}, text)));
+    const [[fx, ux], [fy, uy]] = [shown(one.along_unit), shown(one.unit)];
+    const low = one.values.map((value, k) => value - one.half[k]);
+    const high = one.values.map((value, k) => value + one.half[k]);
+    const picture = new Plot("", `${one.name}: the learned curve over ${one.along}, with its 95 % interval and the nearest closed form`, (p) => {
+      p.axes(extent([one.knots], 0.02, fx), extent([low, high], 0.06, fy), `${one.along}${ux ? ` [${ux}]` : ""}`, uy);
+      p.between(one.knots, (k) => low[k], (k) => high[k], "floor", { fx, fy });
+      p.line(one.knots, one.values, "blue", { fx, fy, width: 1.8 });
+      p.dots(one.knots, one.values, "blue", { fx, fy, size: 4 });
+      if (one.nearest.along) p.line(one.nearest.along, one.nearest.values, "red", { fx, fy, width: 1.4, dash: [6, 4] });
+    });
+    return h("figure", {}, h("h3", {}, one.name), picture.canvas,
+      key(["blue", "learned"], ["floor", "95 % interval", true], ["red", `nearest form: ${one.form}`]),
+      one.sentences.map((text) => h("p", {}, text)));
+  }));
 }
 
 function evidence(verdict) {

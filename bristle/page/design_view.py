@@ -1,0 +1,252 @@
+"""View 8, Design: what is weighed, what the solves found, and the closed loop on three motions."""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..batch.passive import OUTPUT, G
+from ..batch.passive import SCENARIO as PASSIVE
+from ..data.files import read_json
+from ..design import implausible, task_from_data
+from ..design.responses import task_curves
+from ..errors import ScenarioError, StudyError
+from ..physics.drive import VOLTAGE
+from ..physics.law import base_and_variant
+from ..scenario.scenario import Scenario
+from ..simulate.coupled import simulate
+from ..study.study import Study
+from .asked import Asked, damper_of
+from .designs import (
+    FIELDS,
+    FOLDER,
+    INTENSITIES,
+    KINDS,
+    content_of,
+    design_name,
+    kind_of_design,
+    names_of,
+    values_of,
+)
+
+TABLE = "passive/passive.csv"
+"""What `bristle optimise passive` leaves in the folder of designs."""
+ROWS = 3000
+"""Rows of a response that are sent: a screen has fewer columns."""
+JUDGED = (OUTPUT, "structure.base_displacement", "damper.force")
+
+
+def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what view 8 shows of a study before its closed loops.
+
+    Parameters
+    ----------
+    folder : of the study
+    arguments : none are taken
+
+    Raises
+    ------
+    StudyError
+        If a file of the study is wrong.
+    """
+    study = Study(folder)
+    solves = []
+    for name in names_of(folder):
+        solved = folder / FOLDER / f"{name}_answer.json"
+        if solved.is_file():  # it is not where the solver found none, or was cancelled
+            found = read_json(solved)
+            with (folder / FOLDER / f"{name}.toml").open("rb") as file:
+                values = values_of(tomllib.load(file))
+            solves.append({"name": name, "values": values, **_solve(found)})
+    return {
+        "law": study.model(to_show=True).law, "kinds": list(KINDS), "refused": refused(study),
+        "fields": [{"name": name, **one._asdict()} for name, one in FIELDS.items()],
+        "solves": solves, "passive": (folder / FOLDER / TABLE).is_file(),
+        "sets": _sets(folder), "intensities": list(INTENSITIES),
+    }  # fmt: skip
+
+
+def weights(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a task weighs, before it is solved, and what looks unmeant in it.
+
+    Parameters
+    ----------
+    folder : of the study
+    arguments : `kind` and `values`, as for `content_of`
+
+    Raises
+    ------
+    DesignError, RequestError
+        If the task is wrong.
+    """
+    kind, values = arguments.get("kind"), arguments.get("values", {})
+    task = task_from_data(content_of(kind, values, building_of(folder), ""), folder, "design")
+    return {**task_curves(task), "warnings": implausible(task)}
+
+
+def loops(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the closed loop of a design on three motions, and the best constant voltage's.
+
+    Parameters
+    ----------
+    folder : of the study
+    arguments : `name` of the design
+
+    Raises
+    ------
+    ScenarioError
+        If the study's damper cannot act in the scenario, or nothing is designed for it.
+    DesignError
+        If the controller does not belong to its building.
+    """
+    name = design_name(arguments.get("name"))
+    if why := refused(Study(folder)):
+        raise ScenarioError(f"{folder.name}: {why}")
+    kind = kind_of_design(name)
+    found = []
+    best = _best(folder)
+    for k, intensity in enumerate(INTENSITIES):
+        runs = [("controlled", _controlled(folder, name, kind, intensity))]
+        if best:
+            runs.append(("passive", _passive(folder, best[k], intensity)))
+        row: dict[str, Any] = {"intensity": intensity, "voltage": best[k] if best else None}
+        found.append(row | {key: _response(asked) for key, asked in runs})
+    return {"name": name, "motions": found}
+
+
+def refused(study: Study) -> str:
+    """Return why the page designs nothing for a study, "" where it does."""
+    if study.settings.device:
+        return (
+            f"its damper is {study.settings.device}, not the one on the first level, which the "
+            "stock scenarios command. Write a design file with `device`: see docs/design.md."
+        )
+    model = study.model(to_show=True)
+    if model.drive != VOLTAGE.name:
+        return f"its damper is driven by a {model.drive}; a controller commands a voltage."
+    return ""
+
+
+def building_of(folder: Path) -> str:
+    """Return the file of a study's building relative to its folder, "" where it has none."""
+    return Study(folder).model(to_show=True).building
+
+
+def _solve(found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return gamma, norms and margins of a solve, and its curves as arrays."""
+    facts, curves = found["facts"], found["curves"]
+    margins = {k: v for k, v in found["margins"].items() if k != "speeds"}
+    return {
+        "kind": found["kind"], "gamma": facts["gamma"],
+        "norm": facts.get("norm", facts.get("largest_norm", facts.get("largest_row_norm"))),
+        "states": found["states"], "proved": facts.get("share_proved"),
+        "margins": margins, "frequency": np.array(curves["frequency"]),
+        "speeds": [
+            {
+                key: np.array(one) if isinstance(one, list) else one
+                for key, one in speed.items()
+            }
+            for speed in curves["speeds"]
+        ],
+    }  # fmt: skip
+
+
+def _house(folder: Path) -> dict[str, Any]:
+    """Return what makes the structure of a scenario the study's building, as overrides."""
+    building = building_of(folder)
+    return {"structure.building": f"{folder.name}/{building}"} if building else {}
+
+
+def _sets(folder: Path) -> list[str]:
+    """Return the words of --set that give a scenario the study's damper and building."""
+    try:
+        asked = Asked(folder.parent, PASSIVE, {**damper_of(folder.parent, PASSIVE, folder.name)})
+    except ScenarioError:
+        return []
+    return Asked(folder.parent, PASSIVE, {**asked.overrides, **_house(folder)}).sets()
+
+
+def _controlled(folder: Path, name: str, kind: str, intensity: float) -> Asked:
+    scenario = KINDS[kind]
+    overrides = {
+        **damper_of(folder.parent, scenario, folder.name), **_house(folder),
+        "controller.controller": f"{folder.name}/{FOLDER}/{name}.json",
+        "ground.peak": _peak(intensity),
+    }  # fmt: skip
+    asked = Asked(folder.parent, scenario, overrides)
+    if kind == "hinf":
+        asked = Asked(folder.parent, scenario, {**overrides, **_inverse(folder, asked)})
+    return asked
+
+
+def _inverse(folder: Path, asked: Asked) -> dict[str, Any]:
+    """Return what makes the inverse of a force controller that of the study's law, as overrides."""
+    model = Study(folder).model()
+    law = base_and_variant(model.law)[0].name
+    known = asked.load().component("controller").description.variables
+    here = {
+        f"{law}.{name}": float(f"{value:.6g}")
+        for name, value in model.at("damper", not model.building).values().items()
+    }
+    own = {name: value for name, value in here.items() if name in known}
+    if not own:
+        raise ScenarioError(
+            f"{folder.name}: the law {law} has no inverse, which a force controller needs; an LPV "
+            "controller commands the voltage itself."
+        )
+    return {
+        "controller.inverse": law, **{f"controller.{name}": value for name, value in own.items()}
+    }  # fmt: skip
+
+
+def _passive(folder: Path, voltage: float, intensity: float) -> Asked:
+    overrides = {
+        **damper_of(folder.parent, PASSIVE, folder.name), **_house(folder),
+        "voltage.level": voltage, "ground.peak": _peak(intensity),
+    }  # fmt: skip
+    return Asked(folder.parent, PASSIVE, overrides)
+
+
+def _peak(intensity: float) -> float:
+    return round(intensity * G, 9)
+
+
+def _response(asked: Asked) -> dict[str, Any]:
+    scenario = asked.load()
+    columns = simulate(scenario)
+    every = -(-len(columns["time"]) // ROWS)
+    return {
+        "command": asked.run(), "time": columns["time"][::every],
+        "values": columns[OUTPUT][::every], "unit": "m/s2",
+        "peaks": {name: float(np.max(np.abs(columns[name]))) for name in JUDGED},
+        "units": {name: _unit(scenario, name) for name in JUDGED},
+    }  # fmt: skip
+
+
+def _unit(scenario: Scenario, name: str) -> str:
+    component, _, port = name.partition(".")
+    return scenario.component(component).description.variables[port].unit or ""
+
+
+def _best(folder: Path) -> list[float]:
+    """Return the best constant voltage [V] of each motion in the table that the command wrote.
+
+    Empty where there is none, or where it is of other motions.
+    """
+    path = folder / FOLDER / TABLE
+    if not path.is_file():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file))
+    try:
+        table = np.array(rows[1:], dtype=float)
+    except ValueError as error:
+        raise StudyError(f"{path}: {error}; `bristle optimise passive` writes it anew.") from None
+    if table.ndim != 2 or table.shape[1] != 1 + len(INTENSITIES):
+        return []
+    return [float(table[k, 0]) for k in table[:, 1:].argmin(axis=0)]

@@ -1,0 +1,186 @@
+"""View 8: design files of the page's numbers, what they weigh, and the closed loop of a solve."""
+
+from __future__ import annotations
+
+import json
+import shlex
+import tomllib
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from page.served import page_on
+from study.made import write_runs
+
+import bristle
+from bristle.design import read_task
+from bristle.errors import StudyError
+from bristle.page import design_view
+from bristle.page.commands import order_of
+from bristle.page.designs import FIELDS, content_of, design_name, names_of, values_of, write_design
+from bristle.page.message import RequestError
+from bristle.page.packing import unpack
+from bristle.page.worker import answer
+from bristle.scenario.scenario import load_scenario, parse_overrides
+from bristle.study import Study, create_study
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("designed")
+    create_study(folder / "rig", write_runs(folder / "lab", 3, seconds=3.0), law="bingham")
+    return folder
+
+
+def test_the_numbers_of_the_form_are_those_of_the_task(home: Path) -> None:
+    values = {"acceleration.gain": 3.0, "command.pole": 80.0, "noise": 0.02, "tau": 1.5}
+    name = write_design(home / "rig", "hinf", values, "")
+    file = home / "rig" / "design" / f"{name}.toml"
+    task = read_task(file)
+    assert (task.kind, task.tau, task.weights.noise) == ("hinf", 1.5, 0.02)
+    assert task.weights.acceleration.numerator == (3.0 * 12.0,)
+    assert task.weights.command.denominator == (1.0, 80.0)
+    assert task.damper.law == "bingham"
+    kept = values_of(tomllib.loads(file.read_text()))
+    assert kept == {**{key: one.value for key, one in FIELDS.items()}, **values}
+    assert content_of("hinf", values, "tower.toml")["building"] == "../tower.toml"
+
+
+def test_every_solve_is_a_design_file_of_its_own(tmp_path: Path) -> None:
+    made = [write_design(tmp_path, kind, {}, "") for kind in ("lpv", "hinf", "lpv")]
+    assert made == names_of(tmp_path) == ["lpv_1", "hinf_2", "lpv_3"]
+
+
+def test_bounds_hold_where_the_form_begins() -> None:
+    assert all(one.low < one.value < one.high for one in FIELDS.values())
+
+
+@pytest.mark.parametrize(
+    ("kind", "values", "words"),
+    [
+        ("pid", {}, "kind"),
+        (None, {}, "kind"),
+        ("hinf", [], "NAME to number"),
+        ("hinf", {"gain": 1.0}, "gain"),
+        ("hinf", {"tau": "2"}, "tau"),
+        ("hinf", {"tau": True}, "tau"),
+        ("hinf", {"tau": float("nan")}, "tau"),
+        ("hinf", {"noise": 0.0}, "0.001 to 1"),
+    ],
+)
+def test_what_is_no_number_of_a_design_is_refused(kind: object, values: Any, words: str) -> None:
+    with pytest.raises(RequestError, match=words):
+        content_of(kind, values, "")
+
+
+@pytest.mark.parametrize("name", ["", None, "hinf", "hinf_1.toml", "../hinf_1", "pid_1", "hinf_x"])
+def test_what_is_no_name_of_a_design_is_refused(name: object) -> None:
+    with pytest.raises(RequestError, match="hinf_1"):
+        design_name(name)
+
+
+@pytest.mark.parametrize(
+    "sets",
+    ["a=1", [1], ["--out=/tmp/x"], ["a"], ["a=../x"], ["a=/x"], ["a=b/.x"], ["a=1\n--out=x"]],
+)
+def test_what_is_no_value_of_a_scenario_is_refused(sets: object) -> None:
+    with pytest.raises(RequestError, match="sets"):
+        order_of("passive", "rig", {"sets": sets})
+
+
+def test_the_commands_are_those_of_a_terminal(home: Path) -> None:
+    assert order_of("design", "rig", {"name": "lpv_3"}).shown == (
+        "bristle design lpv rig/design/lpv_3.toml --out=rig/design/lpv_3.json"
+    )
+    sets = design_view.answer(home / "rig", {})["sets"]
+    order = order_of("passive", "rig", {"sets": [*sets, "ground.peak=-1.5e-3"]})
+    assert order.shown.startswith("bristle optimise passive --intensities 0.2 0.4 0.6 --grid 33")
+    assert "--set damper.fmu=BinghamDamper" in order.shown
+
+
+def test_weights_are_those_of_the_task(home: Path) -> None:
+    asked = {"kind": "lpv", "values": {"acceleration.gain": 2.0, "acceleration.corner": 20.0}}
+    shown = design_view.weights(home / "rig", asked)
+    turn = 2.0 * np.pi * shown["frequency"]
+    right = 2.0 * 20.0 / np.sqrt(turn**2 + 20.0**2)
+    assert shown["acceleration_weight"] == pytest.approx(right, rel=1e-12)
+    assert shown["warnings"] == []
+    cheap = {"kind": "hinf", "values": {"command.gain": 0.05, "acceleration.gain": 20.0}}
+    assert design_view.weights(home / "rig", cheap)["warnings"]
+
+
+def test_a_study_of_another_device_is_refused(home: Path) -> None:
+    study = Study(home / "rig")
+    assert design_view.refused(study) == ""
+    study.settings = replace(study.settings, device="brace")
+    assert "brace" in design_view.refused(study)
+
+
+def test_designs_are_written_over_http_and_shown_unsolved(home: Path) -> None:
+    with page_on(home, start=False) as client:
+        assert client.post("/api/studies/rig/design", {"kind": "pid"}).status == 400
+        asked = {"kind": "lpv", "values": {"tau": 3.0}}
+        made = client.post("/api/studies/rig/design", asked)
+        assert made.status == 201
+    name = made.json["name"]
+    assert (home / "rig" / "design" / f"{name}.toml").is_file()
+    told, body = answer("design", home / "rig", {})
+    assert told["ok"], told
+    shown = unpack(body)
+    assert (shown["law"], shown["refused"], shown["passive"]) == ("bingham", "", False)
+    assert name not in {one["name"] for one in shown["solves"]}
+    told, _ = answer("loops", home / "rig", {"name": "../x"})
+    assert "no name of one" in told["error"]
+
+
+def test_weights_are_drawn_before_the_study_has_a_folder_of_designs(tmp_path: Path) -> None:
+    create_study(tmp_path / "new", write_runs(tmp_path / "lab", 3, seconds=3.0), law="bingham")
+    assert not (tmp_path / "new" / "design").exists()
+    shown = design_view.weights(tmp_path / "new", {"kind": "hinf", "values": {}})
+    assert len(shown["frequency"]) == len(shown["command_weight"]) > 500
+    assert design_view.answer(tmp_path / "new", {})["solves"] == []
+
+
+def test_a_table_of_voltages_that_is_no_table_says_so(tmp_path: Path) -> None:
+    file = tmp_path / "design" / "passive" / "passive.csv"
+    file.parent.mkdir(parents=True)
+    file.write_text("voltage [V],a,b,c\n0.0,3.0,1.0,2.0\n1.0,2.0,1.5,2.5\n2.0,2.5,0.5,3.0\n")
+    assert design_view._best(tmp_path) == [1.0, 2.0, 0.0]
+    file.write_text("voltage [V],a\n0.0,3.0\n")
+    assert design_view._best(tmp_path) == []  # of other motions
+    file.write_text("voltage [V],a,b,c\n0.0,x,1.0,2.0\n")
+    with pytest.raises(StudyError, match="optimise passive"):
+        design_view._best(tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["hinf", "lpv"])
+def test_a_solve_acts_in_the_building_as_the_command_says(
+    home: Path, kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with page_on(home) as client:
+        made = client.post("/api/studies/rig/design", {"kind": kind, "values": {}}).json["name"]
+        job = client.run("design", "rig", name=made)
+        assert job["state"] == "done", job
+        sets = unpack(client.get("/api/studies/rig/design").body)["sets"]
+        assert client.run("passive", "rig", 300.0, sets=sets)["state"] == "done"
+        shown = unpack(client.get("/api/studies/rig/design").body)
+        (solve,) = [one for one in shown["solves"] if one["name"] == made]
+        told = json.loads((home / "rig" / "design" / f"{made}_answer.json").read_text())
+        assert solve["gamma"] == told["facts"]["gamma"]
+        assert solve["margins"]["modulus"] == told["margins"]["modulus"]
+        loops = unpack(client.get(f"/api/studies/rig/loops?name={made}").body)["motions"]
+    assert [one["intensity"] for one in loops] == [0.2, 0.4, 0.6]
+    monkeypatch.chdir(home)
+    for run in (loops[0]["controlled"], loops[1]["passive"]):
+        words = shlex.split(run["command"])
+        given = parse_overrides([b for a, b in pairwise(words) if a == "--set"])
+        assert load_scenario(words[2], given)
+        frame = bristle.run(words[2], given, engine="compiled")
+        for name, peak in run["peaks"].items():
+            assert peak == pytest.approx(float(frame[name].abs().max()), rel=1e-12)
+    for one in loops:  # the best constant voltage is no worse than another
+        assert 0.0 <= one["voltage"] <= 8.0
