@@ -32,6 +32,7 @@ _SCRIPT = """
     newColours();
     redraw();
   };
+  document.querySelector(".linked").hidden = false;
   dark.addEventListener("change", theme);
   theme();
   document.getElementById("linked").append(new Linked(JSON.parse(head, whole)).nodes());
@@ -76,7 +77,7 @@ def linked_section(found: Comparison, most: int = MOST) -> str:
         "map, with the pointer or the arrow keys: the other pictures show the same samples."
     )
     return "\n".join([
-        '<section class="linked">',
+        '<section class="linked" hidden>',  # until the script runs: some readers let none run
         "<h2>Look closer</h2>",
         html.paragraphs(text),
         f"<style>{_STYLE}</style>",

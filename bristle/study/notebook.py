@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..data.checks.finding import grouped, sentence
+from ..data.equation import equations
 from ..draw import html
 from ..draw.figure import DPI
 from ..draw.style import Page, percent, png, short_z
@@ -35,7 +36,7 @@ _HELD = ("exponent", "mass", "which")
 
 
 def identified_html(found: Identified) -> str:
-    """Return an identification as HTML: parameters with intervals, errors, and its picture."""
+    """Return an identification as HTML: equations, parameters, errors, and its picture."""
     title = " + ".join([found.model.law, *found.model.effects])
     rows = [
         [
@@ -58,6 +59,7 @@ def identified_html(found: Identified) -> str:
     header = ["runs", "error / noise (z)", f"RMS error [N]{low}", "of the force"]
     return html.fragment(
         title,
+        *(html.formula(one.intervals) for one in equations(found.model)),
         html.table(["parameter", "value", "95 % interval", "unit"], rows, numbers=(1, 2)),
         html.table(header, errors, numbers=(1, 2, 3)),
         _forms(found),

@@ -104,6 +104,7 @@ class Page {
     part("black").hidden = Object.keys(this.measured).length === 0;
     this.addSliders();
     for (const [id, name] of Object.entries(this.first())) this.addChoice(id, name);
+    this.loopFirst();
     window.addEventListener("resize", () => this.show());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.show());
     part("back").addEventListener("click", () => this.back());
@@ -119,6 +120,13 @@ class Page {
     const force = like(".force") ?? names[names.length - 1];
     const compared = Object.keys(this.measured)[0];
     return { first: compared ?? top ?? force, second: moved, across: moved, along: force };
+  }
+
+  /** Puts the loop before the curves where there is no building: a damper is known by its loop. */
+  loopFirst() {
+    const building = this.scenario.description.outputs.some((one) => one.name.endsWith("_acceleration_absolute"));
+    const loop = part("loop-picture").closest("figure");
+    if (!building) loop.parentElement.prepend(loop);
   }
 
   addChoice(id, chosen) {

@@ -51,6 +51,7 @@ def test_long_runs_are_thinned_so_that_a_report_stays_below_eight_megabytes(foun
 
 def test_nothing_is_fetched_and_the_modules_are_one_script(found):
     section = linked_section(found)
+    assert section.startswith('<section class="linked" hidden>')  # where no script runs
     assert "http" not in section
     assert not re.search(r"^(import|export) ", script(), re.MULTILINE)
     assert "</script" not in script()
@@ -75,6 +76,7 @@ def test_a_browser_shows_them_and_a_choice_in_one_is_told(found, tmp_path, theme
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.on("console", lambda m: errors.append(m.text) if m.type == "error" else None)
         page.goto(file.as_uri())
+        assert page.locator("section.linked").is_visible()
         canvases = page.locator("#linked canvas")
         assert canvases.count() == 5  # force and error over time, two loops, the map
         drawn = page.evaluate(

@@ -15,6 +15,7 @@ from made import bench_run, write_runs
 from matplotlib.figure import Figure
 
 import bristle
+from bristle.data.equation import equations
 from bristle.data.measurement import read_measurements
 from bristle.diagnose.faults import SensorFault
 from bristle.errors import (
@@ -336,6 +337,12 @@ def test_a_notebook_shows_a_table_and_a_picture(shown, kind):
     assert page.open == []
     assert {"table", "img"} <= set(page.tags)
     assert "script" not in page.tags
+
+
+def test_a_notebook_shows_the_equations_with_numbers(found):
+    shown = found._repr_html_()
+    assert shown.count("<math") == len(equations(found.model)) > 0
+    assert "<mi>sgn</mi>" in shown
 
 
 def test_the_force_budget_is_drawn_with_a_bar_for_each_part(found):
