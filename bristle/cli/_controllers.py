@@ -70,7 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def asked(arguments: argparse.Namespace) -> bool:
     """Return whether an option of a comparison of one's own is given."""
-    return any(getattr(arguments, name) is not None for name in OPTIONS)
+    return arguments.no_figure or any(getattr(arguments, name) is not None for name in OPTIONS)
 
 
 def main(arguments: argparse.Namespace) -> int:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import logging
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -182,12 +184,10 @@ class Bench:
         self.folder.write(file, ensemble_text(content, {**tables, "outputs": kept}))
         plan = read_ensemble(file)
         prepare(plan)
-        rows, failed = dict[int, tuple[float, ...]](), 0
-        for outcome in run_local(plan, range(plan.runs), min(self.workers, plan.runs)):
-            if outcome.reason:
-                failed += 1
-            else:
-                rows[outcome.run] = outcome.numbers
+        with quiet():
+            outcomes = list(run_local(plan, range(plan.runs), min(self.workers, plan.runs)))
+        rows = {one.run: one.numbers for one in outcomes if not one.reason}
+        failed = len(outcomes) - len(rows)
         names = {f"{o.statistic} {columns[o.column]}": o.name for o in self.outputs}
         titles = [names[one.name] for one in plan.outputs]
         frame = pd.DataFrame([rows[k] for k in sorted(rows)], index=sorted(rows), columns=titles)
@@ -219,6 +219,18 @@ class Bench:
             )
         found.index = volts
         return found
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep the runs' own warnings back: the tables tell where a run leaves the stroke."""
+    logger = logging.getLogger("bristle")
+    before = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 def _relative(file: Path, folder: Path) -> str:

@@ -150,8 +150,8 @@ class Maker:
         """Return a controller with a design of its own; `kept` is its file in the folder."""
         file = self.folder.path / FILES / Path(kept).name
         kind = read_controller(file).kind
-        where = f"{kind} design, {Path(kept).name}"
-        about = f"a {where}, made for this building by the comparison" if anew else f"a {where}"
+        about = f"a design of the kind {kind}, {Path(kept).name}"
+        about += ", made for this building by the comparison" if anew else ""
         source = {"fmu": component, "controller": kept}
         found = self._built_in(component, name, source, settings, about, carries=True, file=file)
         return replace(found, anew=anew)

@@ -15,7 +15,7 @@ from ..limit import limit
 from ..limit.case import case_of
 from ..resources import cache_folder
 from ..scenario.scenario import load_scenario
-from .cells import Bench
+from .cells import Bench, quiet
 from .entry import LIMIT, ON, Entry, constant
 from .folder import ABOVE, FILES, LIMITS, Part, plain_name
 from .motions import Motion
@@ -77,10 +77,12 @@ def limit_of(
     found, kept = _read(file), True
     if found is None:
         kept = False
-        one = limit(
-            load_scenario(bench.write(motion, constant(ON, bench.damper.most, ""))),
-            output=judged.column, statistic=judged.statistic, previews=(), starts=starts,
-        )  # fmt: skip
+        scenario = load_scenario(bench.write(motion, constant(ON, bench.damper.most, "")))
+        with quiet():
+            one = limit(
+                scenario, output=judged.column, statistic=judged.statistic, previews=(),
+                starts=starts,
+            )  # fmt: skip
         found = {
             "value": one.value, "bound": one.bound, "agreeing": one.agreeing,
             "starts": len(one.starts), "sure": bool(one.sure), "time": one.time.tolist(),

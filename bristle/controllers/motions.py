@@ -92,7 +92,8 @@ def _motion(choice: Choice, folder: Folder, step: float) -> Motion:
     return Motion(
         choice.label or _said(Path(record).stem if record not in names else record, values),
         Part({"fmu": "GroundMotion"}, {"record": own, **values}),
-        round(ceil(stop / step - 1e-9) * step, 9), scaled, motion.source,
+        round(ceil(stop / step - 1e-9) * step, 9), scaled,
+        motion.source if record in names else Path(record).name,
     )  # fmt: skip
 
 

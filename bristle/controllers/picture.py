@@ -55,7 +55,7 @@ def draw_summary(found: ControllerComparison) -> Page:
     if found.limits:
         said.append("Black bar: the limit.")
     height = _ROW * (len(names) + 1.4) * len(found.motions) + 0.9
-    page = Page(8.6, height, title, " ".join(said))
+    page = Page(8.6, height, _unbroken(title), " ".join(said))
     with look():
         axes = page.figure.add_subplot(page.grid(1, 1, left=2.3, right=0.4, top=0.3)[0, 0])
         left = 72.0 * 2.15
@@ -101,6 +101,11 @@ def draw_summary(found: ControllerComparison) -> Page:
     return page
 
 
+def _unbroken(title: str) -> str:
+    """Return a title whose numbers stay with their unit."""
+    return title.replace(" %", "\u00a0%")
+
+
 def draw_levels(found: ControllerComparison) -> Page:
     """Return the figure of constant voltages: what is judged over the voltage, a panel a motion."""
     judged = found.setting.judged
@@ -124,7 +129,7 @@ def draw_levels(found: ControllerComparison) -> Page:
             axes.plot(volts, values, color=GREY, linewidth=1.6)
             at = int(np.argmin(values.to_numpy()))
             axes.plot(volts[at], values.iloc[at], "o", markersize=8, markerfacecolor="white",
-                      markeredgecolor=INK)  # fmt: skip
+                      markeredgecolor=INK, clip_on=False, zorder=3)  # fmt: skip
             lines = {name: factor * found.value(motion, name) for name in found.controllers}
             if motion in found.limits:
                 lines[LIMIT] = factor * found.value(motion, LIMIT)
@@ -177,7 +182,7 @@ def draw_motion(found: ControllerComparison, motion: str) -> Page:
         f"Left: {judged.column.partition('.')[2].replace('_', ' ')} [{shown}]; grey: at the best "
         "constant voltage; dots: largest values. Right: voltage [V]."
     )
-    page = Page(8.6, 1.05 * len(names) + 0.6, title, subtitle)
+    page = Page(8.6, 1.05 * len(names) + 0.6, _unbroken(title), subtitle)
     with look():
         grid = page.grid(len(names), 2, left=0.5, column_gap=0.55, row_gap=0.34, top=0.3,
                          bottom=0.4, width_ratios=(1.9, 1.0))  # fmt: skip

@@ -54,6 +54,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     ("words", "said"),
     [
         (["--controller", "Skyhook"], "no ground motions"),
+        (["--no-figure"], "no controllers"),
         (["--motions", MOTION], "no controllers"),
         (["--motions", MOTION, "--controller", "LqgCliped"], 'Did you mean "LqgClipped"?'),
         (["--motions", "el_centra", "--controller", "Skyhook"], "el_centro_1940_ns"),
