@@ -13,9 +13,9 @@ import numpy as np
 from ..batch.passive import OUTPUT, G
 from ..batch.passive import SCENARIO as PASSIVE
 from ..data.files import read_json
-from ..design import implausible, task_from_data
+from ..design import implausible, read_task, task_from_data
 from ..design.responses import task_curves
-from ..errors import ScenarioError, StudyError
+from ..errors import DesignError, ScenarioError, StudyError
 from ..physics.drive import VOLTAGE
 from ..physics.law import base_and_variant
 from ..scenario.scenario import Scenario
@@ -62,11 +62,12 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
             found = read_json(solved)
             with (folder / FOLDER / f"{name}.toml").open("rb") as file:
                 values = values_of(tomllib.load(file))
-            solves.append({"name": name, "values": values, **_solve(found)})
+            older = _is_older(folder / FOLDER / f"{name}.toml", found)
+            solves.append({"name": name, "values": values, "older": older, **_solve(found)})
     return {
         "law": study.model(to_show=True).law, "kinds": list(KINDS), "refused": refused(study),
         "fields": [{"name": name, **one._asdict()} for name, one in FIELDS.items()],
-        "solves": solves, "passive": (folder / FOLDER / TABLE).is_file(),
+        "solves": solves, "passive": bool(_best(folder)),
         "sets": _sets(folder), "intensities": list(INTENSITIES),
     }  # fmt: skip
 
@@ -135,6 +136,14 @@ def refused(study: Study) -> str:
 def building_of(folder: Path) -> str:
     """Return the file of a study's building relative to its folder, "" where it has none."""
     return Study(folder).model(to_show=True).building
+
+
+def _is_older(file: Path, found: Mapping[str, Any]) -> bool:
+    """Return whether a solve was of another task than its file is now: the model has changed."""
+    try:
+        return bool(read_task(file).digest() != found["facts"]["task"])
+    except DesignError:
+        return True
 
 
 def _solve(found: Mapping[str, Any]) -> dict[str, Any]:
@@ -236,10 +245,10 @@ def _unit(scenario: Scenario, name: str) -> str:
 def _best(folder: Path) -> list[float]:
     """Return the best constant voltage [V] of each motion in the table that the command wrote.
 
-    Empty where there is none, or where it is of other motions.
+    Empty where there is none, where it is of other motions, or older than the study's model.
     """
-    path = folder / FOLDER / TABLE
-    if not path.is_file():
+    path, model = folder / FOLDER / TABLE, folder / "model.toml"
+    if not path.is_file() or path.stat().st_mtime_ns < model.stat().st_mtime_ns:
         return []
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.reader(file))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shlex
 import tomllib
 from dataclasses import replace
@@ -144,11 +145,32 @@ def test_weights_are_drawn_before_the_study_has_a_folder_of_designs(tmp_path: Pa
     assert design_view.answer(tmp_path / "new", {})["solves"] == []
 
 
+def test_a_solve_of_an_older_model_is_told_apart(home: Path, tmp_path: Path) -> None:
+    name = write_design(home / "rig", "hinf", {}, "")
+    file = home / "rig" / "design" / f"{name}.toml"
+    found = {"facts": {"task": read_task(file).digest()}}
+    assert not design_view._is_older(file, found)
+    other = tmp_path / "rig" / "design" / file.name
+    other.parent.mkdir(parents=True)
+    other.write_text(file.read_text())
+    assert design_view._is_older(other, found)  # its model is not there
+    model = (home / "rig" / "model.toml").read_text()
+    (tmp_path / "rig" / "model.toml").write_text(model.replace("value = 1.3", "value = 1.7", 1))
+    assert "value = 1.7" in (tmp_path / "rig" / "model.toml").read_text()
+    assert design_view._is_older(other, found)
+
+
 def test_a_table_of_voltages_that_is_no_table_says_so(tmp_path: Path) -> None:
+    model = tmp_path / "model.toml"
+    model.write_text("")
     file = tmp_path / "design" / "passive" / "passive.csv"
     file.parent.mkdir(parents=True)
     file.write_text("voltage [V],a,b,c\n0.0,3.0,1.0,2.0\n1.0,2.0,1.5,2.5\n2.0,2.5,0.5,3.0\n")
     assert design_view._best(tmp_path) == [1.0, 2.0, 0.0]
+    after = file.stat().st_mtime + 10.0
+    os.utime(model, (after, after))  # the model has changed since
+    assert design_view._best(tmp_path) == []
+    os.utime(model, (after - 100.0, after - 100.0))
     file.write_text("voltage [V],a\n0.0,3.0\n")
     assert design_view._best(tmp_path) == []  # of other motions
     file.write_text("voltage [V],a,b,c\n0.0,x,1.0,2.0\n")

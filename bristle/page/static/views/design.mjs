@@ -159,7 +159,7 @@ class Design {
     return h("section", {},
       table("Solves", ["controller", "gamma", "closed-loop norm", "distance from −1", "gain times", "phase [deg]", "states"],
         found.solves.toReversed().map((one) => [
-          `${one.name}${one === solve ? " (shown)" : ""}`, number(one.gamma, 4), number(one.norm, 4), number(one.margins.modulus, 3),
+          `${one.name}${one === solve ? " (shown)" : ""}${one.older ? ", for an older model" : ""}`, number(one.gamma, 4), number(one.norm, 4), number(one.margins.modulus, 3),
           any(one.margins.gain_up, "any larger"), any(one.margins.phase, "any"), String(one.states),
         ]), [1, 2, 3, 4, 5, 6]),
       h("div", { class: "act" }, h("label", { class: "field", for: "solve" }, "Shown", select), h("a", { href: page.link("hand_on") }, "Download the controller file")),
