@@ -76,7 +76,7 @@ def slow(scenario_of: Maker, how: str, at: float) -> Path:
 
 
 def test_folder_holds_results_figure_and_log_and_nothing_else(fine: Path, tmp_path: Path) -> None:
-    done = command(fine, cwd=tmp_path)
+    done = command(fine, "--quiet", cwd=tmp_path)
     assert (done.returncode, done.stderr) == (0, "")
     folder = tmp_path / "results" / "toys"
     assert sorted(p.name for p in folder.iterdir()) == ["figure.png", "log", "results.csv"]
