@@ -68,7 +68,7 @@ def export_component(name: str, folder: Path) -> list[Path]:
 
 
 def _module(prepared: Prepared, guid: str, text: Path) -> bytes:
-    content = hashlib.sha256(f"{zig.tools()} web {guid}".encode()).hexdigest()[:24]
+    content = hashlib.sha256(f"{zig.tools_web()} {guid}".encode()).hexdigest()[:24]
 
     def link(path: Path) -> None:
         table = path.parent / "tables.c"

@@ -51,7 +51,7 @@ def module() -> bytes:
         functions = text_digest(loop)
     sizes = [f"-D{name}_SIZE={make().itemsize}" for name, make in RECORDS.items()]
     content = hashlib.sha256(SOURCE.read_bytes())
-    for one in (functions, zig.tools(), *sizes):
+    for one in (functions, zig.tools_web(), *sizes):
         content.update(one.encode())
 
     def link(path: Path) -> None:
