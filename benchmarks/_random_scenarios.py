@@ -31,7 +31,7 @@ DAMPERS = {
 }
 DAMPER_EFFECTS = ("gas_spring", "coil_lag", "stribeck", "mount_compliance", "remanence")
 """Drawn from where the law takes them."""
-DESIGNED = ("ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped")
+DESIGNED = ("ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped", "TrainedPolicy")
 """Controllers that were designed for the default building."""
 ALGORITHMS = ("midpoint", "gauss-seidel", "jacobi", "midpoint-iterated")
 SHARES = (0.4, 0.25, 0.2, 0.15)

@@ -8,6 +8,17 @@ from __future__ import annotations
 
 from ..control.inverse import estimate_states, force_of_law, voltage_of_law
 from ..control.linear import advance, command, table_row
+from ..control.policy import (
+    BESIDES,
+    KEEP,
+    LARGEST,
+    LEAST_LEVEL,
+    estimate,
+    hidden_units,
+    policy_inputs,
+    recent_level,
+    voltage_share,
+)
 from ..control.sensing import (
     filtered_velocity,
     leaky_integral,
@@ -15,7 +26,7 @@ from ..control.sensing import (
     skyhook_command,
     skyhook_switch,
 )
-from ..control.switching import applied_signed, clipped_voltage, signed_voltage
+from ..control.switching import applied_signed, clipped_voltage, limited, signed_voltage
 from ..physics.linear import Row
 from .clock import COMING, ORIGIN, first_sample, last_sample, measure, step_code
 from .controller_setup import (
@@ -25,6 +36,7 @@ from .controller_setup import (
     NO_INVERSE,
     NO_KIND,
     NO_VELOCITY,
+    POLICY,
     REMEMBERED,
     SIGNED,
     SKYHOOK_INVERSE,
@@ -38,16 +50,18 @@ from .controller_setup import (
 
 __all__ = [
     "CLIPPED", "CLIPPED_LQG", "COMMAND_RAW", "INVERSE", "NO_INVERSE", "NO_KIND", "NO_VELOCITY",
-    "SCHEDULING", "SIGNED", "SKYHOOK_INVERSE", "SKYHOOK_SWITCH", "VOLTAGE", "Constants", "bake",
-    "constants", "output", "setup", "sizes", "start", "step",
+    "POLICY", "SCHEDULING", "SIGNED", "SKYHOOK_INVERSE", "SKYHOOK_SWITCH", "VOLTAGE", "Constants",
+    "bake", "constants", "output", "setup", "sizes", "start", "step",
 ]  # fmt: skip
 
 FLOOR_ACCELERATION, BASE_DISPLACEMENT, BASE_VELOCITY, DAMPER_FORCE = range(4)
 VOLTAGE, COMMAND_RAW, SCHEDULING = range(3)
 
 LOW, X_BEFORE, ABSOLUTE, Y_BEFORE = range(-REMEMBERED, -2)
+LEVEL = ABSOLUTE
 """What the state holds behind that of the state-space law and the states of the damper's law that
-is inverted, as the controller estimates them; before `ORIGIN` and `COMING`."""
+is inverted, as the controller estimates them; before `ORIGIN` and `COMING`. A trained policy keeps
+the output's recent level where skyhook has its integral."""
 
 
 def start(time: float, inputs: Row, c: Constants, state: Row, outputs: Row, work: Row) -> int:
@@ -141,7 +155,9 @@ def sample(k: int, measured: Row, c: Constants, state: Row, outputs: Row, spare:
         low = low_passed(state[LOW], state[X_BEFORE], x, c.velocity_corner, c.period)
         state[LOW], state[X_BEFORE] = low, x
         v = filtered_velocity(low, x, c.velocity_corner)
-    if c.kind >= SKYHOOK_SWITCH:
+    if c.kind == POLICY:
+        voltage, u = trained(measured, v, c, state, spare)
+    elif c.kind >= SKYHOOK_SWITCH:
         voltage, u = skyhook(y, x, v, c, state)
     else:
         voltage, u = designed(measured, v, c, state, spare)
@@ -180,6 +196,30 @@ def designed(measured: Row, v: float, c: Constants, state: Row, spare: Row) -> t
         second = f if c.kind == CLIPPED_LQG else 0.0
     advance(c.n, c.A, c.B, c.W, row, state, (y, second), spare)
     return voltage, u
+
+
+def trained(measured: Row, v: float, c: Constants, state: Row, spare: Row) -> tuple[float, float]:
+    """Return voltage and raw command [V] of a trained policy, and move its state on.
+
+    Parameters
+    ----------
+    measured : (4,) inputs, as in `start`; the velocity becomes `v`
+    v : velocity across the damper that the law works with [m/s]
+    c : Constants
+    state : as in `start`, moved on in place
+    spare : room to work, `measured` in it behind the first n
+    """
+    count, hidden = c.n + BESIDES, hidden_units(c.n, len(c.W))
+    first = c.n + len(measured)
+    inputs, units = spare[first : first + count], spare[first + count : first + count + hidden]
+    measured[BASE_VELOCITY] = v
+    estimate(c.n, c.A, c.B, measured, state, spare)
+    level = max(state[LEVEL], c.C[LEAST_LEVEL])
+    level = recent_level(level, measured[FLOOR_ACCELERATION], c.C[KEEP])
+    state[LEVEL] = level
+    policy_inputs(c.n, state, level, measured, c.C, inputs)
+    u = c.C[LARGEST] * voltage_share(count, hidden, inputs, c.W, units)
+    return limited(u, 0.0, c.v_max), u
 
 
 def inverted(u: float, x: float, v: float, c: Constants, state: Row) -> tuple[float, float]:

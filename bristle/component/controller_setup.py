@@ -7,10 +7,11 @@ from math import pi
 from typing import NamedTuple
 
 from ..control.controller import Controller
+from ..control.policy import BESIDES, hidden_units
 from ..physics.linear import Row, copy
 from ..physics.rows import open_row, packed, row
 
-CLIPPED, INVERSE, SIGNED, CLIPPED_LQG, SKYHOOK_SWITCH, SKYHOOK_INVERSE = range(6)
+CLIPPED, INVERSE, SIGNED, CLIPPED_LQG, SKYHOOK_SWITCH, SKYHOOK_INVERSE, POLICY = range(7)
 """Kinds of controllers."""
 
 REMEMBERED = 6
@@ -114,9 +115,13 @@ def sizes(values: Row, baked: Row, counts: Row) -> int:
     """
     built = row(baked, _BUILT)
     n = int(built[_STATES])
-    matrices = int(built[_TABLE]) * n * (n + 3)
+    matrices = 0
+    for k in range(4):
+        matrices += len(row(baked, _BAKED_A + k))
     counts[0] = _P + 1 + _COUNT + matrices + len(row(baked, _PARAMETERS))
     counts[1], counts[2], counts[3] = n + built[_LAW_STATES] + REMEMBERED, 3, n + 4
+    if built[_FIXED_KIND] == POLICY:
+        counts[3] += n + BESIDES + hidden_units(n, len(row(baked, _BAKED_W)))
     return 0
 
 

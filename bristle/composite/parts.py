@@ -74,6 +74,8 @@ def lay_part(k: int, c: Constants, run: Opened, h: float, work: Row) -> None:
         lay_controller(r, law)
         r["A"], r["B"] = at + place(store, 1), at + place(store, 2)
         r["W"], r["C"] = at + place(store, 3), at + place(store, 4)
+        r["A_end"], r["B_end"] = r["A"] + len(law.A), r["B"] + len(law.B)
+        r["W_end"], r["C_end"] = r["W"] + len(law.W), r["C"] + len(law.C)
     else:
         r = run.sampled[i]
         lay_sampled(r, sensors_constants(store).period, wiring, h)

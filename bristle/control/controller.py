@@ -15,11 +15,15 @@ from typing import Any, NamedTuple
 
 from ..errors import DesignError
 from ..physics.building import Building
+from .policy import MEASURED, SCALES, hidden_units, weight_count
 
 SCHEMA = 1
 KINDS = ("hinf", "lpv", "lqg")
-COMMAND_UNITS = {"hinf": "N", "lpv": "V", "lqg": "N"}
-"""Unit of the command: a force, or the signed voltage of `switching.signed_voltage`."""
+POLICY = "policy"
+"""The kind of a controller that is trained instead of synthesised."""
+COMMAND_UNITS = {"hinf": "N", "lpv": "V", "lqg": "N", POLICY: "V"}
+"""Unit of the command: a force, or the signed voltage of `switching.signed_voltage`, or a policy's
+voltage."""
 LARGEST = 64 * 1024**2
 """Largest controller file that is read [bytes]."""
 
@@ -31,8 +35,10 @@ class Controller(NamedTuple):
 
     `A` (rows n n), `B`, `W`, `C` (rows n), flat; `W` belongs to the second input: anti-windup per
     unit of its rate for "hinf" and "lpv", the damper's force for "lqg". `v_top` [m/s] is the speed
-    of the last row (0 with one row). `facts` are the design's numbers for reports: gamma, norms,
-    poles. `design` is the design file's content, `building` the building's digest.
+    of the last row (0 with one row). Of "policy" they are the estimator's `A` (n n), `B` (n 4), the
+    network's weights `W` and the scales `C` (see `policy`). `facts` are the design's numbers for
+    reports: gamma, norms, poles. `design` is the design file's content, `building` the building's
+    digest.
     """
 
     kind: str
@@ -171,7 +177,10 @@ def _check(controller: Controller, where: str) -> None:
     """Refuse a whole file with a matching digest whose content cannot be a controller."""
     c = controller
     sizes = {"A": c.rows * c.n * c.n, "B": c.rows * c.n, "W": c.rows * c.n, "C": c.rows * c.n}
-    wrong = c.kind not in KINDS or c.n < 1 or c.rows < 1 or not c.sample_period > 0.0
+    if c.kind == POLICY:
+        whole = weight_count(c.n, hidden_units(c.n, len(c.W)))
+        sizes |= {"B": MEASURED * c.n, "W": whole, "C": SCALES}
+    wrong = c.kind not in COMMAND_UNITS or c.n < 1 or c.rows < 1 or not c.sample_period > 0.0
     if wrong or (c.rows > 1 and not c.v_top > 0.0):
         raise DesignError(f"{where}: kind, size, sample period or top speed is wrong. {_REMEDY}")
     for name, size in sizes.items():

@@ -82,13 +82,17 @@ def _loops(result: DesignResult) -> Page:
 
 
 def _poles(result: DesignResult) -> Page:
-    """Return the poles of an LQG design, which has no weighted loop to show."""
+    """Return the poles of an LQG design or of a policy's estimator, without a weighted loop."""
     subtitle = "Rings: the building with the regulator. Crosses: the controller."
+    if "regulator_poles" not in result.facts:
+        subtitle = "Crosses: the estimator in front of the network."
     page = Page(6.4, 3.8, headline(result), subtitle)
     with look():
         axes = page.figure.add_subplot(page.grid(1, 1, left=0.75, top=0.15)[0, 0])
         zero_lines(axes)
         for key, mark, colour in (("regulator_poles", "o", GREY), ("poles", "x", BLUE)):
+            if key not in result.facts:
+                continue
             real, imaginary = np.array(result.facts[key]).T
             axes.plot(real, imaginary, mark, color=colour, mfc="none", ms=6.0, mew=1.4)
         axes.set_xlabel("real part [1/s]")

@@ -50,8 +50,10 @@ def implausible(task: Task) -> list[str]:
     reach = reach_of(task)
     found = [
         *_sampling(task),
-        *(_lqg(task, reach) if task.kind == "lqg" else _weights(task, reach)),
     ]
+    if task.kind == "policy":
+        return found
+    found += _lqg(task, reach) if task.kind == "lqg" else _weights(task, reach)
     return [*found, *(_scheduling(task) if task.kind == "lpv" else [])]
 
 

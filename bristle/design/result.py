@@ -82,17 +82,18 @@ def packed(task: Task, discrete: Bank, facts: dict[str, Any]) -> Controller:
         rows=rows,
         v_top=task.scheduling.grid[-1] if rows > 1 else 0.0,
         sample_period=float(task.sample_period),
-        A=_flat(discrete.A),
-        B=_flat(discrete.B),
-        W=_flat(discrete.W),
-        C=_flat(discrete.C),
+        A=flat(discrete.A),
+        B=flat(discrete.B),
+        W=flat(discrete.W),
+        C=flat(discrete.C),
         facts={"building": task.building.name, "task": task.digest(), **facts},
         design=task.data(),
         building=building_digest(task.building),
     )
 
 
-def _flat(values: Array) -> list[float]:
+def flat(values: Array) -> list[float]:
+    """Return a matrix row by row, its numbers rounded to 12 digits."""
     return [float(f"{value:.{_DIGITS}g}") for value in values.ravel().tolist()]
 
 

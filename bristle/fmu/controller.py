@@ -15,6 +15,7 @@ from xml.etree.ElementTree import Element
 from ..component import SAMPLED, clock, controller
 from ..control import inverse
 from ..control.controller import Controller, read_controller
+from ..control.policy import LARGEST
 from ..errors import BristleError
 from ..physics import damper as damper_laws
 from ..physics.laws import DEFAULT, Law, law_code, laws_of
@@ -185,3 +186,9 @@ def declare_inverse(slave: ControllerSlave) -> None:
     slave.add_parameter("still", inverse.STILL, "m/s", text, (0.0, 10.0))
     text = "least force per volt that is divided by"
     slave.add_parameter("least_slope", inverse.LEAST_SLOPE, "N/V", text, (1e-9, 1e9))
+
+
+def declare_trained(slave: LinearSlave) -> None:
+    """Let the largest voltage be that of the training where a design is there."""
+    if slave.controller is not None:
+        slave._values[slave._index["v_max"]] = slave.controller.C[LARGEST]

@@ -41,6 +41,7 @@ class Clocks:
                 lay_controller(record, slave.constants)
                 for name in MATRICES:
                     record[name] = _put(self._constants, getattr(slave.constants, name))
+                    record[f"{name}_end"] = len(self._constants)
             record["state"] = _put(self._memory, slave.state)
             record["work"] = _put(self._memory, slave._work)
             record["end"] = len(self._memory)

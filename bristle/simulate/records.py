@@ -117,12 +117,13 @@ def sampled_record() -> np.dtype[np.void]:
     """Return the record of a controller or of sensors: what acts on a clock of its own.
 
     See `component.controller.Constants` and `component.sensors.Constants`. Sequences whose length
-    differs begin at these places of the run's constants and memory, where state, room to work and
-    `end` follow each other. A clock whose instants are all ends of substeps is `aligned`; sample
-    `coming` is the next. It `senses`, or commands.
+    differs begin and end at these places of the run's constants, and in its memory, where state,
+    room to work and `end` follow each other. A clock whose instants are all ends of substeps is
+    `aligned`; sample `coming` is the next. It `senses`, or commands.
     """
     m = len(MEASURED)
-    places = ("A", "B", "W", "C", "state", "work", "end")
+    matrices = [name + end for name in ("A", "B", "W", "C") for end in ("", "_end")]
+    places = (*matrices, "state", "work", "end")
     numbers = ("v_max", "velocity_corner", "v_top", "f_min", "anti_windup", "still", "least_slope")
     own = ("gains", "biases", "deviation", "quantisation", "corner", "share")
     return np.dtype(

@@ -389,11 +389,10 @@ def take_command(
     constants, memory : flat matrices of all controllers; states and room to work of all clocks
     s : (n,) signals, each in its own unit, changed in place
     """
-    n, size = c.n, c.rows * c.n
     law = ControllerConstants(
-        c.kind, c.period, c.v_max, c.velocity_corner, n, c.rows, c.v_top,
-        constants[c.A : c.A + size * n], constants[c.B : c.B + size],
-        constants[c.W : c.W + size], constants[c.C : c.C + size], c.f_min, c.anti_windup, c.law,
+        c.kind, c.period, c.v_max, c.velocity_corner, c.n, c.rows, c.v_top,
+        constants[c.A : c.A_end], constants[c.B : c.B_end], constants[c.W : c.W_end],
+        constants[c.C : c.C_end], c.f_min, c.anti_windup, c.law,
         c.p[:], c.still, c.least_slope, c.gain, c.integral_corner,
     )  # fmt: skip
     state, work = memory[c.state : c.work], memory[c.work : c.end]

@@ -67,7 +67,17 @@ SENSORS = {
     "base_displacement.cut_off": 20.0, "damper_force.quantisation": 0.01, "sample_period": 7e-4,
 }  # fmt: skip
 CONTROLLERS = [
-    *((name, {}) for name in ("ClippedOptimal", "HinfInverse", "LqgClipped", "Lpv", "Skyhook")),
+    *(
+        (name, {})
+        for name in (
+            "ClippedOptimal",
+            "HinfInverse",
+            "LqgClipped",
+            "Lpv",
+            "Skyhook",
+            "TrainedPolicy",
+        )
+    ),
     ("Skyhook", {"kind": "inverse", "velocity": "filtered", "inverse": "bingham"}),
     ("HinfInverse", {"anti_windup": 50.0, "inverse": "tanh", "tanh.f_c": 2.0}),
 ]

@@ -32,7 +32,7 @@ from bristle.scenario.text import scenario_text
 from bristle.simulate.run import run
 
 H = 0.002
-CONTROLLERS = ("ClippedOptimal", "HinfInverse", "LqgClipped", "Lpv", "Skyhook")
+CONTROLLERS = ("ClippedOptimal", "HinfInverse", "LqgClipped", "Lpv", "Skyhook", "TrainedPolicy")
 SAMPLED = (*CONTROLLERS, "Sensors")
 FROZEN = Path(__file__).parents[1] / "reference" / "controllers"
 

@@ -18,7 +18,7 @@ from bristle.fmu import build, catalogue
 from bristle.physics.effect import effects_of
 from bristle.physics.laws import LAWS
 
-CONTROLLERS = ["ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped", "Skyhook"]
+CONTROLLERS = ["ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped", "Skyhook", "TrainedPolicy"]
 each_component = pytest.mark.parametrize("component", COMPONENTS)
 each_damper = pytest.mark.parametrize("component", DAMPERS)
 
@@ -75,6 +75,7 @@ OUTPUTS: dict[str, dict[str, str | None]] = {
     "Sensors": {f"{name}_measured": unit for name, unit in MEASURED.items()},
     **{name: {"voltage": "V", "command_raw": "N", "scheduling": "m/s"} for name in CONTROLLERS},
     "Lpv": {"voltage": "V", "command_raw": "V", "scheduling": "m/s"},
+    "TrainedPolicy": {"voltage": "V", "command_raw": "V", "scheduling": "m/s"},
 }
 PARAMETERS: dict[str, dict[str, Any]] = {
     "Structure": {"attached_mass": 0.0},
@@ -91,6 +92,7 @@ PARAMETERS: dict[str, dict[str, Any]] = {
     | {f"{name}.{key}": value for name in MEASURED for key, value in FAULTLESS.items()},
     "ClippedOptimal": {**CONTROLLER_PARAMETERS, "f_min": 0.5},
     "LqgClipped": {**CONTROLLER_PARAMETERS, "f_min": 0.5},
+    "TrainedPolicy": {**CONTROLLER_PARAMETERS},
     "HinfInverse": {**CONTROLLER_PARAMETERS, "inverse": "lugre", "anti_windup": 0.0},
     "Lpv": {**CONTROLLER_PARAMETERS, "anti_windup": 200.0},
     "Skyhook": {**CONTROLLER_PARAMETERS, "kind": "switch", "gain": 50.0, "inverse": "lugre"},

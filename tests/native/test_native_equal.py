@@ -37,6 +37,7 @@ LIGHT: list[tuple[str, dict[str, Any]]] = [
     ("ClippedOptimal", {}),
     ("LqgClipped", {"f_min": 0.1, "velocity": "filtered"}),
     ("HinfInverse", {}),
+    ("TrainedPolicy", {}),
     ("HinfInverse", {"inverse": "bingham", "anti_windup": 50.0, "velocity": "filtered"}),
     ("Lpv", {}),
     ("Skyhook", {}),

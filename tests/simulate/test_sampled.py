@@ -58,6 +58,7 @@ SETTINGS = {
     "HinfInverse": [{}, {"inverse": "bingham", "anti_windup": 200.0, "velocity": "filtered"}],
     "Lpv": [{}, {"anti_windup": 0.0, "v_max": 4.0}],
     "LqgClipped": [{}, {"velocity": "filtered"}],
+    "TrainedPolicy": [{}, {"velocity": "filtered", "v_max": 4.0}],
     "Skyhook": [{}, {"kind": "inverse", "gain": 80.0, "integral_corner": 0.4}],
 }
 CASES = [(fmu, given) for fmu, listed in SETTINGS.items() for given in listed]

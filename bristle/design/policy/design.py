@@ -1,0 +1,188 @@
+"""Design of a policy: motions and runs, the training, and the controller that comes of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg
+
+from ...control.controller import Controller, building_digest
+from ...control.policy import weight_count
+from ...errors import DesignError
+from ...physics.damper import start_states
+from ..hinf import design_hinf
+from ..plant import StateSpace, structure
+from ..result import DesignResult, flat, pole_list
+from ..sliding import coefficients
+from ..table import Bank
+from ..task import Task
+from . import motions
+from .closed_loop import Motion, Policy
+from .descent import Outcome, descend, peak_ratios
+from .estimator import GROUNDS, estimator
+from .runs import Loop, Run, disturbed, plant_of, setup_of
+from .training import Training
+
+Array = NDArray[np.float64]
+
+LEVEL_LASTS = 8.0
+"""How long the output's level is remembered [s]."""
+INTENSITIES = 4
+"""Intensities at which a record trains."""
+DISTURBED = 7
+"""Of ten runs, those with wrong parameters, noise and delay."""
+CHOOSING = 6
+"""One held-out motion for so many of the training; at least `FEWEST`."""
+FEWEST = 8
+LEAST, FAST = 0.025, 2.5
+"""Least level in the damper's largest force per mass; typical speed in that of the damper's law."""
+THRESHOLD = 0.05
+"""Command that the clipped-optimal switch answers, as a share of the damper's largest force."""
+SPEEDS = np.linspace(0.0, 0.4, 41)
+"""Where it is looked for a force that follows the voltage [m/s]."""
+
+
+def design_policy(task: Task) -> DesignResult:
+    """Return a trained policy from what every controller measures to a voltage.
+
+    Parameters
+    ----------
+    task : Task
+        Of kind "policy".
+
+    Raises
+    ------
+    DesignError
+        If the damper's force does not follow the voltage, a record cannot be read or is reported,
+        there is no H-infinity design to compare with, or training does not beat the clipped-optimal
+        controller on the motions held out.
+    """
+    training = task.motions
+    assert training is not None
+    s, h = structure(task.plant_building, device=task.place), task.sample_period
+    largest = _largest_force(task)
+    unit = largest / float(np.sum(np.array(task.building.M)))
+    policy = _policy(task, s, largest, unit)
+    grounds, held_out = _grounds(training, unit, h)
+    longest = max(map(len, [*grounds, *held_out]))
+    loop = Loop(policy, longest, start_states(task.damper.kind.name, task.damper.values), len(s.A))
+    runs, choosing = ([_run(task, ground) for ground in each] for each in (grounds, held_out))
+    loop.learn_states(runs[0])
+    reference = _clipped(task, loop, longest, THRESHOLD * largest)
+    for run in (*runs, *choosing):
+        reference.refer(run)
+    random = np.random.default_rng([training.seed, 1])
+    for i in range(len(runs)):
+        if i % 10 < DISTURBED:
+            runs[i] = disturbed(loop, runs[i], task, random)
+    worst = [disturbed(loop, run, task, random, worst=True) for run in choosing]
+    outcome = descend(loop, runs, choosing + worst, training.rounds, random)
+    facts = _facts(loop, choosing, worst, outcome)
+    facts |= {"motions": len(grounds), "weights": weight_count(policy.n, training.hidden)}
+    return _packed(task, policy, outcome, facts)
+
+
+def _largest_force(task: Task) -> float:
+    """Return the damper's largest force in steady sliding [N]; refuse one without voltage."""
+    steady, per_volt = coefficients(task.damper, SPEEDS, 1e-3)
+    if not per_volt.any():
+        raise DesignError(
+            f"damper: the force of {task.damper.law!r} does not follow the voltage; there is "
+            "nothing to train. A parameter per volt above 0 is right."
+        )
+    return float(np.max(steady * SPEEDS + per_volt * task.damper.v_max))
+
+
+def _policy(task: Task, s: StateSpace, largest: float, unit: float) -> Policy:
+    """Return the policy without weights.
+
+    Parameters
+    ----------
+    task, s : Task, and its building
+    largest, unit : the damper's largest force [N], and that per mass of the building [m/s2]
+    """
+    assert task.motions is not None
+    A, B = estimator(s, task.sample_period)
+    keep = np.exp(-task.sample_period / LEVEL_LASTS)
+    scales = np.array(
+        [keep, LEAST * unit, largest, unit, FAST * task.damper.speed, task.damper.v_max]
+    )
+    A, B, scales = (np.array(flat(each)) for each in (A, B, scales))
+    n = len(s.A) + 2 * len(GROUNDS)
+    return Policy(False, 0.0, n, task.motions.hidden, A, B, np.zeros(0), scales)
+
+
+def _packed(task: Task, policy: Policy, outcome: Outcome, facts: dict[str, object]) -> DesignResult:
+    """Return the result; its bank holds the estimator."""
+    n, h = policy.n, float(task.sample_period)
+    A, B = policy.A.reshape(n, n), policy.B.reshape(n, 4)
+    poles = np.asarray(np.log(np.linalg.eigvals(A).astype(complex)) / h, dtype=complex)
+    controller = Controller(
+        kind=task.kind, title=task.title, n=n, rows=1, v_top=0.0, sample_period=h,
+        A=policy.A.tolist(), B=policy.B.tolist(), W=flat(outcome.weights),
+        C=policy.scales.tolist(),
+        facts={"building": task.building.name, "task": task.digest(), **facts,
+               "poles": pole_list(poles)},
+        design=task.data(), building=building_digest(task.building),
+    )  # fmt: skip
+    slow = np.real(linalg.logm(A)) / h
+    bank = Bank(slow[None], B[None, :, :1], B[None, :, 3:], np.zeros((1, 1, n)))
+    return DesignResult(task, controller, np.zeros(1), [], bank, None)
+
+
+def _grounds(training: Training, unit: float, h: float) -> tuple[list[Array], list[Array]]:
+    """Return ground accelerations [m/s2] to train on, and others to choose by.
+
+    Parameters
+    ----------
+    training : Training
+    unit : acceleration [m/s2] that intensities are told in
+    h : sample period [s]
+    """
+    random = np.random.default_rng([training.seed, 0])
+    low, high = np.log(training.weakest * unit), np.log(training.strongest * unit)
+
+    def drawn(count: int) -> list[Array]:
+        return [motions.synthetic(random, h) * np.exp(random.uniform(low, high))
+                for _ in range(count)]  # fmt: skip
+
+    peaks = np.exp(np.linspace(low, high, INTENSITIES))
+    records = [motions.at_samples(motion, h) for motion in training.recorded()]
+    found = drawn(training.synthetic) + [peak * record for record in records for peak in peaks]
+    return found, drawn(max(FEWEST, len(found) // CHOOSING))
+
+
+def _clipped(task: Task, loop: Loop, longest: int, f_min: float) -> Loop:
+    """Return the clipped-optimal switch on the H-infinity design of the same building in closed
+    loop; the design's weights are its default."""
+    c = design_hinf(replace(task, kind="hinf", motions=None)).controller
+    scales = loop.policy.scales
+    law = Policy(True, f_min, c.n, 0, np.array(c.A), np.array(c.B), np.array(c.C), scales)
+    return Loop(law, longest, loop.course.z[0].tolist(), loop.course.x.shape[1])
+
+
+def _run(task: Task, ground: Array) -> Run:
+    motion = Motion(ground, np.zeros((len(ground), 4)), 0)
+    return Run(plant_of(task), setup_of(task.damper, 0.0), motion)
+
+
+def _facts(
+    loop: Loop, choosing: list[Run], worst: list[Run], outcome: Outcome
+) -> dict[str, object]:
+    """Return what a training reached; refuse one that reached nothing."""
+    clean, wrong = (peak_ratios(loop, runs, outcome.weights) for runs in (choosing, worst))
+    if float(clean.mean()) >= 1.0:
+        raise DesignError(
+            f"policy: on {len(choosing)} motions held out the mean peak is "
+            f"{clean.mean():.3g} times that of the clipped-optimal controller: nothing was gained. "
+            "More synthetic motions or rounds would help."
+        )
+    return {
+        "held_out": len(choosing),
+        "peak_ratio": float(f"{clean.mean():.4g}"),
+        "peak_ratio_disturbed": float(f"{wrong.mean():.4g}"),
+        "peak_ratio_trained": float(f"{outcome.trained:.4g}"),
+        "chosen_round": outcome.chosen,
+    }

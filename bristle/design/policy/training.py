@@ -1,0 +1,106 @@
+"""What a policy is trained on and how: the table [motions] of a design file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import numpy as np
+
+from ...data.motion import GroundMotion, read_ground_motion
+from ...errors import DesignError, RecordError
+
+ALIKE = 1e-3
+"""Largest difference, as a share of the peak, of two records that are the same motion."""
+
+
+@dataclass(frozen=True)
+class Training:
+    """The motions of a training, and its size.
+
+    Attributes
+    ----------
+    synthetic : int
+        Number of synthetic motions.
+    records : tuple of str
+        Names or files of ground motions that train beside them, each at four intensities.
+    reported : tuple of str
+        Those that the controller will be judged on: refused among `records`.
+    weakest, strongest : float
+        Peak ground acceleration over the damper's largest force per mass of the building.
+    spread, noise, delay : float
+        Wrong parameters (share), noise (share of a signal's peak) and delay [s] up to which seven
+        of ten motions are trained.
+    hidden, rounds, seed : int
+        Hidden units of the network; steps of the descent; what the draws follow.
+    folder : Path
+        What relative paths of records are relative to.
+    """
+
+    synthetic: int = 0
+    records: tuple[str, ...] = ()
+    reported: tuple[str, ...] = ()
+    weakest: float = 0.4
+    strongest: float = 2.4
+    spread: float = 0.1
+    noise: float = 0.01
+    delay: float = 0.004
+    hidden: int = 16
+    rounds: int = 600
+    seed: int = 1
+    folder: Path = Path()
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in {
+            "synthetic": (0, 10_000), "weakest": (1e-3, 1e3), "strongest": (self.weakest, 1e3),
+            "spread": (0.0, 0.5), "noise": (0.0, 1.0), "delay": (0.0, 1.0), "hidden": (0, 200),
+            "rounds": (1, 100_000), "seed": (0, 2**32 - 1),
+        }.items():  # fmt: skip
+            value = getattr(self, name)
+            if not (isfinite(value) and low <= value <= high):
+                raise DesignError(f"motions: {name} = {value!r} lies outside {low:g} .. {high:g}.")
+        if not self.synthetic and not self.records:
+            raise DesignError(
+                "motions: there is none to train on; synthetic = 300 is usual, records = "
+                '["kobe_1995_nishi_akashi_000"] adds a record.'
+            )
+
+    def recorded(self) -> list[GroundMotion]:
+        """Return the records to train on.
+
+        Raises
+        ------
+        DesignError
+            If one cannot be read, or is among those that are reported.
+        """
+        found = {name: self._read(name) for name in self.records}
+        for other in self.reported if found else ():
+            shown = found.get(other) or self._read(other)
+            seen = [name for name, motion in found.items() if same_motion(motion, shown)]
+            if seen:
+                raise DesignError(
+                    f"motions: {', '.join(seen)} is trained on and reported ({other}); a policy "
+                    "is judged on motions that it has not seen. Take it out of one of the lists."
+                )
+        return list(found.values())
+
+    def _read(self, name: str) -> GroundMotion:
+        try:
+            return read_ground_motion(name, self.folder)
+        except RecordError as error:
+            raise DesignError(f"motions: {error}") from None
+
+    def data(self) -> dict[str, object]:
+        """Return the table of a design file."""
+        content = {name: value for name, value in vars(self).items() if name != "folder"}
+        return {**content, "records": list(self.records), "reported": list(self.reported)}
+
+
+def same_motion(a: GroundMotion, b: GroundMotion) -> bool:
+    """Return whether two records are one motion, whatever their names, files and scales."""
+    if a.name == b.name:
+        return True
+    time = a.time - a.time[0]
+    other = np.interp(time, b.time - b.time[0], b.acceleration / b.peak, right=0.0)
+    return float(np.abs(a.acceleration / a.peak - other).max()) < ALIKE
