@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..control.controller import COMMAND_UNITS, Controller
+from ..control.controller import COMMAND_UNITS, POLICY, Controller
 from ..design import Damper as DesignDamper
 from ..design import LqgWeights, Task, Weight, Weights, design
 from ..design.plausible import Reach, reach_of
@@ -48,6 +48,11 @@ def task_for(kind: str, site: Site, damper: Damper) -> Task:
     kind, site, damper
         As in `designed_for`, and what is raised too.
     """
+    if kind == POLICY:
+        raise DesignError(
+            f"the library's {kind} was trained for its own building and damper. Training takes "
+            f"minutes: `bristle design {kind} my_{kind}.toml`, then --controller my_{kind}.json."
+        )
     known = DesignDamper() if damper.usual else damper.for_design()
     if known is None and COMMAND_UNITS[kind] == VOLTAGE.unit:
         raise DesignError(

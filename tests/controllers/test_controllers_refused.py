@@ -71,6 +71,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (["--motions", MOTION, "--controller", "edited.json"], "does not match its digest"),
         (["--motions", MOTION, "--controller", "other.json", "--building", "tower.toml"],
          "designed for the building"),
+        (["--motions", MOTION, "--controller", "TrainedPolicy", "--building", "tower.toml"],
+         "bristle design policy my_policy.toml"),
         (["--motions", MOTION, "--controller", "gone.fmu"], "gone.fmu"),
         (["--motions", MOTION, "--controller", "gone.py"], "gone.py"),
         (["--motions", MOTION, "--controller", "windy.py"], "windy.py,wind=0"),
