@@ -12,7 +12,7 @@ from .errors_view import linked
 from .packing import pack
 
 STATIC = Path(__file__).with_name("static")
-MODULES = ("dom.mjs", "scale.mjs", "plot.mjs", "brush.mjs", "linked.mjs")
+MODULES = ("dom.mjs", "scale.mjs", "plot.mjs", "brush.mjs", "cells.mjs", "linked.mjs")
 """What draws the pictures, in the order in which they take from each other."""
 MOST = 60_000
 """Samples of all runs in a report: some 3 MB."""
