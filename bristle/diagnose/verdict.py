@@ -180,6 +180,26 @@ class Diagnosis:
         return out
 
     @property
+    def refined(self) -> dict[str, Any]:
+        """The effects that the refitted model holds beside the present one, and all its values.
+
+        Those named, or of several alternatives the best; where nothing explains the error, the
+        single effect at the damper that leaves the least of it, if one was refined. Empty where
+        there is none. `values` by name [SI]: what the data do not identify is there as well, so
+        that the model predicts what the diagnosis judged.
+        """
+        values = self.values
+        effects = [one for one in self.effects if any(n.startswith(f"{one}.") for n in values)]
+        damper = self._damper
+        if self.kind == "unknown" and not effects and damper and damper.before and damper.trials:
+            best = damper.trials[0]
+            if best.refined:
+                known = damper.before.effects
+                effects = [one for one in best.effects if one not in known]
+                values |= best.model.values
+        return {"effects": effects, "values": values} if effects else {}
+
+    @property
     def _damper(self) -> Finding | None:
         return self.findings.get(DAMPER)
 
@@ -218,6 +238,8 @@ class Diagnosis:
             out["coordinate"] = self.coordinate
         if self.laws is not None:
             out |= self.laws.as_dict()
+        if refined := self.refined:
+            out["refined"] = refined
         if self.worst is not None and (gains := gains_of(self.worst)):
             out["gains"] = gains
         return out | {"words": " ".join(verdict_text.sentences(out))}

@@ -28,7 +28,9 @@ ROOM = 512 * 1024**2
 """Bytes that must be free on the disk beside an upload."""
 _PIECE = 1024**2
 
-OF_STUDY = ("data", "check", "fit", "errors", "verdict", "history", "design", "loops")
+OF_STUDY = (
+    "data", "check", "fit", "errors", "residual", "verdict", "history", "design", "loops",
+)  # fmt: skip
 """Views of a study."""
 
 

@@ -12,7 +12,7 @@ from .errors_view import linked
 from .packing import pack
 
 STATIC = Path(__file__).with_name("static")
-MODULES = ("dom.mjs", "plot.mjs", "brush.mjs", "linked.mjs")
+MODULES = ("dom.mjs", "scale.mjs", "plot.mjs", "brush.mjs", "cells.mjs", "linked.mjs")
 """What draws the pictures, in the order in which they take from each other."""
 MOST = 60_000
 """Samples of all runs in a report: some 3 MB."""
@@ -93,5 +93,5 @@ def script() -> str:
     """Return the modules of the pictures as one script, and what begins them."""
     parts = [(STATIC / name).read_text(encoding="utf-8") for name in MODULES]
     joined = "\n".join([*parts, _SCRIPT])
-    joined = re.sub(r"^import .*\n", "", joined, flags=re.MULTILINE)
+    joined = re.sub(r"^(import |export \{).*\n", "", joined, flags=re.MULTILINE)
     return re.sub(r"^export ", "", joined, flags=re.MULTILINE)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,14 +64,19 @@ def linked(found: Comparison, most: int = MOST) -> dict[str, Any]:
     found : what is compared
     most : samples of all runs at the most
     """
-    samples = sum(len(one.measured) for one in found.predictions)
-    every = max(1, -(-samples // most))
+    every = every_of(found.predictions, most)
     return {
         "z": found.z, "quantity": found.quantity, "unit": found.unit,
         "site": site_name(found.site) if found.site else "", "every": every,
         "drive": found.drive.name, "drive_unit": found.drive.unit,
         "runs": [_run(one, found, every) for one in found.predictions],
     }  # fmt: skip
+
+
+def every_of(predictions: Sequence[RunPrediction], most: int = MOST) -> int:
+    """Return 1 where all samples are sent, 2 where every second is, and so on."""
+    samples = sum(len(one.measured) for one in predictions)
+    return max(1, -(-samples // most))
 
 
 def _run(one: RunPrediction, found: Comparison, every: int) -> dict[str, Any]:

@@ -30,6 +30,7 @@ VIEWS = {
     "loops": "design_view.loops",
     "module": "module_view",
     "numbers": "simulate_view.numbers",
+    "residual": "residual_view",
     "scenarios": "scenarios_view",
     "simulate": "simulate_view",
     "spectrum": "simulate_view.spectrum",

@@ -53,6 +53,23 @@ def test_views_open_on_a_narrow_screen_without_an_error_or_a_foreign_request(
     assert not browsed.elsewhere
 
 
+def test_the_residual_is_drawn_without_and_with_what_was_found(tmp_path: Path) -> None:
+    files = write_runs(tmp_path / "lab", 3, seconds=3.0)
+    study = create_study(tmp_path / "home" / "rig", files, law="bingham").study
+    study.model()
+    refined = {"effects": ["gas_spring"], "values": {"gas_spring.k": 50.0}}
+    verdict = {"kind": "unknown", "effects": [], "sites": {}, "ranking": [], "untestable": []}
+    study.write_verdict({"schema": 2, **verdict, "sensors": [], "reasons": [], "refined": refined})
+    with page_on(study.folder.parent) as client, shots.chromium(400) as page:
+        seen = Watched(page, client)
+        seen.open("rig", "verdict")
+        page.get_by_role("heading", name="The residual before and after gas_spring").wait_for()
+        assert page.get_by_text("does not explain the error").count() == 1
+        assert page.locator("main canvas").count() == 4
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
+        assert not seen.errors
+
+
 def axe(folder: Path) -> str:
     """Return the source of axe-core from the npm registry; skip where it cannot be had."""
     npm = shutil.which("npm")

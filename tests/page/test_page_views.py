@@ -19,11 +19,13 @@ from bristle.page import (
     errors_view,
     fit_view,
     history_view,
+    residual_view,
     verdict_view,
 )
 from bristle.page.packing import pack, unpack
 from bristle.page.worker import VIEWS, answer, function_of
 from bristle.study import Study, create_study
+from bristle.study.before_after import before_after, predictions
 from bristle.study.comparison import compare_study
 from bristle.study.data_check import check_data
 
@@ -41,7 +43,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_view_of_the_worker_is_a_module_that_answers(home: Path) -> None:
-    for view in ("data", "check", "fit", "errors", "history", "verdict"):
+    for view in ("data", "check", "fit", "errors", "history", "residual", "verdict"):
         told, body = answer(view, home / "rig", {})
         assert told["ok"], told
         assert unpack(body)
@@ -116,6 +118,28 @@ def test_view_4_says_that_nothing_was_diagnosed(home: Path) -> None:
     assert verdict_view.answer(home / "rig", {}) == {
         "verdict": None, "learned": [], "plans": [],
     }  # fmt: skip
+
+
+def test_view_4_has_the_residuals_without_and_with_what_was_found(
+    home: Path, tmp_path: Path
+) -> None:
+    assert residual_view.answer(home / "rig", {}) == {"effects": []}
+    study = Study(shutil.copytree(home / "rig", tmp_path / "rig"))
+    study.model()
+    refined = {"effects": ["gas_spring"], "values": {"f_c": 1.3, "gas_spring.k": 50.0}}
+    study.write_verdict({"schema": 2, "kind": "unknown", "effects": [], "refined": refined})
+    shown = unpack(pack(residual_view.answer(study.folder, {})))
+    assert (shown["effects"], shown["step"], shown["kind"]) == (["gas_spring"], None, "unknown")
+    found = compare_study(study)
+    assert shown["before"] == pytest.approx(found.z)
+    pair = before_after(study)
+    assert pair is not None
+    after = predictions(study, pair).after
+    for one, other, row in zip(found.predictions, after, shown["runs"], strict=True):
+        assert row["before"]["residual"] == pytest.approx(one.residual, abs=1e-5)
+        assert row["after"]["residual"] == pytest.approx(other.residual, abs=1e-5)
+        assert not np.allclose(row["before"]["residual"], row["after"]["residual"], atol=0.1)
+        assert len(row["time"]) == len(row["displacement"]) == len(row["after"]["normalised"])
 
 
 def test_view_4_draws_what_was_learned_with_its_interval(home: Path, tmp_path: Path) -> None:

@@ -12,6 +12,8 @@ from bristle.cli import main
 from bristle.diagnose import Diagnosis
 from bristle.errors import RecordError, StudyError
 from bristle.study import learning
+from bristle.study.before_after import before_after, predictions
+from bristle.study.comparison import compare_study
 from bristle.study.create import create_study
 from bristle.study.identification import identify_study
 from bristle.study.learning import add_effects, complete, diagnose_study
@@ -102,6 +104,36 @@ def test_what_the_verdict_names_is_added_and_then_nothing_is_missing(study):
     assert 0.0 < verdict["detectable"] < 0.05
     study.undo()
     assert study.model().effects == {}
+
+
+def test_before_and_after_are_the_models_that_diagnose_and_add_have_judged(study):
+    verdict = study.verdict()
+    pair = before_after(study)
+    assert (pair.effects, pair.step) == (("gas_spring",), None)
+    found = predictions(study, pair)
+    assert found.z_before == pytest.approx(compare_study(study).z, rel=1e-9)
+    # Refitted as the diagnosis had it; the noise expected of it is drawn anew.
+    assert found.z_after == pytest.approx(verdict["z_holdout_after"], rel=0.01)
+    assert pair.after.values == {**pair.after.values, **verdict["refined"]["values"]}
+
+    step = add_effects(study, ["gas_spring"]).step
+    added = before_after(study)
+    assert (added.effects, added.step) == (("gas_spring",), step.number)
+    assert added.before.effects == ()
+    again = predictions(study, added)
+    assert again.z_before == pytest.approx(step.before["z_holdout"], rel=0.01)
+    assert again.z_after == pytest.approx(compare_study(study).z, rel=1e-9)
+    study.undo()  # the verdict on the model before is there again, with what it refined
+    assert before_after(study) == pair
+
+
+def test_what_a_diagnosis_refined_is_of_its_own_model_and_law(study):
+    verdict = study.verdict()
+    other = {"laws": [{}], "law": "lugre", "command": "linear", "law_before": "bingham"}
+    study.write_verdict({**verdict, **other})
+    assert before_after(study) is None
+    study.write_verdict({key: verdict[key] for key in verdict if key != "refined"})
+    assert before_after(study) is None  # a verdict that an earlier version wrote
 
 
 def test_adding_tells_the_error_of_the_model_as_it_was(study):

@@ -16,6 +16,7 @@ from bristle.errors import StudyError
 from bristle.identify.assigned import at_site, unassigned
 from bristle.identify.model import Model
 from bristle.physics.effect import EFFECTS
+from bristle.study.before_after import before_after, predictions
 from bristle.study.comparison import compare_study
 from bristle.study.identification import identify_study
 from bristle.study.learning import add_effects, diagnose_study
@@ -33,6 +34,12 @@ def test_hidden_spring_is_found_added_and_the_error_falls(tmp_path, capsys):
     assert found.before.z == pytest.approx(found.z_before)
     assert study.verdict()["sites"] == {"duffing": "layer"}
     assert "with duffing" in diagnose_command.text(found.as_dict(), study.folder)
+    pair = before_after(study)
+    assert pair is not None
+    two = predictions(study, pair)
+    assert {one.site for one in (*two.before, *two.after)} == {"layer"}
+    assert two.z_before == pytest.approx(compare_study(study).z, rel=1e-9)
+    assert two.z_after == pytest.approx(found.z_after, rel=0.02)
     added = add_effects(study, found.effects, found=found)
     assert added.step.before["z_holdout"] == pytest.approx(first.after["z_holdout"], rel=1e-6)
     assert added.step.after["z_holdout"] == pytest.approx(1.0, abs=0.1)

@@ -1,11 +1,9 @@
 // Pictures of the same samples: what is chosen in one, all show.
 
 import { brush } from "./brush.mjs";
+import { Cells, MAP_KEY } from "./cells.mjs";
 import { h, key, number, say, shown, z } from "./dom.mjs";
-import { Plot, colour, extent } from "./plot.mjs";
-
-const CELLS = 13;
-const FEWEST = 8; // samples of a cell that is drawn
+import { Plot, extent } from "./plot.mjs";
 
 /** The samples of all runs in one row, what is chosen of them, and the pictures that show it. */
 export class Linked {
@@ -45,40 +43,8 @@ export class Linked {
 
   makeMap() {
     if (!this.x || !this.v) return;
-    const edges = (values) => {
-      const sorted = Float32Array.from(values).sort();
-      const low = sorted[Math.floor(0.004 * (sorted.length - 1))];
-      const high = sorted[Math.ceil(0.996 * (sorted.length - 1))];
-      return [low, high > low ? high : low + 1];
-    };
-    this.xEdges = edges(this.x);
-    this.vEdges = edges(this.v);
-    this.cell = new Int16Array(this.count);
-    const place = (value, [low, high]) => {
-      const k = Math.floor(((value - low) / (high - low)) * CELLS);
-      return k < 0 || k >= CELLS ? -1 : k;
-    };
-    for (let k = 0; k < this.count; k++) {
-      const [i, j] = [place(this.x[k], this.xEdges), place(this.v[k], this.vEdges)];
-      this.cell[k] = i < 0 || j < 0 ? -1 : i * CELLS + j;
-    }
-    const { mean } = this.means(null);
-    const sizes = Array.from(mean).filter(Number.isFinite).map(Math.abs).sort((a, b) => a - b);
-    this.limit = Math.max(1, sizes[Math.floor(0.97 * sizes.length)] ?? 1);
-  }
-
-  /** Returns the mean error / noise of each cell over the chosen samples. */
-  means(chosen) {
-    const sum = new Float64Array(CELLS * CELLS);
-    const count = new Int32Array(CELLS * CELLS);
-    for (let k = 0; k < this.count; k++) {
-      const cell = this.cell[k];
-      if (cell < 0 || (chosen && !chosen[k])) continue;
-      sum[cell] += Math.min(30, Math.max(-30, this.r[k]));
-      count[cell]++;
-    }
-    const mean = sum.map((value, k) => (count[k] >= (chosen ? 1 : FEWEST) ? value / count[k] : NaN));
-    return { mean, count };
+    this.cells = new Cells(this.x, this.v);
+    this.limit = this.cells.limit(this.r);
   }
 
   makePlots() {
@@ -140,8 +106,8 @@ export class Linked {
       brush(this.overV, (part) => this.chooseBox(this.v, fv, part), { both: true });
       this.plots.push(this.overV);
     }
-    if (this.cell) {
-      this.map = new Plot("high", "mean error over noise, by displacement and velocity", (p) => this.drawMap(p, fx, fv, ux, uv));
+    if (this.cells) {
+      this.map = new Plot("high", "mean error over noise, by displacement and velocity", (p) => this.cells.draw(p, this.r, this.limit, this.chosen));
       brush(this.map, (part) => this.chooseCells(part, fx, fv), { both: true });
       this.plots.push(this.map);
     }
@@ -152,29 +118,6 @@ export class Linked {
     const run = this.runs[number];
     run.error ??= run.measured.map((value, k) => (run.known && !run.known[k] ? 0 : value - run.predicted[k]));
     return run.error;
-  }
-
-  drawMap(p, fx, fv, ux, uv) {
-    const [xs, vs] = [this.xEdges.map((one) => one * fx), this.vEdges.map((one) => one * fv)];
-    p.axes(xs, vs, `displacement [${ux}]`, `velocity [${uv}]`);
-    const { mean } = this.means(this.chosen);
-    const [blue, red] = [colour("blue"), colour("red")];
-    p.clipped((c) => {
-      const [w, t] = [(p.box[2] - p.box[0]) / CELLS, (p.box[3] - p.box[1]) / CELLS];
-      for (let i = 0; i < CELLS; i++) {
-        for (let j = 0; j < CELLS; j++) {
-          const value = mean[i * CELLS + j];
-          const [left, top] = [p.box[0] + i * w, p.box[3] - (j + 1) * t];
-          if (!Number.isFinite(value)) continue;
-          c.globalAlpha = 1;
-          c.fillStyle = colour("wash");
-          c.fillRect(left, top, w - 1, t - 1);
-          c.globalAlpha = Math.min(1, Math.abs(value) / this.limit);
-          c.fillStyle = value > 0 ? red : blue;
-          c.fillRect(left, top, w - 1, t - 1);
-        }
-      }
-    });
   }
 
   chooseTime(part) {
@@ -252,6 +195,6 @@ export class Linked {
         [[this.overX, "Force over displacement, all runs"], [this.overV, "Force over velocity, all runs"]]
           .filter(([plot]) => plot).map(([plot, title]) => h("figure", {}, h("h3", {}, title), plot.canvas)),
         this.map ? h("figure", {}, h("h3", {}, "Mean error / noise by displacement and velocity"), this.map.canvas,
-          key(["red", "measured above the model", true], ["blue", "measured below it", true])) : null));
+          key(...MAP_KEY)) : null));
   }
 }

@@ -46,8 +46,10 @@ function orders(page, found) {
     add.disabled = busy || !found.can_add.length;
     undo.disabled = busy || found.steps.length < 2;
   });
+  const added = found.steps.some((step) => step.what.startsWith("add "));
   return h("div", { class: "act" }, buttons,
-    h("label", { class: "field", for: "other" }, "Another effect", other), add, undo, auto);
+    h("label", { class: "field", for: "other" }, "Another effect", other), add, undo, auto,
+    added ? h("a", { href: page.link("verdict") }, "The residual before and after") : null);
 }
 
 /** The error of each model on held-out runs, on a logarithmic scale from the noise floor. */

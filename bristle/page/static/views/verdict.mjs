@@ -3,6 +3,7 @@
 import { packed } from "../api.mjs";
 import { bars, empty, h, key, shown, table, wrong, z } from "../dom.mjs";
 import { Plot, extent } from "../plot.mjs";
+import { beforeAfter } from "../residual.mjs";
 
 export async function show(page) {
   const found = await packed(page.path("verdict"));
@@ -13,11 +14,23 @@ export async function show(page) {
     trials(page),
     verdict ? badge(verdict) : null,
     orders(page, verdict),
+    residuals(page),
     verdict ? evidence(verdict) : empty("Not diagnosed",
       "Diagnose puts every effect into the model, refits it, and judges each on the held-out runs. It names the effect that is missing, a few that the data cannot distinguish, or none."),
     learned(found.learned),
     plans(page, found, verdict),
   ];
+}
+
+/** The residual without and with the effect that was found, or that was added last. */
+function residuals(page) {
+  const whole = h("section", { "aria-label": "Residual before and after" },
+    h("p", { class: "loading" }, "Predicting the held-out runs without and with the effect …"));
+  packed(page.path("residual")).then(
+    (found) => whole.replaceChildren(...beforeAfter(found).filter(Boolean)),
+    (error) => whole.replaceChildren(page.failure(error)),
+  );
+  return whole;
 }
 
 function badge(verdict) {
