@@ -101,7 +101,7 @@ class Comparing {
   box(name) {
     const { chosen } = this.asked;
     const box = this.check(chosen.has(name), (on) => (on ? chosen.add(name) : chosen.delete(name)));
-    return h("label", { class: "check" }, box, WORDS[name] ? `${name}, ${WORDS[name]}` : `${name}, designed in view 8`);
+    return h("label", { class: "check" }, box, WORDS[name] ? (WORDS[name] === name.toLowerCase() ? name : `${name}, ${WORDS[name]}`) : `${name}, designed in view 8`);
   }
 
   select(key, label, options) {
