@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from playwright.sync_api import Page
 
 ROOT = Path(__file__).resolve().parent.parent
-VIEWS = ("home", "data", "fit", "errors", "verdict", "history", "hand_on", "simulate", "design")
+VIEWS = (
+    "home", "data", "fit", "errors", "verdict", "history", "hand_on", "simulate", "design",
+    "controllers",
+)  # fmt: skip
 WIDTHS = (1280, 400)
 THEMES = ("light", "dark")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,8 @@ OPTIONS = (
     "limit", "ensemble", "spread", "noise", "delay", "step", "engine", "fmus", "workers",
 )  # fmt: skip
 """One of them, and the comparison is the user's own."""
+ANSWER = "answer.json"
+"""What --json prints, beside the report: the page shows it."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -77,6 +80,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Compare, write scenarios, tables and report; print tables and verdict."""
     from ..controllers import compare_controllers
     from ..controllers.folder import plain_name
+    from ..data.files import write_whole
     from ..errors import not_usable
 
     if arguments.newhall is not None:
@@ -95,20 +99,33 @@ def main(arguments: argparse.Namespace) -> int:
     )  # fmt: skip
     files = found.write(folder)
     if not arguments.no_figure:
-        from ..data.files import write_whole
         from ..progress import tell
         from ..report.controllers_page import controllers_report
 
         tell("drawing")
         files.insert(0, folder / "report.html")
         write_whole(files[0], controllers_report(found))
+    answer = {"command": _said(arguments), **_answer(found, files)}
+    write_whole(folder / ANSWER, json.dumps(answer, indent=1, allow_nan=False))
     if arguments.json:
-        import json
-
-        print(json.dumps(_answer(found, files), indent=2, allow_nan=False))
+        print(json.dumps(answer, indent=2, allow_nan=False))
     else:
         _print(found, folder, files)
     return 0
+
+
+def _said(arguments: argparse.Namespace) -> str:
+    """Return the command that makes the same comparison."""
+    from ..findings import command
+
+    words: list[object] = []
+    for name in (*OPTIONS, "out"):
+        value = getattr(arguments, name)
+        if value is True:
+            words.append(f"--{name}")
+        elif value is not None:
+            words += [f"--{name}", *(value if isinstance(value, list) else [value])]
+    return command("controllers", *words)
 
 
 def _spread(arguments: argparse.Namespace) -> Any:
@@ -139,7 +156,9 @@ def _share(option: str, text: str | None) -> float | None:
 
 
 def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
-    def rows(frame: Any) -> list[dict[str, Any]]:
+    from ..controllers.tables import footnotes, header, lowest, rows
+
+    def values(frame: Any) -> list[dict[str, Any]]:
         return [
             {key: None if value != value else value for key, value in row.items()}
             for row in frame.to_dict(orient="records")
@@ -150,13 +169,18 @@ def _answer(found: ControllerComparison, files: list[Path]) -> dict[str, Any]:
         "verdict": found.verdict,
         "judged": {"output": judged.column, "statistic": judged.statistic, "unit": judged.unit},
         "units": found.units,
-        "cases": rows(found.table),
-        "worst": None if found.worst is None else rows(found.worst),
+        "cases": values(found.table),
+        "worst": None if found.worst is None else values(found.worst),
         "limits": {name: one._asdict() for name, one in found.limits.items()},
         "notes": list(found.notes),
+        "tables": [
+            {"motion": name, "rows": rows(found, name), "lowest": lowest(found, name)}
+            for name in found.motions
+        ],
+        "header": header(found), "footnotes": footnotes(found),
         "seconds": round(found.seconds, 1),
         "files": [str(path.absolute()) for path in files],
-    }
+    }  # fmt: skip
 
 
 def _print(found: ControllerComparison, folder: Path, files: list[Path]) -> None:

@@ -42,7 +42,8 @@ class ViewError(BristleError):
 def stamp(folder: Path) -> str:
     """Return a text that changes with a study's files and its history."""
     parts = []
-    for name in (*DEPENDS, "history", "history/undone", "reports", "export", "design", *_DESIGNED):
+    folders = ("history", "history/undone", "reports", "export", "design", "comparisons")
+    for name in (*DEPENDS, *folders, *_DESIGNED):
         with suppress(OSError):
             about = (folder / name).stat()
             parts.append(f"{name}:{about.st_mtime_ns}:{about.st_size}")

@@ -15,12 +15,13 @@ from typing import Any
 from .. import __version__
 from ..errors import BristleError, StudyError
 from .answers import Answers, Compiling, stamp
-from .commands import COMMANDS, UPLOADS, batch_name, file_name, order_of
+from .commands import COMMANDS, order_of
 from .consent import consent, waiting_texts
 from .designs import write_design
 from .files import files_of, is_given, kind_of
 from .jobs import Jobs
 from .message import PACKED, Answer, Handler, Request, RequestError, as_json
+from .names import UPLOADS, batch_name, file_name
 
 LARGEST_UPLOAD = 256 * 1024**2
 """Bytes of a file that may be dropped: as much as the reader of measurements takes."""
@@ -30,6 +31,7 @@ _PIECE = 1024**2
 
 OF_STUDY = (
     "data", "check", "fit", "errors", "residual", "verdict", "history", "design", "loops",
+    "controllers",
 )  # fmt: skip
 """Views of a study."""
 
@@ -138,7 +140,8 @@ class App:
     def _view(self, request: Request) -> Answer:
         name, view = request.parts
         arguments = {key: request.query[key] for key in ("role", "name") if key in request.query}
-        return Answer(self.answers.get(view, self.study(name), arguments), PACKED)
+        keep = view != "controllers"  # dropped records and other studies are beside the study
+        return Answer(self.answers.get(view, self.study(name), arguments, keep), PACKED)
 
     def _files(self, request: Request) -> Answer:
         return as_json({"files": files_of(self.study(request.parts[0]))})

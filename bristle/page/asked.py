@@ -17,8 +17,8 @@ from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..scenario.scenario import Component, Scenario, load_scenario
 from ..study.study import Study
-from .commands import UPLOADS, batch_name, file_name
 from .controls import control_of, stock_file
+from .names import UPLOADS, batch_name, file_name
 
 FILES = (".building", ".controller")
 """How overrides end that name files; a ground motion has a name, or is a dropped file."""

@@ -13,14 +13,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..findings import command, unknown, written
+from . import comparisons
 from .designs import FOLDER as DESIGNS
 from .designs import INTENSITIES, design_name, kind_of_design
 from .message import RequestError
+from .names import UPLOADS, batch_name, file_name
 
-_NAME = re.compile(r"\w[\w .+-]{0,79}")
 _WORD = re.compile(r"[A-Za-z][\w.]{0,79}")
 _SET = re.compile(r"[A-Za-z][\w.\[\]]{0,99}=\w[\w .+-]*(/\w[\w .+-]*)*|[\w.\[\]]{1,100}=-[\d.e+-]+")
-_BATCH = re.compile(r"[0-9a-z][0-9a-z-]{0,39}")
 
 Options = Mapping[str, Any]
 
@@ -37,29 +37,6 @@ class Order:
     def shown(self) -> str:
         """The command line as a shell takes it."""
         return command(*self.words)
-
-
-def file_name(text: object, what: str = "a name") -> str:
-    """Return a text that is the name of a file or folder and no path.
-
-    Raises
-    ------
-    RequestError
-        If it is not.
-    """
-    if not isinstance(text, str) or not _NAME.fullmatch(text) or text.endswith((".", " ")):
-        raise RequestError(
-            f"{what}: {written(text)}; letters, digits, spaces, dots and dashes are right, "
-            "beginning with a letter or digit."
-        )
-    return text
-
-
-def batch_name(text: object) -> str:
-    """Return a text that names files that were dropped together; RequestError if it does not."""
-    if not isinstance(text, str) or not _BATCH.fullmatch(text):
-        raise RequestError(f"a batch of files: {written(text)} is no name of one.")
-    return text
 
 
 def order_of(what: object, study: object, options: Options) -> Order:
@@ -231,13 +208,11 @@ def _simple(*before: str) -> Callable[[str, Options], list[str]]:
     return lambda study, options: [*before, study]
 
 
-UPLOADS = "uploads"
-"""The folder beside the studies where files go that were dropped on the page."""
-
 COMMANDS: dict[str, Callable[[str, Options], list[str]]] = {
     "add": _add,
     "auto": _auto,
     "check": _check,
+    "controllers": comparisons.words,
     "design": _design,
     "diagnose": _diagnose,
     "example": _example,

@@ -62,7 +62,7 @@ def controls(name: str) -> dict[str, Control]:
     if place is None:
         return {}
     found: dict[str, Control] = {}
-    for control in (CONSTANT, *_controllers()):
+    for control in (CONSTANT, *library_controllers()):
         for candidate in sorted(_candidates(own, name, control), key=lambda one: len(one[1])):
             try:
                 load_scenario(stock_file(candidate[0]), candidate[1])
@@ -132,7 +132,7 @@ def _stock(name: str) -> Scenario:
 
 
 @cache
-def _controllers() -> tuple[str, ...]:
+def library_controllers() -> tuple[str, ...]:
     """Return the names of the library's controllers."""
     return tuple(
         name

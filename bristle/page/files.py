@@ -13,7 +13,7 @@ SAFE = {
 }  # fmt: skip
 """Types that a browser may be told; all else is bytes."""
 OWN = ("study.toml", "model.toml", "verdict.json", "README.md")
-FOLDERS = ("reports", "export", "design", "data", "effects", "laws")
+FOLDERS = ("reports", "export", "design", "comparisons", "data", "effects", "laws")
 
 
 def _given(folder: Path) -> Iterator[Path]:

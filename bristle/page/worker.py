@@ -22,6 +22,7 @@ from ..errors import BristleError, TrustError
 VIEWS = {
     "check": "check_view",
     "columns": "columns_view",
+    "controllers": "controllers_view",
     "data": "data_view",
     "design": "design_view",
     "errors": "errors_view",

@@ -18,7 +18,10 @@ from study.made import write_runs
 
 from bristle.study import Study, create_study
 
-VIEWS = ("home", "data", "fit", "errors", "verdict", "history", "hand_on", "simulate", "design")
+VIEWS = (
+    "home", "data", "fit", "errors", "verdict", "history", "hand_on", "simulate", "design",
+    "controllers",
+)  # fmt: skip
 AXE = "axe-core@4.10.3"
 SERIOUS = ("serious", "critical")
 

@@ -1,4 +1,4 @@
-"""Views 7 and 8 in a real Chromium: sliders, dropped records, the page's own engine, designs."""
+"""Views 7, 8 and 9 in a real Chromium: sliders, dropped records, the page's own engine, designs."""
 
 from __future__ import annotations
 
@@ -143,4 +143,33 @@ def test_weights_are_moved_solved_and_the_closed_loop_is_drawn(home: Path) -> No
         page.get_by_role("row", name=re.compile("0.6 g, damper.force")).wait_for(timeout=120_000)
         assert page.evaluate("document.documentElement.scrollWidth") <= 400
         assert (home / "rig" / "design" / "hinf_1.json").is_file()
+        assert not seen.errors
+
+
+@pytest.mark.slow
+def test_controllers_are_compared_and_a_comparison_is_cancelled(home: Path) -> None:
+    with page_on(home) as client, shots.chromium(400) as page:
+        seen = Watched(page, client)
+        page.goto(client.server.address.partition("#")[0] + "#/rig/controllers")
+        page.get_by_role("heading", name="Not compared yet").wait_for(timeout=120_000)
+        page.get_by_label("Members for the worst case").fill("0")
+        page.get_by_role("button", name="Remove motion 2").click()
+        page.get_by_label("clipped LQG").uncheck()
+        seen.press("Compare")
+        page.get_by_text("Skyhook has the lowest peak acceleration").wait_for(timeout=300_000)
+        assert page.locator("table").get_by_role("row", name=re.compile("^Skyhook")).count() == 1
+        with page.expect_download() as download:
+            seen.press("Download the report")
+        assert download.value.suggested_filename == "report.html"
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
+        page.get_by_label("clipped LQG").check()
+        seen.press("Compare")
+        seen.press("Cancel")
+        page.get_by_text("Cancelled", exact=True).wait_for(timeout=60_000)
+        page.get_by_text("Skyhook has the lowest peak acceleration").wait_for()
+        assert page.locator("#comparison option").count() == 1
+        page.evaluate(DROP, "time [s],acceleration [m/s2]\n0,0\n0.02,1\n0.04,0\n")
+        page.locator("#motion-1").get_by_text("shake.csv (dropped)").first.wait_for(
+            state="attached"
+        )
         assert not seen.errors

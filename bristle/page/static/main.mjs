@@ -14,6 +14,7 @@ const VIEWS = [
   ["hand_on", "Hand on"],
   ["simulate", "Simulate"],
   ["design", "Design"],
+  ["controllers", "Compare controllers"],
 ];
 const AT_WORK = ["running", "cancelling"];
 const [OFTEN, SELDOM] = [600, 4000]; // ms between two looks, at work that is going on and else

@@ -7,6 +7,7 @@ const GROUPS = [
   ["reports/", "Reports"],
   ["export/", "FMU, scenario and package"],
   ["design/", "Controllers"],
+  ["comparisons/", "Comparisons of controllers"],
   ["plan", "Next tests"],
   ["", "The study itself"],
 ];

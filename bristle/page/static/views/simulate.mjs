@@ -1,12 +1,12 @@
 // View 7, Simulate: which building, damper, control and ground motion; then sliders.
 
-import { packed, postPacked, put } from "../api.mjs";
-import { bytes, h, say, wrong } from "../dom.mjs";
+import { packed, postPacked } from "../api.mjs";
+import { h, say } from "../dom.mjs";
+import { acceptDrops, named as recordNamed, picker, take } from "../records.mjs";
 import { Simulation } from "../simulation.mjs";
 
 const FIRST = "el_centro_lugre_passive";
-const LARGEST = 64 * 1024 ** 2; // bytes of a ground motion, as its reader has it
-const WORDS = {
+export const WORDS = {
   ConstantVoltage: "constant voltage", ClippedOptimal: "clipped-optimal", HinfInverse: "H-infinity with inverse",
   Lpv: "LPV, scheduled by velocity", LqgClipped: "clipped LQG", Skyhook: "skyhook",
 };
@@ -22,7 +22,10 @@ export async function show(page) {
     if (key === "scenario") page.setting.control = "";
     page.again();
   };
-  const dropped = (name) => (name.includes("/") ? `${name.split("/").pop()} (dropped)` : name);
+  const takeFiles = (files) => take(node, files, (name) => {
+    say(`Running with ${recordNamed(name)}.`);
+    change("record")(name);
+  });
   const whole = h("div", {}, h("p", { class: "loading", role: "status" },
     "Running the scenario; the first time all laws are compiled, which takes a minute …"));
   const node = h("div", { class: "dropped" },
@@ -33,10 +36,10 @@ export async function show(page) {
         page.again();
       }),
       h("label", { class: "field", for: "control" }, "Control", controls),
-      field("record", "Ground motion", [["", "the scenario's"], ...records.map((one) => [one, dropped(one)])], what.record, change("record")),
-      picker(page, (files) => take(page, node, files))),
+      field("record", "Ground motion", [["", "the scenario's"], ...records.map((one) => [one, recordNamed(one)])], what.record, change("record")),
+      picker(takeFiles)),
     whole);
-  acceptDrops(node, (files) => take(page, node, files));
+  acceptDrops(node, takeFiles);
   controls.addEventListener("change", () => change("control")(controls.value));
   postPacked("simulate", { ...what, values: {}, about: true }).then(
     (first) => {
@@ -66,44 +69,4 @@ function field(id, label, options, chosen, then) {
 function named(what) {
   const more = [what.control && (WORDS[what.control] ?? what.control), what.study && `damper of ${what.study}`, what.record && what.record.split("/").pop()];
   return [what.scenario, ...more.filter(Boolean)].join(", ");
-}
-
-function picker(page, then) {
-  const input = h("input", { type: "file", class: "unseen", id: "record-file", accept: ".at2,.csv,.txt,.dat", "aria-label": "Ground motion file", tabindex: "-1" });
-  input.addEventListener("change", () => input.files.length && then([...input.files]));
-  return h("span", {}, h("button", { type: "button", onclick: () => input.click() }, "Another record"), " ",
-    h("span", { class: "soft small" }, "AT2 or CSV; or drop it here"), input);
-}
-
-function acceptDrops(node, then) {
-  node.addEventListener("dragover", (event) => {
-    event.preventDefault();
-    node.classList.add("over");
-  });
-  node.addEventListener("dragleave", (event) => {
-    if (!node.contains(event.relatedTarget)) node.classList.remove("over");
-  });
-  node.addEventListener("drop", (event) => {
-    event.preventDefault();
-    node.classList.remove("over");
-    if (event.dataTransfer.files.length) then([...event.dataTransfer.files]);
-  });
-}
-
-/** Sends a ground motion to the folder of the studies, and runs with it; the readers check it. */
-async function take(page, node, files) {
-  node.querySelector(".state.wrong")?.remove();
-  const [file] = files;
-  const trouble = (text) => node.prepend(wrong("This ground motion cannot be used", text));
-  if (files.length > 1) return trouble("Drop one file: a run has one ground motion.");
-  if (file.size > LARGEST) return trouble(`${file.name}: ${bytes(file.size)}; a ground motion may have ${bytes(LARGEST)}. Cut it, or sample it more coarsely.`);
-  try {
-    const batch = `record-${new Date().toISOString().slice(0, 19).replace(/[T:]/g, "-")}`;
-    await put(`uploads/${batch}/${encodeURIComponent(file.name)}`, file);
-    page.setting.record = `uploads/${batch}/${file.name}`;
-    say(`Running with ${file.name}.`);
-    await page.again();
-  } catch (error) {
-    trouble(error.message);
-  }
 }
