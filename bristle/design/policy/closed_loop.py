@@ -157,7 +157,14 @@ def stepped(plant: Any, setup: Any, u: Any, z0: Any, z1: Any, work: Any) -> floa
 
 
 def free_speed(plant: Any, x: Any, g_0: float, g_1: float) -> float:
-    """Return the damper's speed [m/s] after a step without force."""
+    """Return the damper's speed [m/s] after a step without force.
+
+    Parameters
+    ----------
+    plant : Plant
+    x : (m,) states of the building before the step
+    g_0, g_1 : ground acceleration at its ends [m/s2]
+    """
     found: float = dot(plant.coming, x) + plant.coming_0 * g_0 + plant.coming_1 * g_1
     return found
 
@@ -317,7 +324,14 @@ def pull_back(
 
 
 def clear(course: Any, by_y: Any, by_x: Any, slope: Any) -> None:
-    """Set the derivatives to those that the sum has by itself; see `pull_back`."""
+    """Set the derivatives to those that the sum has by itself; see `pull_back`.
+
+    Parameters
+    ----------
+    course : Course; its derivatives are set
+    by_y, by_x : (N,) of the sum by output and damper's displacement at the samples
+    slope : (w,) of the sum by the weights; set to 0
+    """
     for i in range(len(slope)):
         slope[i] = 0.0
     for k in range(len(by_y)):
@@ -333,7 +347,14 @@ def clear(course: Any, by_y: Any, by_x: Any, slope: Any) -> None:
 
 
 def along(table: Any, by_force: float, by_z: Any, j: int) -> float:
-    """Return what column j of the damper's step does, through its force and its states."""
+    """Return what column j of the damper's step does, through its force and its states.
+
+    Parameters
+    ----------
+    table : (2 + k, columns) derivatives of the step; force at the end in row 1, states from 2 on
+    by_force, by_z : derivatives of the sum by the force and the (k,) states at the end
+    j : column
+    """
     total: float = table[1, j] * by_force
     for i in range(len(table) - 2):
         total += table[2 + i, j] * by_z[i]
@@ -376,7 +397,15 @@ def policy_back(
 
 
 def network_back(policy: Any, course: Any, k: int, by_voltage: float, slope: Any) -> None:
-    """Take sample k's voltage back to the network's weights and inputs; see `policy_back`."""
+    """Take sample k's voltage back to the network's weights and inputs; see `policy_back`.
+
+    Parameters
+    ----------
+    policy, course : Policy, Course
+    k : sample
+    by_voltage : derivative of the sum by its voltage
+    slope : (w,) of the sum by the weights; added to
+    """
     count, hidden, weights = policy.n + BESIDES, policy.hidden, policy.weights
     biases = hidden * count
     outer = biases + hidden

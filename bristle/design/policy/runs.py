@@ -88,7 +88,19 @@ class Loop:
         return self.course.measured[:N, 0], self.course.measured[:N, 1]
 
     def pull_back(self, run: Run, weights: Array, by_y: Array, by_x: Array) -> Array:
-        """Return what the weights do to a sum with given derivatives (N,); after `respond`."""
+        """Return what the weights do to a sum; after `respond`.
+
+        Parameters
+        ----------
+        run : Run
+        weights : (w,) array
+        by_y, by_x : (N,) arrays
+            Derivatives of the sum by output and damper's displacement at the samples.
+
+        Returns
+        -------
+        slope : (w,) array
+        """
         slope = np.zeros_like(weights)
         self._compute(PULL_BACK, run, weights, by_y, by_x, slope)
         return slope
