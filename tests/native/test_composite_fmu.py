@@ -23,6 +23,7 @@ from bristle.conformance import conform
 from bristle.fmu.archive import library_member
 from bristle.native.build import build
 from bristle.native.platforms import here
+from bristle.physics.user import load_law
 from bristle.scenario.scenario import load_scenario, stock_scenarios
 from bristle.simulate.coupled import simulate
 from bristle.simulate.run import run
@@ -43,6 +44,18 @@ VALGRIND = shutil.which("valgrind")
 @pytest.mark.parametrize("scenario", stock_scenarios(), ids=lambda path: path.stem)
 def test_rows_are_those_of_the_coupled_engine(scenario: Path) -> None:
     assert compared(scenario) <= EQUAL
+
+
+def test_so_are_those_of_a_trained_policy() -> None:
+    given = {"controller.fmu": "TrainedPolicy", "damper.fmu": "LuGreDamper"}
+    assert compared("el_centro_0p6g_clipped", given, stop=5.0) <= EQUAL
+
+
+def test_so_are_those_of_a_law_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["laws", "new", "my_law"]) == 0
+    load_law(tmp_path / "my_law.py")
+    assert compared(PASSIVE, {"damper.fmu": "OwnMyLawDamper"}, stop=5.0) <= EQUAL
 
 
 def test_so_are_they_in_fmpy() -> None:
