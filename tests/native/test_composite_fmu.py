@@ -23,7 +23,6 @@ from bristle.conformance import conform
 from bristle.fmu.archive import library_member
 from bristle.native.build import build
 from bristle.native.platforms import here
-from bristle.physics.user import load_law
 from bristle.scenario.scenario import load_scenario, stock_scenarios
 from bristle.simulate.coupled import simulate
 from bristle.simulate.run import run
@@ -54,8 +53,11 @@ def test_so_are_those_of_a_trained_policy() -> None:
 def test_so_are_those_of_a_law_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["laws", "new", "my_law"]) == 0
-    load_law(tmp_path / "my_law.py")
-    assert compared(PASSIVE, {"damper.fmu": "OwnMyLawDamper"}, stop=5.0) <= EQUAL
+    text = load_scenario(PASSIVE).file.read_text(encoding="utf-8")
+    scenario = tmp_path / "mine.toml"
+    scenario.write_text(text.replace('fmu = "LuGreDamper"', 'law = "my_law.py"'), encoding="utf-8")
+    assert "my_law.py" in scenario.read_text(encoding="utf-8")
+    assert compared(scenario, stop=5.0) <= EQUAL
 
 
 def test_so_are_they_in_fmpy() -> None:
