@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from ..physics.vectors import dot
 from .response import (
     STATES,
     TRIED,
@@ -20,7 +21,6 @@ from .response import (
     X_1,
     Course,
     damper_end,
-    dot,
 )
 
 

@@ -13,6 +13,7 @@ from ..physics.damper import force_at
 from ..physics.damper import step as law_step
 from ..physics.inputs import Inputs
 from ..physics.tuples import record
+from ..physics.vectors import dot
 
 SWEEPS = 30
 """Corrections of the force in a step, at most."""
@@ -68,14 +69,6 @@ class Course(NamedTuple):
     energy: Any
     y: Any
     work: Any
-
-
-def dot(a: Any, b: Any) -> float:
-    """Return the product of two rows."""
-    total = 0.0
-    for i in range(len(a)):
-        total += a[i] * b[i]
-    return total
 
 
 def damper_end(

@@ -20,16 +20,8 @@ from ...physics.inputs import Setup
 from ..plant import structure
 from ..sliding import Damper
 from ..task import Task
-from .closed_loop import (
-    PULL_BACK,
-    RESPOND,
-    STATES,
-    Course,
-    Motion,
-    Plant,
-    Policy,
-    compute,
-)
+from .adjoint import PULL_BACK, RESPOND, compute
+from .closed_loop import STATES, Course, Motion, Plant, Policy
 
 Array = NDArray[np.float64]
 
