@@ -10,6 +10,7 @@ voltage's history makes the search short; `Limit` says how sure the outcome is.
 
 from __future__ import annotations
 
-from .compute import Limit, Start, limit
+from .compute import limit
+from .result import Limit, Start
 
 __all__ = ["Limit", "Start", "limit"]

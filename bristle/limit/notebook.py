@@ -12,7 +12,7 @@ from .picture import draw_limit
 from .text import compared, confidence
 
 if TYPE_CHECKING:
-    from .compute import Limit
+    from .result import Limit
 
 
 def limit_html(found: Limit) -> str:

@@ -11,7 +11,7 @@ from .text import compared
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from .compute import Limit
+    from .result import Limit
 
 _BAR = 0.26
 """Height of a bar with the gap to the next [in]."""

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from ..quantity import plain
 
 if TYPE_CHECKING:
-    from .compute import Limit
+    from .result import Limit
 
 AGREE = 0.02
 """Share by which starts that agree differ at most."""
