@@ -14,7 +14,7 @@ from ..data.checks.clipping import stretches
 from ..data.checks.motion import velocity_of_run
 from ..data.measurement import Measurement
 from ..quantity import scale
-from ..study.data_check import Place, place_of_damper
+from ..study.place import Place, place_of_damper
 from ..study.reading import place_of_run
 from ..study.run_file import TEST
 from ..study.study import Study

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,22 +12,19 @@ from ..data.checks.channels import check_channels
 from ..data.checks.differing_runs import check_differing_runs
 from ..data.checks.finding import Finding, grouped, sentence
 from ..data.checks.motion import (
-    ACROSS,
     check_force,
     check_motion,
     velocity_of_run,
-    with_motion_across,
 )
 from ..data.checks.recording import check_recording
 from ..data.checks.runs import Excitation, check_runs, excitation_of
 from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..data.relation import band
-from ..physics.device import GROUND
 from ..quantity import plain, scale
 from .openings import runs_for_test
+from .place import Place, place_of_damper
 from .reading import read_runs
-from .rig import building_of
 from .run_file import TEST
 from .study import Study
 
@@ -205,45 +202,6 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
     findings = [_milder(finding, runs.all) for finding in findings]
     ordered = [finding for level in _HEADINGS for finding in findings if finding.level == level]
     return DataCheck(tuple(ordered), tuple(excitations), tuple(every), at_damper)
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a damper sits.
-
-    `level` is what stands before its displacement and velocity in a run as it is `seen`; `ends` are
-    the levels that a device of the building connects, "" for the ground, () for the damper on the
-    first level and for a bench; `text` says where, in words; `on_first` whether it is between the
-    ground and the first level.
-    """
-
-    level: str = ""
-    ends: tuple[str, str] | tuple[()] = ()
-    text: str = "base"
-    on_first: bool = True
-
-    def seen(self, run: Measurement) -> Measurement:
-        """Return a run with the motion across the damper."""
-        return with_motion_across(run, *self.ends) if self.ends else run
-
-
-def place_of_damper(study: Study, runs: Sequence[Measurement]) -> Place:
-    """Return where the damper of a study's building sits: without devices on the base or floor 1.
-
-    Parameters
-    ----------
-    study : with a building
-    runs : its measurements
-    """
-    named = bool(study.settings.device)
-    building = building_of(study, study.model(to_show=True)) if named else None
-    if building is None:
-        based = any(name.startswith("base_") for run in runs for name in run.channels)
-        return Place("base" if based else "floor1")
-    levels, device = building.levels(), building.device(building.studied)
-    lower, upper = ("" if i == GROUND else levels[i] for i in device.levels)
-    text = f"{device.name} ({device.place(levels)})"
-    return Place(ACROSS, (lower, upper), text, device.on_first)
 
 
 def _check_run(run: Measurement, at_damper: Place) -> list[Finding]:
