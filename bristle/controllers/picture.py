@@ -22,6 +22,8 @@ _MORE = ("#E69F00", "#56B4E9", "#8a4a78", "#5b6770")
 _MARKERS = "osD^vP<>"
 _ROW = 0.2
 """Height of a controller's row in the summary [in]."""
+_LEFT = 72.0 * 2.15
+"""How far left of the axes a motion's heading begins [pt]."""
 _LASTS = 16.0
 """Longest part of a run that is shown [s]."""
 
@@ -58,38 +60,17 @@ def draw_summary(found: ControllerComparison) -> Page:
     page = Page(8.6, height, _unbroken(title), " ".join(said))
     with look():
         axes = page.figure.add_subplot(page.grid(1, 1, left=2.3, right=0.4, top=0.3)[0, 0])
-        left = 72.0 * 2.15
         most, place, ticks = 100.0, 0.0, list[tuple[float, str]]()
         for motion in found.motions:
-            top = place
-            own: Any = wide.loc[motion]
-            value = found.value(motion, BEST)
+            heading = f"{motion} (100 %: {found.value(motion, BEST):.3g} {unit})"
             axes.annotate(
-                f"{motion} (100 %: {value:.3g} {unit})", (0.0, place - 0.95), (-left, 0),
-                xycoords=axes.get_yaxis_transform(), textcoords="offset points", fontsize=8.5,
-                color=INK, va="center", fontweight="bold", annotation_clip=False,
+                heading, (0.0, place - 0.95), (-_LEFT, 0), xycoords=axes.get_yaxis_transform(),
+                textcoords="offset points", fontsize=8.5, color=INK, va="center",
+                fontweight="bold", annotation_clip=False,
             )  # fmt: skip
-            for name in names:
-                share = 100.0 * float(own[name])
-                worst = 100.0 * found.worst_value(motion, name) / value
-                colour = colour_of(found, name)
-                marker = _MARKERS[names.index(name) % len(_MARKERS)]
-                if np.isfinite(worst):
-                    axes.plot([share, worst], [place, place], color=colour, linewidth=1.4)
-                    axes.plot(worst, place, "|", color=colour, markersize=7, markeredgewidth=1.4)
-                    most = max(most, worst)
-                axes.plot(share, place, marker, color=colour, markersize=6)
-                ticks.append((place, name))
-                most = max(most, share)
-                place += 1.0
-            for reference, fill in ((OFF, "white"), (ON, GREY)):
-                share = 100.0 * float(own[reference])
-                axes.plot(share, top - 0.45, "o", color=GREY, markerfacecolor=fill, markersize=4.5,
-                          clip_on=True)  # fmt: skip
-            if motion in found.limits:
-                share = 100.0 * float(own[LIMIT])
-                axes.plot([share, share], [top - 0.5, place - 0.5], color=INK, linewidth=2.0)
-            place += 1.4
+            ticks += [(place + k, name) for k, name in enumerate(names)]
+            most = max(most, _draw_shares(axes, found, motion, wide.loc[motion], place))
+            place += len(names) + 1.4
         axes.axvline(100.0, color=GREY, linewidth=0.9, linestyle=(0, (4, 3)))
         axes.set_yticks([at for at, _ in ticks], [name for _, name in ticks], fontsize=8.5)
         axes.tick_params(axis="y", length=0)
@@ -99,6 +80,39 @@ def draw_summary(found: ControllerComparison) -> Page:
         axes.set_xlim(0.0, 1.06 * min(most, 250.0))
         axes.set_xlabel("% of the best constant voltage", loc="right", labelpad=1)
     return page
+
+
+def _draw_shares(
+    axes: Axes, found: ControllerComparison, motion: str, own: Any, top: float
+) -> float:
+    """Draw a motion's rows from `top` on; return the largest share [%] of its controllers.
+
+    Parameters
+    ----------
+    axes, found, motion
+    own : Series
+        Shares of the best constant voltage, by what commands.
+    top : float
+        Place of the first row.
+    """
+    most, names = 0.0, found.controllers
+    for k, name in enumerate(names):
+        share, place, colour = 100.0 * float(own[name]), top + k, colour_of(found, name)
+        worst = 100.0 * found.worst_value(motion, name) / found.value(motion, BEST)
+        if np.isfinite(worst):
+            axes.plot([share, worst], [place, place], color=colour, linewidth=1.4)
+            axes.plot(worst, place, "|", color=colour, markersize=7, markeredgewidth=1.4)
+            most = max(most, worst)
+        axes.plot(share, place, _MARKERS[k % len(_MARKERS)], color=colour, markersize=6)
+        most = max(most, share)
+    for reference, fill in ((OFF, "white"), (ON, GREY)):
+        share = 100.0 * float(own[reference])
+        axes.plot(share, top - 0.45, "o", color=GREY, markerfacecolor=fill, markersize=4.5,
+                  clip_on=True)  # fmt: skip
+    if motion in found.limits:
+        share = 100.0 * float(own[LIMIT])
+        axes.plot([share, share], [top - 0.5, top + len(names) - 0.5], color=INK, linewidth=2.0)
+    return most
 
 
 def _unbroken(title: str) -> str:
