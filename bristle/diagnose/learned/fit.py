@@ -93,13 +93,38 @@ def learn(
     if not chosen:
         why = "No curve lowers the error on stretches of the training runs that it has not seen."
         return LearnedCurve(name, None, (), before, None, (), why)
-    fitted = _fitted(chosen, name, before.model, train, held_out)
-    fitted = sorted(fitted, key=lambda one: learning.weighed(one.loss, one.curve.memory))
+    fitted = _best_first(_fitted(chosen, name, before.model, train, held_out), learning)
+    if fitted[0].trial.train > rule.clean:
+        model = with_law_of(before.model, fitted[0])
+        other = _others(promises(residual_of(train, model), parts, along, learning), fitted)
+        more = _fitted(distinct(other, TRIED, learning.near), name, model, train, held_out)
+        fitted = _best_first([*fitted, *more], learning)
     refusals = [_refusal(before, one, rule, learning) for one in fitted]
     place = refusals.index("") if "" in refusals else 0
     kept = fitted[place]
     others = tuple(one for one in fitted if one is not kept)
     return LearnedCurve(name, kept.curve, kept.std, before, kept.trial, others, refusals[place])
+
+
+def _best_first(fitted: Sequence[Fitted], learning: LearnRule) -> list[Fitted]:
+    return sorted(fitted, key=lambda one: learning.weighed(one.loss, one.curve.memory))
+
+
+def with_law_of(base: Model, best: Fitted) -> Model:
+    """Return a model with the law's values that were fitted together with a curve.
+
+    Alone, the law has taken up what it can of a large curve. A scan linear in a law so far off
+    mistakes a factor of the whole force for one of a part of it; beside a curve that explains most
+    of the error the law is nearer to the rig's.
+    """
+    values = {key: best.trial.model.value(key) for key in base.values}
+    return replace(base, values=values)
+
+
+def _others(found: Sequence[Promise], fitted: Sequence[Fitted]) -> list[Promise]:
+    """Return promises of parts and signals that no curve was fitted to."""
+    done = {(one.curve.part, one.curve.along) for one in fitted}
+    return [one for one in found if (one.curve.part, one.curve.along) not in done]
 
 
 def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRule) -> str:

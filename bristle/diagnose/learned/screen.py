@@ -28,8 +28,8 @@ Array = NDArray[np.float64]
 FINE = 13
 """Knots of the spline that is looked at."""
 
-RIPPLED = 33
-"""The same along displacement, where a force may ripple."""
+RIPPLED = 65
+"""The same along displacement, where a force may ripple: some 20 periods in the stroke."""
 
 MANY = {"displacement": RIPPLED, "stroke": 2 * RIPPLED - 1}
 """Knots of the spline that is looked at, along signals that need more than `FINE`."""
