@@ -19,7 +19,7 @@ PACKAGE = ROOT / "bristle"
 # imports from those before it in its list, never from beside it or from behind it.
 BASE = (
     {"errors", "resources", "interrupt", "progress"},
-    {"units", "lines", "quantity"},
+    {"units", "lines", "quantity", "shown"},
     {"physics", "findings"},
     {"control", "data", "jit", "trust"},
     {"component"},

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from ..errors import EnsembleError, RunError
 from ..findings import written
 from ..progress import Progress
+from ..shown import shown
 from .file import read_ensemble
 from .plan import Outcome, Plan
 from .quantiles import Failure, failures, parts, quantiles
@@ -78,6 +79,13 @@ class Ensemble:
         if (self.runs["status"] == "done").sum() < 2:
             raise RunError("an ensemble is drawn from two runs on that are done.")
         return draw_ensemble(self).figure
+
+    def __repr__(self) -> str:
+        done = int((self.runs["status"] == "done").sum())
+        failed = [f"{one.count} failed: {one.reason}" for one in self.failures]
+        about = f"{self.plan.title}, {done} of {self.plan.runs} runs done"
+        table = self.quantiles.to_string(float_format="%.4g").splitlines()
+        return shown(self, about, [*table, *failed])
 
     def _repr_html_(self) -> str:
         from .notebook import ensemble_html

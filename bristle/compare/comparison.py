@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from ..identify.fit import Fit, Model, Problem
 from ..physics.drive import DRIVES, Drive
+from ..quantity import short_z
+from ..shown import shown
 from .bands import Spectrum, spectrum
 from .errors import (
     CLOSE,
@@ -140,6 +142,10 @@ class Comparison:
         from .picture import draw_comparison
 
         return draw_comparison(self, title).figure
+
+    def __repr__(self) -> str:
+        runs = f"{len(self.runs)} run" + "s" * (len(self.runs) > 1)
+        return shown(self, f"{self.quantity}, {runs}, z = {short_z(self.z)}", self.sentences)
 
     def _repr_html_(self) -> str:
         from .notebook import comparison_html

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..batch.plan import Output
 from ..errors import not_usable
+from ..shown import shown
 from .dampers import Damper
 from .entry import BEST, LIMIT, OFF, ON, Entry
 from .limits import Reached
@@ -184,6 +185,9 @@ class ControllerComparison:
         from .picture import draw_summary
 
         return draw_summary(self).figure
+
+    def __repr__(self) -> str:
+        return shown(self, ", ".join(self.controllers), self.verdict)
 
     def _repr_html_(self) -> str:
         from ..draw import html

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordError, UnitError
+from ..shown import shown
 from ..units import conversion
 from .channels import DRIVE, ChannelSpec, at_device, channel_unit
 from .corrections import Correction, set_right
@@ -108,6 +109,14 @@ class Measurement:
     labels: Labels = field(default_factory=dict)
     spikes: tuple[Spike, ...] = ()
     extra: Mapping[str, Extra] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        rows = (
+            f"{name} [{self.units[name]}]: {values.min():.4g} to {values.max():.4g}"
+            for name, values in self.channels.items()
+        )
+        about = f"{self.name}, {len(self.time)} samples, {self.step:g} s apart"
+        return shown(self, about, [*rows, *self.notes])
 
     @property
     def step(self) -> float:

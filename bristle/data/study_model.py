@@ -10,6 +10,7 @@ from ..physics.drive import DRIVES, VOLTAGE, unit_for
 from ..physics.effect import EFFECTS, plain_name
 from ..physics.laws import DEFAULT, base_and_variant
 from ..physics.parameter import Parameter
+from ..shown import shown
 from ..units import convert
 from .correlation import Array, Correlation, correlation_of_covariance, covariance_of
 from .declared import declared_of, defaults_of
@@ -34,6 +35,13 @@ class StudyModel:
     only_shown: tuple[str, ...] = ()
     correlation: Correlation | None = None
     drive: str = VOLTAGE.name
+
+    def __repr__(self) -> str:
+        values = (
+            f"{name} = {value.value:.6g}" + (f" {value.unit}" if value.unit != "1" else "")
+            for name, value in self.flat().items()
+        )
+        return shown(self, " + ".join([self.law, *self.effects]), values)
 
     @property
     def base_law(self) -> str:

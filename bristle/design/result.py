@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..control.controller import Controller, building_digest
+from ..shown import shown
 from .lmi import Solution
 from .plant import Plant
 from .table import Bank
@@ -65,6 +66,10 @@ class DesignResult:
         from .picture import draw_result
 
         return draw_result(self).figure
+
+    def __repr__(self) -> str:
+        facts = (f"{name} = {value}" for name, value in self.facts.items())
+        return shown(self, f"{self.task.kind}, {self.task.title}", facts)
 
     def _repr_html_(self) -> str:
         from .notebook import design_html

@@ -12,6 +12,7 @@ from ..compare.patterns import ResidualPattern
 from ..identify.assigned import late_effects
 from ..identify.rig import DAMPER
 from ..physics.effect import EFFECTS
+from ..shown import shown
 from . import verdict_text
 from .candidates import Trial
 from .effect_limits import EffectLimit
@@ -208,6 +209,9 @@ class Diagnosis:
         from .picture import draw_diagnosis
 
         return draw_diagnosis(self).figure
+
+    def __repr__(self) -> str:
+        return shown(self, ", ".join([self.kind, *self.effects]), [self.words])
 
     def _repr_html_(self) -> str:
         from .notebook import diagnosis_html

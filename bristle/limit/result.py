@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .text import AGREE, TRUST
+from ..quantity import plain
+from ..shown import shown
+from .text import AGREE, TRUST, compared
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,6 +104,13 @@ class Limit:
         from .picture import draw_limit
 
         return draw_limit(self).figure
+
+    def __repr__(self) -> str:
+        rows = (
+            f"{name}: {plain(value)} {self.unit}" + (f", {said}" if said else "")
+            for name, value, said in compared(self)
+        )
+        return shown(self, self.output, rows)
 
     def _repr_html_(self) -> str:
         from .notebook import limit_html

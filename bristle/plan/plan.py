@@ -11,6 +11,7 @@ from ..diagnose.rule import BENCH
 from ..errors import StudyError
 from ..physics.drive import DRIVES
 from ..quantity import plain
+from ..shown import shown
 from .folder import PlanFolder, PlannedRun, write_plan
 from .outcome import Outcome
 from .planned_test import Signals, Test
@@ -174,6 +175,9 @@ class Plan:
         from .picture import draw_test
 
         return draw_test(self.runs()[k], self.signals[k], self.drive)
+
+    def __repr__(self) -> str:
+        return shown(self, f"{len(self.tests)} tests for {self.study}", self.sentences())
 
     def _repr_html_(self) -> str:
         from .notebook import plan_html

@@ -27,6 +27,7 @@ from ..errors import StudyError
 from ..physics.effect import EFFECTS
 from ..progress import tell
 from ..quantity import plain, quantity
+from ..shown import shown
 from ..trust import remember_made
 from .curve_options import refuse_elsewhere
 from .curve_picture import curve_png
@@ -60,6 +61,9 @@ class LearnedEffect:
     def name(self) -> str:
         """The effect's name."""
         return self.found.name
+
+    def __repr__(self) -> str:
+        return shown(self, self.name, self.sentences())
 
     def sentences(self) -> list[str]:
         """Return what was learned, as an engineer would say it."""

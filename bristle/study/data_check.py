@@ -22,6 +22,7 @@ from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..data.relation import band
 from ..quantity import plain, scale
+from ..shown import shown
 from .openings import runs_for_test
 from .place import Place, place_of_damper
 from .reading import read_runs
@@ -54,6 +55,10 @@ class DataCheck:
     def plot(self) -> Figure:
         """Return the figure: the channels of all runs over time, and force over motion."""
         return self.page().figure
+
+    def __repr__(self) -> str:
+        found = (f"{one.level}: {sentence(one, runs)}" for one, runs in grouped(self.findings))
+        return shown(self, f"{len(self.runs)} runs", found)
 
     def _repr_html_(self) -> str:
         from .notebook import data_check_html

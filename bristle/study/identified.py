@@ -13,6 +13,7 @@ from ..identify.fit import Fit, Problem
 from ..identify.rig_fit import SiteModel
 from ..identify.table import LawError
 from ..physics.forms import split_form
+from ..shown import shown
 from .forms import FormError, form_of
 from .history import Step
 
@@ -108,6 +109,10 @@ class Identified:
             raise StudyError(f"{self.at.site.name}: only a damper has a force budget.")
         return page.figure
 
+    def __repr__(self) -> str:
+        about = " + ".join([self.model.law, *self.model.effects])
+        return shown(self, about, [*map(_in_line, self.parameters()), *self.notes])
+
     def _repr_html_(self) -> str:
         from .notebook import identified_html
 
@@ -156,3 +161,10 @@ class Identified:
                 }
             )  # fmt: skip
         return rows
+
+
+def _in_line(row: dict[str, Any]) -> str:
+    """Return a parameter in a line: name, value, half of its interval or how it was found, unit."""
+    known = row["how"] if row["interval95"] is None else f"+- {row['interval95']:.2g}"
+    unit = "" if row["unit"] == "1" else f" {row['unit']}"
+    return f"{row['name']} = {row['value']:.5g}{unit} ({known})"

@@ -22,6 +22,7 @@ from ..data.model_text import model_text
 from ..errors import StudyError
 from ..findings import command, written
 from ..physics.user import Loaded, waiting
+from ..shown import shown
 from ..trust import can_do_without, load
 from .added_runs import added_text
 from .history import History, Step
@@ -406,6 +407,11 @@ class Study:
         from .notebook import study_page
 
         return study_page(self).figure
+
+    def __repr__(self) -> str:
+        steps = self.steps()
+        last = f"; last step: {steps[-1].what}" if steps else ""
+        return shown(self, f"{self.folder}, {len(self.settings.runs)} runs{last}")
 
     def _repr_html_(self) -> str:
         from .notebook import study_html
