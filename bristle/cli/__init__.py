@@ -102,12 +102,14 @@ def _run(arguments: argparse.Namespace) -> int:
 @contextmanager
 def _progress(arguments: argparse.Namespace) -> Iterator[None]:
     """Tell on stderr what is being done, unless nobody wants to know."""
+    from .. import snapshots
     from ..progress import Line, telling, wants_lines
 
     if arguments.quiet or (getattr(arguments, "json", False) and not wants_lines()):
         yield
         return
-    with Line() as line, telling(line.say):
+    take = snapshots.write if snapshots.wanted() else None
+    with Line() as line, telling(line.say), snapshots.watched_by(take):
         yield
 
 

@@ -17,11 +17,13 @@ from ..identify.residuals import errors
 from ..identify.search import z_scale
 from ..identify.search_context import Search, refine
 from ..identify.starts import start_models
+from ..identify.watch import LAW, series
 from ..physics.effect import EFFECTS
 from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
 from ..physics.laws import base_and_variant, law_names
 from ..progress import Count
 from ..quantity import short_z
+from ..snapshots import watcher
 from .candidates import Trial, judge
 from .decision import Z
 from .rule import BENCH, DecisionRule
@@ -99,11 +101,12 @@ def try_laws(
     """
     unfit = not_finite(train, present)  # which compiles all before threads ask for it
     names = [name for name in law_names() if name not in unfit]
-    count = Count("law", len(names))
+    count, take = Count("law", len(names)), watcher()
     with ThreadPoolExecutor(cpu_count()) as pool:
 
         def tried(name: str) -> list[LawTrial]:
-            found = _tried(name, train, held_out, present, bends)
+            with series(LAW, name, take):
+                found = _tried(name, train, held_out, present, bends)
             count.done(name)
             return found
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,7 @@ from .model import (
 from .residuals import BLOCK, Expected, drawn_noise, residuals
 from .search import HUBER_AT_ONE, descend, jacobian, loss
 from .starts import start_model, start_models
+from .watch import share_of, watched
 
 __all__ = [
     "Expected",
@@ -137,15 +139,17 @@ def fit(
     if not scaled.names:
         cost = float(np.mean(loss(scaled.residuals(np.zeros(0)))))
         return Fit(model, {}, cost)
-    found = descend(
-        scaled.residuals,
-        scaled.start,
-        scaled.low,
-        scaled.high,
-        max_evaluations,
-        tolerance=1e-5,
-        rough=scaled.rough,
-    )
+    with watched(problem, scaled.at, partial(share_of, problem, expected)) as accepted:
+        found = descend(
+            scaled.residuals,
+            scaled.start,
+            scaled.low,
+            scaled.high,
+            max_evaluations,
+            tolerance=1e-5,
+            rough=scaled.rough,
+            accepted=accepted,
+        )
     best = scaled.at(found.theta)
     if not with_std:
         return Fit(best, {}, found.cost, (), found.sweeps)

@@ -11,7 +11,7 @@ from ..errors import RecordError
 from ..physics.drive import VOLTAGE
 from .begin import begin_of
 from .drive import smooth_drive
-from .fit import Run
+from .model import Run
 from .smooth import posterior_draws, smooth
 
 Array = NDArray[np.float64]

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Accepted = Callable[[Array, Array, float], None]
+"""Is told of a step that a search keeps: theta (p,), residuals (n,), cost; it may change none."""
 
 HUBER = 2.0
 """Normalised residual beyond which the loss grows linearly."""
@@ -87,6 +89,7 @@ def descend(
     sweeps: int = 20,
     tolerance: float = 1e-4,
     rough: bool = False,
+    accepted: Accepted | None = None,
 ) -> Descent:
     """Minimise the mean robust loss of `residuals` from `theta` within bounds.
 
@@ -98,6 +101,7 @@ def descend(
     sweeps : most Jacobians
     tolerance : relative decrease of the cost below which the search ends
     rough : whether events such as impacts make the residuals jump; see `jacobian`
+    accepted : is told where the search begins and of each step that lowers the cost
 
     Notes
     -----
@@ -109,6 +113,8 @@ def descend(
     theta = np.clip(theta, low, high)
     r = residuals(theta)
     cost = float(np.mean(loss(r)))
+    if accepted:
+        accepted(theta, r, cost)
     if not len(theta):
         return Descent(theta, cost, np.zeros((0, 0)), 0)
     damping, small, sweep, secants = 1e-3, 0, 1, 0
@@ -120,6 +126,8 @@ def descend(
         tried = _try(residuals, (theta, cost), normal, gradient, damping, (low, high), not secants)
         damping = tried.damping
         if tried.moved:
+            if accepted:
+                accepted(tried.theta, tried.r, tried.cost)
             gain, promised = cost - tried.cost, tried.promised / len(r)
             change = tried.theta - theta
             slow = gain < tolerance * cost

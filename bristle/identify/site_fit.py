@@ -17,6 +17,7 @@ from .rig import Site
 from .search_context import refine
 from .start_grid import initial_guesses
 from .structure import StructureProblem, thinned
+from .watch import MODEL, series
 
 QUICK = 8
 """Sweeps of the first, short search from each start, on every fifth sample."""
@@ -35,7 +36,8 @@ def fit_site(model: Model, site: Site, sites: Mapping[str, Site], count: int, al
     also : values in SI by name from which one more fit begins; the better one counts
     """
     own = at_site(model, site.name, sites)
-    return _fit_line(own, site, also) if site.is_line else _fit_law(own, site, count, also)
+    with series(MODEL, site.shown):
+        return _fit_line(own, site, also) if site.is_line else _fit_law(own, site, count, also)
 
 
 def _fit_law(own: Model, site: Site, count: int, also: Values) -> Fit:

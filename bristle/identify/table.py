@@ -20,9 +20,11 @@ from numpy.typing import NDArray
 from ..errors import RecordError
 from ..physics.laws import base_and_variant, law_names
 from ..progress import Count
+from ..snapshots import watcher
 from .model import Model, Problem, Run, steady, without
 from .search import descend
 from .starts import start_models
+from .watch import LAW, series, watched
 
 Array = NDArray[np.float64]
 
@@ -139,10 +141,11 @@ def error_table(
     laws = law_names() if laws is None else laws
     train.bench(Model(base_and_variant(laws[0])[0].name))  # compiled before threads ask for it
     with ThreadPoolExecutor(cpu_count()) as pool:
-        count = Count("law of the table", len(laws))
+        count, take = Count("law of the table", len(laws)), watcher()
 
         def error(law: str) -> LawError:
-            found = _law_error(train, holdout, cutoff, law, starts)
+            with series(LAW, law, take):
+                found = _law_error(train, holdout, cutoff, law, starts)
             count.done(law)
             return found
 
@@ -206,6 +209,12 @@ def _fit_filtered(problem: Problem, model: Model, cutoff: float) -> tuple[Model,
         errors = filtered_errors(problem, scaled.at(theta), cutoff)
         return np.nan_to_num(np.concatenate(errors) / unit, nan=1e3, posinf=1e3, neginf=-1e3)
 
-    found = descend(residuals, scaled.start, scaled.low, scaled.high, 12, tolerance=1e-4)
+    def share(r: Array) -> float:
+        return _QUADRATIC * _rms([r])
+
+    with watched(problem, scaled.at, share, over_noise=False) as accepted:
+        found = descend(
+            residuals, scaled.start, scaled.low, scaled.high, 12, tolerance=1e-4, accepted=accepted
+        )
     best = scaled.at(found.theta)
     return replace(best, values=dict(best.values)), error_rms(problem, best, cutoff)

@@ -134,7 +134,8 @@ class App:
         name = request.query.get("study", "")
         known = bool(name) and _is_study(self.home / file_name(name, "the study"))
         since = _whole(request.query.get("since", "0"))
-        jobs = [job.as_dict(since if job.at_work else 0) for job in self.jobs.all()]
+        after = _whole(request.query.get("after", "0"))
+        jobs = [job.as_dict(since if job.at_work else 0, after) for job in self.jobs.all()]
         return as_json({"jobs": jobs, "stamp": stamp(self.home / name) if known else ""})
 
     def _view(self, request: Request) -> Answer:

@@ -17,9 +17,11 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from http import HTTPStatus
+from itertools import count
 from pathlib import Path
 from typing import IO, Any
 
+from .. import snapshots
 from ..interrupt import INTERRUPTED
 from ..progress import LINES
 from .commands import Order
@@ -28,6 +30,8 @@ from .message import RequestError
 KEPT_LINES = 500
 """Lines of progress that are kept of a job."""
 KEPT_JOBS = 50
+KEPT_SERIES = 60
+"""Series of snapshots of a job; there are some ten laws, and as many sites of a building."""
 LONGEST_ANSWER = 32 * 1024**2
 """Bytes of a command's output that are kept."""
 AGAIN = 3.0
@@ -44,6 +48,8 @@ class Job:
 
     `state` is "running", "cancelling", "done", "failed" or "cancelled"; `lines` what it told on its
     way, `first` the number of the oldest that is kept; `error` why it failed, `output` its answer.
+    `fits` holds the last snapshot of each series of fits, with a number that grows from one to the
+    next of all jobs; none is kept of a job that is done, or was before another one of its study.
     """
 
     number: int
@@ -56,6 +62,7 @@ class Job:
     ended: float | None = None
     error: str = ""
     output: bytes = b""
+    fits: dict[str, tuple[int, dict[str, Any]]] = field(default_factory=dict, repr=False)
     watching: threading.Thread | None = field(default=None, repr=False)
 
     @property
@@ -68,15 +75,29 @@ class Job:
         self.first += len(self.lines) == KEPT_LINES
         self.lines.append(text)
 
-    def as_dict(self, since: int = 0) -> dict[str, Any]:
-        """Return what a page shows of it, with the lines from number `since` on."""
+    def showed(self, snapshot: dict[str, Any], number: int) -> None:
+        """Keep a snapshot of a fit in place of the one before of its series."""
+        name = str(snapshot.get("series", ""))
+        if name in self.fits or len(self.fits) < KEPT_SERIES:
+            self.fits[name] = number, snapshot
+
+    def as_dict(self, since: int = 0, after: int = 0) -> dict[str, Any]:
+        """Return what a page shows of it.
+
+        Parameters
+        ----------
+        since : the lines from this number on are among it
+        after : so are the snapshots of fits that are later than this one
+        """
         lines = list(self.lines)
+        fits = [{**one, "number": number} for number, one in list(self.fits.values())]
         end = self.ended or time.monotonic()
         return {
             "number": self.number, "study": self.order.study, "what": self.order.what,
             "command": self.order.shown, "state": self.state, "error": self.error,
             "seconds": round(end - self.began, 1), "next": self.first + len(lines),
             "lines": lines[max(0, since - self.first) :], "now": lines[-1] if lines else "",
+            "fits": [one for one in fits if one["number"] > after],
         }  # fmt: skip
 
     def answer(self) -> Any:
@@ -102,6 +123,7 @@ class Jobs:
         self._jobs: dict[int, Job] = {}
         self._lock = threading.Lock()
         self._count = 0
+        self._snapshots = count(1)
 
     def start(self, order: Order) -> Job:
         """Start a command; return its job.
@@ -118,11 +140,13 @@ class Jobs:
                         f"{order.study}: `{one.order.shown}` is at work. Wait for it, or cancel "
                         "it.", HTTPStatus.CONFLICT,
                     )  # fmt: skip
+                if one.order.study == order.study:
+                    one.fits = {}
             self._count += 1
             process = subprocess.Popen(
-                [sys.executable, "-m", "bristle.cli", *order.words], cwd=self._folder,
-                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                env={**os.environ, LINES: "lines"}, **_own_group(),
+                program(order), cwd=self._folder, stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                env={**os.environ, LINES: "lines", snapshots.VARIABLE: "lines"}, **_own_group(),
             )  # fmt: skip
             job = Job(self._count, order, process, time.monotonic())
             self._jobs[job.number] = job
@@ -168,8 +192,8 @@ class Jobs:
         assert job.process.stderr is not None
         wrong: list[str] = []
         told = threading.Thread(
-            target=_each_line, args=(job.process.stderr, lambda text: _sort(text, job, wrong)),
-            daemon=True,
+            target=_each_line, daemon=True,
+            args=(job.process.stderr, lambda text: self._sort(text, job, wrong)),
         )  # fmt: skip
         told.start()
         output = job.process.stdout.read(LONGEST_ANSWER)
@@ -187,14 +211,22 @@ class Jobs:
             job.state = "cancelled" if asked else ENDED.get(code, "failed")
             if job.state == "failed":
                 job.error = "\n".join(wrong) or f"the process ended with code {code}."
+            if job.state == "done":
+                job.fits = {}
+
+    def _sort(self, text: str, job: Job, wrong: list[str]) -> None:
+        """Keep snapshots, and progress, which ends in dots, apart from what is wrong."""
+        if (snapshot := snapshots.read(text)) is not None:
+            job.showed(snapshot, next(self._snapshots))
+        elif text.endswith(" ..."):
+            job.told(text.removesuffix(" ..."))
+        elif text.strip():
+            wrong.append(text)
 
 
-def _sort(text: str, job: Job, wrong: list[str]) -> None:
-    """Keep progress, which ends in dots, apart from what is wrong."""
-    if text.endswith(" ..."):
-        job.told(text.removesuffix(" ..."))
-    elif text.strip():
-        wrong.append(text)
+def program(order: Order) -> list[str]:
+    """Return the words of the process that runs a command."""
+    return [sys.executable, "-m", "bristle.cli", *order.words]
 
 
 def _each_line(stream: IO[bytes], take: Callable[[str], None]) -> None:

@@ -2,6 +2,7 @@
 
 import { ServerError, get, post } from "./api.mjs";
 import { commandLine, h, say, seconds, wrong } from "./dom.mjs";
+import { Fits } from "./fits.mjs";
 import { newColours, redraw } from "./plot.mjs";
 import { consentPanel } from "./consent.mjs";
 
@@ -17,7 +18,7 @@ const VIEWS = [
   ["controllers", "Compare controllers"],
 ];
 const AT_WORK = ["running", "cancelling"];
-const [OFTEN, SELDOM] = [600, 4000]; // ms between two looks, at work that is going on and else
+const [LIVE, OFTEN, SELDOM] = [250, 600, 4000]; // ms between two looks: at a fit, at other work, else
 
 const part = (id) => document.getElementById(id);
 
@@ -30,6 +31,7 @@ class Page {
     this.jobs = [];
     this.lines = new Map(); // of jobs that this page has seen at work
     this.seen = new Map(); // number of a job to its last state
+    this.fits = new Fits();
     this.turn = 0;
     this.listeners = new Set();
     window.addEventListener("hashchange", () => this.open());
@@ -43,10 +45,9 @@ class Page {
     try {
       this.home = await get("home");
     } catch (error) {
-      this.fail(error);
-      return;
+      return this.fail(error);
     }
-    this.jobs = this.home.jobs;
+    this.jobs = this.fits.take(this.home.jobs);
     for (const job of this.jobs) this.seen.set(job.number, job.state);
     const place = location.hash.replace(/^#\/?/, "");
     if (!place && this.home.first) {
@@ -172,9 +173,8 @@ class Page {
     clearTimeout(this.timer);
     let busy = false;
     try {
-      const study = this.study ? `?study=${encodeURIComponent(this.study)}` : "";
-      const state = await get(`state${study}`);
-      this.jobs = state.jobs;
+      const state = await get(`state?after=${this.fits.last}&study=${encodeURIComponent(this.study)}`);
+      this.jobs = this.fits.take(state.jobs);
       let ended = false;
       for (const job of state.jobs) {
         if (job.lines.length) this.lines.set(job.number, job.lines);
@@ -188,8 +188,7 @@ class Page {
         busy ||= AT_WORK.includes(job.state);
       }
       const moved = this.stampOf === this.study && this.stamp !== state.stamp;
-      this.stampOf = this.study;
-      this.stamp = state.stamp;
+      [this.stampOf, this.stamp] = [this.study, state.stamp];
       this.showJobs();
       if ((ended || (moved && !busy)) && !this.editing) await this.again();
       this.lost = false;
@@ -197,7 +196,8 @@ class Page {
       if (!this.lost) this.fail(error);
       this.lost = true;
     }
-    if (!document.hidden) this.timer = setTimeout(() => this.look(), busy ? OFTEN : SELDOM);
+    const pause = busy ? (this.view === "fit" ? LIVE : OFTEN) : SELDOM;
+    if (!document.hidden) this.timer = setTimeout(() => this.look(), pause);
   }
 
   showJobs() {

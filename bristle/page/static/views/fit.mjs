@@ -3,6 +3,7 @@
 import { packed } from "../api.mjs";
 import { consentPanel } from "../consent.mjs";
 import { bars, empty, h, key, number, percent, shown, table, z } from "../dom.mjs";
+import { atWork, fitsAtWork, fitting } from "../fits.mjs";
 import { Plot, extent } from "../plot.mjs";
 
 export async function show(page) {
@@ -17,14 +18,18 @@ export async function show(page) {
       (error) => loops.replaceChildren(page.failure(error)),
     );
   }
+  const before = fit.identified ? loops : empty("No fit yet",
+    "Identify finds the parameters of the law on the training runs, with intervals, and says what the data do not identify.");
+  const lawsBefore = h("div", {}, laws(fit));
+  page.onJobs(() => (before.hidden = lawsBefore.hidden = atWork(fitting(page))));
   return [
     h("h1", {}, fit.identified ? `The model: ${name}` : `Not identified yet: ${name}`),
     fit.waiting.length ? consentPanel(page, { error: "" }) : null,
     orders(page, fit),
-    fit.identified ? loops : empty("No fit yet",
-      "Identify finds the parameters of the law on the training runs, with intervals, and says what the data do not identify."),
+    fitsAtWork(page),
+    before,
     parameters(fit),
-    laws(fit),
+    lawsBefore,
     h("h2", {}, "What the model says"),
     fit.about.map((one) => h("div", {}, h("h3", {}, `${one.kind === "law" ? "Law" : "Effect"}: ${one.name}`),
       h("pre", { tabindex: "0" }, one.text), h("p", { class: "soft small" }, one.source))),
