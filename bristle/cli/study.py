@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ._channels import add_channels
 from ._common import add_common_to_actions
 from ._consent import add_trust
 from ._extend import add_extend
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from ..study.create import Created
     from ..study.data_check import DataCheck
 
-HELP = "studies of measurements: new, extend, check, roles, auto"
+HELP = "studies of measurements: new, extend, check, roles, channels, auto"
 _OLD = "first-look"
 
 
@@ -28,6 +29,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_extend(commands.add_parser("extend", help="add measured runs to a study"))
     _add_check(commands.add_parser("check", help="check the data, before any model"))
     add_roles(commands.add_parser("roles", help="show or change what the runs are for"))
+    add_channels(commands.add_parser("channels", help="show or correct columns, units and signs"))
     # The name until 0.1; here for one release.
     _add_check(commands.add_parser(_OLD, description="The old name of `study check`."))
     auto = commands.add_parser(
@@ -82,11 +84,9 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         help="measurement files, or a folder of them; quote a pattern: 'lab/*.csv'",
     )  # fmt: skip
     parser.add_argument(
-        "--rig",
-        choices=("bench", "structure"),
-        default="bench",
+        "--rig", choices=("bench", "structure"), default="bench",
         help="motion prescribed and force measured, or ground motion in and response out",
-    )
+    )  # fmt: skip
     parser.add_argument(
         "--building", type=Path, metavar="FILE",
         help="the structure's data file, with --rig structure",
@@ -213,7 +213,8 @@ def _print_new(created: Created) -> None:
     for note in created.notes:
         print(f"{note[:1].upper()}{note[1:]}.")
     then = command("study", "check", folder)
-    print(f"Wrong? Change it in {folder / 'study.toml'}. Then:  {then}")
+    wrong = command("study", "channels", folder, "--channel", "CHANNEL=COLUMN@UNIT")
+    print(f"Wrong? Correct it:  {wrong}\nThen:  {then}")
 
 
 def _check(arguments: argparse.Namespace) -> int:

@@ -31,7 +31,7 @@ _PIECE = 1024**2
 
 OF_STUDY = (
     "data", "check", "fit", "errors", "residual", "verdict", "history", "design", "loops",
-    "controllers",
+    "controllers", "channels",
 )  # fmt: skip
 """Views of a study."""
 
@@ -74,7 +74,7 @@ class App:
                 ("GET", "/api/studies/([^/]+)/file", self._file),
                 ("GET", "/api/studies/([^/]+)/consent", self._waiting),
                 ("POST", "/api/studies/([^/]+)/consent", self._consent),
-                ("POST", "/api/studies/([^/]+)/weights", self._weights),
+                ("POST", "/api/studies/([^/]+)/(weights|preview)", self._asked),
                 ("POST", "/api/studies/([^/]+)/design", self._design),
                 ("PUT", "/api/uploads/([^/]+)/(building/)?([^/]+)", self._upload),
                 ("GET", "/api/uploads/([^/]+)/columns", self._columns),
@@ -164,9 +164,10 @@ class App:
         consent(self.study(request.parts[0]), asked.get("file"), asked.get("digest"))
         return as_json({"ok": True})
 
-    def _weights(self, request: Request) -> Answer:
-        folder = self.study(request.parts[0])
-        return Answer(self.answers.get("weights", folder, request.json(), keep=False), PACKED)
+    def _asked(self, request: Request) -> Answer:
+        name, view = request.parts
+        found = self.answers.get(view, self.study(name), request.json(), keep=False)
+        return Answer(found, PACKED)
 
     def _design(self, request: Request) -> Answer:
         folder, asked = self.study(request.parts[0]), request.json()

@@ -12,15 +12,21 @@ from typing import Any
 import numpy as np
 
 from ..data.channels import channel_unit
-from ..data.guess import guess_channels, left_out
+from ..data.guess import Guess, guess_channels, left_out
 from ..data.read import files_in, read_table
 from ..data.table import Table
 from ..errors import BristleError, RecordError
 from ..physics.building import read_building, with_damper
+from ..units import same_dimension
 from .data_view import thinned
 
 SHOWN = 24
 """Columns that are drawn of a file."""
+USUAL = (
+    "s", "ms", "min", "m", "mm", "cm", "um", "in", "ft", "m/s", "mm/s", "cm/s", "in/s", "m/s2",
+    "mm/s2", "cm/s2", "g", "N", "kN", "MN", "lbf", "kip", "V", "mV", "A", "mA", "%", "1", "T", "mT",
+)  # fmt: skip
+"""Units that a menu offers, each where it is one of the quantity; any other may be written."""
 
 
 def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -58,25 +64,36 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     rig = "structure" if levels else "bench"
     guesses = guess_channels(first, rig, levels, devices)
     chosen = {guess.column: guess for guess in guesses}
-    numeric = {
-        column.text: np.asarray(first.values[column.text], dtype=float)
-        for column in first.columns if column.text in first.values
-    }  # fmt: skip
-    rows = thinned(np.arange(first.rows, dtype=float), dict(list(numeric.items())[:SHOWN]))
     return {
         "files": read, "first": Path(first.source).name, "rig": rig,
-        "columns": [
-            {
-                "text": column.text, "unit": column.unit.name if column.unit else "",
-                "values": numeric[column.text][rows] if column.text in numeric else None,
-                "channel": guess.channel if (guess := chosen.get(column.text)) else "",
-                "guessed_unit": guess.unit if guess else "", "sign": guess.sign if guess else 1,
-                "reason": guess.reason if guess else "", "doubt": guess.doubt if guess else "",
-            }
-            for column in first.columns
-        ],
-        "unused": left_out(first, guesses), "known": _known(levels or [], devices),
+        "columns": columns_of(first, chosen), "unused": left_out(first, guesses),
+        "known": known_channels(levels or [], devices),
     }  # fmt: skip
+
+
+def columns_of(table: Table, taken: Mapping[str, Guess]) -> list[dict[str, Any]]:
+    """Return a row per column of a file: its trace, and what it is taken for and why.
+
+    Parameters
+    ----------
+    table : what the file holds
+    taken : by the title of the column, which channel it is
+    """
+    numeric = {
+        column.text: np.asarray(table.values[column.text], dtype=float)
+        for column in table.columns if column.text in table.values
+    }  # fmt: skip
+    rows = thinned(np.arange(table.rows, dtype=float), dict(list(numeric.items())[:SHOWN]))
+    return [
+        {
+            "text": column.text, "unit": column.unit.name if column.unit else "",
+            "values": numeric[column.text][rows] if column.text in numeric else None,
+            "channel": guess.channel if (guess := taken.get(column.text)) else "",
+            "guessed_unit": guess.unit if guess else "", "sign": guess.sign if guess else 1,
+            "reason": guess.reason if guess else "", "doubt": guess.doubt if guess else "",
+        }
+        for column in table.columns
+    ]  # fmt: skip
 
 
 def _plainly(text: str, folder: Path) -> str:
@@ -84,12 +101,18 @@ def _plainly(text: str, folder: Path) -> str:
     return text.replace(f"{folder}/", "")
 
 
-def _known(levels: list[str], devices: list[str]) -> list[dict[str, str]]:
-    """Return the channels that a column may be: name and SI unit."""
+def known_channels(levels: list[str], devices: list[str]) -> list[dict[str, Any]]:
+    """Return the channels that a column may be: name, SI unit, and the units to choose from."""
     names = ["time", "displacement", "velocity", "acceleration", "force", "voltage", "current"]
     if levels:
         own = [f"{level}_{what}" for level in levels for what in
                ("displacement", "velocity", "acceleration_absolute")]  # fmt: skip
         of_devices = [f"{one}_{what}" for one in devices for what in ("force", "voltage")]
         names = ["time", "ground_acceleration", *own, "force", "voltage", "current", *of_devices]
-    return [{"name": name, "unit": channel_unit(name)} for name in names]
+    return [{"name": name, **_units(channel_unit(name))} for name in names]
+
+
+def _units(unit: str) -> dict[str, Any]:
+    """Return the SI unit of a channel, and the ones that its files are in now and then."""
+    usual = [one for one in USUAL if same_dimension(one, unit)]
+    return {"unit": unit, "units": list(dict.fromkeys((unit, *usual)))}

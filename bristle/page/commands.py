@@ -107,10 +107,7 @@ def _new(study: str, options: Options) -> list[str]:
     folder = f"{UPLOADS}/{batch_name(options.get('batch'))}"
     words = ["study", "new", study, "--data", folder]
     words += _building(options, folder)
-    for text in options.get("channels", []):
-        if not isinstance(text, str) or not text.isprintable() or len(text) > 300:
-            raise RequestError(f"channels: {written(text)}; CHANNEL=COLUMN@UNIT is right.")
-        words.append(f"--channel={text}")
+    words += _channel_words(options)
     words += _option("law", _word(options, "law"))
     step = options.get("step")
     if step is not None:
@@ -118,6 +115,25 @@ def _new(study: str, options: Options) -> list[str]:
             raise RequestError(f"step: {written(step)}; seconds above 0 are right.")
         words.append(f"--step={step:g}")
     return words
+
+
+def _channel_words(options: Options) -> list[str]:
+    """Return the words about where channels are."""
+    texts = options.get("channels", [])
+    if not isinstance(texts, list):
+        raise RequestError(f"channels: {written(texts)}; a list of CHANNEL=COLUMN@UNIT is right.")
+    for text in texts:
+        if not isinstance(text, str) or not text.isprintable() or len(text) > 300:
+            raise RequestError(f"channels: {written(text)}; CHANNEL=COLUMN@UNIT is right.")
+    return [f"--channel={text}" for text in texts]
+
+
+def _channels(study: str, options: Options) -> list[str]:
+    words = _channel_words(options)
+    words += [f"--without={name}" for name in _words(options, "without")]
+    if not words:
+        raise RequestError("channels: name one or more; nothing would change.")
+    return ["study", "channels", study, *words]
 
 
 def _building(options: Options, folder: str) -> list[str]:
@@ -211,6 +227,7 @@ def _simple(*before: str) -> Callable[[str, Options], list[str]]:
 COMMANDS: dict[str, Callable[[str, Options], list[str]]] = {
     "add": _add,
     "auto": _auto,
+    "channels": _channels,
     "check": _check,
     "controllers": comparisons.words,
     "design": _design,

@@ -20,6 +20,7 @@ from typing import Any, BinaryIO
 from ..errors import BristleError, TrustError
 
 VIEWS = {
+    "channels": "channels_view",
     "check": "check_view",
     "columns": "columns_view",
     "controllers": "controllers_view",
@@ -31,6 +32,7 @@ VIEWS = {
     "loops": "design_view.loops",
     "module": "module_view",
     "numbers": "simulate_view.numbers",
+    "preview": "channels_view.preview",
     "residual": "residual_view",
     "scenarios": "scenarios_view",
     "simulate": "simulate_view",

@@ -26,6 +26,16 @@ def channel_as_toml(spec: ChannelSpec) -> dict[str, Any]:
     return found
 
 
+def spec_text(spec: ChannelSpec | None) -> str:
+    """Return where a channel is, in a few words."""
+    if spec is None:
+        return "not read"
+    if spec.step is not None:
+        return f"a step of {spec.step:g} s"
+    unit = f" in {spec.unit}" if spec.unit else ""
+    return f'"{spec.column}"{unit}{", sign turned" if spec.sign < 0 else ""}'
+
+
 def is_right_channel(toml: Toml, name: str, table: Any, of_devices: bool = False) -> bool:
     """Return whether there is a channel of a name and it has a table; else note what is wrong.
 

@@ -33,6 +33,7 @@ from .curve_options import refuse_elsewhere
 from .curve_picture import curve_png
 from .identification import as_model
 from .rig import building_of
+from .set_aside import LEARNED
 from .study import Study
 
 Runs = BenchRuns | BuildingRuns
@@ -220,7 +221,7 @@ def learn_effect(
 def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffect:
     """Write a learned effect's file, its picture, and what the report says of it."""
     name, closed = learned.name, learned.closed
-    origin = f"learned from the runs of {study.name}, {date.today().year}"
+    origin = f"{LEARNED} {study.name}, {date.today().year}"
     if closed is not None:
         memory = tuple((n, closed.trial.model.value(f"{name}.{n}")) for n, _ in curve.memory)
         curve = replace(curve, memory=memory)

@@ -17,6 +17,7 @@ from typing import Any
 from .. import __version__
 from ..data.files import other_schema, read_json, write_json, write_whole
 from ..errors import StudyError
+from .set_aside import free_number, kept_folder, set_aside
 
 _NUMBER = re.compile(r"\d{3,}")
 
@@ -141,6 +142,24 @@ class History:
         self.recover()
         return last
 
+    def begin_anew(self, first: int | None) -> Path:
+        """Set aside all that was found from the data, and put the draft of study.toml in place.
+
+        Parameters
+        ----------
+        first : the number of the first step whose model is from the data, None where none is
+
+        Returns
+        -------
+        Path
+            The folder where it is kept.
+        """
+        number = free_number(self.study)
+        after = max(self.numbers(), default=0) + 1
+        self._begin({"channels": number, "first": after if first is None else first})
+        self.recover()
+        return kept_folder(self.study, number)
+
     def refuse_damaged(self) -> None:
         """Refuse to take a step back where that step, or the one before, cannot be read.
 
@@ -169,6 +188,8 @@ class History:
                 kept.parent.mkdir(exist_ok=True)
                 shutil.rmtree(kept, ignore_errors=True)
                 self.path(number).replace(kept)
+        if "channels" in unfinished:
+            set_aside(self.study, int(unfinished["channels"]), int(unfinished["first"]))
         for draft in self.folder.glob(".draft-*"):
             shutil.rmtree(draft, ignore_errors=True)
         self.pending.unlink(missing_ok=True)

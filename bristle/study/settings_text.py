@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from ..data.channels import ChannelSpec, at_device
 from ..data.corrections import Correction
+from .channel_file import channel_as_toml
 from .run_file import EXCLUDE, RunFile, corrections_as_toml, run_as_toml
 
 
@@ -93,3 +95,48 @@ def with_corrections(text: str, found: Mapping[tuple[str, int], Sequence[Correct
         known = [Correction(**one) for one in table.unwrap().get("correct", [])]
         table["correct"] = corrections_as_toml([*known, *corrections])
     return tomlkit.dumps(document)
+
+
+def with_channels(
+    text: str,
+    channels: Mapping[str, ChannelSpec | None],
+    extra: Mapping[str, ChannelSpec | None],
+    corrections: Mapping[tuple[str, int], Sequence[Correction]],
+    device: str = "",
+) -> str:
+    """Return the text of a study.toml with channels read in another way, all else as it was.
+
+    Comments in the tables of these channels told why they were read as they were: they go.
+
+    Parameters
+    ----------
+    text : of the file
+    channels, extra : where a channel is from now on, None for those that are no longer read
+    corrections : those that are left, by file and piece of the runs that lose some
+    device : the one that the study is about: its brace_force is called force
+    """
+    import tomlkit
+
+    document: Any = tomlkit.parse(text)
+    own = {at_device(name, device): name for name in document["channels"]}
+    for key, listed in (("channels", channels), ("extra", extra)):
+        for name, spec in listed.items():
+            place = own.get(name, name) if key == "channels" else name
+            if spec is None:
+                document[key].remove(place)
+                continue
+            if key not in document:
+                document.add(key, tomlkit.table(is_super_table=True))
+            table = tomlkit.table()
+            if key == "channels":
+                table.add(tomlkit.comment("given"))
+            table.update(channel_as_toml(spec))
+            table.add(tomlkit.nl())
+            document[key][place] = table
+    for table in document["runs"]:
+        left = corrections.get((table["file"], table.get("piece", 0)))
+        if left:
+            table["correct"] = corrections_as_toml(left)
+        elif left is not None:
+            table.remove("correct")
+    return tomlkit.dumps(document).rstrip("\n") + "\n"

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from filelock import FileLock, Timeout
 
 from .. import __version__
+from ..data.channels import ChannelSpec
 from ..data.corrections import Correction
 from ..data.files import read_json, write_json, write_whole
 from ..data.measurement import Measurement
@@ -26,7 +27,7 @@ from ..shown import shown
 from ..trust import can_do_without, load
 from .added_runs import added_text
 from .history import History, Step
-from .new import make_folder
+from .new import make_folder, parse_channel
 from .reading import place_of_run, read_runs
 from .role_changes import roles_by_place
 from .run_file import ROLES, TEST
@@ -354,6 +355,37 @@ class Study:
         places = roles_by_place(self.folder / "study.toml", self.settings, roles)
         return self._with_settings(lambda text: with_roles(text, places))
 
+    def with_channels(
+        self, channels: Mapping[str, str | ChannelSpec], *, without: Sequence[str] = ()
+    ) -> Study:
+        """Write where channels are into study.toml, and return the study as it is then.
+
+        All runs are read by them first. Fits, verdict and reports were of the channels as they
+        were: they are set aside in history/, and the model is the last one that was from no data.
+
+        Parameters
+        ----------
+        channels : where channels are from now on, `{"force": "-Ch3@kN"}`: column, unit, a minus to
+            turn the sign
+        without : channels that are no longer read
+
+        Raises
+        ------
+        StudyError
+            If there is no such channel, a unit is not that of its quantity, two channels claim one
+            column, or a channel that the rig needs would be missing.
+        RecordError
+            If a file has no such column, or cannot be read by it.
+        """
+        from .channel_changes import correct_channels
+
+        given = {
+            name: where if isinstance(where, ChannelSpec) else parse_channel(f"{name}={where}")[1]
+            for name, where in channels.items()
+        }
+        correct_channels(self, given, without=without)
+        return Study(self.folder)
+
     def _with_settings(self, change: Callable[[str], str]) -> Study:
         """Write study.toml with its text changed, and return the study as it is then."""
         path = self.folder / "study.toml"
@@ -451,6 +483,11 @@ class Study:
         return tuple(self.history.numbers()), hashlib.sha256(content).hexdigest()
 
     def _refuse_if_changed(self) -> None:
+        if read_settings(self.folder / "study.toml").channels != self.settings.channels:
+            raise StudyError(
+                f"{self.folder}: its channels have been corrected meanwhile, so that this result "
+                "is not of the present data. Nothing is written; run this again."
+            )
         now = self._state()
         if now != self._seen:
             steps = len(now[0]) - len(self._seen[0])

@@ -109,6 +109,39 @@ def test_a_fit_is_shown_while_it_is_at_work_and_after_it_was_cancelled(
     assert not browsed.errors
 
 
+@pytest.mark.slow
+def test_a_unit_and_a_sign_are_corrected_by_menus(tmp_path: Path) -> None:
+    files = write_runs(tmp_path / "lab", 3, seconds=2.0)
+    folder = create_study(tmp_path / "home" / "rig", files, law="bingham").study.folder
+    with page_on(folder.parent) as client, shots.chromium(400) as page:
+        seen = Watched(page, client)
+        seen.open("rig", "data")
+        seen.press("Correct a column, a unit or a sign")
+        write = page.get_by_role("button", name="Write these channels into the study")
+        unit = page.get_by_label("unit of F [N]")
+        unit.fill("V")
+        page.get_by_text("no unit of this quantity").wait_for()
+        assert write.is_disabled()
+        unit.fill("kN")
+        force = page.locator("figure", has=page.get_by_role("heading", name="F [N]", exact=True))
+        force.get_by_label("turn the sign").check()
+        page.get_by_text('"F [N]" in kN, sign turned').wait_for()
+        assert page.locator("section[aria-label='force before and after'] canvas").count() == 2
+        assert page.evaluate("document.documentElement.scrollWidth") <= 400
+        force.get_by_label("is").select_option("voltage")  # U [V] gives its place
+        page.get_by_text('voltage: "F [N]" in kN').wait_for()
+        assert page.locator("#column-U-V-").input_value() == ""
+        force.get_by_label("is").select_option("force")
+        page.locator("#column-U-V-").select_option("voltage")
+        page.get_by_text('"F [N]" in kN, sign turned').wait_for()
+        write.click()
+        page.get_by_text("F [N] (sign turned)").wait_for()
+        page.locator("#commands code", has_text="bristle study channels rig").wait_for()
+    assert Study(folder).settings.channels["force"].sign == -1
+    # A choice that is refused is an answer 422, which the console tells.
+    assert all("422" in one for one in seen.errors)
+
+
 def axe(folder: Path) -> str:
     """Return the source of axe-core from the npm registry; skip where it cannot be had."""
     npm = shutil.which("npm")

@@ -105,6 +105,10 @@ def test_a_name_that_is_no_study_is_refused(client: Client, name: str, view: str
         ("example", "rig", {"rig": "house"}, "bench"),
         ("example", "rig", {"rig": "bench", "seed": -1}, "seed"),
         ("roles", "rig", {"train": "run_1"}, "train"),
+        ("channels", "rig", {}, "nothing would change"),
+        ("channels", "rig", {"channels": "force=F@N"}, "a list"),
+        ("channels", "rig", {"channels": ["force=F\n@N"]}, "CHANNEL=COLUMN@UNIT"),
+        ("channels", "rig", {"without": ["--trust"]}, "without"),
         ("export_ssp", "rig", {}, "scenario"),
         ("export_ssp", "rig", {"scenario": "../bench.toml"}, "scenario"),
         ("export_ssp", "rig", {"scenario": "-o.toml"}, "scenario"),
@@ -367,6 +371,25 @@ def test_roles_are_written_by_a_command(client: Client, home: Path) -> None:
     assert job["state"] == "done", job
     text = (home / "rig" / "study.toml").read_text()
     assert 'role = "test"' in text
+
+
+def test_channels_are_previewed_and_corrected_by_a_command(client: Client, home: Path) -> None:
+    asked = {"channels": ["force=-F [N]@kN"], "without": []}
+    seen = client.post("/api/studies/rig/preview", asked)
+    assert seen.status == 200, seen.body
+    assert client.get("/api/studies/rig/channels").status == 200
+    wrong = client.post("/api/studies/rig/preview", {"channels": ["force=G@N"]})
+    assert (wrong.status, 'no column is called "G"' in wrong.error) == (422, True)
+    before = (home / "rig" / "study.toml").read_bytes()
+    job = client.run("channels", "rig", **asked)
+    assert job["state"] == "done", job
+    assert job["command"] == "bristle study channels rig '--channel=force=-F [N]@kN'"
+    assert Study(home / "rig").settings.channels["force"].unit == "kN"
+    refused = client.run("channels", "rig", channels=["force=U [V]"])
+    assert refused["state"] == "failed"
+    assert "no unit of this quantity" in refused["error"]
+    assert client.run("channels", "rig", channels=["force=F [N]@N"])["state"] == "done"
+    (home / "rig" / "study.toml").write_bytes(before)
 
 
 def test_what_the_commands_wrote_can_be_downloaded_and_nothing_else(

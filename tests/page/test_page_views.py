@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from study.made import bench_run, write, write_runs
 
+from bristle.data.channels import ChannelSpec
 from bristle.data.model_value import Value
 from bristle.errors import StudyError
 from bristle.page import (
+    channels_view,
     check_view,
     columns_view,
     data_view,
@@ -43,7 +45,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_every_view_of_the_worker_is_a_module_that_answers(home: Path) -> None:
-    for view in ("data", "check", "fit", "errors", "history", "residual", "verdict"):
+    for view in ("data", "channels", "check", "fit", "errors", "history", "residual", "verdict"):
         told, body = answer(view, home / "rig", {})
         assert told["ok"], told
         assert unpack(body)
@@ -180,3 +182,44 @@ def test_dropped_files_are_told_apart_with_reasons(tmp_path: Path) -> None:
     force = next(one for one in shown["columns"] if one["channel"] == "force")
     assert (force["text"], force["guessed_unit"], force["sign"]) == ("F [N]", "N", 1)
     assert force["reason"]
+
+
+def columns(folder: Path) -> Path:
+    """Make a study whose force is in kN under a title that says N."""
+    lab = folder / "lab"
+    for seed in (1, 2, 3):
+        run = bench_run(seed, seconds=2.0)
+        run["F [N]"] = -1e-3 * run["F [N]"]
+        write(lab / f"run_{seed}.csv", run)
+    files = sorted(lab.glob("*.csv"))
+    given = {"force": ChannelSpec("F [N]", "N")}
+    return create_study(folder / "rig", files, law="bingham", channels=given).study.folder
+
+
+def test_view_1_has_the_columns_of_a_study_and_what_other_channels_would_change(
+    tmp_path: Path,
+) -> None:
+    folder = columns(tmp_path)
+    before = (folder / "study.toml").read_bytes()
+    shown = channels_view.answer(folder, {})
+    force = next(one for one in shown["columns"] if one["channel"] == "force")
+    assert (force["text"], force["guessed_unit"], force["sign"], force["reason"]) == (
+        "F [N]", "N", 1, "",
+    )  # fmt: skip
+    units = next(one["units"] for one in shown["known"] if one["name"] == "force")
+    assert {"N", "kN", "lbf"} <= set(units)
+    told = channels_view.preview(folder, {"channels": ["force=-F [N]@kN"], "without": ["voltage"]})
+    changes = {one["channel"]: one for one in told["changes"]}
+    assert changes["force"]["after"] == '"F [N]" in kN, sign turned'
+    old, new = changes["force"]["traces"]
+    scaled = [one["factor"] * one["values"] for one in (old, new)]
+    np.testing.assert_allclose(scaled[1], -1e3 * scaled[0] * new["factor"] / old["factor"])
+    assert changes["voltage"]["traces"][1] is None
+    assert told["results"] == []
+    with pytest.raises(StudyError, match="no unit of this quantity"):
+        channels_view.preview(folder, {"channels": ["force=F [N]@V"]})
+    with pytest.raises(StudyError, match="given twice"):
+        channels_view.preview(folder, {"channels": ["force=F [N]@N", "force=F [N]@kN"]})
+    with pytest.raises(StudyError, match="list of texts"):
+        channels_view.preview(folder, {"without": "voltage"})
+    assert (folder / "study.toml").read_bytes() == before

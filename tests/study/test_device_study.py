@@ -16,6 +16,7 @@ from bristle.bridge.in_building import others_of, shaking_of
 from bristle.cli import main
 from bristle.data.channels import channel_unit
 from bristle.errors import PhysicsError, StudyError
+from bristle.page import channels_view
 from bristle.study.building import identify_building_alone
 from bristle.study.data_check import check_data
 from bristle.study.rig import building_of
@@ -172,6 +173,30 @@ def test_what_is_wrong_with_a_device_is_named(tmp_path):
     file.write_text(text.replace('rig = "structure"', 'rig = "bench"'))
     with pytest.raises(StudyError, match='device goes with rig = "structure"'):
         Study(study.folder)
+
+
+def test_the_channels_of_devices_are_corrected_by_either_name(tmp_path):
+    house = files_in(tmp_path)
+    study = Study.create(
+        tmp_path / "rig", sorted(tmp_path.glob("*.csv")), rig="structure", building=house,
+        device="brace", law="tanh",
+    )  # fmt: skip
+    before = study.read()[0]
+    column = study.settings.channels["force"].column
+    now = study.with_channels({"force": f"-{column}@kN", "tie_force": "-tie_force"})
+    text = (now.folder / "study.toml").read_text()
+    assert "[channels.brace_force]" in text
+    assert "[channels.force]" not in text
+    run = now.read()[0]
+    np.testing.assert_allclose(run["force"], -1e3 * before["force"])
+    np.testing.assert_allclose(run["tie_force"], -before["tie_force"])
+    assert now.with_channels({"brace_force": column + "@N"}).settings.channels["force"].sign == 1
+    with pytest.raises(StudyError, match='there is no device "roof"; there are brace, tie'):
+        now.with_channels({"roof_force": column})
+    with pytest.raises(StudyError, match="are one channel here"):
+        now.with_channels({"force": column, "brace_force": column})
+    shown = channels_view.answer(now.folder, {})
+    assert {"tie_force", "base_displacement"} <= {one["name"] for one in shown["known"]}
 
 
 @pytest.mark.slow

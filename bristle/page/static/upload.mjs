@@ -1,8 +1,8 @@
 // Files that are dropped: sent to the folder of the studies, looked at, and made a study.
 
 import { packed, put } from "./api.mjs";
+import { columnRow } from "./columns.mjs";
 import { bytes, h, say, wrong } from "./dom.mjs";
-import { Plot, extent } from "./plot.mjs";
 
 const LARGEST = 256 * 1024 ** 2;
 
@@ -65,7 +65,8 @@ function trouble(page, whole, text) {
 /** Returns the columns as they were guessed, each with menus to correct it. */
 function preview(page, whole, batch, building, found) {
   const name = h("input", { type: "text", id: "new-name", value: "my_rig", maxlength: "60", pattern: "\\w[\\w .+\\-]*", required: true });
-  const rows = found.columns.map((column) => columnRow(column, found.known));
+  const rows = found.columns.map((column) => columnRow(column, found.known,
+    column.reason ? `Guessed by ${column.reason}.${column.doubt ? ` Doubtful: ${column.doubt}.` : ""}` : ""));
   const said = h("p", { role: "alert" });
   const make = h("button", { type: "submit", class: "main" }, "Make the study");
   page.editing = true; // what is chosen here stays until it is made or left
@@ -93,38 +94,4 @@ function preview(page, whole, batch, building, found) {
     h("div", { class: "grid" }, rows.map((row) => row.node)),
     form, said,
   ].filter(Boolean);
-}
-
-function columnRow(column, known) {
-  const id = `column-${column.text.replace(/\W+/g, "-")}`;
-  const options = [h("option", { value: "" }, "not used"),
-    ...known.map((one) => h("option", { value: one.name, selected: one.name === column.channel }, one.name.replaceAll("_", " ")))];
-  if (column.channel && !known.some((one) => one.name === column.channel)) {
-    options.push(h("option", { value: column.channel, selected: true }, column.channel));
-  }
-  const channel = h("select", { id }, options);
-  const unit = h("input", { type: "text", value: column.guessed_unit || column.unit, maxlength: "12", "aria-label": `unit of ${column.text}` });
-  const turned = h("input", { type: "checkbox", checked: column.sign < 0 });
-  const plot = column.values
-    ? new Plot("low", `${column.text} over the rows of the file`, (p) => {
-        p.axes([0, column.values.length - 1], extent([column.values]), null, "");
-        p.line(Float32Array.from(column.values, (_, k) => k), column.values, "blue");
-      }).canvas
-    : h("p", { class: "soft" }, "no numbers");
-  const node = h("figure", {},
-    h("h3", {}, column.text), plot,
-    h("div", { class: "act" },
-      h("label", { class: "field", for: id }, "is", channel),
-      h("label", { class: "field", style: { width: "6rem" } }, "unit", unit),
-      h("label", { class: "check" }, turned, "turn the sign")),
-    column.reason ? h("figcaption", {}, `Guessed by ${column.reason}.`, column.doubt ? ` Doubtful: ${column.doubt}.` : "") : null);
-  return {
-    node,
-    /** Returns CHANNEL=COLUMN@UNIT where the user has another mind than the guess. */
-    changed() {
-      const same = channel.value === column.channel && unit.value === (column.guessed_unit || column.unit) && turned.checked === column.sign < 0;
-      if (same || !channel.value) return null;
-      return `${channel.value}=${turned.checked ? "-" : ""}${column.text}${unit.value.trim() ? `@${unit.value.trim()}` : ""}`;
-    },
-  };
 }

@@ -1,7 +1,8 @@
 // View 1, Data: traces with what the check found, channels, roles, excitation map.
 
 import { packed } from "../api.mjs";
-import { h, key, number, shown, table, unitText } from "../dom.mjs";
+import { channels } from "../channels.mjs";
+import { h, key, number, shown, unitText } from "../dom.mjs";
 import { Plot, extent } from "../plot.mjs";
 
 const ROLES = [
@@ -48,7 +49,7 @@ export async function show(page) {
     h("h2", {}, "What the runs are for"),
     roles(page, data),
     excitation(data),
-    channels(data),
+    channels(page, data),
   ];
 }
 
@@ -203,14 +204,3 @@ function excitation(data) {
     most ? key(["pale", `up to ${at(1 / 3)} ${unit}`], ["mark", `to ${at(2 / 3)} ${unit}`], ["blue", `to ${at(1)} ${unit}`]) : null,
     h("p", { class: "soft small" }, "Held-out runs judge a model well where training runs have been, too."));
 }
-
-function channels(data) {
-  return table("Channels",
-    ["channel", "column", "lowest", "highest", "noise", "unit"],
-    data.channels.map((one) => [
-      one.name.replaceAll("_", " "),
-      one.column ? `${one.column}${one.turned ? " (sign turned)" : ""}` : "–",
-      number(one.low, 4), number(one.high, 4), number(one.noise, 2), one.unit === "1" ? "" : one.unit,
-    ]), [2, 3, 4]);
-}
-
