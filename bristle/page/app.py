@@ -30,7 +30,7 @@ ROOM = 512 * 1024**2
 _PIECE = 1024**2
 
 OF_STUDY = (
-    "data", "check", "fit", "errors", "residual", "verdict", "history", "design", "loops",
+    "data", "check", "fit", "errors", "residual", "verdict", "history", "design",
     "controllers",
 )  # fmt: skip
 """Views of a study."""
@@ -74,7 +74,7 @@ class App:
                 ("GET", "/api/studies/([^/]+)/file", self._file),
                 ("GET", "/api/studies/([^/]+)/consent", self._waiting),
                 ("POST", "/api/studies/([^/]+)/consent", self._consent),
-                ("POST", "/api/studies/([^/]+)/weights", self._weights),
+                ("POST", "/api/studies/([^/]+)/(weights|loops)", self._designed),
                 ("POST", "/api/studies/([^/]+)/design", self._design),
                 ("PUT", "/api/uploads/([^/]+)/(building/)?([^/]+)", self._upload),
                 ("GET", "/api/uploads/([^/]+)/columns", self._columns),
@@ -140,7 +140,8 @@ class App:
     def _view(self, request: Request) -> Answer:
         name, view = request.parts
         arguments = {key: request.query[key] for key in ("role", "name") if key in request.query}
-        keep = view != "controllers"  # dropped records and other studies are beside the study
+        # Dropped records and other studies are beside the study.
+        keep = view not in ("controllers", "design")
         return Answer(self.answers.get(view, self.study(name), arguments, keep), PACKED)
 
     def _files(self, request: Request) -> Answer:
@@ -163,9 +164,10 @@ class App:
         consent(self.study(request.parts[0]), asked.get("file"), asked.get("digest"))
         return as_json({"ok": True})
 
-    def _weights(self, request: Request) -> Answer:
-        folder = self.study(request.parts[0])
-        return Answer(self.answers.get("weights", folder, request.json(), keep=False), PACKED)
+    def _designed(self, request: Request) -> Answer:
+        folder, view = self.study(request.parts[0]), request.parts[1]
+        keep = view == "loops"  # they take seconds
+        return Answer(self.answers.get(view, folder, request.json(), keep), PACKED)
 
     def _design(self, request: Request) -> Answer:
         folder, asked = self.study(request.parts[0]), request.json()
