@@ -29,7 +29,8 @@ def table_html(name: str, table: pd.DataFrame) -> str:
     groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
     for (motion, g), group in groups:
         own = group.set_index("law")
-        rows, bold = [], {}
+        rows: list[list[str]] = []
+        bold: dict[tuple[int, int], str] = {}
         for k, law in enumerate(own.index.astype(str)):
             rows.append([law, *(_cell(own, law, column) for _, column in listed)])
             lowest = [_is_lowest(own, law, column) for _, column in listed]
