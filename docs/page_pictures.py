@@ -25,12 +25,15 @@ VIEWS = (
     "home", "data", "fit", "errors", "verdict", "history", "hand_on", "simulate", "design",
     "controllers",
 )  # fmt: skip
-LIVE = {"fit_live": "Identify", "verdict_live": "Diagnose"}
-"""Views at work, and the button that starts it."""
-WORK = 120.0
-"""Seconds within which a command must tell what it is at."""
-LATER = 6.0
-"""Seconds from then to the picture: something is drawn."""
+LIVE = {
+    "fit_live": ("Identify", "#job:has(.moving) .now:not(:text('beginning'))"),
+    "verdict_live": ("Diagnose", "h3:text('What remains of the cost')"),
+}
+"""Views at work: the button that starts it, and what shows that it is well under way."""
+WORK = 300.0
+"""Seconds within which that must be shown."""
+LATER = 5.0
+"""Seconds from then to the picture."""
 WIDTHS = (1280, 400)
 THEMES = ("light", "dark")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -74,7 +77,8 @@ def open_view(page: Page, address: str, study: str, view: str) -> None:
     hash_ = "#/" if view == "home" else f"#/{study}/{view}"
     page.evaluate(f"location.hash = {hash_!r}")
     page.wait_for_selector(READY.format(place=place), timeout=120_000)
-    page.wait_for_timeout(150)  # pictures are drawn with the next frame of the screen
+    page.wait_for_timeout(400)  # what is asked for when a view is shown, and the next frame
+    page.wait_for_selector(READY.format(place=place), timeout=120_000)
 
 
 def shoot(page: Page, out: Path, name: str, width: int, theme: str) -> None:
@@ -112,10 +116,9 @@ def views_at_work(study: Path, out: Path, views: tuple[str, ...]) -> None:
             page.wait_for_selector("html[data-ready]", timeout=60_000)
             for view in views:
                 open_view(page, server.address, study.name, view.partition("_")[0])
-                button = re.compile(f"^{LIVE[view]}( again)?$")
-                page.get_by_role("button", name=button).click()
-                told = page.locator("#job .now").filter(has_not_text="beginning")
-                told.wait_for(timeout=1000.0 * WORK)
+                button, shown = LIVE[view]
+                page.get_by_role("button", name=re.compile(f"^{button}( again)?$")).click()
+                page.wait_for_selector(shown, timeout=1000.0 * WORK)
                 page.wait_for_timeout(1000.0 * LATER)
                 for theme in THEMES:
                     for width in WIDTHS:

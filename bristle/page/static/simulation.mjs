@@ -137,6 +137,7 @@ export class Simulation {
     if (!this.first.accelerations.length) return;
     const asked = JSON.stringify(this.values);
     this.spectrumState.textContent = "Computing the spectrum …";
+    this.spectrumState.classList.add("loading");
     try {
       const found = await postPacked("spectrum", { ...this.what, values: this.values });
       if (asked !== JSON.stringify(this.values)) return;
@@ -148,6 +149,7 @@ export class Simulation {
       this.spectra = null;
       this.spectrumState.textContent = error.message;
     }
+    this.spectrumState.classList.remove("loading");
     this.draw();
   }
 
