@@ -1,13 +1,17 @@
 """Takes a screenshot of every view of the page, at 1280 and 400 px, light and dark.
 
-python docs/page_pictures.py FOLDER OUT [VIEW ...]   FOLDER as for `bristle page`; a study in it
-is named first: the views are those of the study that the page opens. Needs Playwright and Chromium.
+python docs/page_pictures.py STUDY OUT [VIEW ...]
+
+Views 2 and 4 are shown at work as well, as fit_live and verdict_live: on a copy of the study, whose
+work is cancelled. Needs Playwright and Chromium.
 """
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +25,15 @@ VIEWS = (
     "home", "data", "fit", "errors", "verdict", "history", "hand_on", "simulate", "design",
     "controllers",
 )  # fmt: skip
+LIVE = {
+    "fit_live": ("Identify", "#job:has(.moving) .now:not(:text('beginning'))"),
+    "verdict_live": ("Diagnose", "h3:text('What remains of the cost')"),
+}
+"""Views at work: the button that starts it, and what shows that it is well under way."""
+WORK = 300.0
+"""Seconds within which that must be shown."""
+LATER = 5.0
+"""Seconds from then to the picture."""
 WIDTHS = (1280, 400)
 THEMES = ("light", "dark")
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
@@ -64,31 +77,76 @@ def open_view(page: Page, address: str, study: str, view: str) -> None:
     hash_ = "#/" if view == "home" else f"#/{study}/{view}"
     page.evaluate(f"location.hash = {hash_!r}")
     page.wait_for_selector(READY.format(place=place), timeout=120_000)
-    page.wait_for_timeout(150)  # pictures are drawn with the next frame of the screen
+    page.wait_for_timeout(400)  # what is asked for when a view is shown, and the next frame
+    page.wait_for_selector(READY.format(place=place), timeout=120_000)
 
 
-def main(folder: Path, out: Path, views: tuple[str, ...] = VIEWS) -> None:
-    """Write FOLDER's views as OUT/VIEW_WIDTH_THEME.png."""
-    sys.path.insert(0, str(ROOT))
+def shoot(page: Page, out: Path, name: str, width: int, theme: str) -> None:
+    """Write what is shown, whole, as OUT/NAME_WIDTH_THEME.png."""
+    target = out / f"{name}_{width}_{theme}.png"
+    page.screenshot(path=target, full_page=True)
+    print(target)
+
+
+def views_at_rest(study: Path, out: Path, views: tuple[str, ...]) -> None:
+    """Write the pictures of views of a study."""
     from bristle.page.app import App
     from bristle.page.run import serving
 
-    out.mkdir(parents=True, exist_ok=True)
-    with serving(App(folder)) as server:
-        study = server.app.first
+    with serving(App(study)) as server:
         for width in WIDTHS:
             for theme in THEMES:
                 with chromium(width, theme) as page:
                     page.goto(server.address)
                     page.wait_for_selector("html[data-ready]", timeout=60_000)
                     for view in views:
-                        open_view(page, server.address, study, view)
-                        target = out / f"{view}_{width}_{theme}.png"
-                        page.screenshot(path=target, full_page=True)
-                        print(target)
+                        open_view(page, server.address, study.name, view)
+                        shoot(page, out, view, width, theme)
+
+
+def views_at_work(study: Path, out: Path, views: tuple[str, ...]) -> None:
+    """Write the pictures of views while their command is at work on a copy of a study."""
+    from bristle.page.app import App
+    from bristle.page.run import serving
+
+    with tempfile.TemporaryDirectory() as folder:
+        copy = shutil.copytree(study, Path(folder, study.name))
+        with serving(App(copy)) as server, chromium(WIDTHS[0], THEMES[0]) as page:
+            page.goto(server.address)
+            page.wait_for_selector("html[data-ready]", timeout=60_000)
+            for view in views:
+                open_view(page, server.address, study.name, view.partition("_")[0])
+                button, shown = LIVE[view]
+                page.get_by_role("button", name=re.compile(f"^{button}( again)?$")).click()
+                page.wait_for_selector(shown, timeout=1000.0 * WORK)
+                page.wait_for_timeout(1000.0 * LATER)
+                for theme in THEMES:
+                    for width in WIDTHS:
+                        page.set_viewport_size({"width": width, "height": 900})
+                        page.wait_for_timeout(150)
+                        shoot(page, out, view, width, theme)
+                    page.locator("#theme").click()
+                page.get_by_role("button", name="Cancel").click()
+                page.get_by_text("Cancelled", exact=True).wait_for(timeout=1000.0 * WORK)
+
+
+def main(study: Path, out: Path, views: tuple[str, ...] = (*VIEWS, *LIVE)) -> None:
+    """Write a study's views as OUT/VIEW_WIDTH_THEME.png."""
+    sys.path.insert(0, str(ROOT))
+    for view in views:
+        if view not in (*VIEWS, *LIVE):
+            sys.exit(f"{view}: no view is called so. There are: {', '.join((*VIEWS, *LIVE))}.")
+    if not (study / "study.toml").is_file():
+        sys.exit(f"{study}: holds no study; a folder with study.toml is right.")
+    out.mkdir(parents=True, exist_ok=True)
+    study = study.resolve()
+    if resting := tuple(view for view in views if view in VIEWS):
+        views_at_rest(study, out, resting)
+    if working := tuple(view for view in views if view in LIVE):
+        views_at_work(study, out, working)
 
 
 if __name__ == "__main__":
     if len(sys.argv) < 3:
         sys.exit(__doc__)
-    main(Path(sys.argv[1]), Path(sys.argv[2]), tuple(sys.argv[3:]) or VIEWS)
+    main(Path(sys.argv[1]), Path(sys.argv[2]), tuple(sys.argv[3:]) or (*VIEWS, *LIVE))

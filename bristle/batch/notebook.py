@@ -1,4 +1,4 @@
-"""What a notebook shows of an ensemble."""
+"""What a notebook shows of an ensemble, and of the best constant voltages."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 from ..draw import html
 from ..draw.figure import DPI
 from ..draw.style import png
+from ..quantity import plain
+from .passive_picture import draw_passive
 from .picture import draw_ensemble
 
 if TYPE_CHECKING:
     from .execute import Ensemble
+    from .passive import Passive
 
 
 def ensemble_html(found: Ensemble) -> str:
@@ -36,3 +39,22 @@ def ensemble_html(found: Ensemble) -> str:
 
 def _cell(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def passive_html(found: Passive) -> str:
+    """Return best constant voltages as HTML: of each motion and of all, and their picture."""
+    value = f"{found.what} [{found.unit}]"
+    best = [
+        [motion.name, f"{one.voltage:.2f}", plain(one.value, 4)]
+        for motion, one in zip(found.motions, found.best, strict=True)
+    ]
+    title = f"Best constant voltages: least {found.what}"
+    return html.fragment(
+        title,
+        html.table(["ground motion", "voltage [V]", value], best, (1, 2)),
+        html.table(
+            ["for all of them", "voltage [V]", ""],
+            [[text, f"{v:.2f}", said] for text, v, said in found.for_all()], (1,),
+        ),
+        html.figure(png(draw_passive(found), DPI), title),
+    )  # fmt: skip

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,12 @@ from numpy.typing import NDArray
 from ..errors import ScenarioError
 from ..findings import unknown
 from ..progress import Progress
+from ..quantity import plain
 from ..scenario.scenario import Component, Scenario, load_scenario
 from ..simulate.rows import make_columns
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 
@@ -32,7 +36,11 @@ OUTPUT = "structure.floor2_acceleration_absolute"
 GRID = 17
 TOLERANCE = 0.01
 """Voltage [V] to which a minimum is found."""
-GOALS = ("worst", "mean", "regret")
+GOALS = {
+    "worst": "least for the worst motion",
+    "mean": "least mean of the motions",
+    "regret": "least excess over each motion's own best",
+}
 
 
 @dataclass(frozen=True)
@@ -59,10 +67,14 @@ class Optimum:
 
 @dataclass(frozen=True)
 class Passive:
-    """The answer.
+    """The best constant voltages.
 
     Attributes
     ----------
+    motions : tuple of Motion
+        (m,).
+    output, statistic, unit : str
+        The column that is judged, "peak" or "rms" of it, and its unit.
     grid : (k,) array
         Voltages [V].
     values : (m, k) array
@@ -72,6 +84,8 @@ class Passive:
     goals : mapping
         For the set: "worst" (least largest value), "mean", "regret" (least largest excess over each
         motion's own best, as a ratio).
+    runs : int
+        How many runs it took.
     """
 
     motions: tuple[Motion, ...]
@@ -83,6 +97,32 @@ class Passive:
     best: list[Optimum]
     goals: dict[str, Optimum]
     runs: int
+
+    @property
+    def what(self) -> str:
+        """What is least, in words: "peak of structure.drift1"."""
+        return f"{'RMS' if self.statistic == 'rms' else self.statistic} of {self.output}"
+
+    def for_all(self) -> list[tuple[str, float, str]]:
+        """Return each goal of the set in words, its best voltage [V], and the value there."""
+        found = []
+        for goal, text in GOALS.items():
+            value = self.goals[goal].value
+            excess = f"at most {100 * (value - 1):.1f} % above"
+            said = excess if goal == "regret" else plain(value, 4)
+            found.append((text, self.goals[goal].voltage, said))
+        return found
+
+    def plot(self) -> Figure:
+        """Return the figure: the output over the voltage, the least of each motion marked."""
+        from .passive_picture import draw_passive
+
+        return draw_passive(self).figure
+
+    def _repr_html_(self) -> str:
+        from .notebook import passive_html
+
+        return passive_html(self)
 
 
 def optimise_passive(

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("results", "optimise"),
         metavar="FOLDER",
-        help="where passive.csv and passive.png go; else results/optimise/",
+        help="where passive.csv, .json and .png go; else results/optimise/",
     )
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_trust(parser)
@@ -92,7 +92,8 @@ def main(arguments: argparse.Namespace) -> int:
     if arguments.json:
         import json
 
-        print(json.dumps(_answer(found, files), indent=2, allow_nan=False))
+        named = {name: str(path.absolute()) for name, path in files.items()}
+        print(json.dumps({**_answer(found), **named}, indent=2, allow_nan=False))
     else:
         _print(found, files)
     return 0
@@ -101,25 +102,27 @@ def main(arguments: argparse.Namespace) -> int:
 def _write(found: Passive, folder: Path, figure: bool) -> dict[str, Path]:
     import pandas as pd
 
+    from ..data.files import write_json
     from ..errors import not_usable
 
     table = pd.DataFrame(found.values.T, columns=[motion.name for motion in found.motions])
     table.insert(0, "voltage [V]", found.grid)
-    files = {"table": folder / "passive.csv"}
+    files = {"table": folder / "passive.csv", "answer": folder / "passive.json"}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         table.to_csv(files["table"], index=False, float_format="%.9g")
+        write_json(files["answer"], {"schema": 1, **_answer(found)})
     except OSError as error:
         raise not_usable(f"{folder}: cannot be written: {error.strerror or error}.") from error
     if figure:
-        from ..report.passive import passive_figure
+        from ..batch.passive_picture import passive_figure
 
         files["figure"] = folder / "passive.png"
         passive_figure(found, files["figure"])
     return files
 
 
-def _answer(found: Passive, files: dict[str, Path]) -> dict[str, Any]:
+def _answer(found: Passive) -> dict[str, Any]:
     motions = [
         {"record": m.record, "intensity": m.intensity, "voltage": b.voltage, "value": b.value}
         for m, b in zip(found.motions, found.best, strict=True)
@@ -131,35 +134,21 @@ def _answer(found: Passive, files: dict[str, Path]) -> dict[str, Any]:
         "motions": motions,
         "set": {goal: vars(optimum) for goal, optimum in found.goals.items()},
         "runs": found.runs,
-        **{name: str(path.absolute()) for name, path in files.items()},
     }
-
-
-_GOALS = {
-    "worst": "least for the worst motion",
-    "mean": "least mean of the motions",
-    "regret": "least excess over each motion's own best",
-}
 
 
 def _print(found: Passive, files: dict[str, Path]) -> None:
     width = max(len(motion.name) for motion in found.motions)
     at = [round(k) for k in (0, (len(found.grid) - 1) / 2, len(found.grid) - 1)]
     heads = "".join(f"{f'{found.grid[k]:g} V':>9}" for k in at)
-    print(f"{found.statistic} of {found.output} [{found.unit}]")
+    print(f"{found.what} [{found.unit}]")
     print(f"{'':{width}}  best voltage   value {heads}")
     for motion, best, row in zip(found.motions, found.best, found.values, strict=True):
         values = "".join(f"{plain(row[k], 4):>9}" for k in at)
         print(f"{motion.name:{width}}  {best.voltage:10.2f} V {plain(best.value, 4):>7} {values}")
     print("for all of them")
-    for goal, text in _GOALS.items():
-        optimum = found.goals[goal]
-        value = (
-            f"at most {100 * (optimum.value - 1):.1f} % above"
-            if goal == "regret"
-            else plain(optimum.value, 4)
-        )
-        print(f"  {text}: {optimum.voltage:.2f} V ({value})")
+    for text, voltage, value in found.for_all():
+        print(f"  {text}: {voltage:.2f} V ({value})")
     print(f"{found.runs} runs")
     for path in files.values():
         print(f"  {path}")

@@ -9,13 +9,14 @@ import tempfile
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import PhysicsError, RecordError
 from ..physics.record import HEADER, LARGEST, is_two_column, parse_two_column, read_text
-from . import at2, columns, fema
+from . import at2, columns, fema, synthetic
 from .listing import Listing
 
 _EL_CENTRO = Listing(
@@ -58,7 +59,7 @@ def baked_in() -> dict[str, Path]:
 
 def list_ground_motions() -> list[Listing]:
     """Return one row per ground motion that has a name, its package installed or not."""
-    return [_EL_CENTRO, *fema.listings()]
+    return [_EL_CENTRO, *synthetic.listings(), *fema.listings()]
 
 
 def read_ground_motion(record: str, folder: Path) -> GroundMotion:
@@ -84,8 +85,9 @@ def read_ground_motion(record: str, folder: Path) -> GroundMotion:
     """
     if record in baked_in():
         return _from_file(baked_in()[record], record, _EL_CENTRO.source)[0]
-    if record in fema.NAMES:
-        time, acceleration, source = fema.read(record)
+    named = _named(record)
+    if named is not None:
+        time, acceleration, source = named.read(record)
         return GroundMotion(time, acceleration, record, source)
     path = _existing(record, folder)
     return _from_file(path, path.stem, str(path))[0]
@@ -115,11 +117,16 @@ def ground_motion_file(record: str, folder: Path) -> str:
     """
     if record in baked_in():
         return record
-    if record in fema.NAMES:
+    if _named(record) is not None:
         return str(_cached(read_ground_motion(record, folder)))
     path = _existing(record, folder)
     motion, ready = _from_file(path, path.stem, str(path))
     return str(path if ready else _cached(motion))
+
+
+def _named(record: str) -> ModuleType | None:
+    """Return the module that reads a name, None where it is built in or no name."""
+    return next((one for one in (synthetic, fema) if record in one.NAMES), None)
 
 
 def _existing(record: str, folder: Path) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
 
@@ -71,10 +71,11 @@ def page(title: str, body: Iterable[str], foot: str) -> str:
     )
 
 
-def section(title: str, *parts: str) -> str:
-    """Return a section; parts are HTML, empty ones are left out."""
+def section(title: str, *parts: str, name: str = "") -> str:
+    """Return a section; parts are HTML, empty ones are left out. Links lead to its `name`."""
     inner = "\n".join(part for part in parts if part)
-    return f"<section>\n<h2>{escape(title)}</h2>\n{inner}\n</section>"
+    place = f' id="{escape(name)}"' if name else ""
+    return f"<section>\n<h2{place}>{escape(title)}</h2>\n{inner}\n</section>"
 
 
 def paragraphs(*texts: str, kind: str = "") -> str:
@@ -100,6 +101,7 @@ def table(
     rows: Sequence[Sequence[str]],
     numbers: Iterable[int] = (),
     strong: Iterable[int] = (),
+    kinds: Mapping[tuple[int, int], str] | None = None,
 ) -> str:
     """Return a table.
 
@@ -109,13 +111,16 @@ def table(
     rows : texts of each row, one per column; they are escaped
     numbers : indices of the columns that are set right
     strong : indices of the rows that are bold
+    kinds : by row and column the class of a cell: "strong" is bold; "good", "bad", "open" are
+        verdicts in their colours
     """
     right, bold = set(numbers), set(strong)
 
     several = len(header) > _NARROW
 
-    def cell(kind: str, i: int, text: str) -> str:
-        mark = ' class="n"' if i in right else ""
+    def cell(kind: str, i: int, text: str, own: str = "") -> str:
+        names = " ".join([*(["n"] if i in right else []), *([own] if own else [])])
+        mark = f' class="{names}"' if names else ""
         if kind == "th":
             mark += ' scope="col"'
         elif several:  # where rows stand below each other, each value says what it is
@@ -129,7 +134,8 @@ def table(
     lines.append("<tbody>")
     for k, row in enumerate(rows):
         begin = '<tr class="strong">' if k in bold else "<tr>"
-        lines.append(begin + "".join(cell("td", i, text) for i, text in enumerate(row)) + "</tr>")
+        cells = (cell("td", i, text, (kinds or {}).get((k, i), "")) for i, text in enumerate(row))
+        lines.append(begin + "".join(cells) + "</tr>")
     return "\n".join([*lines, "</tbody>", "</table>", "</div>"])
 
 

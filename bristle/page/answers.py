@@ -26,7 +26,7 @@ DEPENDS = ("study.toml", "model.toml", "verdict.json", "reports/identify.json")
 """Files of a study that its views show."""
 
 
-_DESIGNED = ("design/passive/passive.csv",)
+_DESIGNED = ("design/passive/passive.json",)
 
 
 class ViewError(BristleError):

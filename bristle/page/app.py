@@ -30,7 +30,7 @@ ROOM = 512 * 1024**2
 _PIECE = 1024**2
 
 OF_STUDY = (
-    "data", "check", "fit", "errors", "residual", "verdict", "history", "design", "loops",
+    "data", "check", "fit", "errors", "residual", "verdict", "history", "design",
     "controllers", "channels",
 )  # fmt: skip
 """Views of a study."""
@@ -74,7 +74,7 @@ class App:
                 ("GET", "/api/studies/([^/]+)/file", self._file),
                 ("GET", "/api/studies/([^/]+)/consent", self._waiting),
                 ("POST", "/api/studies/([^/]+)/consent", self._consent),
-                ("POST", "/api/studies/([^/]+)/(weights|preview)", self._asked),
+                ("POST", "/api/studies/([^/]+)/(weights|preview|loops)", self._asked),
                 ("POST", "/api/studies/([^/]+)/design", self._design),
                 ("PUT", "/api/uploads/([^/]+)/(building/)?([^/]+)", self._upload),
                 ("GET", "/api/uploads/([^/]+)/columns", self._columns),
@@ -141,7 +141,8 @@ class App:
     def _view(self, request: Request) -> Answer:
         name, view = request.parts
         arguments = {key: request.query[key] for key in ("role", "name") if key in request.query}
-        keep = view != "controllers"  # dropped records and other studies are beside the study
+        # Dropped records and other studies are beside the study.
+        keep = view not in ("controllers", "design")
         return Answer(self.answers.get(view, self.study(name), arguments, keep), PACKED)
 
     def _files(self, request: Request) -> Answer:
@@ -165,9 +166,9 @@ class App:
         return as_json({"ok": True})
 
     def _asked(self, request: Request) -> Answer:
-        name, view = request.parts
-        found = self.answers.get(view, self.study(name), request.json(), keep=False)
-        return Answer(found, PACKED)
+        folder, view = self.study(request.parts[0]), request.parts[1]
+        keep = view == "loops"  # they take seconds
+        return Answer(self.answers.get(view, folder, request.json(), keep), PACKED)
 
     def _design(self, request: Request) -> Answer:
         folder, asked = self.study(request.parts[0]), request.json()

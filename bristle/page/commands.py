@@ -15,7 +15,7 @@ from typing import Any
 from ..findings import command, unknown, written
 from . import comparisons
 from .designs import FOLDER as DESIGNS
-from .designs import INTENSITIES, design_name, kind_of_design
+from .designs import design_name, kind_of_design
 from .message import RequestError
 from .names import UPLOADS, batch_name, file_name
 
@@ -205,7 +205,12 @@ def _passive(study: str, options: Options) -> list[str]:
     for one in sets:
         if not _SET.fullmatch(one):
             raise RequestError(f"sets: {written(one)}; NAME=VALUE is right.")
-    words = ["optimise", "passive", "--intensities", *(f"{one:g}" for one in INTENSITIES)]
+    records = options.get("motions")
+    if not isinstance(records, list) or not records:
+        raise RequestError(f"motions: {written(records)}; a list of ground motions is right.")
+    motions = [comparisons.record_name(one) for one in records]
+    peak = comparisons.peak_of("motions", options.get("peak"))
+    words = ["optimise", "passive", "--motions", *motions, f"--intensities={peak:g}"]
     words += ["--grid", "33", f"--out={study}/{DESIGNS}/passive", "--no-figure"]
     return [*words, *(word for one in sets for word in ("--set", one))]
 

@@ -84,19 +84,25 @@ def _motion(asked: object) -> str:
     """Return a ground motion as the command takes it."""
     if not isinstance(asked, Mapping):
         raise RequestError(f"motions: {written(asked)}; a record with its peak is right.")
-    record, peak = asked.get("record"), asked.get("peak")
+    text, peak = record_name(asked.get("record")), asked.get("peak")
+    return text if peak is None else f"{text},peak={peak_of(text, peak):.6g}g"
+
+
+def record_name(record: object) -> str:
+    """Return the name of a ground motion, or a dropped file's; RequestError if it is neither."""
     if isinstance(record, str) and record.startswith(f"{UPLOADS}/") and record.count("/") == 2:
         _, batch, name = record.split("/")
-        text = f"{UPLOADS}/{batch_name(batch)}/{file_name(name, 'the record')}"
-    else:
-        text = _word("motions", record)
-    if peak is None:
-        return text
+        return f"{UPLOADS}/{batch_name(batch)}/{file_name(name, 'the record')}"
+    return _word("motions", record)
+
+
+def peak_of(motion: str, peak: object) -> float:
+    """Return the peak [g] to which a ground motion is scaled; RequestError if it cannot be."""
     if isinstance(peak, bool) or not isinstance(peak, int | float) or not isfinite(peak):
-        raise RequestError(f"{text}: peak = {written(peak)}; a number in g is right.")
+        raise RequestError(f"{motion}: peak = {written(peak)}; a number in g is right.")
     if not 0.0 < peak <= PEAK:
-        raise RequestError(f"{text}: peak = {peak:g} g; above 0, to {PEAK:g} g, is right.")
-    return f"{text},peak={peak:.6g}g"
+        raise RequestError(f"{motion}: peak = {peak:g} g; above 0, to {PEAK:g} g, is right.")
+    return float(peak)
 
 
 def _list(options: Mapping[str, Any], key: str) -> list[Any]:

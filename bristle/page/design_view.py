@@ -1,8 +1,7 @@
-"""View 8, Design: what is weighed, what the solves found, and the closed loop on three motions."""
+"""View 8, Design: what is weighed, what the solves found, and their closed loops."""
 
 from __future__ import annotations
 
-import csv
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,23 +17,27 @@ from ..design.responses import task_curves
 from ..errors import DesignError, ScenarioError, StudyError
 from ..physics.drive import VOLTAGE
 from ..physics.law import base_and_variant
-from ..scenario.scenario import Scenario
+from ..scenario.scenario import Scenario, load_scenario
 from ..simulate.coupled import simulate
 from ..study.study import Study
-from .asked import Asked, damper_of
+from .asked import Asked, damper_of, record_of, records
+from .comparisons import peak_of, record_name
+from .controls import stock_file
 from .designs import (
     FIELDS,
     FOLDER,
-    INTENSITIES,
     KINDS,
+    MOTIONS,
+    PEAK,
     content_of,
     design_name,
     kind_of_design,
     names_of,
     values_of,
 )
+from .message import RequestError
 
-TABLE = "passive/passive.csv"
+ANSWER = "passive/passive.json"
 """What `bristle optimise passive` leaves in the folder of designs."""
 ROWS = 3000
 """Rows of a response that are sent: a screen has fewer columns."""
@@ -67,8 +70,8 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "law": study.model(to_show=True).law, "kinds": list(KINDS), "refused": refused(study),
         "fields": [{"name": name, **one._asdict()} for name, one in FIELDS.items()],
-        "solves": solves, "passive": bool(_best(folder)),
-        "sets": _sets(folder), "intensities": list(INTENSITIES),
+        "solves": solves, "records": records(folder.parent), "motions": list(MOTIONS),
+        "peak": PEAK,
     }  # fmt: skip
 
 
@@ -91,33 +94,53 @@ def weights(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def loops(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the closed loop of a design on three motions, and the best constant voltage's.
+    """Return the closed loop of a design on ground motions, and the best constant voltage's.
 
     Parameters
     ----------
     folder : of the study
-    arguments : `name` of the design
+    arguments : `name` of the design; `motions`, ground motions by name or as dropped files; `peak`
+        [g] to which each is scaled
 
     Raises
     ------
-    ScenarioError
-        If the study's damper cannot act in the scenario, or nothing is designed for it.
+    RequestError
+        If one of them is not right.
+    ScenarioError, RecordError
+        If the study's damper cannot act in the scenario, nothing is designed for it, or there is no
+        such ground motion.
     DesignError
         If the controller does not belong to its building.
     """
     name = design_name(arguments.get("name"))
+    motions = arguments.get("motions", list(MOTIONS))
+    if not isinstance(motions, list) or not 1 <= len(motions) <= len(MOTIONS):
+        raise RequestError(f"motions: a list of 1 to {len(MOTIONS)} ground motions is right.")
+    peak = peak_of("motions", arguments.get("peak", PEAK))
     if why := refused(Study(folder)):
         raise ScenarioError(f"{folder.name}: {why}")
-    kind = kind_of_design(name)
-    found = []
+    shaken = _shaken(folder, [record_name(one) for one in motions], peak)
     best = _best(folder)
-    for k, intensity in enumerate(INTENSITIES):
-        runs = [("controlled", _controlled(folder, name, kind, intensity))]
-        if best:
-            runs.append(("passive", _passive(folder, best[k], intensity)))
-        row: dict[str, Any] = {"intensity": intensity, "voltage": best[k] if best else None}
-        found.append(row | {key: _response(asked) for key, asked in runs})
-    return {"name": name, "motions": found}
+    found = []
+    for record, ground in shaken.items():
+        voltage = best.get((record, peak))
+        runs = [("controlled", _controlled(folder, name, ground))]
+        if voltage is not None:
+            runs.append(("passive", _passive(folder, {**ground, "voltage.level": voltage})))
+        responses = {key: _response(asked) for key, asked in runs}
+        found.append({"record": record, "voltage": voltage, **responses})
+    # `bristle optimise passive` gives record and peak itself.
+    rest = {key: next(iter(shaken.values()))[key] for key in ("ground.factor", "run.stop")}
+    return {"name": name, "peak": peak, "motions": found, "sets": _passive(folder, rest).sets()}
+
+
+def _shaken(folder: Path, motions: list[str], peak: float) -> dict[str, dict[str, Any]]:
+    """Return by ground motion what makes it that of a scenario, as overrides; ends are alike."""
+    found = {record: record_of(folder.parent, PASSIVE, record) for record in motions}
+    own = load_scenario(stock_file(PASSIVE)).stop
+    stop = max(one.get("run.stop", own) for one in found.values())
+    scale = {"ground.peak": round(peak * G, 9), "ground.factor": 1.0, "run.stop": stop}
+    return {record: {**one, **scale} for record, one in found.items()}
 
 
 def refused(study: Study) -> str:
@@ -171,21 +194,12 @@ def _house(folder: Path) -> dict[str, Any]:
     return {"structure.building": f"{folder.name}/{building}"} if building else {}
 
 
-def _sets(folder: Path) -> list[str]:
-    """Return the words of --set that give a scenario the study's damper and building."""
-    try:
-        asked = Asked(folder.parent, PASSIVE, {**damper_of(folder.parent, PASSIVE, folder.name)})
-    except ScenarioError:
-        return []
-    return Asked(folder.parent, PASSIVE, {**asked.overrides, **_house(folder)}).sets()
-
-
-def _controlled(folder: Path, name: str, kind: str, intensity: float) -> Asked:
+def _controlled(folder: Path, name: str, ground: Mapping[str, Any]) -> Asked:
+    kind = kind_of_design(name)
     scenario = KINDS[kind]
     overrides = {
         **damper_of(folder.parent, scenario, folder.name), **_house(folder),
-        "controller.controller": f"{folder.name}/{FOLDER}/{name}.json",
-        "ground.peak": _peak(intensity),
+        "controller.controller": f"{folder.name}/{FOLDER}/{name}.json", **ground,
     }  # fmt: skip
     asked = Asked(folder.parent, scenario, overrides)
     if kind == "hinf":
@@ -213,16 +227,9 @@ def _inverse(folder: Path, asked: Asked) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _passive(folder: Path, voltage: float, intensity: float) -> Asked:
-    overrides = {
-        **damper_of(folder.parent, PASSIVE, folder.name), **_house(folder),
-        "voltage.level": voltage, "ground.peak": _peak(intensity),
-    }  # fmt: skip
-    return Asked(folder.parent, PASSIVE, overrides)
-
-
-def _peak(intensity: float) -> float:
-    return round(intensity * G, 9)
+def _passive(folder: Path, ground: Mapping[str, Any]) -> Asked:
+    damper = damper_of(folder.parent, PASSIVE, folder.name)
+    return Asked(folder.parent, PASSIVE, {**damper, **_house(folder), **ground})
 
 
 def _response(asked: Asked) -> dict[str, Any]:
@@ -242,20 +249,18 @@ def _unit(scenario: Scenario, name: str) -> str:
     return scenario.component(component).description.variables[port].unit or ""
 
 
-def _best(folder: Path) -> list[float]:
-    """Return the best constant voltage [V] of each motion in the table that the command wrote.
+def _best(folder: Path) -> dict[tuple[str, float], float]:
+    """Return by ground motion and peak [g] the best constant voltage [V] that was found.
 
-    Empty where there is none, where it is of other motions, or older than the study's model.
+    Empty where none was, or the study's model has changed since.
     """
-    path, model = folder / FOLDER / TABLE, folder / "model.toml"
+    path, model = folder / FOLDER / ANSWER, folder / "model.toml"
     if not path.is_file() or path.stat().st_mtime_ns < model.stat().st_mtime_ns:
-        return []
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.reader(file))
+        return {}
     try:
-        table = np.array(rows[1:], dtype=float)
-    except ValueError as error:
-        raise StudyError(f"{path}: {error}; `bristle optimise passive` writes it anew.") from None
-    if table.ndim != 2 or table.shape[1] != 1 + len(INTENSITIES):
-        return []
-    return [float(table[k, 0]) for k in table[:, 1:].argmin(axis=0)]
+        motions = read_json(path)["motions"]
+        return {(one["record"], one["intensity"]): float(one["voltage"]) for one in motions}
+    except (KeyError, TypeError, ValueError) as error:
+        raise StudyError(
+            f"{path}: {type(error).__name__} {error}; `bristle optimise passive` writes it anew."
+        ) from None

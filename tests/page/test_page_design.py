@@ -21,12 +21,22 @@ from bristle.design import read_task
 from bristle.errors import StudyError
 from bristle.page import design_view
 from bristle.page.commands import order_of
-from bristle.page.designs import FIELDS, content_of, design_name, names_of, values_of, write_design
+from bristle.page.designs import (
+    FIELDS,
+    MOTIONS,
+    content_of,
+    design_name,
+    names_of,
+    values_of,
+    write_design,
+)
 from bristle.page.message import RequestError
 from bristle.page.packing import unpack
 from bristle.page.worker import answer
 from bristle.scenario.scenario import load_scenario, parse_overrides
 from bristle.study import Study, create_study
+
+SHAKEN: dict[str, Any] = {"motions": list(MOTIONS), "peak": 0.3}
 
 
 @pytest.fixture(scope="module")
@@ -89,17 +99,51 @@ def test_what_is_no_name_of_a_design_is_refused(name: object) -> None:
 )
 def test_what_is_no_value_of_a_scenario_is_refused(sets: object) -> None:
     with pytest.raises(RequestError, match="sets"):
-        order_of("passive", "rig", {"sets": sets})
+        order_of("passive", "rig", {**SHAKEN, "sets": sets})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"motions": []}, "a list of ground motions"),
+        ({"motions": "el_centro_1940_ns"}, "a list of ground motions"),
+        ({"motions": ["--out=x"]}, "a name is right"),
+        ({"motions": ["uploads/../x.csv"]}, "a batch of files"),
+        ({"motions": ["uploads/record-1/..csv"]}, "the record"),
+        ({"peak": None}, "a number in g"),
+        ({"peak": 0.0}, "above 0, to 3 g"),
+    ],
+)
+def test_what_is_no_ground_motion_of_a_closed_loop_is_refused(
+    home: Path, wrong: dict[str, Any], words: str
+) -> None:
+    with pytest.raises(RequestError, match=words):
+        order_of("passive", "rig", {**SHAKEN, **wrong})
+    if wrong != {"motions": []}:
+        told, _ = answer("loops", home / "rig", {"name": "hinf_1", **SHAKEN, **wrong})
+        assert not told["ok"]
 
 
 def test_the_commands_are_those_of_a_terminal(home: Path) -> None:
     assert order_of("design", "rig", {"name": "lpv_3"}).shown == (
         "bristle design lpv rig/design/lpv_3.toml --out=rig/design/lpv_3.json"
     )
-    sets = design_view.answer(home / "rig", {})["sets"]
-    order = order_of("passive", "rig", {"sets": [*sets, "ground.peak=-1.5e-3"]})
-    assert order.shown.startswith("bristle optimise passive --intensities 0.2 0.4 0.6 --grid 33")
-    assert "--set damper.fmu=BinghamDamper" in order.shown
+    dropped = "uploads/record-1/my shake.csv"
+    asked = {"motions": ["near_fault_pulse", dropped], "peak": 0.25}
+    order = order_of("passive", "rig", {**asked, "sets": ["damper.fmu=BinghamDamper"]})
+    assert order.words[:6] == (
+        "optimise", "passive", "--motions", "near_fault_pulse", dropped, "--intensities=0.25",
+    )  # fmt: skip
+    assert order.shown.endswith("--no-figure --set damper.fmu=BinghamDamper")
+
+
+def test_the_three_motions_are_named_and_others_can_be_chosen(home: Path) -> None:
+    dropped = home / "uploads" / "record-7" / "mine.csv"
+    dropped.parent.mkdir(parents=True)
+    dropped.write_text("time [s],acceleration [m/s2]\n0.0,0.0\n0.1,1.5\n0.2,0.0\n")
+    shown = design_view.answer(home / "rig", {})
+    assert len(set(shown["motions"])) == 3
+    assert {*shown["motions"], "uploads/record-7/mine.csv"} <= set(shown["records"])
 
 
 def test_weights_are_those_of_the_task(home: Path) -> None:
@@ -131,7 +175,7 @@ def test_designs_are_written_over_http_and_shown_unsolved(home: Path) -> None:
     told, body = answer("design", home / "rig", {})
     assert told["ok"], told
     shown = unpack(body)
-    assert (shown["law"], shown["refused"], shown["passive"]) == ("bingham", "", False)
+    assert (shown["law"], shown["refused"]) == ("bingham", "")
     assert name not in {one["name"] for one in shown["solves"]}
     told, _ = answer("loops", home / "rig", {"name": "../x"})
     assert "no name of one" in told["error"]
@@ -160,22 +204,23 @@ def test_a_solve_of_an_older_model_is_told_apart(home: Path, tmp_path: Path) -> 
     assert design_view._is_older(other, found)
 
 
-def test_a_table_of_voltages_that_is_no_table_says_so(tmp_path: Path) -> None:
+def test_voltages_that_are_wrong_say_so(tmp_path: Path) -> None:
     model = tmp_path / "model.toml"
     model.write_text("")
-    file = tmp_path / "design" / "passive" / "passive.csv"
+    assert design_view._best(tmp_path) == {}
+    file = tmp_path / "design" / "passive" / "passive.json"
     file.parent.mkdir(parents=True)
-    file.write_text("voltage [V],a,b,c\n0.0,3.0,1.0,2.0\n1.0,2.0,1.5,2.5\n2.0,2.5,0.5,3.0\n")
-    assert design_view._best(tmp_path) == [1.0, 2.0, 0.0]
+    motions = [{"record": "a", "intensity": 0.2, "voltage": 1.5, "value": 3.0}]
+    file.write_text(json.dumps({"motions": motions}))
+    assert design_view._best(tmp_path) == {("a", 0.2): 1.5}
     after = file.stat().st_mtime + 10.0
     os.utime(model, (after, after))  # the model has changed since
-    assert design_view._best(tmp_path) == []
+    assert design_view._best(tmp_path) == {}
     os.utime(model, (after - 100.0, after - 100.0))
-    file.write_text("voltage [V],a\n0.0,3.0\n")
-    assert design_view._best(tmp_path) == []  # of other motions
-    file.write_text("voltage [V],a,b,c\n0.0,x,1.0,2.0\n")
-    with pytest.raises(StudyError, match="optimise passive"):
-        design_view._best(tmp_path)
+    for wrong in ({}, {"motions": 3}, {"motions": [{**motions[0], "voltage": "x"}]}):
+        file.write_text(json.dumps(wrong))
+        with pytest.raises(StudyError, match="optimise passive"):
+            design_view._best(tmp_path)
 
 
 @pytest.mark.slow
@@ -183,26 +228,43 @@ def test_a_table_of_voltages_that_is_no_table_says_so(tmp_path: Path) -> None:
 def test_a_solve_acts_in_the_building_as_the_command_says(
     home: Path, kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    dropped = home / "uploads" / "record-8" / "my shake.csv"
+    dropped.parent.mkdir(parents=True, exist_ok=True)
+    t = np.arange(1001) * 0.04  # longer than the scenario
+    rows = [f"{one:.2f},{np.sin(9.0 * one) * np.exp(-0.3 * one):.6f}" for one in t.tolist()]
+    dropped.write_text("\n".join(["time [s],acceleration [m/s2]", *rows]) + "\n")
+    asked = {"motions": [*MOTIONS[:2], "uploads/record-8/my shake.csv"], "peak": 0.2}
     with page_on(home) as client:
         made = client.post("/api/studies/rig/design", {"kind": kind, "values": {}}).json["name"]
         job = client.run("design", "rig", name=made)
         assert job["state"] == "done", job
-        sets = unpack(client.get("/api/studies/rig/design").body)["sets"]
-        assert client.run("passive", "rig", 300.0, sets=sets)["state"] == "done"
+        path = "/api/studies/rig/loops"
+        before = unpack(client.post(path, {"name": made, **asked}).body)
+        job = client.run("passive", "rig", 300.0, **asked, sets=before["sets"])
+        assert job["state"] == "done", job
         shown = unpack(client.get("/api/studies/rig/design").body)
         (solve,) = [one for one in shown["solves"] if one["name"] == made]
         told = json.loads((home / "rig" / "design" / f"{made}_answer.json").read_text())
         assert solve["gamma"] == told["facts"]["gamma"]
         assert solve["margins"]["modulus"] == told["margins"]["modulus"]
-        loops = unpack(client.get(f"/api/studies/rig/loops?name={made}").body)["motions"]
-    assert [one["intensity"] for one in loops] == [0.2, 0.4, 0.6]
+        loops = unpack(client.post(path, {"name": made, **asked}).body)["motions"]
+        other = unpack(client.post(path, {"name": made, **asked, "peak": 0.1}).body)["motions"]
+    assert [one["record"] for one in loops] == asked["motions"]
+    assert all(one["voltage"] is None for one in other)  # they were found for another peak
+    assert {len(one["controlled"]["time"]) for one in loops} == {
+        len(loops[0]["controlled"]["time"])
+    }
+    found = json.loads((home / "rig" / "design" / "passive" / "passive.json").read_text())
     monkeypatch.chdir(home)
-    for run in (loops[0]["controlled"], loops[1]["passive"]):
+    for run in (loops[0]["controlled"], loops[1]["passive"], loops[2]["controlled"]):
         words = shlex.split(run["command"])
         given = parse_overrides([b for a, b in pairwise(words) if a == "--set"])
         assert load_scenario(words[2], given)
         frame = bristle.run(words[2], given, engine="compiled")
+        assert frame.index[-1] == 40.0 or frame["time"].iloc[-1] == 40.0
         for name, peak in run["peaks"].items():
             assert peak == pytest.approx(float(frame[name].abs().max()), rel=1e-12)
-    for one in loops:  # the best constant voltage is no worse than another
+    for one, best in zip(loops, found["motions"], strict=True):
         assert 0.0 <= one["voltage"] <= 8.0
+        reached = one["passive"]["peaks"][design_view.OUTPUT]
+        assert reached == pytest.approx(best["value"], rel=1e-6)

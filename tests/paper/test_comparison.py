@@ -228,7 +228,11 @@ def test_the_page_needs_no_network_and_holds_every_statement(written: Path) -> N
     text = (written / "report.html").read_text(encoding="utf-8")
     assert not re.findall(r"""(?:src|href)=["'](?!data:|#)""", text)
     assert "<script" not in text
-    assert text.count('class="badge') == 21
+    assert len(re.findall(r'class="(?:good|bad|open)" data-of="Verdict"', text)) == 21
+    assert re.findall(r"<th\b(?![^>]*scope=)", text) == []
+    assert "prefers-color-scheme: dark" in text
+    cases = 4 + 2 * (len(at_hand()) - 1)
+    assert text.count('<table class="wide">') == text.count("<table") == 3 + 2 * cases
     figures = [path for path in written.iterdir() if path.suffix == ".png"]
     assert text.count("data:image/png;base64,") == len(figures)
     for words in ("reconstructed", "Table IV", "Decided by"):
@@ -239,7 +243,7 @@ def test_the_ledger_file_agrees_with_the_page(written: Path) -> None:
     ledger = pd.read_csv(written / "ledger.csv", comment="#")
     assert list(ledger["number"]) == list(range(1, 22))
     page = (written / "report.html").read_text(encoding="utf-8")
-    shown = re.findall(r'class="badge \w+">([^<]+)<', page)
+    shown = re.findall(r'data-of="Verdict">([^<]+)<', page)
     assert shown == list(ledger["verdict"])
     assert set(shown) <= {"reproduced", "not reproduced", "undecidable"}
 

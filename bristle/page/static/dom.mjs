@@ -33,7 +33,7 @@ export function z(value) {
   return value < 100 ? value.toFixed(2) : value.toPrecision(3);
 }
 
-const SCALES = { m: [1e3, "mm"], "m/s": [1e3, "mm/s"] };
+const SCALES = { m: [1e3, "mm"], "m/s": [1e3, "mm/s"], "m/s2": [1, "m/s²"] };
 
 /** Returns the factor from SI and the unit in which an engineer reads a signal. */
 export const shown = (unit) => SCALES[unit] ?? [1, unit === "1" ? "" : unit];
@@ -57,15 +57,21 @@ export function say(text) {
   document.getElementById("said").textContent = text;
 }
 
-/** Returns a table; `numbers` are the columns that are set right, the first column heads its row. */
+const NARROW = 3; // columns up to which a table fits on the screen of a telephone
+
+/**
+ * Returns a table; `numbers` are the columns that are set right, the first column heads its row. On a
+ * narrow screen the cells of a wide table stand below each other, each with the title of its column.
+ */
 export function table(caption, header, rows, numbers = []) {
   const kind = (k) => (numbers.includes(k) ? "n" : null);
+  const wide = header.length > NARROW;
   return h("div", { class: "scroll", tabindex: "0", role: "region", "aria-label": caption },
-    h("table", {},
+    h("table", { class: wide ? "wide" : null },
       h("caption", {}, caption),
       h("thead", {}, h("tr", {}, header.map((text, k) => h("th", { scope: "col", class: kind(k) }, text)))),
       h("tbody", {}, rows.map((row) => h("tr", {}, row.map((cell, k) =>
-        k === 0 ? h("th", { scope: "row" }, cell) : h("td", { class: kind(k) }, cell)))))));
+        k === 0 ? h("th", { scope: "row" }, cell) : h("td", { class: kind(k), "data-of": wide ? header[k] : null }, cell)))))));
 }
 
 /** Returns a command with a button that copies it. */

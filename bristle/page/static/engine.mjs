@@ -12,7 +12,7 @@ export class Engine {
     this.what = what;
     this.first = first;
     this.scenario = null;
-    this.why = "The page's own engine is being made; until then the server computes.";
+    this.why = "The engine is being compiled for this page. Until then the server computes the runs.";
   }
 
   /** Gets what the page needs to run it itself; where that cannot be had, the server goes on. */

@@ -12,7 +12,7 @@ const VIEWS = [
   ["errors", "Where it fails"],
   ["verdict", "What is missing"],
   ["history", "Add and compare"],
-  ["hand_on", "Hand on"],
+  ["hand_on", "Export"],
   ["simulate", "Simulate"],
   ["design", "Design"],
   ["controllers", "Compare controllers"],

@@ -22,7 +22,7 @@ export class Simulation {
     this.build();
     this.finish();
     this.engine.prepare().then(() => {
-      this.took.textContent = this.engine.why || "The page computes by itself.";
+      this.took.textContent = this.engine.why || "Runs are computed in this page.";
       whole.dataset.engine = this.engine.why ? "server" : "page";
     });
     window.bristleSimulation = this;
@@ -69,7 +69,7 @@ export class Simulation {
     this.keys = h("div", {});
     this.spectrumState = h("p", { class: "soft small", role: "status" });
     this.figures = h("div", {});
-    this.forget = h("button", { type: "button", onclick: () => this.keep(null) }, "Forget the kept one");
+    this.forget = h("button", { type: "button", onclick: () => this.keep(null) }, "Drop the kept setting");
     this.whole.replaceChildren(
       h("p", { class: "lead" }, this.first.title ?? ""),
       h("div", { class: "bench" },
@@ -78,7 +78,7 @@ export class Simulation {
           h("div", { class: "act" },
             h("button", { type: "button", class: "main", onclick: () => this.keep({ ...this.now, spectra: this.spectra, label: this.label() }) }, "Keep this setting"),
             this.forget,
-            h("button", { type: "button", onclick: () => this.back() }, "As the scenario is")),
+            h("button", { type: "button", onclick: () => this.back() }, "Reset the sliders")),
           this.took),
         h("div", {},
           this.keys,
@@ -137,6 +137,7 @@ export class Simulation {
     if (!this.first.accelerations.length) return;
     const asked = JSON.stringify(this.values);
     this.spectrumState.textContent = "Computing the spectrum …";
+    this.spectrumState.classList.add("loading");
     try {
       const found = await postPacked("spectrum", { ...this.what, values: this.values });
       if (asked !== JSON.stringify(this.values)) return;
@@ -148,6 +149,7 @@ export class Simulation {
       this.spectra = null;
       this.spectrumState.textContent = error.message;
     }
+    this.spectrumState.classList.remove("loading");
     this.draw();
   }
 
@@ -155,7 +157,7 @@ export class Simulation {
     const shownValue = h("output", {});
     const id = `slider-${slider.name}`; // the label is the input's: an output could have it, too
     const input = h("input", { id, type: "range", min: 0, max: 1000, step: "any" });
-    const tell = (value) => (shownValue.textContent = `${number(value, 4)} ${slider.unit === "1" ? "" : slider.unit}`);
+    const tell = (value) => (shownValue.textContent = `${number(value, 4)} ${slider.unit === "1" ? "" : slider.unit.replace("s2", "s²")}`);
     const put = (value) => {
       input.value = String((1000 * (value - slider.low)) / (slider.high - slider.low));
       input.setAttribute("aria-valuetext", tell(value));
@@ -203,7 +205,7 @@ export class Simulation {
       try {
         this.now = await this.engine.run({ ...this.values });
         const took = performance.now() - began;
-        this.took.textContent = `${this.now.time.length} rows in ${took.toFixed(0)} ms, by the ${here ? "page itself" : "server"}. ${here ? "" : this.engine.why}`;
+        this.took.textContent = `${this.now.time.length} rows in ${took.toFixed(0)} ms, computed ${here ? "in this page" : "on the server"}. ${here ? "" : this.engine.why}`;
         this.finish();
       } catch (error) {
         this.took.textContent = error.message;

@@ -19,7 +19,7 @@ function begin(page, whole) {
   const choose = h("button", { type: "button", onclick: () => input.click() }, "Choose files");
   const drop = h("div", { class: "drop" },
     h("p", {}, "Drop measurement files here: CSV, text, MAT, Excel, TDMS, HDF5, Parquet."),
-    h("p", { class: "soft small" }, "One run a file. Of a building add its file (tower.toml)."),
+    h("p", { class: "soft small" }, "One file per run. For a study of a building, add the file of the building (tower.toml)."),
     h("div", { class: "act", style: { "justify-content": "center" } }, choose), input);
   const take = (files) => files.length && send(page, whole, [...files]);
   input.addEventListener("change", () => take(input.files));

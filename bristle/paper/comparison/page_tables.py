@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from html import escape
 from typing import TYPE_CHECKING, Any
 
+from ...draw import html
 from .experiment import BEYOND, CONTROLLERS, NONE, Comparison
 from .tables import MARK, TABLES, columns, shown, stroke_lines, stroke_text
 
@@ -22,41 +22,35 @@ def table_html(name: str, table: pd.DataFrame) -> str:
     """
     kind, title = TABLES[name]
     listed = columns(kind)
-    heads = "".join(f"<th>{escape(heading).replace('2]', '²]')}</th>" for heading, _ in listed)
-    body = []
-    groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
-    for (motion, g), group in groups:
-        body.append(
-            f'<tr class="group"><td colspan="{1 + len(listed)}">{escape(motion)}, nominal '
-            f"{g:g} g</td></tr>"
-        )
-        own = group.set_index("law")
-        for law in own.index:
-            cells = "".join(_cell(own, str(law), column) for _, column in listed)
-            body.append(f"<tr><td>{escape(str(law))}</td>{cells}</tr>")
-    rows = "\n".join(body)
+    header = ["Law", *(heading.replace("2]", "²]") for heading, _ in listed)]
     marked = f" {MARK}: beyond the damper's stroke." if kind == "peak" else ""
     window = "" if kind == "peak" else " RMS values are over the record as published."
-    return f"""<section>
-<h2 id="{name}">{escape(title)}</h2>
-<p>Bold: the lowest of the three controllers.{marked}{window}</p>
-<div class="scroll"><table class="numbers"><thead><tr><th>Law</th>{heads}</tr></thead><tbody>
-{rows}
-</tbody></table></div>
-</section>
-"""
+    parts = [html.paragraphs(f"Bold: the lowest of the three controllers.{marked}{window}")]
+    groups: Any = table.groupby(["motion", "intensity [g]"], sort=False)
+    for (motion, g), group in groups:
+        own = group.set_index("law")
+        rows: list[list[str]] = []
+        bold: dict[tuple[int, int], str] = {}
+        for k, law in enumerate(own.index.astype(str)):
+            rows.append([law, *(_cell(own, law, column) for _, column in listed)])
+            lowest = [_is_lowest(own, law, column) for _, column in listed]
+            bold |= {(k, 1 + i): "strong" for i, one in enumerate(lowest) if one}
+        parts.append(f"<h3>{html.escape(motion)}, nominal {g:g} g</h3>")
+        parts.append(html.table(header, rows, range(1, len(header)), kinds=bold))
+    return html.section(title, *parts, name=name)
 
 
 def _cell(own: Any, law: str, column: str) -> str:
-    value = float(own.loc[law, column])
-    text = shown(value, column)
-    others = [shown(float(own.loc[c, column]), column) for c in CONTROLLERS if c != law]
-    if law in CONTROLLERS and float(text) < min(map(float, others)):
-        text = f"<b>{text}</b>"
     if law == NONE and ("force" in column or "voltage" in column):
-        text = "-"
+        return "-"
     beyond = "base drift" in column and BEYOND in own and float(own.loc[law, BEYOND]) > 0.0
-    return f"<td>{text}{MARK if beyond else ''}</td>"
+    return shown(float(own.loc[law, column]), column) + (MARK if beyond else "")
+
+
+def _is_lowest(own: Any, law: str, column: str) -> bool:
+    """Return whether a controller has the lowest value, as the numbers are shown."""
+    value = {one: float(shown(float(own.loc[one, column]), column)) for one in CONTROLLERS}
+    return law in value and all(value[law] < value[one] for one in value if one != law)
 
 
 def stroke_html(comparison: Comparison) -> str:
@@ -64,10 +58,7 @@ def stroke_html(comparison: Comparison) -> str:
     text = stroke_text(comparison)
     if not text:
         return ""
-    rows = "".join(f"<li>{escape(line)}</li>" for line in stroke_lines(comparison))
-    return f"""<section>
-<h2 id="stroke">Runs beyond the damper's stroke</h2>
-<p>{escape(text)}</p>
-<ul>{rows}</ul>
-</section>
-"""
+    return html.section(
+        "Runs beyond the damper's stroke", html.paragraphs(text),
+        html.items(stroke_lines(comparison)), name="stroke",
+    )  # fmt: skip

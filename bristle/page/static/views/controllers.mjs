@@ -36,9 +36,9 @@ class Comparing {
     acceptDrops(node, (files) => take(node, files, (name) => this.takeRecord(name)));
     return [
       h("h1", {}, "Compare controllers"),
-      h("p", { class: "lead" }, "Every controller acts in the building under every ground motion, beside the damper at constant voltages. The best constant voltage of each motion was chosen with the motion known: it is hard to beat."),
+      h("p", { class: "lead" }, "Each controller acts in the building under each ground motion, beside the damper at constant voltages. The best constant voltage is found with the motion known in advance, so it is hard to beat."),
       node,
-      ...(shown ? this.answer() : [empty("Not compared yet", "Choose what is compared, then Compare. Members are buildings, dampers and sensors that differ a little from what the controllers were told; the worst of them shows how sure a result is.")]),
+      ...(shown ? this.answer() : [empty("Not compared yet", "Choose what is compared, then press Compare. Members are buildings, dampers and sensors that differ a little from those the controllers were designed for. The worst of them shows how sure a result is.")]),
     ];
   }
 
@@ -62,8 +62,8 @@ class Comparing {
             this.select("damper", "Damper", [[page.study, `that of ${page.study}`], ["", "the library's LuGre damper"]])),
           h("div", { class: "act" },
             h("label", { class: "field", for: "members" }, "Members for the worst case", members),
-            h("label", { class: "check" }, this.check(asked.limit, (on) => (asked.limit = on)), "compute the limit of any voltage")),
-          h("p", { class: "soft small" }, "0 members: no worst case. The limit takes up to a minute for each motion."))),
+            h("label", { class: "check" }, this.check(asked.limit, (on) => (asked.limit = on)), "also find the least that any voltage could reach")),
+          h("p", { class: "soft small" }, "0 members: no worst case. The least of any voltage takes up to a minute for each motion."))),
       h("div", { class: "act" }, compare), this.state);
     form.addEventListener("submit", (event) => {
       event.preventDefault();
@@ -101,7 +101,8 @@ class Comparing {
   box(name) {
     const { chosen } = this.asked;
     const box = this.check(chosen.has(name), (on) => (on ? chosen.add(name) : chosen.delete(name)));
-    return h("label", { class: "check" }, box, WORDS[name] ? (WORDS[name] === name.toLowerCase() ? name : `${name}, ${WORDS[name]}`) : `${name}, designed in view 8`);
+    const words = this.found.designs.includes(name) ? "designed in view 8" : WORDS[name];
+    return h("label", { class: "check" }, box, !words || words === name.toLowerCase() ? name : `${name}, ${words}`);
   }
 
   select(key, label, options) {
@@ -119,14 +120,14 @@ class Comparing {
     const record = h("select", { id: `motion-${k}` }, found.records.map((one) =>
       h("option", { value: one.name, selected: one.name === motion.record }, `${named(one.name)}${one.peak === null ? "" : `, ${number(one.peak, 2)} g`}`)));
     record.addEventListener("change", () => this.change(() => (motion.record = record.value)));
-    const peak = h("input", { id: `peak-${k}`, type: "number", min: 0.001, max: found.most.peak, step: "any", value: motion.peak, placeholder: "as it is" });
+    const peak = h("input", { id: `peak-${k}`, type: "number", min: 0.001, max: found.most.peak, step: "any", value: motion.peak, placeholder: "as recorded" });
     peak.addEventListener("input", () => this.change(() => (motion.peak = peak.value === "" ? null : Number(peak.value))));
     const remove = h("button", { type: "button", class: "quiet", disabled: asked.motions.length === 1, "aria-label": `Remove motion ${k + 1}`, onclick: () => {
       this.change(() => asked.motions.splice(k, 1));
       this.rows();
     } }, "Remove");
     return h("li", { class: "act motion" },
-      h("label", { class: "field", for: record.id }, "record, peak as recorded", record),
+      h("label", { class: "field", for: record.id }, "record, with its peak", record),
       h("label", { class: "field", for: peak.id, style: { width: "6.5rem" } }, "peak [g]", peak), remove);
   }
 

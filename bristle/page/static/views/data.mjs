@@ -91,7 +91,7 @@ function traces(data, names, state) {
     plots.forEach((plot) => plot.later());
   };
   again();
-  const node = h("section", { "aria-label": "Traces" },
+  const node = h("section", {}, h("h2", {}, "Traces"),
     h("div", { class: "act" }, h("label", { class: "field", for: "run" }, "Run", select)),
     drawn.slice(0, SHOWN),
     drawn.length > SHOWN ? h("details", {}, h("summary", {}, `${drawn.length - SHOWN} more channels`), drawn.slice(SHOWN)) : null,
@@ -120,7 +120,7 @@ function roles(page, data) {
   const wanted = new Map(data.files.map((file) => [file.name, file.role]));
   const whole = h("div", { class: "roles" });
   const apply = h("button", { type: "button", class: "main" }, "Write these roles into the study");
-  const back = h("button", { type: "button" }, "As they are");
+  const back = h("button", { type: "button" }, "Reset the roles");
   const row = h("div", { class: "act", hidden: true }, apply, back);
   const moved = () => data.files.filter((file) => wanted.get(file.name) !== file.role);
   apply.addEventListener("click", () => {
@@ -197,10 +197,10 @@ function excitation(data) {
   const unit = drive === "current" ? "A" : "V";
   const at = (share) => number(share * most, 2);
   return h("section", {},
-    h("h2", {}, "Where the runs have been"),
+    h("h2", {}, "What the runs cover"),
     h("div", { class: "grid" },
       h("figure", {}, h("h3", {}, "Training"), new Plot("high", "displacement and velocity of the training runs", draw((run) => !held(run))).canvas),
       h("figure", {}, h("h3", {}, "Held out"), new Plot("high", "displacement and velocity of the held-out runs", draw(held)).canvas)),
     most ? key(["pale", `up to ${at(1 / 3)} ${unit}`], ["mark", `to ${at(2 / 3)} ${unit}`], ["blue", `to ${at(1)} ${unit}`]) : null,
-    h("p", { class: "soft small" }, "Held-out runs judge a model well where training runs have been, too."));
+    h("p", { class: "soft small" }, "Held-out runs judge a model best where training runs cover the same motions."));
 }

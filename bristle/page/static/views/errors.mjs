@@ -21,8 +21,9 @@ export async function show(page) {
   return [
     h("h1", {}, found.right ? "Noise explains the error" : `The error is ${z(found.z)} times the noise floor`),
     found.sentences.slice(0, 3).map((text, k) => h("p", { class: k ? null : "lead" }, text)),
-    h("div", { class: "act" }, h("label", { class: "field", for: "role" }, "Compared with", select),
+    h("div", { class: "act" }, h("label", { class: "field", for: "role" }, "Runs", select),
       h("a", { href: page.link("verdict") }, "Next: what is missing")),
+    h("h2", {}, "Where the error is"),
     found.sites.length ? sites(found) : null,
     linked.nodes(),
     h("div", { class: "grid" }, perRun(found), dependence(found), spectrum(found)),

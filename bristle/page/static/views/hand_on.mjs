@@ -1,4 +1,4 @@
-// View 6, Hand on: report, FMU and scenario, SSP package, and all files of the study to download.
+// View 6, Export: report, FMU and scenario, SSP package, and all files of the study to download.
 
 import { download, get } from "../api.mjs";
 import { bytes, h, say, table, wrong } from "../dom.mjs";
@@ -20,7 +20,7 @@ export async function show(page) {
   const scenario = files.map((file) => /^export\/([^/]+\.toml)$/.exec(file.name)?.[1]).find(Boolean);
   page.same(`bristle report ${page.study}`, `bristle export ${page.study}`,
     ...(scenario ? [`bristle export-ssp ${page.study}/export/${scenario}`] : []));
-  const ssp = h("button", { type: "button", class: scenario ? "main" : null, onclick: () => page.run("export_ssp", { scenario }) }, "Pack it as SSP");
+  const ssp = h("button", { type: "button", class: scenario ? "main" : null, onclick: () => page.run("export_ssp", { scenario }) }, "Pack the scenario as SSP");
   page.onJobs(() => {
     report.disabled = fmu.disabled = Boolean(page.working());
     ssp.disabled = report.disabled || !scenario;
@@ -43,16 +43,16 @@ export async function show(page) {
     return [title, own];
   });
   return [
-    h("h1", {}, "Hand on"),
+    h("h1", {}, "Export"),
     h("ul", { class: "cards" },
-      h("li", { class: "card" }, h("h3", {}, "Report"),
-        h("p", {}, "One HTML file that opens offline: verdict and evidence, loops, parameters with intervals, the commands that repeat it."), report),
-      h("li", { class: "card" }, h("h3", {}, "FMU and scenario"),
+      h("li", { class: "card" }, h("h2", {}, "Report"),
+        h("p", {}, "One HTML file that opens offline, with verdict, evidence, loops, parameters and their intervals, and the commands that repeat the study."), report),
+      h("li", { class: "card" }, h("h2", {}, "FMU and scenario"),
         h("p", {}, "The damper with the identified values, for any FMI tool, and a scenario that applies a measured motion to it."), fmu),
-      h("li", { class: "card" }, h("h3", {}, "SSP package"),
-        h("p", {}, scenario ? `The scenario ${scenario} with its FMUs in one file, for OMSimulator, libcosim and others; with the error to expect there.`
-          : "The scenario with its FMUs in one file, for other tools. Export the FMU first: its scenario is what is packed."), ssp),
-      h("li", { class: "card" }, h("h3", {}, "In a building"),
+      h("li", { class: "card" }, h("h2", {}, "SSP package"),
+        h("p", {}, scenario ? `The scenario ${scenario} with its FMUs in one file, for OMSimulator, libcosim and others. It states the coupling error to expect there.`
+          : "The scenario with its FMUs in one file, for other tools. Export the FMU first: its scenario is packed."), ssp),
+      h("li", { class: "card" }, h("h2", {}, "In a building"),
         h("p", {}, "The damper with these values in a building under an earthquake."), h("a", { href: page.link("simulate"), onclick: () => (page.damper = page.study) }, "Simulate it"))),
     trouble,
     h("div", { class: "files" }, groups.filter(([, own]) => own.length).map(([title, own]) => table(title, ["file", "size", "written", "download"], own.map((file) => {

@@ -66,7 +66,7 @@ function staircase(found) {
       text: step.z === null ? "not judged" : `${z(step.z)}${step.rms === null ? "" : ` · ${number(step.rms)} N`}`,
     })), { most: top, edge: log(1) }),
     h("p", { class: "soft small" }, "Error / noise (z) on held-out runs, logarithmic; RMS error ",
-      found.cut_off ? `below ${number(found.cut_off)} Hz. ` : ". ", "Green: on the noise floor, where a correct model is."));
+      found.cut_off ? `below ${number(found.cut_off)} Hz. ` : ". ", "Green line: the noise floor, z = 1. Green bar: a model that reaches it."));
 }
 
 function compare(page, found) {
@@ -85,7 +85,7 @@ function compare(page, found) {
     });
     return [h("label", { class: "field", for: `step-${side}` }, text, select), select];
   };
-  const [[labelA, selectA], [labelB, selectB]] = [menu("a", "This step"), menu("b", "beside this one")];
+  const [[labelA, selectA], [labelB, selectB]] = [menu("a", "Step"), menu("b", "compared with")];
   const move = (way) => {
     const [a, b] = [chosen.a + way, chosen.b + way];
     if (a < 0 || b < 0 || a >= steps.length || b >= steps.length) return;
@@ -106,11 +106,11 @@ function compare(page, found) {
     back.disabled = Math.min(chosen.a, chosen.b) === 0;
     on.disabled = Math.max(chosen.a, chosen.b) === steps.length - 1;
     target.replaceChildren(
-      table("Errors", ["", a.what, b.what], [
+      table("Errors", ["error", a.what, b.what], [
         ["z, held-out runs", z(a.z), z(b.z)],
         ["z, training runs", z(a.train), z(b.train)],
         ["RMS error, held-out runs [N]", number(a.rms), number(b.rms)],
-        ["of the force", a.share === null ? "–" : percent(a.share), b.share === null ? "–" : percent(b.share)],
+        ["RMS error over RMS force", a.share === null ? "–" : percent(a.share), b.share === null ? "–" : percent(b.share)],
       ], [1, 2]),
       table("Parameters", ["parameter", a.what, b.what, "unit"], names.map((name) => [
         h("code", {}, name), cell(of(a, name)), cell(of(b, name)), (of(a, name) ?? of(b, name)).unit.replace(/^1$/, ""),

@@ -8,7 +8,7 @@ import { Simulation } from "../simulation.mjs";
 const FIRST = "el_centro_lugre_passive";
 export const WORDS = {
   ConstantVoltage: "constant voltage", ClippedOptimal: "clipped-optimal", HinfInverse: "H-infinity with inverse",
-  Lpv: "LPV, scheduled by velocity", LqgClipped: "clipped LQG", Skyhook: "skyhook",
+  Lpv: "LPV, scheduled by velocity", LqgClipped: "clipped LQG", Skyhook: "skyhook", TrainedPolicy: "trained policy",
 };
 
 export async function show(page) {
@@ -16,7 +16,7 @@ export async function show(page) {
   page.setting ??= {};
   const what = { scenario: FIRST, control: "", record: "", ...page.setting, study: page.damper ?? "" };
   if (!records.includes(what.record)) what.record = "";
-  const controls = h("select", { id: "control" }, h("option", { value: what.control }, WORDS[what.control] ?? "the scenario's"));
+  const controls = h("select", { id: "control" }, h("option", { value: what.control }, WORDS[what.control] ?? "as in the scenario"));
   const change = (key) => (value) => {
     page.setting[key] = value;
     if (key === "scenario") page.setting.control = "";
@@ -31,19 +31,19 @@ export async function show(page) {
   const node = h("div", { class: "dropped" },
     h("div", { class: "act" },
       field("scenario", "Scenario", scenarios.map((one) => [one, one]), what.scenario, change("scenario")),
-      field("damper", "Damper", [["", "the scenario's"], ...studies.map((one) => [one, `that of ${one}`])], what.study, (value) => {
+      field("damper", "Damper", [["", "as in the scenario"], ...studies.map((one) => [one, `that of ${one}`])], what.study, (value) => {
         page.damper = value;
         page.again();
       }),
       h("label", { class: "field", for: "control" }, "Control", controls),
-      field("record", "Ground motion", [["", "the scenario's"], ...records.map((one) => [one, recordNamed(one)])], what.record, change("record")),
+      field("record", "Ground motion", [["", "as in the scenario"], ...records.map((one) => [one, recordNamed(one)])], what.record, change("record")),
       picker(takeFiles)),
     whole);
   acceptDrops(node, takeFiles);
   controls.addEventListener("change", () => change("control")(controls.value));
   postPacked("simulate", { ...what, values: {}, about: true }).then(
     (first) => {
-      const options = [["", "the scenario's"], ...first.controls.map((one) => [one, WORDS[one] ?? one])];
+      const options = [["", "as in the scenario"], ...first.controls.map((one) => [one, WORDS[one] ?? one])];
       controls.replaceChildren(...options.map(([value, text]) => h("option", { value, selected: value === what.control }, text)));
       controls.disabled = !first.controls.length;
       new Simulation(page, what, named(what), first, whole);

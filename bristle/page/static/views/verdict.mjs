@@ -16,7 +16,7 @@ export async function show(page) {
     orders(page, verdict),
     residuals(page),
     verdict ? evidence(verdict) : empty("Not diagnosed",
-      "Diagnose puts every effect into the model, refits it, and judges each on the held-out runs. It names the effect that is missing, a few that the data cannot distinguish, or none."),
+      "Diagnose adds one effect after the other to the model, fits all parameters again, and compares the result with the held-out runs. It names the missing effect, a few that the data cannot distinguish, or none."),
     learned(found.learned),
     plans(page, found, verdict),
   ];
@@ -80,7 +80,7 @@ function trials(page) {
       names.length ? bars("cost that remains with each effect", names.map((name, k) => ({
         name, value: rest.get(name), strong: k === 0, text: held.has(name) ? `${rest.get(name)} % · z = ${held.get(name)} held out` : `${rest.get(name)} %`,
       })), { most: 100, edge: 100 }) : null,
-      names.length ? h("p", { class: "soft small" }, "Green line: the model as it is. Blue: what remains least so far. Held-out runs decide.") : null);
+      names.length ? h("p", { class: "soft small" }, "Green line: the model as it is. Blue: the best so far. Held-out runs decide.") : null);
   });
   return whole;
 }
@@ -136,16 +136,14 @@ function evidence(verdict) {
         strong: verdict.effects.includes(row.effect), good: row.z_holdout <= 1.1 && row.gain > 0.02,
         text: z(row.z_holdout), title: row.refined ? "searched at length" : "short search: it gains too little",
       })), { edge: log(before), most: log(Math.max(before, 2)) }),
-      h("p", { class: "soft small" }, "Logarithmic, from z = 1 on the left. Green line: the model as it is. Blue: named by the verdict."));
+      h("p", { class: "soft small" }, "Logarithmic, from z = 1 on the left. Green line: the model as it is. Green bar: down to the noise floor. Blue bar: named by the verdict, above the noise floor."));
   }
   if (verdict.laws.length) parts.push(table("The laws", verdict.laws_header, verdict.laws, [2, 3, 4, 5, 6, 7]));
   if (verdict.limits.length) {
     const most = Math.max(...verdict.limit_shares.filter((one) => one !== null), 0) * 100;
     parts.push(h("h2", {}, "How large each effect may still be"),
-      most ? bars("share of the force that each effect may still have", verdict.limits.map((row, k) => ({
-        name: row[0], value: verdict.limit_shares[k] === null ? null : 100 * verdict.limit_shares[k],
-        text: row[2] === "-" ? "–" : row[2],
-      })), { most }) : null,
+      most ? bars("share of the force that each effect may still have", verdict.limits.map((row, k) => [row, verdict.limit_shares[k]])
+        .filter(([, share]) => share !== null).map(([row, share]) => ({ name: row[0], value: 100 * share, text: row[2] })), { most }) : null,
       table("Limits at 95 %", ["effect", "still possible (95 %)", "of the force", "to be named from, about"], verdict.limits, []),
       verdict.limits_notes.map((text) => h("p", { class: "soft small" }, text)));
   }
@@ -174,7 +172,7 @@ function plans(page, found, verdict) {
   return [
     h("h2", {}, "The next tests"),
     verdict?.separating ? h("p", {}, verdict.separating) : null,
-    h("p", { class: "soft" }, "Motions and commands within the rig's limits that would settle what is open; without limits, what the runs have done."),
+    h("p", { class: "soft" }, "Motions and commands that decide what is still open, within the limits of your rig. Without limits, the range of the past runs is used."),
     form,
     found.plans.toReversed().map((plan) => plan.error ? wrong(plan.name, plan.error) : drawn(page, plan)),
   ];
@@ -182,10 +180,10 @@ function plans(page, found, verdict) {
 
 function drawn(page, plan) {
   return h("section", {}, h("h3", {}, plan.name),
-    h("p", {}, "The files are under ", h("a", { href: page.link("hand_on") }, "Hand on"), "."),
+    h("p", {}, "The files are under ", h("a", { href: page.link("hand_on") }, "Export"), "."),
     h("div", { class: "grid" }, plan.runs.map((run) => {
       const [[name, motion], ...rest] = Object.entries(run.channels);
-      const [factor, unit] = name === "displacement" ? shown("m") : [1, "m/s2"];
+      const [factor, unit] = shown(name === "displacement" ? "m" : "m/s2");
       return h("figure", {}, h("h3", {}, `${run.name} (${run.role === "holdout" ? "held out" : "training"})`),
         new Plot("low", `${name} of ${run.name} over time`, (p) => {
           p.axes([run.time[0], run.time.at(-1)], extent([motion], 0.05, factor), rest.length ? null : "time [s]", unit);

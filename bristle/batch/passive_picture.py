@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ..draw.style import INK, PALE, Page, label, look, ramp
 
 if TYPE_CHECKING:
-    from ..batch.passive import Passive
+    from .passive import Passive
 
 _DPI = 160
 
@@ -21,17 +21,21 @@ def passive_figure(found: Passive, path: str | Path) -> None:
     RunError
         If the file cannot be written or its ending is no format.
     """
-    with look():
-        draw_passive(found).save(Path(path), dpi=_DPI)
+    draw_passive(found).save(Path(path), dpi=_DPI)
 
 
 def draw_passive(found: Passive) -> Page:
     """Return the figure, drawn and not yet written."""
+    with look():
+        return _page(found)
+
+
+def _page(found: Passive) -> Page:
     fair = found.goals["regret"]
-    what = {"rms": "RMS"}.get(found.statistic, found.statistic)
+    what = found.what
     title = f"Best constant voltage for {len(found.motions)} ground motions: {fair.voltage:.2g} V"
     subtitle = (
-        f"{what} of {found.output} over the voltage. Ring: least for the motion. Dashed: the "
+        f"{what} over the voltage. Ring: least for the motion. Dashed: the "
         f"voltage that is at most {100 * (fair.value - 1):.0f} % above the least for any of them."
     )
     page = Page(7.6, 4.7, title, subtitle)
@@ -49,7 +53,7 @@ def draw_passive(found: Passive) -> Page:
         label(axes, f"{best.value:.3g}", best.voltage, best.value, INK, xytext=(0, 8), ha="center")
         end, last = float(found.grid[-1]), float(values[-1])
         label(axes, motion.name, end, last, colour, xytext=(8, 0), va="center")
-    axes.set_title(f"{what} of {found.output} [{found.unit}]")
+    axes.set_title(f"{what} [{found.unit}]")
     axes.set_xlabel("voltage [V]")
     axes.set_ylim(0.0, 1.06 * float(found.values.max()))
     return page
