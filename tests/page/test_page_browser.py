@@ -188,7 +188,7 @@ def test_the_hour_on_an_example_from_its_making_to_a_running_fmu(tmp_path: Path)
         page.locator("section.fits canvas").nth(3).wait_for(timeout=300_000)
         for theme in ("light", "dark"):
             if found := findings(page, source):
-                serious[f"fit at work, {theme}"] = found
+                faults[f"fit at work, {theme}"] = found
             page.locator("#theme").click()
         page.get_by_role("heading", name="Not identified yet").wait_for(
             state="detached", timeout=300_000
