@@ -26,7 +26,7 @@ VIEWS = (
     "controllers",
 )  # fmt: skip
 LIVE = {
-    "fit_live": ("Identify", "#job:has(.moving) .now:not(:text('beginning'))"),
+    "fit_live": ("Identify", "section.fits canvas >> nth=3"),
     "verdict_live": ("Diagnose", "h3:text('What remains of the cost')"),
 }
 """Views at work: the button that starts it, and what shows that it is well under way."""

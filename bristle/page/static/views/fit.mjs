@@ -30,7 +30,7 @@ export async function show(page) {
     before,
     parameters(fit),
     lawsBefore,
-    h("h2", {}, "What the model says"),
+    h("h2", {}, "Equations of the model"),
     fit.about.map((one) => h("div", {}, h("h3", {}, `${one.kind === "law" ? "Law" : "Effect"}: ${one.name}`),
       h("pre", { tabindex: "0" }, one.text), h("p", { class: "soft small" }, one.source))),
   ];
