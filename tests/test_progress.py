@@ -11,7 +11,9 @@ from concurrent.futures import ThreadPoolExecutor
 import pytest
 
 from bristle import progress
-from bristle.progress import Count, Line, Progress, counted, tell, telling
+from bristle.cli import _line
+from bristle.cli._line import Line
+from bristle.progress import Count, Progress, counted, tell, telling
 
 
 def test_nobody_is_told_where_nobody_listens(capsys: pytest.CaptureFixture[str]) -> None:
@@ -69,8 +71,8 @@ def test_a_pipe_gets_few_plain_lines(
 def test_what_takes_long_is_told_though_nothing_more_is_said(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(progress, "_PLAIN_AFTER", 0.5)
-    monkeypatch.setattr(progress, "_AGAIN", 1.5)
+    monkeypatch.setattr(_line, "_PLAIN_AFTER", 0.5)
+    monkeypatch.setattr(_line, "_AGAIN", 1.5)
     with Line() as line, telling(line.say):
         tell("compiling the laws, once")
         time.sleep(4.5)

@@ -52,7 +52,7 @@ def main(arguments: argparse.Namespace) -> int:
     from ..paper.comparison.make import make
 
     folder = arguments.out or Path("results", "controllers")
-    report = make(folder, arguments.newhall, progress=not arguments.json)
+    report = make(folder, arguments.newhall, progress=True)
     if arguments.json:
         import json
 

@@ -16,6 +16,7 @@ from ..batch.plan import Output
 from ..batch.pool import run_local
 from ..batch.worker import prepare, statistic
 from ..errors import RunError
+from ..progress import Count
 from ..scenario.scenario import load_scenario
 from ..simulate.coupled import simulate
 from ..simulate.run import run_quietly
@@ -185,7 +186,10 @@ class Bench:
         plan = read_ensemble(file)
         prepare(plan)
         with quiet():
-            outcomes = list(run_local(plan, range(plan.runs), min(self.workers, plan.runs)))
+            count, outcomes = Count(f"{file.parent.name}, {file.stem}: run", plan.runs), []
+            for outcome in run_local(plan, range(plan.runs), min(self.workers, plan.runs)):
+                outcomes.append(outcome)
+                count.done()
         rows = {one.run: one.numbers for one in outcomes if not one.reason}
         failed = len(outcomes) - len(rows)
         names = {f"{o.statistic} {columns[o.column]}": o.name for o in self.outputs}
