@@ -16,8 +16,8 @@ KEPT = {
     "build": _COMPILED,
     "compare": f"No picture was written. {_ANEW}",
     "conform": f"No verdict is kept. {_ANEW}",
-    "controllers": "Limits that were found stay in the cache; all other cases are run again by the "
-    "same command.",
+    "controllers": "Limits that were found and runs of ensembles are kept; the same command takes "
+    "them, and runs each case once more.",
     "design": f"No controller was written. {_ANEW}",
     "diagnose": f"Of this diagnosis nothing is kept. {_AS_IT_WAS}",
     "effects check": _ANEW,

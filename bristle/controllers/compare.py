@@ -138,6 +138,7 @@ def compare_controllers(
             refuse_limit(bench, chosen[0], judged)
         run = _Run(bench, judged, entries, grid, limit, spread)
         run.motions(chosen)
+        folder.finish()
         setting = Setting(
             site, one, entries, chosen, judged, spread, None if out is None else Path(path),
             "" if spread is None else varied(bench, entries, spread),
