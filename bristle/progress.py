@@ -82,7 +82,7 @@ class _Pace:
         if self._first is None:
             self._first = now, done
         began, before = self._first
-        return _in_words((now - began) / max(1, done - before) * (total - done))
+        return _in_words((now - began) / (done - before) * (total - done)) if done > before else ""
 
 
 class Count:

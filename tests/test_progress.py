@@ -194,7 +194,7 @@ def test_bars_are_silenced_where_a_command_is_quiet() -> None:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a pseudo-terminal is needed")
-def test_nothing_is_shown_while_a_question_stands_on_the_terminal(
+def test_questions_and_warnings_stand_alone_on_the_terminal(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     import pty
@@ -204,10 +204,14 @@ def test_nothing_is_shown_while_a_question_stands_on_the_terminal(
         monkeypatch.setattr(sys, "stderr", stream)
         with Line("bristle run") as line, telling(line.say):
             tell("")
-            print("Run it? [y/N] ", end="", file=stream, flush=True)
+            print("Run it? [y/N] ", end="", file=sys.stderr, flush=True)
             time.sleep(1.2)
-        stream.flush()
-    shown = os.read(ours, 4096).decode()
+            tell("at work")
+            print("a warning", file=sys.stderr, flush=True)
+        assert sys.stderr is stream
+    shown = ""
+    while "a warning\r\n" not in shown:
+        shown += os.read(ours, 4096).decode()
     os.close(theirs)
     os.close(ours)
-    assert shown == "Run it? [y/N] "
+    assert shown == "Run it? [y/N] \r\033[2Kat work ...\r\r\033[2Ka warning\r\n"

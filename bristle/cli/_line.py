@@ -35,7 +35,7 @@ class Line:
         self._title = title
         self._every = wants_lines()
         self._live = sys.stderr.isatty() and not self._every
-        self._stdout = sys.stdout
+        self._stdout, self._stderr = sys.stdout, sys.stderr
         self._process = os.getpid()
         self._lock = threading.Lock()
         self._over = threading.Event()
@@ -45,6 +45,8 @@ class Line:
         self._shown = ""
 
     def __enter__(self) -> Self:
+        if self._live:
+            sys.stderr = cast("TextIO", _Clearing(self._stderr, self.clear))
         if self._live and self._stdout.isatty():
             sys.stdout = cast("TextIO", _Clearing(self._stdout, self.clear))
         if self._live and self._title:
@@ -58,7 +60,7 @@ class Line:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        sys.stdout = self._stdout
+        sys.stdout, sys.stderr = self._stdout, self._stderr
         self._over.set()
         if self._ticking is not None:
             self._ticking.join()
@@ -67,7 +69,7 @@ class Line:
     def clear(self) -> None:
         """Take the terminal's line away, where one is shown."""
         if self._live and self._shown:
-            print("\r\033[2K", end="", file=sys.stderr, flush=True)
+            print("\r\033[2K", end="", file=self._stderr, flush=True)
             self._shown = ""
 
     def say(self, text: str) -> None:
@@ -100,14 +102,14 @@ class Line:
             text = f"{self._text}, {spent} s" if spent >= SOON else self._text
             if text != self._shown:
                 width = max(20, shutil.get_terminal_size().columns - 5)
-                print(f"\r\033[2K{text[:width]} ...\r", end="", file=sys.stderr, flush=True)
+                print(f"\r\033[2K{text[:width]} ...\r", end="", file=self._stderr, flush=True)
                 self._shown = text
             return
         same = self._text == self._shown
         due = now - self._last >= (_AGAIN if same else _PLAIN_AFTER)
         if due or (self._every and not same):
             text = f"{self._text}, {spent} s" if same else self._text
-            print(f"{text} ...", file=sys.stderr, flush=True)
+            print(f"{text} ...", file=self._stderr, flush=True)
             self._shown, self._last = self._text, now
 
 
