@@ -12,7 +12,7 @@ import numpy as np
 from ..data.files import write_whole
 from ..errors import StudyError
 from ..interrupt import deferred
-from ..progress import counted
+from ..progress import counted, tell
 from ..study.create import create_study
 from ..study.study import Study
 from . import bench, tower
@@ -112,6 +112,7 @@ def make_building(folder: Path | str, choice: Choice, *, load_cell: bool = True)
     values, frame = draw_damper(law, draw), draw_frame(draw)
     hidden, secret = _secret("building", law, choice, scales_of("building", law), drawn)
     rig, plain = (tower_of(frame, law, values, one) for one in (secret, {}))
+    tell("planning the ground motions")
     plan = tower.plan(plain, draw)
     runs = {name: rig.perform(ground, volts) for name, ground, volts in counted(plan, "run")}
     if not load_cell:
