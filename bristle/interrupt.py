@@ -25,6 +25,20 @@ INTERRUPTED = 130
 """The exit code of a command that Ctrl-C ended."""
 
 
+_kept = ""
+
+
+def keeps(text: str) -> None:
+    """Say what is kept where Ctrl-C comes from now on, and how to go on: sentences, "" for none."""
+    global _kept  # one for the process, for a thread may tell it
+    _kept = text
+
+
+def message() -> str:
+    """Return the line that a command tells which Ctrl-C ended."""
+    return f"interrupted. {_kept}" if _kept else "interrupted"
+
+
 class Interrupt:
     """A context in which `asked` tells whether Ctrl-C was pressed.
 
@@ -129,7 +143,8 @@ def _end_workers() -> None:
 def _end_process() -> None:
     """End this process and its workers at once, with the exit code of an interrupted one."""
     _end_workers()
-    os.write(2, b"interrupted\n")
+    shown = "\r\033[2K\033[?25h" if os.isatty(2) else ""  # no line or bar, and the cursor is back
+    os.write(2, f"{shown}{message()}\n".encode())
     os._exit(INTERRUPTED)
 
 

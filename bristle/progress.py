@@ -1,4 +1,4 @@
-"""What a command is at, on stderr: one line that is overwritten; in a pipe, a few plain ones.
+"""What a command is at, told to whoever listens, with the time left where work done tells it.
 
 Whoever works calls `tell`; the command decides where that goes (`telling`). Without one nothing is
 told: a library is silent.
@@ -7,15 +7,15 @@ told: a library is silent.
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
+from math import nan
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, TextIO, TypeVar, cast
+from typing import TYPE_CHECKING, Self, TypeVar
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -24,22 +24,28 @@ Item = TypeVar("Item")
 
 _PATIENCE = 0.3
 """Seconds after which something that is not yet done gets a bar."""
-_PLAIN_AFTER = 5.0
-"""Seconds without a word after which a plain line is due."""
-_AGAIN = 30.0
-"""Seconds after which a plain line is told again, with how long it takes."""
-_SOON = 3.0
+SOON = 3.0
 """Seconds, left or spent, below which none are told."""
+_MINUTES = 150.0
+"""Seconds left from which on they are told in minutes."""
 
 LINES = "BRISTLE_PROGRESS"
 """The environment variable by which a program that starts a command asks for every text as a line
 of its own, at once: `lines`."""
 
-_teller: ContextVar[Callable[[str], None] | None] = ContextVar("teller", default=None)
+
+def _nobody(text: str) -> None:
+    """Take what is told where no command listens; a bar that is asked for is shown all the same."""
+
+
+_teller: ContextVar[Callable[[str], None] | None] = ContextVar("teller", default=_nobody)
 
 
 def tell(text: str) -> None:
-    """Tell what is being done, in a few words, to whom `telling` has named."""
+    """Tell what is being done, in a few words, to whom `telling` has named; "": nothing any more.
+
+    What asks on the terminal, or waits there for something else, tells "" first.
+    """
     teller = _teller.get()
     if teller is not None:
         teller(text)
@@ -47,7 +53,7 @@ def tell(text: str) -> None:
 
 @contextmanager
 def telling(teller: Callable[[str], None] | None) -> Iterator[None]:
-    """Send what `tell` is given in this context to a function; None silences it."""
+    """Send what `tell` is given in this context to a function; None silences it, and bars."""
     before = _teller.set(teller)
     try:
         yield
@@ -60,96 +66,23 @@ def wants_lines() -> bool:
     return os.environ.get(LINES) == "lines"
 
 
-class Line:
-    """Shows texts on stderr: overwritten on a terminal; in a pipe only after some silence.
-
-    A context; the terminal's line is cleared at its end, and before anything is printed there. What
-    takes long is told with its seconds, so that nobody takes it for dead.
-    """
+class _Pace:
+    """What is left of a work, by what was measured of it: nothing as long as nothing was."""
 
     def __init__(self) -> None:
-        self._every = wants_lines()
-        self._live = sys.stderr.isatty() and not self._every
-        self._stdout = sys.stdout
-        self._process = os.getpid()
-        self._lock = threading.Lock()
-        self._over = threading.Event()
-        self._ticking: threading.Thread | None = None
-        self._text = ""
-        self._since = self._last = time.monotonic()  # of the text, and of the last plain line
-        self._shown = ""
+        self._first: tuple[float, int] | None = None
 
-    def __enter__(self) -> Self:
-        if self._live and self._stdout.isatty():
-            sys.stdout = cast("TextIO", _Clearing(self._stdout, self.clear))
-        return self
+    def left(self, done: int, total: int) -> str:
+        """Return the time left where `done` of `total` are done, "" where there is none to tell.
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        sys.stdout = self._stdout
-        self._over.set()
-        if self._ticking is not None:
-            self._ticking.join()
-        self.clear()
-
-    def clear(self) -> None:
-        """Take the terminal's line away, where one is shown."""
-        if self._live and self._shown:
-            print("\r\033[2K", end="", file=sys.stderr, flush=True)
-            self._shown = ""
-
-    def say(self, text: str) -> None:
-        """Show a text, if it is time for one."""
-        if os.getpid() != self._process:
-            return  # a forked process: the first one tells
-        with self._lock:
-            if text != self._text:
-                self._text, self._since = text, time.monotonic()
-            self._show()
-        if self._ticking is None:
-            self._ticking = threading.Thread(target=self._tick, name="bristle-line", daemon=True)
-            self._ticking.start()
-
-    def _tick(self) -> None:
-        while not self._over.wait(1.0):
-            with self._lock:
-                self._show()
-
-    def _show(self) -> None:
+        It counts from what was done at the first call: the first of them compiles, or was kept from
+        before, and says nothing of the rest.
+        """
         now = time.monotonic()
-        spent = int(now - self._since)
-        if self._live:
-            text = f"{self._text}, {spent} s" if spent >= _SOON else self._text
-            if text != self._shown:
-                width = max(20, shutil.get_terminal_size().columns - 5)
-                print(f"\r\033[2K{text[:width]} ...\r", end="", file=sys.stderr, flush=True)
-                self._shown = text
-            return
-        same = self._text == self._shown
-        due = now - self._last >= (_AGAIN if same else _PLAIN_AFTER)
-        if due or (self._every and not same):
-            text = f"{self._text}, {spent} s" if same else self._text
-            print(f"{text} ...", file=sys.stderr, flush=True)
-            self._shown, self._last = self._text, now
-
-
-class _Clearing:
-    """The terminal's output, before which something is called."""
-
-    def __init__(self, stream: TextIO, before: Callable[[], None]) -> None:
-        self._stream, self._before = stream, before
-
-    def write(self, text: str) -> int:
-        """Write a text."""
-        self._before()
-        return self._stream.write(text)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
+        if self._first is None:
+            self._first = now, done
+        began, before = self._first
+        return _in_words((now - began) / (done - before) * (total - done)) if done > before else ""
 
 
 class Count:
@@ -164,35 +97,95 @@ class Count:
 
     Notes
     -----
-    `done` may be called from any thread; whom to tell is asked where this is made.
+    `done` may be called from any thread; whom to tell is asked where this is made. Where each takes
+    long, `begins` tells which one is at work, in place of `done`.
     """
 
     def __init__(self, what: str, total: int) -> None:
         self._what, self._total, self._done = what, total, 0
         self._teller = _teller.get()
-        self._first = 0.0
+        self._pace = _Pace()
         self._lock = threading.Lock()
 
     def done(self, name: str = "", note: str = "") -> None:
         """Tell that one more is done: its name, and what else there is to know."""
-        if self._teller is None:
-            return
         with self._lock:
             self._done += 1
-            now = time.monotonic()
-            self._first = self._first or now  # the first one compiles: it says nothing of the rest
-            left = (now - self._first) / max(1, self._done - 1) * (self._total - self._done)
+            self._tell(self._done, name, note)
+
+    def begins(self, name: str = "") -> None:
+        """Tell that the next one begins, and so that those before it are done."""
+        with self._lock:
+            self._done += 1
+            self._tell(self._done - 1, name, "")
+
+    def _tell(self, done: int, name: str, note: str) -> None:
+        left = self._pace.left(done, self._total) if done else ""
+        if self._teller is not None:
             text = f"{self._what} {self._done} of {self._total}"
             text += f", {name}" if name else ""
-            text += f"; {note}" if note else ""
-            text += f"; about {_round(left)} s left" if left >= _SOON else ""
-            self._teller(text)
+            self._teller("; ".join(filter(None, (text, note, left))))
+
+
+class Stages:
+    """Tells which of several things of several kinds is at work: "case 3 of 12, Skyhook".
+
+    The time left is told once one of each kind that is left was measured.
+
+    Parameters
+    ----------
+    what : str
+        What is counted, in the singular.
+    kinds : mapping
+        Kind to how many there are of it; those of a kind take about as long as each other.
+    """
+
+    def __init__(self, what: str, kinds: Mapping[str, int]) -> None:
+        self._what, self._total, self._left = what, sum(kinds.values()), dict(kinds)
+        self._spent: dict[str, list[float]] = {kind: [] for kind in kinds}
+        self._at: tuple[str, float] | None = None
+
+    def begins(self, kind: str, name: str) -> None:
+        """Tell that the next one begins, by its kind and name, and so that the last one is done."""
+        now = time.monotonic()
+        if self._at is not None:
+            self._spent[self._at[0]].append(now - self._at[1])
+        self._at = kind, now
+        seconds = 0.0
+        for each, left in self._left.items():
+            # The first one of a kind may compile: it counts as long as there is no other.
+            spent = self._spent[each][1:] or self._spent[each] or [nan]
+            seconds += left * sum(spent) / len(spent) if left else 0.0
+        number = self._total - sum(self._left.values()) + 1
+        self._left[kind] -= 1
+        tell(
+            "; ".join(
+                filter(
+                    None, (f"{self._what} {number} of {self._total}, {name}", _in_words(seconds))
+                )
+            )
+        )
+
+
+def _in_words(seconds: float) -> str:
+    """Return a time left as it is told, "" for a short or unknown one."""
+    if not seconds >= SOON:
+        return ""
+    if seconds >= _MINUTES:
+        return f"about {round(seconds / 60.0)} min left"
+    return f"about {_round(seconds)} s left"
+
+
+def listening() -> bool:
+    """Return whether somebody listens to what is told: a command does, a library's caller may."""
+    return _teller.get() not in (None, _nobody)
 
 
 def counted(items: Sequence[Item], what: str) -> Iterator[Item]:
     """Yield items, telling which of them is at work: "start 2 of 4"."""
-    for number, item in enumerate(items, 1):
-        tell(f"{what} {number} of {len(items)}")
+    count = Count(what, len(items))
+    for item in items:
+        count.begins()
         yield item
 
 
@@ -213,25 +206,30 @@ class Progress:
         The number of steps.
     wanted : bool
         False shows nothing.
+    even : bool
+        Whether the steps are alike, so that those done tell how long the rest takes.
 
     Notes
     -----
     In a pipe it tells now and then. What is told meanwhile (`tell`) stands before the bar.
     """
 
-    def __init__(self, title: str, total: int, wanted: bool) -> None:
+    def __init__(self, title: str, total: int, wanted: bool, even: bool = True) -> None:
         self._title = title
         self._total = total
         self._wanted = wanted
-        self._live = wanted and sys.stderr.isatty()
+        self._even = even
+        self._live = wanted and sys.stderr.isatty() and _teller.get() is not None
         self._began = time.perf_counter()
+        self._pace = _Pace()
         self._bar: Bar | None = None
-        self._telling = telling(self._tell if self._live else _teller.get())
+        self._outer = _teller.get()
+        self._telling = telling(self._tell if self._live else self._outer)
 
     def __enter__(self) -> Self:
-        self._telling.__enter__()
-        if self._wanted and not self._live:
+        if self._wanted:
             tell(self._title)
+        self._telling.__enter__()
         return self
 
     def __exit__(
@@ -250,9 +248,9 @@ class Progress:
             return
         spent = time.perf_counter() - self._began
         if not self._live:
-            left = spent / max(1, done) * (self._total - done)
-            soon = f", about {_round(left)} s left" if done and left >= _SOON else ""
-            tell(f"{self._title}: {100 * done // max(1, self._total)} %{soon}")
+            left = self._pace.left(done, self._total) if done and self._even else ""
+            share = f"{self._title}: {100 * done // max(1, self._total)} %"
+            tell(", ".join(filter(None, (share, left))))
             return
         if self._bar is None and spent > _PATIENCE:
             self._bar = self._start()
@@ -262,15 +260,19 @@ class Progress:
     def _tell(self, text: str) -> None:
         if self._bar is None:
             self._bar = self._start()
-        self._bar.update(self._bar.task_ids[0], description=f"{self._title}: {text}")
+        description = f"{self._title}: {text}" if text else self._title
+        self._bar.update(self._bar.task_ids[0], description=description)
 
     def _start(self) -> Bar:
+        if self._outer is not None:
+            self._outer("")  # the bar stands where its line was
         from rich.console import Console
         from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
         from rich.progress import Progress as Bar
 
-        columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn())
-        bar = Bar(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+        columns = [TextColumn("{task.description}"), BarColumn(), TaskProgressColumn()]
+        columns += [TimeRemainingColumn()] if self._even else []
+        bar = Bar(*columns, console=Console(stderr=True), transient=True)
         bar.add_task(self._title, total=self._total)
         bar.start()
         return bar

@@ -14,6 +14,15 @@ EVERYWHERE = {
 }
 """Options of every command, told once."""
 
+PROGRESS = (
+    "On a terminal a command tells on stderr what it is at, with the time left as soon as the work "
+    "done tells it; in a pipe a plain line comes now and then. The first run on a machine compiles "
+    "the laws, and says so. `--quiet` silences all of it; stdout holds the answer alone. Ctrl-C "
+    "ends a command with one line, which says what is kept and how to go on: files are whole or "
+    "not there, an ensemble and `bristle study auto` go on where they were."
+)
+"""What every command shows on its way."""
+
 
 def command_page() -> str:
     """Return the page of all commands, from their parsers."""
@@ -26,6 +35,7 @@ def command_page() -> str:
         "# Commands",
         f"`bristle COMMAND --help` prints the same. Every command also takes {every}.",
         about,
+        PROGRESS,
     ]
     rows = [
         [f"[`bristle {name}`](#bristle-{name})", _cell(help_of)]

@@ -390,10 +390,11 @@ def _try(varied: Varied, base: Scenario) -> str:
 
 
 def _files_read(base: Scenario, varied: tuple[Varied, ...]) -> list[Path]:
-    """Return the files whose content decides the numbers: records, signals, buildings."""
+    """Return the files whose content decides the numbers: records, signals, buildings, own laws."""
     named: list[object] = []
     for component in base.components:
-        named += [component.building, component.controller, component.path]
+        named += [component.building, component.controller, component.path, *component.effects]
+        named += [component.law.file] if component.law else []
         named += [component.parameters.get(key) for key in FILE_PARAMETERS]
     for one in varied:
         if one.name.rpartition(".")[2] in _FILES:

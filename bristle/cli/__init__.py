@@ -71,14 +71,18 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         if debug:
             raise
-        print("interrupted", file=sys.stderr)
+        from ..interrupt import message
+
+        print(message(), file=sys.stderr)
         return 130
 
 
 def _run(arguments: argparse.Namespace) -> int:
     """Run a command; say in one line why it fails, unless its tracebacks are asked for."""
-    from ..interrupt import Hurry
+    from ..interrupt import Hurry, keeps
+    from ._kept import kept_by
 
+    keeps(kept_by(arguments))
     try:
         with Hurry(), _progress(arguments):
             return _with_consent(arguments)
@@ -101,15 +105,22 @@ def _run(arguments: argparse.Namespace) -> int:
 
 @contextmanager
 def _progress(arguments: argparse.Namespace) -> Iterator[None]:
-    """Tell on stderr what is being done, unless nobody wants to know."""
-    from .. import snapshots
-    from ..progress import Line, telling, wants_lines
+    """Tell on stderr what is being done, unless nobody wants to know.
 
-    if arguments.quiet or (getattr(arguments, "json", False) and not wants_lines()):
-        yield
+    Where the answer is JSON, a terminal and a program that asks for lines want to: no other pipe.
+    """
+    from .. import snapshots
+    from ..progress import telling, wants_lines
+    from ._line import Line
+
+    piped = not (sys.stderr.isatty() or wants_lines())
+    if arguments.quiet or (getattr(arguments, "json", False) and piped):
+        with telling(None):
+            yield
         return
     take = snapshots.write if snapshots.wanted() else None
-    with Line() as line, telling(line.say), snapshots.watched_by(take):
+    line = Line(f"bristle {arguments.command}")
+    with line, telling(line.say), snapshots.watched_by(take):
         yield
 
 

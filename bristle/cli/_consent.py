@@ -22,8 +22,10 @@ def given(error: TrustError) -> bool:
     """
     if not error.text or not (sys.stdin.isatty() and sys.stderr.isatty()):
         return False
+    from ..progress import tell
     from ..trust import readable, remember
 
+    tell("")  # the question stands on the terminal until it is answered
     print(f"{error.path} has not run on this machine before:\n", file=sys.stderr)
     for line in readable(error.text).splitlines():
         print(f"    {line}", file=sys.stderr)

@@ -153,11 +153,13 @@ def check(arguments: argparse.Namespace, own: Own) -> int:
     Of a file that `new` made here, checking it is consent to what it holds now.
     """
     from ..errors import PhysicsError
+    from ..progress import tell
     from ..trust import is_made_here, load_file
 
     file = Path(arguments.target)
     # Refuses what is wrong with file and line.
     made = load_file(file, own.word, trust=is_made_here(file))
+    tell(f"checking {file.name}: its hooks are called some hundred thousand times, and compiled")
     program = [sys.executable, "-m", "bristle.check.own", own.word, str(file)]
     try:
         child = subprocess.run(program, capture_output=True, text=True, check=False, timeout=WITHIN)

@@ -28,11 +28,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Add, refit, print."""
+    from ..interrupt import keeps
     from ..study.learning import add_effects
     from ..study.study import Study
 
     study = Study(arguments.folder)
     added = add_effects(study, arguments.effects, why=arguments.why)
+    keeps("The new step is kept in the study's history.")
     if arguments.json:
         print(json.dumps(added.as_dict(), indent=2, ensure_ascii=False))
     else:

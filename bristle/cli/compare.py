@@ -127,11 +127,13 @@ def _in_closed_loop(arguments: argparse.Namespace) -> int:
 def _of_study(arguments: argparse.Namespace) -> int:
     from ..compare.picture import draw_comparison
     from ..draw.style import png
+    from ..progress import tell
     from ..study.comparison import compare_study
     from ..study.study import Study
 
     study = Study(arguments.folder)
     comparison = compare_study(study, role=arguments.role)
+    tell("drawing")
     page = draw_comparison(comparison)
     if arguments.out is None:
         picture = study.write_report("compare.png", png(page))

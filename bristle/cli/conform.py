@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -45,7 +44,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(arguments: argparse.Namespace) -> int:
     """Judge one FMU; return 0 if it conforms, 1 if it breaks a rule."""
-    report = _judge(arguments)
+    from ..conformance import conform
+
+    report = conform(arguments.fmu, arguments.timeout, only=arguments.only, beside=arguments.beside)
     if arguments.json:
         print(report.to_json())
     elif sys.stdout.isatty():
@@ -53,26 +54,6 @@ def main(arguments: argparse.Namespace) -> int:
     else:
         print(report.to_text())
     return 0 if (report.ok if arguments.strict else report.conforms) else 1
-
-
-def _judge(arguments: argparse.Namespace) -> Report:
-    from ..conformance import conform
-
-    def judge(progress: Callable[[str], None] | None) -> Report:
-        return conform(
-            arguments.fmu,
-            arguments.timeout,
-            only=arguments.only,
-            beside=arguments.beside,
-            progress=progress,
-        )
-
-    if not sys.stderr.isatty():
-        return judge(None)
-    from rich.console import Console
-
-    with Console(stderr=True).status("reading the FMU") as status:
-        return judge(lambda name: status.update(f"trying: {name}"))
 
 
 def _show(report: Report) -> None:

@@ -49,10 +49,12 @@ def main(arguments: argparse.Namespace) -> int:
     """Design, run, judge, draw and write; print tables and verdicts."""
     if _controllers.asked(arguments):
         return _controllers.main(arguments)
+    from ..interrupt import keeps
     from ..paper.comparison.make import make
 
+    keeps("No report was written. The same command begins anew.")
     folder = arguments.out or Path("results", "controllers")
-    report = make(folder, arguments.newhall, progress=not arguments.json)
+    report = make(folder, arguments.newhall, progress=True)
     if arguments.json:
         import json
 

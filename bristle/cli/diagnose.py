@@ -41,6 +41,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Diagnose, write verdict.json and the picture, print the verdict with its evidence."""
     from ..draw.style import png
+    from ..interrupt import keeps
+    from ..progress import tell
     from ..study.learning import diagnose_study, verdict_of
     from ..study.study import Study
 
@@ -51,6 +53,8 @@ def main(arguments: argparse.Namespace) -> int:
     verdict = verdict_of(study, found)
     picture = None
     if not arguments.dry_run:
+        keeps("The verdict is kept in verdict.json; its picture was not drawn.")
+        tell("drawing")
         picture = study.write_report("diagnose.png", png(found.plot()))
     if arguments.json:
         print(json.dumps(verdict, indent=2, ensure_ascii=False))

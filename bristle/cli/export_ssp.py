@@ -7,7 +7,6 @@ a step, which makes a coupling error: its size is printed, with a step that keep
 from __future__ import annotations
 
 import argparse
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,10 +53,11 @@ def main(arguments: argparse.Namespace) -> int:
     exported = export_ssp(scenario, target, arguments.osp, builder(arguments))
     expected: tuple[Expected, ...] = ()
     if not arguments.no_coupling_error:
+        from ..progress import tell
         from ..simulate.elsewhere import expect
         from ..simulate.run import run_quietly
 
-        print("estimating the coupling error in other tools ...", file=sys.stderr)
+        tell("estimating the coupling error in other tools")
         expected = expect(scenario, run_quietly)
     if arguments.json:
         _print_json(exported, expected)

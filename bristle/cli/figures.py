@@ -46,7 +46,7 @@ def main(arguments: argparse.Namespace) -> int:
             arguments.out,
             engine=arguments.engine,
             format=arguments.format,
-            progress=not arguments.json,
+            progress=True,
         )
         written[name] = [str(file.absolute()) for file in files]
         if not arguments.json:

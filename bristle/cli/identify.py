@@ -70,14 +70,15 @@ def main(arguments: argparse.Namespace) -> int:
 
         return _building.main(arguments)
     from ..draw.style import png
-    from ..progress import Progress
+    from ..interrupt import keeps
+    from ..progress import Progress, tell
     from ..study.budget_picture import draw_budget
     from ..study.fit_picture import identify_png
     from ..study.identification import STAGES, identify_study
     from ..study.study import Study
 
     study = Study(arguments.folder)
-    with Progress("identifying", STAGES, not arguments.json) as progress:
+    with Progress("identifying", STAGES, True, even=False) as progress:
         found = identify_study(
             study,
             law=arguments.law,
@@ -88,6 +89,9 @@ def main(arguments: argparse.Namespace) -> int:
             write=not arguments.dry_run,
             show=progress.show,
         )
+    tell("drawing")
+    if not arguments.dry_run:
+        keeps("The new step is kept in the study's history; its pictures were not all drawn.")
     picture = budget = None
     if not arguments.dry_run:
         picture = study.write_report("identify.png", identify_png(found))

@@ -26,8 +26,10 @@ def main(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     from ..page.app import App
     from ..page.run import open_browser, serve
+    from ..progress import tell
 
     def ready(address: str) -> None:
+        tell("")
         print(f"{address}\nCtrl-C ends the page.", flush=True)
         if not arguments.no_browser:
             open_browser(address)

@@ -35,6 +35,7 @@ def main(arguments: argparse.Namespace) -> int:
     """Write the report; print where it is."""
     from ..data.files import write_whole
     from ..page.embedded import linked_section
+    from ..progress import tell
     from ..report.study_content import gather
     from ..report.study_page import render
     from ..study.staircase import Staircase
@@ -44,6 +45,7 @@ def main(arguments: argparse.Namespace) -> int:
     content = gather(study, open_test=not arguments.keep_test_closed, what_if=arguments.what_if)
     if content.now is not None and not arguments.static:
         content = replace(content, linked=linked_section(content.now))
+    tell("drawing")
     page = render(content)
     if arguments.out is None:
         file = study.write_report("report.html", page)

@@ -235,7 +235,7 @@ def _check(arguments: argparse.Namespace) -> int:
         if not arguments.json:
             print(f"{study.folder / 'study.toml'}: {study.settings.excluded_text}\n")
     total = len(study.settings.runs)
-    with Progress("checking the data", total, not arguments.json) as progress:
+    with Progress("checking the data", total, True) as progress:
         found = check_data(study, progress.show)
     if arguments.correct and found.corrections():
         study = study.with_corrections(found.corrections())

@@ -16,6 +16,7 @@ from ..errors import BristleError, FmuError
 from ..fmu.archive import extract
 from ..fmu.description import NATIVE, describe, read_description, read_root
 from ..fmu.description_fmi3 import check_ports
+from ..progress import Count
 from ._probe import BOX, FINDING, PLAN
 from .native import BlackBox
 from .plan import Plan
@@ -172,17 +173,20 @@ class _Session:
     def rows(self) -> list[Row]:
         """Try everything that was asked for, and what that needs."""
         rows = []
-        for probe in PROBES.values():
-            if self.only is None:
-                wanted = self.plan.ours or probe.rule != "bristle"
-            else:
-                wanted = probe.name in self.only
-            if wanted or probe.name in self.first:
-                self.progress(probe.name)
-                finding = self.find(probe)
-                if wanted or finding.verdict == "fail":
-                    rows.append(self._row(probe, finding))
+        chosen = [p for p in PROBES.values() if self._wanted(p) or p.name in self.first]
+        count = Count("probe", len(chosen))
+        for probe in chosen:
+            self.progress(probe.name)
+            count.begins(probe.name)
+            finding = self.find(probe)
+            if self._wanted(probe) or finding.verdict == "fail":
+                rows.append(self._row(probe, finding))
         return rows
+
+    def _wanted(self, probe: Probe) -> bool:
+        if self.only is None:
+            return self.plan.ours or probe.rule != "bristle"
+        return probe.name in self.only
 
     def _row(self, probe: Probe, finding: Finding) -> Row:
         tried, seen, standard = probe.tried, finding.seen, probe.standard

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..batch.file import read_ensemble
-from ..batch.plan import Output
+from ..batch.plan import Output, Plan
 from ..batch.pool import run_local
+from ..batch.table import RunsTable
 from ..batch.worker import prepare, statistic
-from ..errors import RunError
+from ..errors import EnsembleError, RunError
+from ..progress import Count
 from ..scenario.scenario import load_scenario
 from ..simulate.coupled import simulate
 from ..simulate.run import run_quietly
@@ -184,8 +186,14 @@ class Bench:
         self.folder.write(file, ensemble_text(content, {**tables, "outputs": kept}))
         plan = read_ensemble(file)
         prepare(plan)
-        with quiet():
-            outcomes = list(run_local(plan, range(plan.runs), min(self.workers, plan.runs)))
+        runs_file = file.with_suffix(".csv")
+        with quiet(), _continued(plan, runs_file, self.folder.goes_on) as table:
+            left = [run for run in range(plan.runs) if run not in table.outcomes]
+            count = Count(f"{file.parent.name}, {file.stem}: run", len(left))
+            for outcome in run_local(plan, left, min(self.workers, len(left))) if left else ():
+                table.add(outcome)
+                count.done()
+        outcomes = [table.outcomes[run] for run in range(plan.runs)]
         rows = {one.run: one.numbers for one in outcomes if not one.reason}
         failed = len(outcomes) - len(rows)
         names = {f"{o.statistic} {columns[o.column]}": o.name for o in self.outputs}
@@ -219,6 +227,20 @@ class Bench:
             )
         found.index = volts
         return found
+
+
+@contextmanager
+def _continued(plan: Plan, path: Path, goes_on: bool) -> Iterator[RunsTable]:
+    """Yield the table of an ensemble's runs, with those of before where it `goes_on`."""
+    try:
+        table = RunsTable(plan, path, fresh=not goes_on)
+        table.forget_failures()
+    except EnsembleError:  # of other files or numbers, or damaged
+        table = RunsTable(plan, path, fresh=True)
+    try:
+        yield table
+    finally:
+        table.close(complete=len(table.outcomes) >= plan.runs)
 
 
 @contextmanager

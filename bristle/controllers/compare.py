@@ -13,7 +13,7 @@ from ..batch.execute import cores
 from ..batch.plan import Output
 from ..errors import ScenarioError
 from ..findings import unknown
-from ..progress import tell
+from ..progress import Stages, tell
 from .cells import Bench, best_level, flat
 from .choice import Given
 from .dampers import DEFAULT, damper_from
@@ -137,8 +137,8 @@ def compare_controllers(
         if limit:
             refuse_limit(bench, chosen[0], judged)
         run = _Run(bench, judged, entries, grid, limit, spread)
-        for motion in chosen:
-            run.motion(motion)
+        run.motions(chosen)
+        folder.finish()
         setting = Setting(
             site, one, entries, chosen, judged, spread, None if out is None else Path(path),
             "" if spread is None else varied(bench, entries, spread),
@@ -151,6 +151,10 @@ def compare_controllers(
         setting, bench.outputs, run.table(), run.worst(), run.levels, run.limits, run.frames,
         tuple(dict.fromkeys(notes)), clock.monotonic() - began,
     )  # fmt: skip
+
+
+CONSTANTS = 3
+"""Constant voltages beside the controllers: none, the largest, the best."""
 
 
 class _Run:
@@ -169,7 +173,16 @@ class _Run:
         self.frames: dict[tuple[str, str], pd.DataFrame] = {}
         self.notes: list[str] = []
 
-    def motion(self, motion: Motion) -> None:
+    def motions(self, chosen: list[Motion]) -> None:
+        """Run everything under all ground motions."""
+        n, worst = len(chosen), len(self.entries) + CONSTANTS
+        kinds = {"run": worst + self.limit, "levels": 1, "limit": int(self.limit)}
+        kinds["worst"] = worst * (self.spread is not None)
+        self.stages = Stages("case", {kind: n * each for kind, each in kinds.items()})
+        for motion in chosen:
+            self._motion(motion)
+
+    def _motion(self, motion: Motion) -> None:
         """Run everything under one ground motion."""
         # What has a clock goes first: the loop that it is compiled to serves all the others.
         clocked = sorted(self.entries, key=lambda one: one.period is None)
@@ -179,7 +192,7 @@ class _Run:
         for entry in [*constants, *self.entries]:
             self._row(motion, entry)
         if self.limit:
-            tell(f"{motion.name}: the limit")
+            self.stages.begins("limit", f"{motion.name}: the limit")
             entry, self.limits[motion.name] = limit_of(self.bench, motion, self.judged)
             self._row(motion, entry)
         if self.spread is not None:
@@ -188,7 +201,7 @@ class _Run:
 
     def _constants(self, motion: Motion) -> list[Entry]:
         """Return the constant voltages of a motion: none, the largest, the best."""
-        tell(f"{motion.name}: {self.grid} constant voltages")
+        self.stages.begins("levels", f"{motion.name}: {self.grid} constant voltages")
         levels = self.bench.levels(motion, self.grid)
         if flat(levels["rms damper.force"]):
             raise ScenarioError(
@@ -207,7 +220,7 @@ class _Run:
     def _frame(self, motion: Motion, entry: Entry) -> pd.DataFrame:
         key = motion.name, entry.name
         if key not in self.frames:
-            tell(f"{motion.name}: {entry.name}")
+            self.stages.begins("run", f"{motion.name}: {entry.name}")
             self.frames[key] = self.bench.run(motion, entry)
         return self.frames[key]
 
@@ -226,7 +239,7 @@ class _Run:
         )  # fmt: skip
 
     def _worst(self, motion: Motion, entry: Entry, spread: Spread) -> None:
-        tell(f"{motion.name}: {entry.name}, {spread.members} members")
+        self.stages.begins("worst", f"{motion.name}: {entry.name}, {spread.members} members")
         most, failed = worst_of(
             self.bench,
             motion,

@@ -12,6 +12,8 @@ from ..errors import not_usable
 from ..scenario.text import toml_key, toml_value
 
 FILES, SCENARIOS, ENSEMBLES, LIMITS = "files", "scenarios", "ensembles", "limits"
+UNFINISHED = ".unfinished"
+"""Stands in the folder until its comparison has come to its end."""
 ABOVE = "../.."
 """From a scenario, which lies two folders deep, to the comparison's folder."""
 
@@ -31,6 +33,11 @@ class Folder:
     path : Path
         Made where it is missing.
 
+    Attributes
+    ----------
+    goes_on : bool
+        Whether a comparison there was interrupted: runs of its ensembles that fit are taken over.
+
     Raises
     ------
     RunError
@@ -40,8 +47,14 @@ class Folder:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._kept: dict[str, Path] = {}
+        self.goes_on = (path / UNFINISHED).exists()
         self.write(path / FILES / ".keep", "")
         (path / FILES / ".keep").unlink()
+        self.write(path / UNFINISHED, "")
+
+    def finish(self) -> None:
+        """Say that the comparison came to its end: the next one there begins anew."""
+        (self.path / UNFINISHED).unlink(missing_ok=True)
 
     def keep(self, file: Path, name: str = "") -> str:
         """Copy a file in; return its path as scenarios write it.

@@ -6,6 +6,7 @@ from math import log10
 
 import numpy as np
 
+from ..progress import tell
 from . import lmi, table, verify
 from .norms import hinf_norm, least_gamma
 from .plant import Plant, Units, balancing, generalized
@@ -56,6 +57,7 @@ def design_hinf(task: Task) -> DesignResult:
     normalised = units.normalised(plant)
     balanced = normalised.transformed(balancing(normalised, task.order))
     still = np.zeros(1)
+    tell("solving the linear matrix inequalities")
     solution = lmi.solve([balanced], still, task.tau)
     bank = table.reconstruct(solution, [balanced], still, units)
     facts = verify.check_poles(bank, still, task.sample_period)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DesignError
+from ..progress import tell
 from . import lmi, table, verify
 from .hinf import units_for
 from .norms import hinf_norm, least_gamma
@@ -109,6 +110,7 @@ def design_lpv(task: Task) -> DesignResult:
     at_grid, at_rows = plants_at(task, grid), plants_at(task, speeds)
     units, states = _frame(task, at_grid)
     scaled = [units.normalised(plant).transformed(states) for plant in at_grid]
+    tell("solving the linear matrix inequalities")
     solution = lmi.solve(scaled, grid, task.tau, scheduling.varies, scheduling.rate)
     scaled_rows = [units.normalised(plant).transformed(states) for plant in at_rows]
     bank = table.reconstruct(solution, scaled_rows, speeds, units)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy import linalg
 
 from ..errors import DesignError
+from ..progress import counted
 from .norms import hinf_norm
 from .plant import Plant
 from .table import Bank
@@ -104,7 +105,8 @@ def closed_loop_norms(plants: list[Plant], bank: Bank, r: Array) -> Array:
     DesignError
         If a closed loop is unstable.
     """
-    norms = np.array([hinf_norm(plant.closed_loop(bank.at(k))) for k, plant in enumerate(plants)])
+    pairs = counted(list(enumerate(plants)), "verifying the closed loop: norm")
+    norms = np.array([hinf_norm(plant.closed_loop(bank.at(k))) for k, plant in pairs])
     if not np.all(np.isfinite(norms)):
         k = int(np.argmax(~np.isfinite(norms)))
         raise DesignError(f"the closed loop is unstable{_at(r, k)}, whatever the solver said.")

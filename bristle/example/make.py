@@ -11,6 +11,8 @@ import numpy as np
 
 from ..data.files import write_whole
 from ..errors import StudyError
+from ..interrupt import deferred
+from ..progress import counted, tell
 from ..study.create import create_study
 from ..study.study import Study
 from . import bench, tower
@@ -74,8 +76,10 @@ def make_bench(folder: Path | str, choice: Choice) -> Study:
     hidden, secret = _secret("bench", law, choice, scales, drawn)
     plan = bench.plan(scales, draw, choice.held)
     damper, bare = Damper(law, values, secret), Damper(law, values)
-    runs = [bench.perform(damper, motion, volts, scales) for _, motion, volts in plan]
-    plain = [bench.perform(bare, motion, volts, scales) for _, motion, volts in plan]
+    runs, plain = [], []
+    for _, motion, volts in counted(plan, "run"):
+        runs.append(bench.perform(damper, motion, volts, scales))
+        plain.append(bench.perform(bare, motion, volts, scales))
     answer = _answer("bench", law, choice, hidden) | {
         "values": _with_units(secret), "base": in_library_names(law, values),
         "share": bench.share(runs, plain),
@@ -108,8 +112,9 @@ def make_building(folder: Path | str, choice: Choice, *, load_cell: bool = True)
     values, frame = draw_damper(law, draw), draw_frame(draw)
     hidden, secret = _secret("building", law, choice, scales_of("building", law), drawn)
     rig, plain = (tower_of(frame, law, values, one) for one in (secret, {}))
+    tell("planning the ground motions")
     plan = tower.plan(plain, draw)
-    runs = {name: rig.perform(ground, volts) for name, ground, volts in plan}
+    runs = {name: rig.perform(ground, volts) for name, ground, volts in counted(plan, "run")}
     if not load_cell:
         runs = {name: _without(run, "force") for name, run in runs.items()}
     answer = _answer("building", law, choice, hidden) | {
@@ -193,9 +198,11 @@ def _written(
             drawing.write_text(building, encoding="utf-8")
         files = [place / f"{run}.csv" for run in runs]
         rig = {"rig": "structure", "building": drawing} if building else {"rig": "bench"}
-        study = create_study(folder, files, title=title, law=answer["law"], **rig).study
-    seal(folder, answer)
-    write_whole(folder / "README.md", text.format(name=folder.name, noise=100 * answer["noise"]))
+        with deferred():  # an example is whole with its answer, or not there
+            study = create_study(folder, files, title=title, law=answer["law"], **rig).study
+            seal(folder, answer)
+            readme = text.format(name=folder.name, noise=100 * answer["noise"])
+            write_whole(folder / "README.md", readme)
     return study
 
 

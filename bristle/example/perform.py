@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import StudyError
 from ..plan.folder import NAME, PlanFolder, PlannedRun, read_plan
-from ..progress import tell
+from ..progress import Count
 from ..quantity import plain
 from ..study.extend import Extended, extend_study
 from ..study.study import Study
@@ -73,8 +73,9 @@ def perform_plan(
         files = {
             Path(scratch, f"{one}.csv"): run for one, run in zip(names, planned.runs, strict=True)
         }
+        count = Count("run", len(files))
         for file, run in files.items():
-            tell(f"performing {run.name}")
+            count.begins(run.name)
             rng = np.random.default_rng([int(answer["seed"]), *file.stem.encode()])
             shown = _performed(rig, run, answer)
             write_csv(file, recorded(shown, answer["instruments"], rng))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import RunError, ScenarioError
 from ..findings import unknown
-from ..progress import tell
+from ..progress import Count, counted, tell
 from ..scenario.scenario import Scenario, load_scenario
 from ..simulate.coupled import simulate
 from ..simulate.run import run
@@ -112,7 +112,9 @@ def limit(
     if not _in_window(problem, whole, found[0][1]):
         problem, found = _searched_from_all(whole, whole.last, statistic, best, starts)
     searched, voltage = found[0][0].value, found[0][1]
-    ahead = {s: _seen_ahead(problem, whole, s, best, searched, statistic) for s in seen}
+    ahead = {}
+    for s in counted(seen, "receding horizon"):
+        ahead[s] = _seen_ahead(problem, whole, s, best, searched, statistic)
     bound, most = _bound(problem, whole, voltage, statistic)
     results = _played(case, voltage, out)
     return Limit(
@@ -159,10 +161,11 @@ def _searched_from_all(
     case = whole.case
     every = max(1, round(1.0 / (case.frequency * NODES_PER_PERIOD * case.plant.h)))
     problem = Problem(case, every, last)
-    found = [
-        _searched(problem, whole, name, values, statistic, rest)
-        for name, values in _begins(problem, rest, starts).items()
-    ]
+    begins = _begins(problem, rest, starts)
+    count, found = Count("search", len(begins)), []
+    for name, values in begins.items():
+        count.begins(f"from {name}")
+        found.append(_searched(problem, whole, name, values, statistic, rest))
     return problem, sorted(found, key=lambda one: one[0].value)
 
 
@@ -186,7 +189,6 @@ def _searched(
     problem: Problem, whole: Problem, name: str, values: Array, statistic: str, rest: float
 ) -> tuple[Start, Array]:
     """Search from voltages (n,) at the nodes; return what came out, and the voltage (N + 1,)."""
-    tell(f"searching from {name}")
     before = value_of(whole.respond(_continued(problem, values, rest)), statistic)
     values = descended(problem, values, statistic)
     if statistic == "peak":
@@ -205,7 +207,6 @@ def _seen_ahead(
     problem: Problem, whole: Problem, seconds: float, rest: float, least: float, statistic: str
 ) -> float:
     """Return what a receding horizon reaches; the cost is never told by less than 2 % of least."""
-    tell(f"a receding horizon that sees {seconds:g} s ahead")
     voltage = foreseen(problem, seconds, rest, 0.02 * least, statistic)
     tail = np.full(len(problem.case.ground) - 1 - problem.last, rest)
     return value_of(whole.respond(np.append(voltage, tail)), statistic)

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from ..fmu.plan import Plan
-from ..progress import tell
+from ..progress import Count, tell
 from . import zig
 from .platforms import Platform
 from .prepare import compile_functions
@@ -138,6 +138,14 @@ def libraries(
     BuildError
         What is wrong with the first platform that fails, once all are done.
     """
+    tell(f"compiling {name} for {len(platforms)} platform(s)")
+    count = Count(f"{name}: library", len(platforms))
+
+    def counted(one: Platform) -> bytes:
+        made = library(name, text, table, one, fmi)
+        count.done(one.name)
+        return made
+
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        runs = [pool.submit(library, name, text, table, one, fmi) for one in platforms]
+        runs = [pool.submit(counted, one) for one in platforms]
     return {one: run.result() for one, run in zip(platforms, runs, strict=True)}

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from ..errors import BristleError
+from ..progress import counted, tell
 from ..study.run_file import TEST
 from ..study.staircase import HistoryStep, history_steps
 
@@ -73,9 +74,10 @@ def gather(study: Study, *, open_test: bool = True, what_if: bool = False) -> Co
             earlier = read_model(study.history.model_file(step.number - 1), study.folder)
             new = [name for name in model.effects if name not in earlier.effects]
             if new:
+                tell("the model before its last effect")
                 before, added = against.compare(as_model(earlier)), " and ".join(new)
                 break
-        found = [_with_error(one, against, study) for one in found]
+        found = [_with_error(one, against, study) for one in counted(found, "step")]
         if open_test and study.files(TEST):
             test = compare_study(study, role=TEST)
     except BristleError as error:

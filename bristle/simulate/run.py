@@ -17,6 +17,7 @@ from ..errors import RunError, not_usable
 from ..findings import written
 from ..fmu.description import Description, read_description
 from ..interrupt import Interrupt
+from ..progress import Progress, listening, tell
 from ..scenario.scenario import Scenario, fmu_parameters, load_scenario
 from ..scenario.text import scenario_text
 from .coupling_error import as_data, estimate
@@ -214,8 +215,12 @@ def run_quietly(scenario: Scenario, engine: str, fmus: str = "python") -> Result
     fmus : str
         As in `run`, for the engine "fmu".
     """
-    form = fmus if engine == "fmu" else "python"
-    return execute(scenario, None, engine, _Silent(None), False, reference=True, fmus=form)
+    form, shown = fmus if engine == "fmu" else "python", False
+    if engine == "fmu":
+        shown = listening()
+    else:
+        tell(f"{scenario.title}: the coupled engine")
+    return execute(scenario, None, engine, _Silent(None), shown, reference=True, fmus=form)
 
 
 class _Silent(Output):
@@ -303,14 +308,15 @@ class _Job:
             return frame
 
     def _go(self, master: Master, interrupt: Interrupt, progress: bool) -> None:
-        from ..progress import Progress
-
         try:
             master.start()
         finally:
             if master.rows:
                 self.output.begin(master.table(), self.made, self.scenario.remarks())
-        with Progress(self.scenario.title, master.steps, progress) as bar:
+        title = self.scenario.title
+        if isinstance(self.output, _Silent):  # one of several, which differ in it
+            title += f", a step of {1e3 * self.scenario.step:.4g} ms"
+        with Progress(title, master.steps, progress) as bar:
             count, due = 1, time.perf_counter() + FLUSH
             try:
                 while master.rows <= master.steps and not interrupt.asked:

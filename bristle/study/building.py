@@ -13,6 +13,7 @@ from ..errors import StudyError
 from ..identify.building import StructureFit, equilibrium, identify_structure
 from ..identify.building_file import building_text
 from ..physics.building import Building, frequencies
+from ..progress import tell
 from ..quantity import plain
 from .history import Step
 from .rig import building_of
@@ -92,7 +93,9 @@ def identify_building_alone(study: Study, *, write: bool = True) -> IdentifiedBu
             "--structure needs a study made with  --rig structure --building FILE"
         )
     runs = study.runs()
+    tell("identifying the building")
     fit = identify_structure(runs.train, given)
+    tell("holding the building against the runs")
     before: dict[str, float] = {}
     after: dict[str, float] = {}
     for role, part in (("train", runs.train), ("holdout", runs.holdout)):

@@ -7,6 +7,7 @@ from dataclasses import replace
 from ..compare.comparison import Comparison
 from ..compare.rig import RigComparer
 from ..data.model import StudyModel
+from ..progress import tell
 from .identification import as_model
 from .openings import count_opening, opened_text, openings, runs_for_test
 from .rig import rig_of
@@ -30,6 +31,7 @@ def comparer(study: Study, role: str = "holdout") -> RigComparer:
     model, runs = study.model(), study.runs()
     if role == TEST:
         runs = runs_for_test(study, runs)
+    tell("holding the model against the runs")
     made = RigComparer(rig_of(study, model, runs), role, as_model(model))
     if role == TEST:  # before anybody can have seen an error
         count_opening(study)

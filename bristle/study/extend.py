@@ -14,6 +14,7 @@ from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import StudyError
+from ..progress import counted
 from .added_runs import FILE as ADDED
 from .added_runs import note_addition
 from .new import refuse_other_columns
@@ -74,7 +75,7 @@ def extend_study(
     """
     paths, choices = [Path(file) for file in files], choices or RunChoices()
     _refuse_names(study, paths)
-    tables = [read_table(path) for path in paths]
+    tables = [read_table(path) for path in counted(paths, "reading file")]
     _refuse_other_columns(study, tables)
     about, notes = facts_of(paths, choices, bool({*DRIVE} & {*study.settings.channels}))
     listed, said = _roles(paths, roles or {}, holdout)

@@ -25,6 +25,7 @@ from ..errors import BristleError, StudyError, UnitError
 from ..physics.building import Building, read_building, with_damper
 from ..physics.drive import VOLTAGE
 from ..physics.laws import DEFAULT
+from ..progress import counted
 from ..quantity import plain
 from ..units import canonical
 from .history import History, Step
@@ -83,7 +84,7 @@ def make_folder(
     studied = "" if house is None else house.studied
     devices = [] if house is None else [one.name for one in house.devices]
     _refuse_no_device(channels or {}, devices)
-    tables = [read_table(Path(file)) for file in files]
+    tables = [read_table(Path(file)) for file in counted(files, "reading file")]
     closed = for_test([Path(file) for file in files], choices)
     first = tables[closed.index(False)]  # a guess is a choice, which no test run may see
     guesses = _chosen(first, guess_channels(first, rig, levels, devices), channels or {})

@@ -10,6 +10,7 @@ from ..data.pieces import pieces_of
 from ..data.read import read_table
 from ..data.table import Table
 from ..errors import StudyError
+from ..progress import Count
 from .run_file import RunFile
 from .settings import Settings
 
@@ -32,10 +33,11 @@ def read_runs(folder: Path, settings: Settings, role: str | None = None) -> list
     """
     tables: dict[str, Sequence[Table]] = {}
     found: list[Measurement] = []
-    for run in settings.runs:
-        if role not in (None, run.role):
-            continue
+    chosen = [run for run in settings.runs if role in (None, run.role)]
+    count = Count("reading file", len({run.file for run in chosen}))
+    for run in chosen:
         if run.file not in tables:
+            count.begins(run.file)
             table = read_table(folder / run.file)
             split = settings.split
             tables[run.file] = pieces_of(table, split, settings.channels) if split else [table]

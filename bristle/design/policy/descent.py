@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...progress import tell
+from ...progress import Count
 from .runs import PATIENT, Loop, Run
 
 Array = NDArray[np.float64]
@@ -94,8 +94,9 @@ def descend(
     w[-1] = -1.0
     first, second = np.zeros_like(w), np.zeros_like(w)
     best = Outcome(white.weights(w), np.inf, np.inf, 0)
+    count = Count("training: round", rounds)
     for k in range(1, rounds + 1):
-        tell(f"training: round {k} of {rounds}")
+        count.begins()
         size = min(BATCH, len(runs))
         batch = [runs[i] for i in random.choice(len(runs), size, replace=False)]
         slope = _limited(white.slope(_slope(loop, batch, white.weights(w))), MOST[1])

@@ -12,6 +12,7 @@ from ...control.controller import Controller, building_digest
 from ...control.policy import weight_count
 from ...errors import DesignError
 from ...physics.damper import start_states
+from ...progress import counted, tell
 from ..hinf import design_hinf
 from ..plant import StateSpace, structure
 from ..result import DesignResult, flat, pole_list
@@ -68,10 +69,11 @@ def design_policy(task: Task) -> DesignResult:
     grounds, held_out = _grounds(training, unit, h)
     longest = max(map(len, [*grounds, *held_out]))
     loop = Loop(policy, longest, start_states(task.damper.kind.name, task.damper.values), len(s.A))
+    tell("compiling the closed loop, once")
     runs, choosing = ([_run(task, ground) for ground in each] for each in (grounds, held_out))
     loop.learn_states(runs[0])
     reference = _clipped(task, loop, longest, THRESHOLD * largest)
-    for run in (*runs, *choosing):
+    for run in counted([*runs, *choosing], "clipped-optimal control: motion"):
         reference.refer(run)
     random = np.random.default_rng([training.seed, 1])
     for i in range(len(runs)):

@@ -9,7 +9,7 @@ const PAUSE = 350; // ms after the last change, before the server is asked
 
 /** Returns the channels of a study, and what corrects them. */
 export function channels(page, data) {
-  const whole = h("section", { "aria-label": "Channels" });
+  const whole = h("div");
   const begin = () => {
     page.editing = false;
     const open = h("button", { type: "button", onclick: () => edit(page, whole, begin) }, "Correct a column, a unit or a sign");

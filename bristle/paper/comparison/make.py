@@ -18,7 +18,7 @@ from ... import __version__
 from ...control.controller import read_controller
 from ...draw.style import Page, look
 from ...errors import DesignError, not_usable
-from ...progress import Progress
+from ...progress import Progress, counted
 from .. import optimum, stiction
 from ..figures import prepare
 from ..runs import Drawing, Runs
@@ -158,7 +158,7 @@ def _draw(comparison: Comparison, peaks: Drawing, best: Drawing, folder: Path) -
     with look():
         pages |= {name: (number, draw(comparison)) for name, (number, draw) in FIGURES.items()}
     drawn = {}
-    for name, (number, page) in pages.items():
+    for name, (number, page) in counted([*pages.items()], "drawing figure"):
         if page is not None:
             page.save(folder / f"{name}.png", dpi=page_of.DOTS)
             drawn[name] = number
