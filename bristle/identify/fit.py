@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
 from ..progress import counted, tell
+from .intervals import covariance_of
 from .model import (
     Model,
     Problem,
@@ -27,8 +28,9 @@ from .model import (
     steady,
     without,
 )  # fmt: skip
-from .residuals import BLOCK, Expected, drawn_noise, residuals
-from .search import HUBER_AT_ONE, descend, jacobian, loss
+from .residuals import Expected
+from .scaled import Scaled
+from .search import descend, loss
 from .starts import start_model, start_models
 from .watch import share_of, watched
 
@@ -52,8 +54,6 @@ __all__ = [
 Array = NDArray[np.float64]
 
 _ALIKE = 1e-3  # relative difference of costs below which two starts have come to the same end
-_WEAK = 1e-6  # a singular value of the scaled Jacobian below this share of the largest is none
-_MISFIT = 1.15  # z above which a residual is more than noise
 _FINAL_DRAWS = 24  # draws of the motion for bias and intervals of what is reported
 _ENDS = 6  # searches from beside the best point where the loss is rough
 _ASIDE = {"N/m": 0.4, "kg": 0.4}  # by what share, by unit: what a joint's spikes hardly tell
@@ -79,35 +79,6 @@ class Fit:
     starts: int = 1
     agreed: int = 1
     covariance: Array | None = None
-
-
-class Scaled:
-    """A model's free parameters as numbers of order one, and the residuals over them."""
-
-    def __init__(self, problem: Problem, model: Model, expected: Expected) -> None:
-        self.problem, self.model, self.expected = problem, model, expected
-        self.names = model.free()
-        # An impact's spike would tell a gap far more sharply than its fit can find it.
-        self.rough = any(EFFECTS[name].joint for name in model.effects)
-        start = np.array([model.value(name) for name in self.names])
-        units = [parameter(model.law, name).unit for name in self.names]
-        self.scale = np.maximum(np.abs(start), 1e-2 * np.array([problem.size(u) for u in units]))
-        bounds = np.array([model.bounds(name) for name in self.names], dtype=float).reshape(-1, 2)
-        self.low, self.high = bounds[:, 0] / self.scale, bounds[:, 1] / self.scale
-        self.start = np.clip(start / self.scale, self.low, self.high)
-
-    def at(self, theta: Array) -> Model:
-        """Return the model with these values."""
-        own = dict(zip(self.names, (theta * self.scale).tolist(), strict=True))
-        return replace(self.model, values={**self.model.values, **own})
-
-    def residuals(self, theta: Array) -> Array:
-        """Return the normalised residuals of all runs, finite."""
-        return residuals(self.problem, self.at(theta), self.expected)
-
-    def jacobian(self, theta: Array, r: Array) -> Array:
-        """Return the derivatives (n, p) of the residuals at theta."""
-        return jacobian(self.residuals, theta, r, self.low, self.high, self.rough)
 
 
 def fit(
@@ -157,7 +128,7 @@ def fit(
 
 
 def _with_intervals(found: Fit, scaled: Scaled, theta: Array) -> Fit:
-    covariance, lost = _intervals(scaled, theta)
+    covariance, lost = covariance_of(scaled, theta)
     std = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
     by_name = dict(zip(scaled.names, std, strict=True))
     return replace(found, std=by_name, unidentified=lost, covariance=covariance)
@@ -217,63 +188,6 @@ def intervals_of(problem: Problem, model: Model) -> Fit:
 def _spread(values: list[float], about: float) -> float:
     """Return the root of the mean square of values about one of them."""
     return float(np.sqrt(np.sum((np.array(values) - about) ** 2) / max(len(values) - 1, 1)))
-
-
-def _intervals(scaled: Scaled, theta: Array) -> tuple[Array, tuple[str, ...]]:
-    """Return the covariance (p, p) [SI], and the names that the data do not identify.
-
-    Covariance A^-1 B A^-1 of an M-estimator (Huber 1981, Robust Statistics, ch. 7): A = J'J over
-    the samples within the quadratic part of the loss, B the covariance of J' psi under the drawn
-    noise, white for the force's own. Where the residual is more than noise, B is taken from the
-    residual itself, in blocks, so that a wrong model's intervals widen with its error.
-    """
-    r = scaled.residuals(theta)
-    J = scaled.jacobian(theta, r)
-    norms = np.linalg.norm(J, axis=0)
-    safe = np.where(norms > 0.0, norms, 1.0)
-    J = J / safe
-    inner = np.abs(r) <= 2.0
-    A = J[inner].T @ J[inner]
-    values, vectors = np.linalg.eigh(A)
-    weak = values <= _WEAK**2 * values[-1]
-    inverse = (vectors * np.where(weak, 0.0, 1.0 / np.where(weak, 1.0, values))) @ vectors.T
-    own, drawn = drawn_noise(scaled.problem, scaled.expected)
-    B = (J * (own**2)[:, None]).T @ J
-    if len(drawn) > 1:
-        scores = np.array([J.T @ np.clip(e, -2.0, 2.0) for e in drawn])
-        scores -= scores.mean(axis=0)
-        B = B + scores.T @ scores / (len(drawn) - 1)
-    if float(np.mean(loss(r))) > _MISFIT**2 * HUBER_AT_ONE:
-        B = _scores_of_blocks(J, r)
-    covariance = inverse @ B @ inverse
-    size = scaled.scale / safe
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0)) * size
-    return covariance * np.outer(size, size), _lost(
-        scaled, theta * scaled.scale, std, norms, vectors[:, weak]
-    )
-
-
-def _scores_of_blocks(J: Array, r: Array) -> Array:
-    """Return the covariance (p, p) of J' psi, from blocks of samples taken as independent."""
-    scores = J * np.clip(r, -2.0, 2.0)[:, None]
-    edges = np.arange(0, len(r), min(BLOCK, max(1, len(r) // 20)))
-    sums = np.add.reduceat(scores, edges, axis=0)
-    sums -= sums.mean(axis=0)
-    B: Array = sums.T @ sums
-    return B
-
-
-def _lost(
-    scaled: Scaled, value: Array, std: Array, norms: Array, directions: Array
-) -> tuple[str, ...]:
-    """Name what does not move the force, is mixed up with others, or is wider than its size."""
-    lost = []
-    for i, name in enumerate(scaled.names):
-        size = scaled.problem.size(parameter(scaled.model.law, name).unit)
-        mixed = directions.size and float(np.max(np.abs(directions[i]))) > 0.3
-        if norms[i] == 0.0 or mixed or std[i] > max(abs(value[i]), size):
-            lost.append(name)
-    return tuple(lost)
 
 
 def identify(
