@@ -257,7 +257,7 @@ def _unmeasured(runs: list[Measurement], at_damper: Place) -> list[Finding]:
     there = set.intersection(*(set(run.channels) for run in runs))
     if "ground_acceleration" not in there:
         text = "the ground's acceleration was not measured: the structure's response has no input."
-        do = "Name its column in [channels.ground_acceleration]."
+        do = "Name its column: bristle study channels MY_RIG --channel ground_acceleration=COLUMN"
         findings.append(Finding("ground", "error", text, do))
     if "force" not in there:
         text = (

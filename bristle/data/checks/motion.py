@@ -71,7 +71,8 @@ def check_motion(run: Measurement, level: str = "") -> Iterator[Finding]:
                 "note",
                 f"{v} is the numerical derivative of {x} ({own}): it adds no information, and "
                 "its noise is that of the displacement.",
-                f"Remove {v} from [channels], or record it with a separate instrument.",
+                f"Leave it out with bristle study channels MY_RIG --without {v} , or record it "
+                "with an instrument of its own.",
                 run.name,
                 v,
             )
@@ -111,7 +112,8 @@ def check_force(run: Measurement, velocity: Array) -> Iterator[Finding]:
             "sign",
             "error",
             f"force drives the motion, because it is positive along it ({text}).",
-            "Turn sign in [channels.force]: a force is positive when it resists motion along +x.",
+            "Turn its sign with bristle study channels MY_RIG --channel force=-COLUMN : a force is "
+            "positive when it resists motion along +x.",
             run.name,
             "force",
             -share,
