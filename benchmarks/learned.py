@@ -197,6 +197,6 @@ def _closed(
         if closed:
             trial, formula = closed.trial, closed.formula
         right = RIGHT.get(form, {}).get(curve.along, set())
-        named = name_of(forms) is not None and best.name in right
+        named = (closed is not None or name_of(forms) is not None) and best.name in right
         out |= {"name": best.name, "left": best.left, "closed": bool(closed), "named": named}
     return out, effect_text(found.name, curve, "a benchmark", formula), trial

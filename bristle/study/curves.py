@@ -78,7 +78,7 @@ class LearnedEffect:
             f"held-out runs falls from {found.before.z:.2f} to {found.after.z:.2f}; that is "
             f"{fall:.0f} % of what exceeds the noise."
         ]
-        best = name_of(self.forms)
+        best = self.closed.form if self.closed else name_of(self.forms)
         if best is not None:
             out.append(
                 f"The curve is nearly {in_words(best, curve)} "

@@ -160,7 +160,7 @@ def close(
     forms : fitted to the curve, the best first
     rule : the numbers that decide between curves
     """
-    able = [one for one in forms if one.left <= rule.follows][:CLOSED]
+    able = [one for one in forms if one.left <= rule.resembles][:CLOSED]
     return next(filter(None, (fit_closed(opened, found, one, rule) for one in able)), None)
 
 
@@ -169,7 +169,8 @@ def fit_closed(
 ) -> Closed | None:
     """Fit a closed form in the place of a learned curve; None where it is clearly worse.
 
-    It has fewer numbers, and holds between and beyond the knots: as good is good enough.
+    It has fewer numbers, and holds between and beyond the knots: as good is good enough, and better
+    where it follows the curve less closely.
 
     Parameters
     ----------
@@ -192,9 +193,8 @@ def fit_closed(
         held_out = opened.held_out.of(opened.held_out.runs)
         model = refine(replace(base, values=values), train, SWEEPS)
         trial = judge(model, train, held_out)
-        if trial.train > rule.as_good * found.after.train or not missing(
-            found.before, trial, opened.rule
-        ):
+        worst = (rule.as_good if form.left <= rule.follows else 1.0) * found.after.train
+        if trial.train > worst or not missing(found.before, trial, opened.rule):
             return None
         std = intervals_of(train, model).std
         given = tuple(

@@ -64,6 +64,15 @@ class LearnRule:
     Trades: if higher, wrong names; if lower, curves without a name. Found: blind seeds.
     """
 
+    resembles: float = 0.35
+    """Largest such share at which a closed form may still take a curve's place.
+
+    Beyond `follows` it must do better than the curve on the training runs: with fewer numbers it
+    only does so if the table between its knots, or a second look, was what fell short. Trades: if
+    higher, fits of forms that have no promise; if lower, ripples that knots hardly resolve keep
+    their table. Found: blind seeds.
+    """
+
     def weighed(self, loss: float, memory: Sequence[tuple[str, float]]) -> float:
         """Return a mean squared residual, raised by what its memory must pay.
 
