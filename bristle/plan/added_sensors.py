@@ -17,11 +17,10 @@ from ..diagnose.rule import BENCH
 from ..identify.rig import DAMPER
 from ..identify.structure import StructureProblem
 from .goal import Purposes, Stated
-from .knowledge import Known
+from .knowledge import Known, of_roles
 from .measured_force import of_one_force, with_measured_force
 from .outcome import Outcome
-from .planned_test import Signals
-from .shaking_table import FORCE, Columns, ShakingTable
+from .shaking_table import FORCE, Shaken, ShakingTable
 
 HELPS, SOME = 1.5, 1.15
 """Factors from which on a sensor is said to help, and from which on the best one is named."""
@@ -93,7 +92,7 @@ def added_sensors(
     table: ShakingTable,
     show: Show,
     stand: Mapping[str, Stated],
-    tests: Sequence[tuple[Signals, Columns]],
+    tests: Sequence[Shaken],
     then: Mapping[str, Sequence[Known]],
     rows: Sequence[Outcome],
 ) -> list[Added]:
@@ -106,7 +105,7 @@ def added_sensors(
     table : simulates the tests
     show : returns the sites of runs that were not measured yet
     stand : the purposes of each site, with what the runs at hand say
-    tests : what each prescribes, and every output of its simulation
+    tests : the tests, simulated
     then : what the runs at hand and the tests say of each site
     rows : the outcomes of the tests
     """
@@ -116,10 +115,11 @@ def added_sensors(
     } | {(DAMPER, "separate", pair): inf for pair in of_one_force(stand)}
     out = []
     for channel in table.lacking():
-        sites = [show([table.measured(*test, (channel,))]) for test in tests]
-        values = _values(stand, sites)
+        sites = [show([table.measured(one.signals, one.columns, (channel,))]) for one in tests]
+        roles = [one.held_out for one in tests]
+        values = _values(stand, sites, roles)
         if channel == FORCE and DAMPER in stand:
-            values |= with_measured_force(stand[DAMPER], sites)
+            values |= with_measured_force(stand[DAMPER], sites, roles)
         helps = {
             key: plain_values[key] / value
             for key, value in values.items()
@@ -132,7 +132,9 @@ def added_sensors(
     return helping or [one for one in out[:1] if one.factor >= SOME]
 
 
-def _values(stand: Mapping[str, Stated], sites: Sequence[Sites]) -> dict[Key, float]:
+def _values(
+    stand: Mapping[str, Stated], sites: Sequence[Sites], roles: Sequence[bool]
+) -> dict[Key, float]:
     """Return the figures with a sensor, smaller ones being better, of sites that stay the same."""
     out: dict[Key, float] = {}
     for site, one in stand.items():
@@ -140,11 +142,8 @@ def _values(stand: Mapping[str, Stated], sites: Sequence[Sites]) -> dict[Key, fl
             continue
         known = []
         for asked, now in zip(one.asked, one.known, strict=True):
-            for k, found in enumerate(sites):
-                runs = found[site].runs
-                count = sum(len(run.x) - run.skip for run in runs)
-                now = now.with_runs(asked.of(runs), count, count * (k % 2))
-            known.append(now)
+            told = [asked.evidence(found[site].runs) for found in sites]
+            known.append(now.with_runs(of_roles(told, roles)))
         out |= {(site, f.purpose, f.name): f.value for f in one.purposes.figures(known)}
     return out
 

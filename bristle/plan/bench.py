@@ -27,7 +27,7 @@ from .rig_limits import RigLimits, limits_of_runs, with_given
 from .search import Planner
 from .wish import Wish, default_wish, errs, note_of_missing, parameters_of
 
-DRAWS = 4
+DRAWS = 12
 """Draws of the motion's error that planned runs are judged with."""
 
 
@@ -135,14 +135,14 @@ def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:
     return Plan(
         name, tuple(one.test for one in tests),
         tuple(one.test.signals(limits) for one in tests),
-        tuple(told), limits, drive, gain,
+        tuple(told), limits, drive, gain, tuple(one.role for one in tests),
     )  # fmt: skip
 
 
 def _or_beyond(left: Outcome, found: Stated, planner: Planner) -> Outcome:
     """Return what a plan leaves open, with whether a test of its own would settle it."""
     for one in planner.looked_at():
-        after = found.goal.with_tests([one, one])[: found.goal.count]
+        after = found.goal.with_pair(one)[: found.goal.count]
         told = outcomes(found.purposes, found.asked, found.known, after)
         if any(other.name == left.name and other.settled for other in told):
             return left

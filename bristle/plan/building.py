@@ -191,7 +191,7 @@ def _joint(stand: Mapping[str, Stated]) -> Goal:
         spread = [np.log([*one.deviations().values()]).mean() for one in found if one.deviations()]
         return float(np.mean(total) + TIE * np.mean(spread or [0.0]))
 
-    return Goal(asked, known, len(asked), cost)
+    return Goal(asked, known, len(asked), cost, any(one.goal.judged for one in stand.values()))
 
 
 def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -> BuildingPlan:
@@ -203,7 +203,7 @@ def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -
         for site, one in stand.items()
     ]
     rows = [one if one.settled else _or_beyond(one, stand, planner) for one in _rows(stand, then)]
-    shown = [planner.response(one.test) for one in tests]
+    shown = [planner.response(one) for one in tests]
     tell("looking at sensors")
     assert planner.table is not None
     assert planner.show is not None
@@ -212,8 +212,8 @@ def _planned(study: Study, stand: Mapping[str, Stated], planner: TablePlanner) -
     return BuildingPlan(
         study.name, tuple(one.test for one in tests),
         tuple(one.test.signals(planner.limits) for one in tests), tuple(rows), planner.limits,
-        study.drive, float(np.exp(np.mean(costs))),
-        predicted=tuple(columns[f"structure.{level}_displacement"] for _, columns in shown),
+        study.drive, float(np.exp(np.mean(costs))), tuple(one.role for one in tests),
+        predicted=tuple(one.columns[f"structure.{level}_displacement"] for one in shown),
         sensors=tuple(sensors), level=level,
     )  # fmt: skip
 
@@ -239,7 +239,7 @@ def _rows(stand: Mapping[str, Stated], then: Mapping[str, Sequence[Known]]) -> l
 def _or_beyond(left: Outcome, stand: Mapping[str, Stated], planner: TablePlanner) -> Outcome:
     """Return what a plan leaves open, with whether a test of its own would settle it."""
     for one in planner.looked_at():
-        told = _rows(stand, _by_site(stand, planner.goal.with_tests([one, one])))
+        told = _rows(stand, _by_site(stand, planner.goal.with_pair(one)))
         if any(other.name == left.name and other.settled for other in told):
             return left
     return replace(left, beyond=True)

@@ -49,6 +49,11 @@ class Purposes:
     parts: Question | None = None
     rule: DecisionRule = BENCH
 
+    @property
+    def judged(self) -> bool:
+        """Whether a verdict is asked for."""
+        return bool(self.effects or self.rivals)
+
     def questions(self) -> list[Question]:
         """Return the questions, in the order in which `figures` takes them."""
         rivals = tuple(one.rival() for one in self.effects)
@@ -104,16 +109,14 @@ def stated(purposes: Purposes, problem: Problem, measured: Measured, z: float, s
         parts = [found[k : k + width] for k in range(0, len(found), width)]
         return float(np.mean([cost_of(purposes.figures(one)) for one in parts]))
 
-    goal = Goal(tuple(a for one in sets for a in one), known * len(sets), width, cost)
+    goal = Goal(
+        tuple(a for one in sets for a in one), known * len(sets), width, cost, purposes.judged
+    )
     return Stated(purposes, asked, known, goal)
 
 
 def _known(asked: Asked, measured: Measured) -> Known:
-    return Known(
-        asked.question, asked.of((*measured.train, *measured.held_out), OF_MEASURED),
-        _samples((*measured.train, *measured.held_out)), _samples(measured.held_out),
-    )  # fmt: skip
-
-
-def _samples(runs: Sequence[Run]) -> int:
-    return sum(len(run.x) - run.skip for run in runs)
+    train, held_out = (
+        asked.evidence(runs, OF_MEASURED) for runs in (measured.train, measured.held_out)
+    )
+    return Known(asked.question, train + held_out.judging())

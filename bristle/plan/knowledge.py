@@ -6,7 +6,7 @@ fit. What a refit of the model's parameters would take up of a change is left ou
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 SPREAD = 0.3
 """Standard deviation at most, over its size, of a parameter that is drawn."""
 
-DRAWS = 4
+DRAWS = 12
 """Draws of the motion's error from which the noise on a planned run is taken."""
 
 
@@ -74,19 +74,24 @@ class Asked:
         self.names = model.free()
         self._scaled = Search(problem, model, problem.expectation(model, 0), self.names)
 
-    def of(self, runs: Sequence[Run], draws: int = DRAWS) -> Array:
-        """Return the normal equations (w, w) of runs, in standard deviations of their noise."""
-        total = np.zeros((self.question.width, self.question.width))
+    def evidence(self, runs: Sequence[Run], draws: int = DRAWS) -> Evidence:
+        """Return what runs say that a model is fitted to."""
+        width = self.question.width
+        normal, scatter = np.zeros((2, width, width))
         for run in runs:
-            columns = self.columns(run, draws)
-            total += columns.T @ columns
-        return total
+            expected = self.problem.planned([run]).expectation(self.question.model, draws)
+            columns = self.columns(run, expected)
+            normal += columns.T @ columns
+            scatter += _scatter(columns, run, expected)
+        return Evidence(normal, normal, scatter, samples_of(runs))
 
-    def columns(self, run: Run, draws: int = DRAWS) -> Array:
-        """Return what each parameter, rival and part of a basis changes on a run (n, w)."""
+    def columns(self, run: Run, expected: Expected) -> Array:
+        """Return what each parameter, rival and part of a basis changes on a run (n, w).
+
+        In standard deviations of the noise; `expected` is what a true model would show there.
+        """
         model = self.question.model
         one = self.problem.planned([run])
-        expected = one.expectation(model, draws)
         search = Search(one, model, expected, self.names)
         search.log, search.scale = self._scaled.log, self._scaled.scale
         search.low, search.high = self._scaled.low, self._scaled.high
@@ -114,7 +119,7 @@ class Asked:
         generator : draws
         """
         p = len(self.names)
-        covariance = np.linalg.inv(known.normal[:p, :p] + np.eye(p) / SPREAD**2)
+        covariance = np.linalg.inv(known.told.fitted[:p, :p] + np.eye(p) / SPREAD**2)
         step = generator.multivariate_normal(np.zeros(p), covariance, method="eigh")
         theta = np.clip(self._scaled.start + step, self._scaled.low, self._scaled.high)
         moved = {n: v for n, v in self._scaled.at(theta).values.items() if n in self.names}
@@ -137,23 +142,78 @@ def _with(model: Model, values: Mapping[str, float]) -> Model:
     return replace(model, values={**model.values, **values})
 
 
-@dataclass(frozen=True)
-class Known:
-    """What runs say of a question: normal equations (w, w), and how many samples they have.
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What runs say: normal equations (w, w), and how many samples they have.
 
+    `normal` of all runs; `fitted` of those that a model is fitted to, `scatter` (w, w) how their
+    noise scatters its products with the columns, more than `fitted` where it lasts over samples;
     `held_out` of the `samples` decide a verdict.
     """
 
-    question: Question
     normal: Array
+    fitted: Array
+    scatter: Array
     samples: int = 0
     held_out: int = 0
 
-    def with_runs(self, normal: Array, samples: int, held_out: int) -> Known:
+    def judging(self) -> Evidence:
+        """Return what the same runs say where they are held out."""
+        nothing = np.zeros_like(self.normal)
+        return Evidence(self.normal, nothing, nothing, self.samples, self.samples)
+
+    def within(self, mask: Array) -> Evidence:
+        """Return what runs say of some columns alone, by a mask (w, w) of 0 and 1."""
+        return Evidence(
+            self.normal * mask, self.fitted * mask, self.scatter * mask, self.samples,
+            self.held_out,
+        )  # fmt: skip
+
+    def __add__(self, other: Evidence) -> Evidence:
+        """Return what the runs of both say."""
+        return Evidence(
+            self.normal + other.normal, self.fitted + other.fitted, self.scatter + other.scatter,
+            self.samples + other.samples, self.held_out + other.held_out,
+        )  # fmt: skip
+
+
+def _scatter(columns: Array, run: Run, expected: Expected) -> Array:
+    """Return the covariance (w, w) of the products of a run's noise with columns (n, w)."""
+    sigma, draws = expected[0][1][run.skip :], expected[0][2][:, run.skip :]
+    own = columns * (run.noise / sigma)[:, None]
+    total = own.T @ own
+    if len(draws) < 2:
+        return np.asarray(total)
+    scores = (draws / sigma) @ columns
+    scores -= scores.mean(axis=0)
+    return np.asarray(total + scores.T @ scores / (len(draws) - 1))
+
+
+def of_roles(told: Sequence[Evidence], held_out: Sequence[bool]) -> list[Evidence]:
+    """Return what runs say, each in its role."""
+    return [one.judging() if out else one for one, out in zip(told, held_out, strict=True)]
+
+
+def samples_of(runs: Sequence[Run]) -> int:
+    """Return how many samples of runs count."""
+    return sum(len(run.x) - run.skip for run in runs)
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What runs say of a question.
+
+    Parameters are known from the runs that are fitted to, what is beside them from all. `typical`
+    (w, w) are normal equations of a sample of what the rig can do, None where nobody looked.
+    """
+
+    question: Question
+    told: Evidence
+    typical: Array | None = None
+
+    def with_runs(self, told: Iterable[Evidence]) -> Known:
         """Return what these runs and further ones say."""
-        return Known(
-            self.question, self.normal + normal, self.samples + samples, self.held_out + held_out
-        )
+        return replace(self, told=sum(told, start=self.told))
 
     @property
     def _own(self) -> int:
@@ -164,10 +224,13 @@ class Known:
 
         Every parameter is known to about its own size beforehand.
         """
+        return self._left(self.told.normal)
+
+    def _left(self, normal: Array) -> Array:
         p = self._own
-        own = self.normal[:p, :p] + np.eye(p)
-        across = self.normal[:p, p:]
-        return np.asarray(self.normal[p:, p:] - across.T @ np.linalg.solve(own, across))
+        across = normal[:p, p:]
+        own = normal[:p, :p] + np.eye(p)
+        return np.asarray(normal[p:, p:] - across.T @ np.linalg.solve(own, across))
 
     def distances(self) -> dict[str, float]:
         """Return how far each rival is from the model, refitted, in standard deviations."""
@@ -181,24 +244,37 @@ class Known:
         """Return how far each rival is from the model as it is, in standard deviations."""
         p = self._own
         return {
-            rival.name: float(np.sqrt(max(self.normal[p + i, p + i], 0.0)))
+            rival.name: float(np.sqrt(max(self.told.normal[p + i, p + i], 0.0)))
             for i, rival in enumerate(self.question.rivals)
         }
 
     def deviations(self) -> dict[str, float]:
         """Return the standard deviation of each parameter of the model, over its size."""
         p = self._own
-        covariance = np.linalg.inv(self.normal[:p, :p] + np.eye(p))
+        inverse = np.linalg.inv(self.told.fitted[:p, :p] + np.eye(p))
+        covariance = inverse @ (self.told.scatter[:p, :p] + np.eye(p)) @ inverse
         return dict(
             zip(self.question.model.free(), np.sqrt(np.diag(covariance)).tolist(), strict=True)
         )
+
+    def of_force(self) -> float:
+        """Return the standard deviation of the force over all that the rig can do, over its noise.
+
+        By the parameters and the free parts together: what a model with a learned curve errs by.
+        """
+        assert self.typical is not None
+        p, q = self._own, self._own + len(self.question.rivals)
+        kept = [*range(p), *range(q, len(self.typical))]
+        prior = [np.ones(p), *(np.full(one.size, one.size**-2.0) for one in self.question.bases)]
+        normal = self.told.fitted[np.ix_(kept, kept)] + np.diag(np.concatenate(prior))
+        return float(np.sqrt(np.trace(np.linalg.solve(normal, self.typical[np.ix_(kept, kept)]))))
 
     def of_bases(self) -> Mapping[str, Array]:
         """Return the standard deviations (m,) of a free part along each basis, law refitted.
 
         Over the noise of a sample: 1 is a part that is known no better than one sample shows.
         """
-        left, first, out = self.left(), len(self.question.rivals), {}
+        left, first, out = self._left(self.told.fitted), len(self.question.rivals), {}
         for basis in self.question.bases:
             block = left[first : first + basis.size, first : first + basis.size]
             block = block + np.eye(basis.size) * basis.size**-2.0

@@ -19,7 +19,7 @@ from ..physics.effect import EFFECTS
 from ..physics.laws import law_of_part
 from .building_sites import are_twins
 from .goal import Purposes, Stated
-from .knowledge import Asked, Known, Question, Rival
+from .knowledge import Asked, Evidence, Known, Question, Rival, of_roles
 from .purposes import seen
 from .questions import AT, SizedRival
 
@@ -45,7 +45,7 @@ def of_one_force(stand: Mapping[str, Stated]) -> set[str]:
 
 
 def with_measured_force(
-    stand: Stated, sites: Sequence[dict[str, StructureProblem]]
+    stand: Stated, sites: Sequence[dict[str, StructureProblem]], roles: Sequence[bool]
 ) -> dict[Key, float]:
     """Return the figures of a reconstructed damper's site if its force were measured in the tests.
 
@@ -53,6 +53,7 @@ def with_measured_force(
     ----------
     stand : the purposes of the site, with what the runs at hand say
     sites : of each test, with the damper's force
+    roles : of each test, whether it is held out
     """
     before = stand.asked[0].problem
     assert isinstance(before, StructureProblem)
@@ -60,22 +61,24 @@ def with_measured_force(
         return {}
     damper = [list(one[DAMPER].runs) for one in sites]
     layer = [one[LAYER] for one in sites if LAYER in one]
-    found = _of_damper(stand, damper)
+    found = _of_damper(stand, damper, roles)
     if len(layer) == len(sites):
         problem = layer[0].of(list(chain(*(one.runs for one in layer))))
         line = fit_line(problem, law_of_part(LAYER).name).model
-        found |= _of_layer(stand.purposes, line, problem, [list(one.runs) for one in layer])
+        found |= _of_layer(stand.purposes, line, problem, [list(one.runs) for one in layer], roles)
         found |= _apart(stand, damper, line, problem)
     return found
 
 
-def _counted(runs: Sequence[Sequence[Run]]) -> tuple[int, int]:
-    """Return the samples of tests, and those held out."""
-    counts = [sum(len(run.x) - run.skip for run in own) for own in runs]
-    return sum(counts), sum(counts[1::2])
+def _evidence(asked: Asked, runs: Sequence[Sequence[Run]], roles: Sequence[bool]) -> Evidence:
+    """Return what tests say of a question."""
+    each = of_roles([asked.evidence(own) for own in runs], roles)
+    return sum(each[1:], start=each[0])
 
 
-def _of_damper(stand: Stated, runs: Sequence[Sequence[Run]]) -> dict[Key, float]:
+def _of_damper(
+    stand: Stated, runs: Sequence[Sequence[Run]], roles: Sequence[bool]
+) -> dict[Key, float]:
     """Return the figures of the damper's own effects and parameters.
 
     The layer's are no part of a measured force: the tests say nothing of them there.
@@ -84,8 +87,8 @@ def _of_damper(stand: Stated, runs: Sequence[Sequence[Run]]) -> dict[Key, float]
     names = [*asked.names, *(one.name for one in asked.question.rivals)]
     own = np.array([not _of_structure(name) for name in names])
     own = np.append(own, np.ones(asked.question.width - len(own), dtype=bool))
-    normal = asked.of(list(chain(*runs))) * np.outer(own, own)
-    known = now.with_runs(normal, *_counted(runs))
+    told = _evidence(asked, runs, roles)
+    known = now.with_runs([told.within(np.outer(own, own))])
     purposes = replace(stand.purposes, rivals=())
     return {
         (DAMPER, one.purpose, one.name): one.value
@@ -101,15 +104,18 @@ def _of_structure(name: str) -> bool:
 
 
 def _of_layer(
-    purposes: Purposes, line: Model, problem: StructureProblem, runs: Sequence[Sequence[Run]]
+    purposes: Purposes,
+    line: Model,
+    problem: StructureProblem,
+    runs: Sequence[Sequence[Run]],
+    roles: Sequence[bool],
 ) -> dict[Key, float]:
     """Return from what size the layer's effects are named at their own site."""
     effects = [one for one in purposes.effects if _of_structure(one.sized.name)]
     question = Question(line, tuple(_on_line(one, line) for one in effects))
     if not effects:
         return {}
-    asked = Asked(question, problem)
-    known = Known(question, asked.of(problem.runs), *_counted(runs))
+    known = Known(question, _evidence(Asked(question, problem), runs, roles))
     return {(DAMPER, one.purpose, one.name): one.value for one in seen(known, SITE)}
 
 
@@ -149,5 +155,5 @@ def _distance(problem: Problem, runs: Sequence[Run], one: Model, other: Model) -
     if (one.law, one.effects) == (other.law, other.effects):
         return 0.0
     question = Question(one, (Rival("other", other, one),))
-    known = Known(question, Asked(question, problem).of(runs))
+    known = Known(question, Asked(question, problem).evidence(runs))
     return known.distances()["other"]

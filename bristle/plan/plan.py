@@ -38,7 +38,7 @@ class Plan:
     study : str
         The study's name, "" before the first measurement.
     tests : tuple of Test
-        The tests, in order; those at odd places are held out.
+        The tests, in order.
     signals : tuple of Signals
         What each prescribes, at the controller's rate.
     outcomes : tuple of Outcome
@@ -49,6 +49,8 @@ class Plan:
         The channel of the command, "" where there is none.
     gain : float
         By what factor the figures become smaller on average.
+    roles : tuple of str
+        What each test is for: "train" or "holdout".
     notes : tuple of str
         What weakens the plan, in sentences.
 
@@ -80,6 +82,7 @@ class Plan:
     limits: RigLimits
     drive: str
     gain: float
+    roles: tuple[str, ...]
     notes: tuple[str, ...] = ()
     rig: ClassVar[str] = "bench"
 
@@ -96,9 +99,8 @@ class Plan:
             channels = {"displacement": signals.x}
             if drive is not None:
                 channels[drive.name] = signals.V
-            role = "holdout" if k % 2 else "train"
             about = test.words(signals, drive)
-            out.append(PlannedRun(f"plan_{k + 1}", role, about, signals.time, channels))
+            out.append(PlannedRun(f"plan_{k + 1}", self.roles[k], about, signals.time, channels))
         return out
 
     def sentences(self) -> list[str]:

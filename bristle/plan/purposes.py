@@ -68,8 +68,8 @@ def seen(
         no test shows less
     """
     least = least or {}
-    held_out = known.held_out
-    wanted = named_distance(known.samples, held_out, rule) if held_out else inf
+    held_out = known.told.held_out
+    wanted = named_distance(known.told.samples, held_out, rule) if held_out else inf
     left, raw = known.distances(), known.raw()
     return [
         Figure(
@@ -100,7 +100,9 @@ def sharpened(known: Known, names: Sequence[str]) -> list[Figure]:
 
 
 def learned(known: Known) -> list[Figure]:
-    """Return how well a part without a form is held along each coordinate: its worst knots."""
+    """Return how well a part without a form is held: over all the rig can do, or by coordinate."""
+    if known.typical is not None:
+        return [Figure("learn", "force", known.of_force(), 1e-3)]
     return [
         Figure("learn", name, float(np.sqrt(np.mean(spread**2))), 1e-3)
         for name, spread in known.of_bases().items()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from os import cpu_count
 from typing import ClassVar
 
@@ -13,10 +14,11 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from ..data.noise import white_noise
 from ..errors import StudyError
 from ..identify.model import Run
 from ..progress import Count, tell
-from .knowledge import Asked, Known
+from .knowledge import Asked, Evidence, Known
 from .motions import Command, Waveform
 from .planned_test import Signals, Test
 from .rig_limits import RESERVE, RigLimits
@@ -48,17 +50,42 @@ SECOND = 1000
 """Distance between the seeds of the two."""
 
 
+HELD_OUT = 4
+"""Of so many tests one is held out where parameters and curves are all that is asked for."""
+
+
+def roles_of(count: int, judged: bool) -> list[bool]:
+    """Return of each of so many tests whether it is held out; one that is follows its like.
+
+    Parameters
+    ----------
+    count : of the tests
+    judged : whether a verdict is asked for, which held-out runs decide: then every second one is
+    """
+    every = 2 if judged or count < HELD_OUT else HELD_OUT
+    return [k % every == 1 for k in range(count)]
+
+
 @dataclass(frozen=True, eq=False)
 class Seen:
     """A test as it would be seen: what it prescribes.
 
-    `normals`, `samples` its normal equations, and the samples that count, per question.
+    `shown` what it would say per question if it is fitted to; `held_out` whether it is to judge by.
     """
 
     test: Test
     signals: Signals
-    normals: tuple[Array, ...]
-    samples: tuple[int, ...]
+    shown: tuple[Evidence, ...]
+    held_out: bool = False
+
+    @property
+    def role(self) -> str:
+        """What the test is for, as files have it."""
+        return "holdout" if self.held_out else "train"
+
+    def told(self, k: int) -> Evidence:
+        """Return what it would say of a question."""
+        return self.shown[k].judging() if self.held_out else self.shown[k]
 
 
 @dataclass(frozen=True)
@@ -67,23 +94,31 @@ class Goal:
 
     `asked` the questions, over and over where parameters are drawn, the `count` first ones with the
     fitted ones; `known` what the runs at hand say of them; `cost` what is to become small, of what
-    runs would say.
+    runs would say; `judged` whether it is a verdict, which the tests that are held out decide.
     """
 
     asked: tuple[Asked, ...]
     known: tuple[Known, ...]
     count: int
     cost: Callable[[Sequence[Known]], float]
+    judged: bool = True
 
     def with_tests(self, tests: Sequence[Seen]) -> list[Known]:
         """Return what the runs at hand and tests would say of each question."""
-        return [
-            known.with_runs(
-                sum((one.normals[k] for one in tests), np.zeros(1)),
-                sum(one.samples[k] for one in tests), sum(one.samples[k] for one in tests[1::2]),
-            )
-            for k, known in enumerate(self.known)
-        ]  # fmt: skip
+        return [known.with_runs(one.told(k) for one in tests) for k, known in enumerate(self.known)]
+
+    def with_pair(self, one: Seen) -> list[Known]:
+        """Return what the runs at hand, a test and another one to judge by would say."""
+        return self.with_tests([one, replace(one, held_out=True)])
+
+    def among(self, tests: Sequence[Seen]) -> Goal:
+        """Return the goal where tests show what the rig can do."""
+        known = []
+        for k, one in enumerate(self.known):
+            told = [test.shown[k] for test in tests if test.shown[k].samples]
+            typical = np.mean([each.normal / each.samples for each in told], axis=0)
+            known.append(replace(one, typical=typical if told else None))
+        return replace(self, known=tuple(known))
 
     def value(self, tests: Sequence[Seen]) -> float:
         """Return the cost of the runs at hand with tests."""
@@ -131,7 +166,7 @@ class Planner:
     )
 
     def plan(self) -> list[Seen]:
-        """Return the tests, in pairs: one to fit to, and one of its kind to judge by.
+        """Return the tests: those to fit to, and others of their kind to judge by.
 
         Raises
         ------
@@ -150,22 +185,39 @@ class Planner:
             found = [one for one in pool.map(look, tests) if one is not None]
         if not found:
             raise StudyError(self.nothing_kept)
-        picked: list[Seen] = []
-        for number in range(-(-self.limits.runs // 2)):
-            best = min(found, key=lambda one: self.goal.value([*picked, *self._both(one)]))
-            if len(found) > 1:
-                found.remove(best)  # the next test shall be another one
-            tell(f"improving test {number + 1}")
-            best = self._improved(best, picked)
-            picked += self._both(best, exact=True)
-        return picked[: self.limits.runs]
+        roles = roles_of(self.limits.runs, self.goal.judged)
+        goal, picked = self.goal.among(found), list[Seen]()
+        for own, following in pairwise([*roles, False]):
+            if not own:
+                tell(f"improving test {len(picked) + 1}")
+                picked += self._next(goal, found, picked, following)
+        return picked
 
-    def _both(self, one: Seen, exact: bool = False) -> list[Seen]:
-        """Return a test and the second one of its kind, which until it matters is like it."""
-        if self.limits.runs == 1:
-            return [one]
-        twin = self.see(self.twin(one.test)) if exact else one
-        return [one, twin or one]
+    def _next(
+        self, goal: Goal, found: list[Seen], picked: Sequence[Seen], judged: bool
+    ) -> list[Seen]:
+        """Return the test that serves best beside others, and where it is judged one of its kind.
+
+        Parameters
+        ----------
+        goal : what the tests shall serve
+        found : tests that may be picked; the one that is picked leaves them
+        picked : those that are picked already
+        judged : whether a second one is held out
+        """
+
+        def cost(one: Seen) -> float:
+            second = [replace(one, held_out=True)] if judged else []  # until it matters alike
+            return goal.value([*picked, one, *second])
+
+        best = min(found, key=cost)
+        if len(found) > 1:
+            found.remove(best)  # the next test shall be another one
+        best = self._improved(best, cost)
+        if not judged:
+            return [best]
+        twin = self.see(self.twin(best.test)) or best
+        return [best, replace(twin, held_out=True)]
 
     def looked_at(self) -> list[Seen]:
         """Return the tests that were looked at and keep the limits."""
@@ -191,8 +243,8 @@ class Planner:
             test = test.smaller(SMALLER)
         else:
             return None
-        normals = tuple(asked.of([run]) for asked in self.goal.asked)
-        return Seen(test, signals, normals, (len(run.x) - run.skip,) * len(normals))
+        shown = (asked.evidence([self._recorded(asked, run)]) for asked in self.goal.asked)
+        return Seen(test, signals, tuple(shown))
 
     def _run(self, signals: Signals) -> Run:
         count = len(signals.x)
@@ -203,6 +255,15 @@ class Planner:
             "plan", signals.dt, signals.x, signals.v, signals.a, signals.V, nothing, self.noise,
             draws, drive=self.drive,
         )  # fmt: skip
+
+    def _recorded(self, asked: Asked, run: Run) -> Run:
+        """Return a run with the noise that will be estimated of its force.
+
+        A force that turns within a few samples is taken for noise in part, and weighs less.
+        """
+        force = asked.problem.planned([run]).predict(asked.question.model, run)
+        white = np.random.default_rng(self.seed).normal(0.0, self.noise, len(force))
+        return replace(run, noise=max(self.noise, white_noise(force + white)))
 
     def _keeps(self, run: Run) -> bool:
         """Return whether a run keeps the limits of force and heat, by every model in question."""
@@ -267,22 +328,22 @@ class Planner:
         bottom, top = self.limits.nearest(bottom), self.limits.nearest(top)
         return Command(kind, bottom, top, period, seed)
 
-    def _improved(self, best: Seen, picked: Sequence[Seen]) -> Seen:
+    def _improved(self, best: Seen, cost: Callable[[Seen], float]) -> Seen:
         """Return a test after a search about it for size, frequencies, levels and dwell."""
         known = {best.test: best}
 
-        def cost(point: Array) -> float:
+        def at(point: Array) -> float:
             one = self.see(self._moved(best.test, point))
             if one is None:
                 return 1e3
             known[one.test] = one
-            return self.goal.value([*picked, *self._both(one)])
+            return cost(one)
 
         start = np.zeros(5)
         simplex = np.vstack([start, 0.4 * np.eye(5)])
         options = {"maxfev": self.improved, "initial_simplex": simplex}
-        minimize(cost, start, method="Nelder-Mead", options=options)
-        return min(known.values(), key=lambda one: self.goal.value([*picked, *self._both(one)]))
+        minimize(at, start, method="Nelder-Mead", options=options)
+        return min(known.values(), key=cost)
 
     def _moved(self, test: Test, point: Array) -> Test:
         """Return a test with its numbers moved by a point (5,) of logarithms and shares."""

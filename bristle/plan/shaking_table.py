@@ -26,6 +26,19 @@ from .rig_limits import RESERVE, RigLimits
 Array = NDArray[np.float64]
 Columns = Mapping[str, Array]
 
+
+@dataclass(frozen=True, eq=False)
+class Shaken:
+    """A test, simulated.
+
+    `signals` what it prescribes; `columns` every output; `held_out` whether it is to judge by.
+    """
+
+    signals: Signals
+    columns: Columns
+    held_out: bool
+
+
 FORCE = "force"
 DEMANDS = ("damper_stroke", "drift", "force", "heat")
 """What a building's response asks for, by the names of `RigLimits`."""

@@ -12,7 +12,7 @@ from ..identify.structure import StructureProblem
 from .motions import Waveform
 from .planned_test import Signals, Test
 from .search import LEAST, Planner, Seen
-from .shaking_table import Columns, ShakingTable
+from .shaking_table import Columns, Shaken, ShakingTable
 
 TRIES, GENTLE, STEEP = 6, 0.97, 0.3
 """How often a motion beyond a limit is made smaller, how far below that limit, at the most by."""
@@ -38,13 +38,13 @@ class TablePlanner(Planner):
         "or acceleration of the table, or a larger stroke of the damper or drift, is needed."
     )
 
-    def response(self, test: Test) -> tuple[Signals, Columns]:
+    def response(self, one: Seen) -> Shaken:
         """Return what a test prescribes, and every output of the simulation."""
         assert self.table is not None
-        signals = test.signals(self.limits, self.rate)
+        signals = one.test.signals(self.limits, self.rate)
         columns = self.table.response(signals)
         assert columns is not None
-        return signals, columns
+        return Shaken(signals, columns, one.held_out)
 
     def _look(self, test: Test) -> Seen | None:
         assert self.table is not None
@@ -67,12 +67,11 @@ class TablePlanner(Planner):
             found = self.show([self.table.measured(signals, columns)])
         except RecordError:  # the base does not move
             return None
-        normals, samples = [], []
-        for site, asked in zip(self.places, self.goal.asked, strict=True):
-            runs = found[site].runs if site in found else []
-            normals.append(asked.of(runs))
-            samples.append(sum(len(run.x) - run.skip for run in runs))
-        return Seen(test, signals, tuple(normals), tuple(samples))
+        shown = (
+            asked.evidence(found[site].runs if site in found else [])
+            for site, asked in zip(self.places, self.goal.asked, strict=True)
+        )
+        return Seen(test, signals, tuple(shown))
 
     def _motion(self, which: float, at: float, seed: int) -> Waveform:
         """Return a motion by two numbers between 0 and 1: a record, or its kind and frequency."""

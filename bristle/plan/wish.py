@@ -47,7 +47,7 @@ def default_wish(study: Study) -> Wish:
     if kind == "ambiguous" and len(named) > 1 and all(name in EFFECTS for name in named):
         return Wish(separate=named)
     if kind == "unknown":
-        return Wish(sharpen=(), learn=())
+        return Wish(learn=())
     return Wish(see=(), sharpen=())
 
 

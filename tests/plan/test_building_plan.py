@@ -292,7 +292,10 @@ def a_plan(**changed: Any) -> BuildingPlan:
     rows = (replace(PAIR, settled=False),)
     base = tuple(0.001 * one.a for one in signals)
     given = {"predicted": base, "sensors": (Added("force", PAIR, np.inf, True),)} | changed
-    return BuildingPlan("tower", tuple(tests), signals, rows, LIMITS, "voltage", 1.0, **given)
+    roles = ("train", "holdout")
+    return BuildingPlan(
+        "tower", tuple(tests), signals, rows, LIMITS, "voltage", 1.0, roles, **given
+    )
 
 
 def test_a_plan_is_worth_its_tests_where_a_sensor_settles() -> None:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.ndimage import uniform_filter1d
 
 import bristle
 from bristle.errors import StudyError
 from bristle.example.make import Choice, make_bench
+from bristle.identify.fit import intervals_of
 from bristle.identify.model import Model, Problem, Run
 from bristle.plan.folder import read_plan
-from bristle.plan.knowledge import Asked, Known, Question, Rival
+from bristle.plan.knowledge import Asked, Evidence, Known, Question, Rival
 from bristle.plan.purposes import Figure, cost_of, seen
+from bristle.plan.rig_limits import RigLimits
+from bristle.plan.search import Goal, Planner, roles_of
 from bristle.plan.wish import Wish, default_wish
 
 SHEET = """schema = 1
@@ -66,7 +71,7 @@ def test_deviations_and_distances_are_those_of_least_squares() -> None:
     more = Model("bingham", values={**PLAIN.values, "c_0": 23.0}, fixed=PLAIN.fixed)
     question = Question(PLAIN, (Rival("thicker", more, PLAIN),))
     asked = Asked(question, Problem([run]))
-    known = Known(question, asked.of([run]), len(run.x))
+    known = Known(question, asked.evidence([run]))
     J = np.stack([np.sign(run.v), run.v], axis=1)[run.skip :] / run.noise
     exact = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
     for name, std in zip(("f_c", "c_0"), exact, strict=True):
@@ -79,11 +84,69 @@ def test_deviations_and_distances_are_those_of_least_squares() -> None:
 def test_runs_add_up_and_never_tell_less() -> None:
     runs = [a_run(0.01), a_run(0.004)]
     asked = Asked(Question(PLAIN), Problem(runs))
-    both = asked.of(runs)
-    assert both == pytest.approx(asked.of(runs[:1]) + asked.of(runs[1:]))
-    one = Known(asked.question, asked.of(runs[:1]), 1000)
-    more = one.with_runs(asked.of(runs[1:]), 1000, 0)
+    first, second = (asked.evidence([run]) for run in runs)
+    assert asked.evidence(runs).normal == pytest.approx((first + second).normal)
+    one = Known(asked.question, first)
+    more = one.with_runs([second])
     assert all(more.deviations()[name] < one.deviations()[name] for name in ("f_c", "c_0"))
+
+
+def test_the_deviations_are_the_intervals_that_a_fit_would_give() -> None:
+    run = a_run()
+    generator = np.random.default_rng(4)
+    # An error of the velocity that lasts some 0.1 s: far worse than as much white noise.
+    lasting = uniform_filter1d(generator.normal(0.0, 0.01, (24, len(run.x))), 20, axis=1)
+    draws = np.zeros((24, len(run.x), 4))
+    draws[:, :, 1] = lasting
+    run = replace(run, draws=draws)
+    white = generator.normal(0.0, run.noise, len(run.x))
+    run = replace(run, force=Problem([run]).predict(PLAIN, run) + white)
+    problem = Problem([run])
+    asked = Asked(Question(PLAIN), problem)
+    known = Known(asked.question, asked.evidence([run], draws=24))
+    std = intervals_of(problem, PLAIN).std
+    for name, found in known.deviations().items():
+        assert found * asked.spread(name)[0] == pytest.approx(std[name], rel=0.1)
+    short = replace(known.told, scatter=known.told.fitted)
+    assert replace(known, told=short).deviations()["c_0"] < 0.7 * known.deviations()["c_0"]
+
+
+def test_the_mean_variance_of_the_force_on_the_runs_of_the_fit_is_that_of_the_parameters() -> None:
+    run = a_run()
+    asked = Asked(Question(PLAIN), Problem([run]))
+    told = asked.evidence([run])
+    known = Known(asked.question, told, told.normal / told.samples)
+    assert known.of_force() == pytest.approx(np.sqrt(2.0 / told.samples), rel=1e-3)
+
+
+def test_a_force_that_turns_within_samples_is_taken_for_noise_in_part() -> None:
+    run = a_run()
+    asked = Asked(Question(PLAIN), Problem([run]))
+    own = RigLimits(stroke=0.02, speed=0.25, rate=1.0 / run.dt)
+    planner = Planner(Goal((asked,), (), 1, cost=len), own, run.noise, run.draws, 1.0 / run.dt)
+    t = np.arange(len(run.x)) * run.dt
+    slow, fast = (
+        planner._recorded(asked, replace(run, v=0.1 * np.cos(2.0 * np.pi * f * t))).noise
+        for f in (0.5, 20.0)
+    )
+    assert slow == pytest.approx(run.noise, rel=0.15)
+    assert fast > 3.0 * run.noise
+
+
+def test_a_run_that_is_held_out_decides_and_is_not_fitted_to() -> None:
+    run = a_run()
+    asked = Asked(Question(PLAIN), Problem([run]))
+    one = Known(asked.question, asked.evidence([run]))
+    more = one.with_runs([asked.evidence([run]).judging()])
+    assert more.deviations() == one.deviations()
+    assert (more.told.held_out, more.told.samples) == (one.told.samples, 2 * one.told.samples)
+
+
+def test_a_verdict_needs_half_of_the_tests_and_parameters_a_quarter() -> None:
+    assert roles_of(4, judged=True) == [False, True, False, True]
+    assert roles_of(8, judged=False) == [False, True, False, False] * 2
+    assert roles_of(2, judged=False) == [False, True]
+    assert roles_of(1, judged=True) == [False]
 
 
 def test_a_figure_costs_nothing_below_what_is_enough() -> None:
@@ -139,7 +202,8 @@ def test_the_same_seed_gives_the_same_plan(sheet: Path) -> None:
 
 def test_what_is_at_the_resolution_of_the_integration_gains_nothing() -> None:
     question = Question(PLAIN, (Rival("lag", PLAIN, PLAIN),))
-    known = Known(question, 4e4 * np.eye(question.width), 1000, 500)
+    normal = 4e4 * np.eye(question.width)
+    known = Known(question, Evidence(normal, normal, normal, 1000, 500))
     coarse, fine = (seen(known, least={"lag": least})[0].cost for least in (1.0, 1e-6))
     assert coarse == 0.0 < fine
 
@@ -197,7 +261,7 @@ def test_a_data_sheet_with_mistakes_is_refused(
     [
         ({"kind": "ambiguous", "effects": ["gas_spring", "duffing"]},
          Wish(separate=("gas_spring", "duffing"))),
-        ({"kind": "unknown", "effects": []}, Wish(sharpen=(), learn=())),
+        ({"kind": "unknown", "effects": []}, Wish(learn=())),
         ({"kind": "none", "effects": []}, Wish(see=(), sharpen=())),
         (None, Wish(see=(), sharpen=())),
     ],
