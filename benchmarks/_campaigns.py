@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +23,10 @@ from bristle.plan.planned_test import Test
 from bristle.plan.rig_limits import RigLimits
 from bristle.study.create import create_study
 from bristle.study.study import Study
+from tests.independent.experiments import proposed
 
+from ._blind import cases
+from ._blind.plan import make_plan
 from ._blind.subject import measurements
 
 LIMITS = RigLimits(
@@ -42,6 +47,9 @@ command = ["0 V", "8 V"]
 band = ["0.3 Hz", "8 Hz"]
 """
 """The same as a rig.toml; its force is a data sheet's round number."""
+
+IN_USE = 0.8
+"""Share of the stroke that a hidden rig is driven to."""
 
 CHANNELS = ("displacement", "velocity", "voltage", "force")
 
@@ -85,29 +93,94 @@ class TrueRig:
 
     def study(self, runs: Sequence[PlannedRun], folder: Path) -> Study:
         """Return an example with these runs in place of its own."""
-        folder.mkdir(parents=True)
-        files = []
-        for run, one in zip(runs, self.performed(runs), strict=True):
-            files.append(
-                folder / f"{'holdout' if run.role == 'holdout' else 'train'}_{run.name}.csv"
-            )
-            write_csv(files[-1], one)
+        files = _written(runs, self.performed(runs), folder)
         study = create_study(folder / "study", files, law=self.law, rig="bench").study
         seal(study.folder, self.answer)
         return study
 
 
-def _runs(tests: Sequence[Test], name: str) -> list[PlannedRun]:
+class HiddenRig:
+    """A rig of the blind benchmark's generator, with an effect that the library does not have.
+
+    Parameters
+    ----------
+    seed : of the cases
+    number : of the case among them, at 15 or 40 % and with 1 % noise
+    """
+
+    def __init__(self, seed: int, number: int) -> None:
+        tasks = make_plan(seed, 3 * (number + 1) + 12, "outside")
+        self.task = [one for one in tasks if one.noise == 0.01 and one.strength > 0.05][number]
+        self._made = cases.make(self.task)
+        rig = self._made.specimen.rig
+        self.limits = replace(
+            LIMITS, stroke=IN_USE * rig.stroke, speed=rig.speed, acceleration=np.inf
+        )
+        self._rig = rig
+
+    def sheet(self, path: Path) -> Path:
+        """Write the data sheet of the rig as a rig.toml; return its path."""
+        limits = self.limits
+        path.write_text(
+            f"""schema = 1
+[damper]
+law = "{self.task.law}"
+max_force = "{self._rig.force:.2g} N"
+[limits]
+stroke = "{limits.stroke:.6g} m"
+speed = "{limits.speed:.6g} m/s"
+command = ["0 V", "8 V"]
+band = ["0.3 Hz", "8 Hz"]
+""",
+            encoding="utf-8",
+        )
+        return path
+
+    def performed(self, runs: Sequence[PlannedRun]) -> list[Signals]:
+        """Return what the rig's instruments show of runs."""
+        out = []
+        for k, run in enumerate(runs):
+            given = (run.signals["displacement"], run.signals["voltage"])
+            one = proposed(self._rig, given, run.role, {})
+            out.append(_signals(self._made.perform(one, self.task.seed + k, run.name)))
+        return out
+
+    def own(self) -> dict[str, Signals]:
+        """Return the runs that the generator makes of the rig by itself."""
+        return {run["name"]: _signals(run) for run in self._made.runs}
+
+    def study(self, runs: Sequence[PlannedRun], folder: Path) -> Study:
+        """Return a study of runs on the rig."""
+        files = _written(runs, self.performed(runs), folder)
+        return create_study(folder / "study", files, law=self.task.law, rig="bench").study
+
+
+def _signals(run: dict[str, Any]) -> Signals:
+    return {name: values for name, values in run.items() if name not in ("name", "role")}
+
+
+def _written(runs: Sequence[PlannedRun], shown: Sequence[Signals], folder: Path) -> list[Path]:
+    """Write recorded runs as files whose names have their roles; return the files."""
+    folder.mkdir(parents=True)
+    files = []
+    for run, one in zip(runs, shown, strict=True):
+        role = "holdout" if run.role == "holdout" else "train"
+        files.append(folder / f"{role}_{run.name}.csv")
+        write_csv(files[-1], one)
+    return files
+
+
+def _runs(tests: Sequence[Test], name: str, limits: RigLimits) -> list[PlannedRun]:
     out = []
     for k, test in enumerate(tests):
-        one = test.signals(LIMITS)
+        one = test.signals(limits)
         signals = {"displacement": one.x, "voltage": one.V}
         role = "holdout" if k % 2 else "train"
         out.append(PlannedRun(f"{name}_{k + 1}", role, "", one.time, signals))
     return out
 
 
-def chirps(seed: int) -> list[PlannedRun]:
+def chirps(seed: int, limits: RigLimits = LIMITS) -> list[PlannedRun]:
     """Return the paper's chirp under a sine of the command, four times."""
     rng = np.random.default_rng([seed, 1])
     return _runs(
@@ -115,22 +188,22 @@ def chirps(seed: int) -> list[PlannedRun]:
             Test(Waveform("sweep", 0.4, float(rng.uniform(4.0, 6.0))),
                  Command("sine", 0.0, 5.0, float(rng.uniform(0.7, 2.0))))
             for _ in range(4)
-        ], "chirp",
+        ], "chirp", limits,
     )  # fmt: skip
 
 
-def random_runs(seed: int) -> list[PlannedRun]:
+def random_runs(seed: int, limits: RigLimits = LIMITS) -> list[PlannedRun]:
     """Return seven random runs under random steps of the command."""
     return _runs(
         [
             Test(Waveform("multisine", 0.5, 5.0, 10 * seed + k),
                  Command("random", 0.0, 8.0, 0.7, k), seconds=48.0 / 7.0)
             for k in range(7)
-        ], "random",
+        ], "random", limits,
     )  # fmt: skip
 
 
-def sines(seed: int) -> list[PlannedRun]:
+def sines(seed: int, limits: RigLimits = LIMITS) -> list[PlannedRun]:
     """Return sines at three amplitudes and four levels of the command."""
     rng = np.random.default_rng([seed, 3])
     f = float(rng.uniform(1.0, 2.0))
@@ -139,7 +212,7 @@ def sines(seed: int) -> list[PlannedRun]:
             Test(Waveform("sine", 0.3, f), Command("held", 0.0, level), share, 4.0)
             for share in (1.0, 0.5, 0.25)
             for level in (0.0, 8.0 / 3.0, 16.0 / 3.0, 8.0)
-        ], "sine",
+        ], "sine", limits,
     )  # fmt: skip
 
 
@@ -152,7 +225,7 @@ def few_sines(seed: int) -> list[PlannedRun]:
         for level in (low, high)
         for share in (0.9, 0.8, 0.45, 0.4)
     ]
-    return _runs(tests, "sine")
+    return _runs(tests, "sine", LIMITS)
 
 
 ORDINARY = {"chirp": chirps, "random": random_runs, "sines": sines}
