@@ -327,6 +327,19 @@ def test_the_server_ends_its_commands_when_it_ends(home: Path) -> None:
     assert process.poll() is not None
 
 
+def test_a_worker_whose_page_has_ended_ends_without_a_word(tmp_path: Path) -> None:
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "bristle.page.worker"],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    assert worker.stdin is not None
+    assert worker.stdout is not None
+    worker.stdout.close()
+    asked = {"view": "data", "folder": str(tmp_path), "arguments": {}}
+    _, said = worker.communicate(json.dumps(asked).encode() + b"\n", timeout=60.0)
+    assert (worker.returncode, b"Traceback" in said) == (0, False)
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="Ctrl-C of another process is POSIX")
 def test_ctrl_c_ends_the_page_and_its_worker(home: Path) -> None:
     order = [sys.executable, "-m", "bristle.cli", "page", str(home), "--no-browser"]
