@@ -32,7 +32,7 @@ from .measured_force import of_one_force
 from .outcome import Outcome, outcomes
 from .purposes import cost_of
 from .rig_limits import RigLimits, with_given
-from .search import Goal
+from .seen import Goal
 from .shaking_limits import limits_of_shaking
 from .shaking_table import ShakingTable
 from .table_planner import TablePlanner

@@ -12,7 +12,7 @@ from ..identify.model import Model, Problem, Run
 from .knowledge import Asked, Known, Question
 from .purposes import Figure, cost_of, learned, seen, separated, sharpened
 from .questions import SizedRival
-from .search import Goal
+from .seen import Goal
 
 DRAWN = 2
 """Further values of the parameters at which a plan is judged: it holds beside the fitted ones."""

@@ -11,7 +11,8 @@ from ..errors import RecordError
 from ..identify.structure import StructureProblem
 from .motions import Waveform
 from .planned_test import Signals, Test
-from .search import LEAST, Planner, Seen
+from .search import LEAST, Planner
+from .seen import Seen
 from .shaking_table import Columns, Shaken, ShakingTable
 
 TRIES, GENTLE, STEEP = 6, 0.97, 0.3

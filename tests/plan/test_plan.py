@@ -18,7 +18,8 @@ from bristle.plan.folder import read_plan
 from bristle.plan.knowledge import Asked, Evidence, Known, Question, Rival
 from bristle.plan.purposes import Figure, cost_of, seen
 from bristle.plan.rig_limits import RigLimits
-from bristle.plan.search import Goal, Planner, roles_of
+from bristle.plan.search import Planner
+from bristle.plan.seen import Goal, roles_of
 from bristle.plan.wish import Wish, default_wish
 
 SHEET = """schema = 1
