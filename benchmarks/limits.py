@@ -104,7 +104,9 @@ def _opened(number: int) -> Opening:
 
 def _clean(opened: Opening) -> Known:
     deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
-    return _known(opened.problem, opened.before.model, deciding)
+    model = opened.before.model
+    expected = opened.problem.expectation(model)
+    return Known(opened.problem, model, expected, deciding, judging=opened.held_out)
 
 
 def _within(number: int) -> Answer:

@@ -79,7 +79,8 @@ def _limits(found: Finding, opened: Opening, profile: bool) -> tuple[EffectLimit
     model = (found.after if found.kind == "effect" else opened.before).model
     problem = opened.searched
     deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
-    known = Known(problem, model, problem.expectation(model), deciding, opened.rule)
+    expected = problem.expectation(model)
+    known = Known(problem, model, expected, deciding, opened.rule, opened.held_out)
     able = [
         name
         for name in _able(found, opened)

@@ -38,6 +38,9 @@ ALIKE = 0.1
 ONE_SIDED, TWO_SIDED = 1.645, 1.96
 """Standard deviations of a 95 % limit."""
 
+UNSHOWN = 0.05
+"""What the runs that decide show of an effect at the least, over those that are fitted to."""
+
 NINE_OF_TEN = 1.282
 """Standard deviations above the mean that 9 of 10 stay below."""
 
@@ -304,8 +307,28 @@ def _named(sized: Sized, least: float) -> tuple[float | None, float | None]:
     sized : the effect
     least : where it is looked at first
     """
-    known, size = sized.known, least
+    known = sized.known
     wanted = named_distance(len(known.plain), known.held_out, known.rule)
+    size = _distant(sized, least, wanted)
+    if size is not None and known.judging is not None:
+        wanted /= max(_shown_there(sized, size), UNSHOWN)
+        size = _distant(sized, size, wanted)
+    return (None, None) if size is None else (sized.value(size), wanted / known.size)
+
+
+def _shown_there(sized: Sized, size: float) -> float:
+    """Return what a sample that decides shows of an effect, over one that is fitted to."""
+    there = sized.change_there(size)
+    here = sized.known.beyond(sized.change(size))
+    return float(np.linalg.norm(there) / np.linalg.norm(here) * sqrt(len(here) / len(there)))
+
+
+def _distant(sized: Sized, least: float, wanted: float) -> float | None:
+    """Return the size at which an effect is so many standard deviations from none.
+
+    None beyond the parameter's bounds; `least` is the size that is looked at first.
+    """
+    known, size = sized.known, least
 
     def beyond(size: float) -> float:
         return float(np.linalg.norm(known.beyond(sized.change(size)))) / wanted - 1.0
@@ -314,11 +337,11 @@ def _named(sized: Sized, least: float) -> tuple[float | None, float | None]:
         size = float(np.clip(size / (1.0 + beyond(size)), SMALLEST, LARGEST))
         off = beyond(size)
         if not sized.ended(size) and abs(off) <= ALIKE:
-            return sized.value(size / (1.0 + off)), wanted / known.size
+            return size / (1.0 + off)
     low = size = least
     while beyond(size) < 0.0:
         if sized.ended(size) or size >= LARGEST:
-            return None, None
+            return None
         low, size = size, STEP * size
     size = _crossing(beyond, low, size) if low < size else size
-    return (None, None) if sized.ended(size) else (sized.value(size), wanted / known.size)
+    return None if sized.ended(size) else size

@@ -23,6 +23,9 @@ from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
 
+FEW = 4
+"""Draws of the motion's error from which the noise on the runs that decide is taken."""
+
 TOLD = 1e-3
 """Size of a direction, over the largest, in which the runs tell the model's parameters."""
 
@@ -31,7 +34,8 @@ TOLD = 1e-3
 class Known:
     """What all limits of some runs are found with: the model's residuals and sensitivities.
 
-    `names` of the model's free parameters; `held_out` how many samples decide a verdict.
+    `names` of the model's free parameters; `held_out` how many samples decide a verdict; `judging`
+    the runs that these are of, None where a sample of them is taken to be like one of the others.
     """
 
     problem: Problem
@@ -39,6 +43,13 @@ class Known:
     expected: Expected
     held_out: int
     rule: DecisionRule = BENCH
+    judging: Problem | None = None
+
+    @cached_property
+    def expected_there(self) -> Expected:
+        """What a true model would show on the runs that decide."""
+        assert self.judging is not None
+        return self.judging.expectation(self.model, FEW)
 
     @cached_property
     def search(self) -> Search:
@@ -145,6 +156,23 @@ class Sized:
     def change(self, size: float) -> Array:
         """Return by how much the effect changes the normalised residuals (n,) at a size."""
         return self._counted(self.with_value(self.value(size))) - self._without
+
+    def change_there(self, size: float) -> Array:
+        """Return what is left (n,) of the effect on the runs that decide, the model refitted.
+
+        Of the normalised residuals there; the model's parameters take up of the effect what they
+        can on the runs that are fitted to.
+        """
+        judging, expected = self.known.judging, self.known.expected_there
+        assert judging is not None
+        found = self.with_value(self.value(size))
+        values = dict(found.values)
+        for name, moved in self.known.moved(self.change(size)):
+            values[name] = found.value(name) + moved
+        two = (replace(found, values=values), self.without())
+        with_it, without = (residuals(judging, one, expected) for one in two)
+        counts = np.concatenate([~jumps(run.V)[run.skip :] for run in judging.runs])
+        return np.asarray(counts * (with_it - without))
 
     def _counted(self, model: Model) -> Array:
         known = self.known
