@@ -58,6 +58,19 @@ def test_what_is_named_is_far_above_what_is_allowed_and_leaves_the_gain_of_the_r
     assert 1.02 < z < 1.05
 
 
+def test_what_is_named_is_what_the_runs_that_decide_show(known):
+    sized = Sized(SPRING, known)
+    alone = limit_of(sized).named
+    assert limit_of(Sized(SPRING, replace(known, judging=known.problem))).named == pytest.approx(
+        alone, rel=0.1
+    )
+    # A spring of half the stroke has half the force; the law takes up none of it.
+    half = known.problem.of([replace(run, x=0.5 * run.x) for run in known.problem.runs])
+    halved = limit_of(Sized(SPRING, replace(known, judging=half)))
+    assert halved.named == pytest.approx(2.0 * alone, rel=0.15)
+    assert halved.largest == limit_of(sized).largest  # all that is fitted to says that
+
+
 def test_an_effect_that_vanishes_as_its_parameter_grows_is_limited_from_below(known):
     limit = limit_of(Sized("saturation", known))
     assert limit.falls
