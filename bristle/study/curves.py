@@ -223,7 +223,8 @@ def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffec
     name, closed = learned.name, learned.closed
     origin = f"{LEARNED} {study.name}, {date.today().year}"
     if closed is not None:
-        memory = tuple((n, closed.trial.model.value(f"{name}.{n}")) for n, _ in curve.memory)
+        values = closed.trial.model.values  # of an effect that has no file yet
+        memory = tuple((n, values[f"{name}.{n}"]) for n, _ in curve.memory)
         curve = replace(curve, memory=memory)
     text = effect_text(name, curve, origin, closed.formula if closed else None)
     file = study.effects_folder / f"{name}.py"

@@ -12,12 +12,14 @@ import pytest
 from bristle.cli import main
 from bristle.cli.learn import _of_command
 from bristle.diagnose.candidates import Trial
+from bristle.diagnose.learned.closed import formula_of
 from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.fit import LearnedCurve
+from bristle.diagnose.learned.fit import Closed, LearnedCurve
 from bristle.diagnose.opening import Opening
 from bristle.diagnose.verdict_file import SCHEMA
 from bristle.errors import StudyError
 from bristle.identify.fit import Model, Problem
+from bristle.physics.effect import EFFECTS
 from bristle.study import curves
 from bristle.study.curves import learn_effect
 from bristle.study.identification import identify_study
@@ -180,6 +182,29 @@ def test_elastic_slip_elements_are_told_one_by_one(study, learned, monkeypatch):
     first, second = learn_effect(study).sentences()
     assert first.startswith("learned_1 is parallel elastic-slip elements. With it")
     assert second == "They give way with 0.4 N at 0.4 mm, 0.8 N at 9 mm of travel."
+
+
+def test_a_formula_over_a_memory_is_written_with_the_time_that_was_fitted(
+    study, learned, monkeypatch
+):
+    learned()
+    knots = np.linspace(0.0, 0.1, 13)  # m/s
+    curve = Curve("force", "recent_speed", (("tau", 0.5),), tuple(knots), tuple(30.0 * knots))
+    found = replace(found_of(), curve=curve)
+    monkeypatch.setattr(curves, "learn", lambda *_, **__: found)
+
+    def closed(_opened, _found, forms):
+        formula = formula_of(forms[0], curve)
+        values = {f"learned_1.{n}": value for n, value, _ in formula.parameters}
+        model = Model("bingham", ("learned_1",), values | {"learned_1.tau": 0.7})
+        std = dict.fromkeys(("tau", *(n for n, _, _ in formula.parameters)), 0.01)
+        return Closed(forms[0], formula, replace(trial(1.01), model=model), std)
+
+    monkeypatch.setattr(curves, "close", closed)
+    told = learn_effect(study)
+    study.usable_effects()
+    assert EFFECTS["learned_1"].parameters["tau"].value == pytest.approx(0.7)
+    assert "KNOTS" not in told.file.read_text()
 
 
 def test_a_dry_run_writes_no_effect(study, learned):
