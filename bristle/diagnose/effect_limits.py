@@ -124,7 +124,7 @@ def effect_limits(
     names : of effects that can join the model
     hidden : those of them that the runs cannot show
     """
-    known.basis, known.noise, known.size  # noqa: B018  # made before threads ask for them
+    known.basis, known.noise, known.size, known.taken  # noqa: B018  # before threads ask for them
 
     def found(name: str) -> EffectLimit:
         one = Sized(name, known)

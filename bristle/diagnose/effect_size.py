@@ -23,6 +23,9 @@ from .rule import BENCH, DecisionRule
 
 Array = NDArray[np.float64]
 
+KEPT = 8
+"""Changes of an effect that are kept, for sizes that are asked for again."""
+
 FEW = 4
 """Draws of the motion's error from which the noise on the runs that decide is taken."""
 
@@ -87,6 +90,11 @@ class Known:
         return self._scaled[0]
 
     @cached_property
+    def taken(self) -> Array:
+        """What of a change (n,) the model's own parameters take up (p, n), by least squares."""
+        return np.asarray(np.linalg.pinv(self.own, rcond=TOLD), dtype=float)
+
+    @cached_property
     def basis(self) -> Array:
         """Orthonormal columns (n, p) that span what the model's own parameters change."""
         return np.linalg.qr(self.own)[0]
@@ -118,8 +126,8 @@ class Known:
         ----------
         change : of the normalised residuals
         """
-        search, (columns, lengths) = self.search, self._scaled
-        steps = np.linalg.lstsq(columns, -change, rcond=TOLD)[0] / lengths
+        search = self.search
+        steps = -(self.taken @ change) / self._scaled[1]
         theta = np.clip(search.start + steps, search.low, search.high)
         there = search.at(theta)
         return tuple((name, there.value(name) - self.model.value(name)) for name in search.names)
@@ -148,6 +156,7 @@ class Sized:
         self.low, self.high = self.model.bounds(self.key)
         self.signed = self.low < 0.0 and not self.falls
         self._without = self._counted(self.without())
+        self._changes: dict[float, Array] = {}
 
     def value(self, size: float) -> float:
         """Return the parameter's value [SI] at a size, within its bounds."""
@@ -155,7 +164,12 @@ class Sized:
 
     def change(self, size: float) -> Array:
         """Return by how much the effect changes the normalised residuals (n,) at a size."""
-        return self._counted(self.with_value(self.value(size))) - self._without
+        value = self.value(size)
+        if value not in self._changes:
+            if len(self._changes) == KEPT:
+                del self._changes[next(iter(self._changes))]
+            self._changes[value] = self._counted(self.with_value(value)) - self._without
+        return self._changes[value]
 
     def change_there(self, size: float) -> Array:
         """Return what is left (n,) of the effect on the runs that decide, the model refitted.
