@@ -179,18 +179,27 @@ def _thinned_out(problem: Problem, expected: Expected, kind: str) -> tuple[Probl
 
 @dataclass(frozen=True)
 class Candidate:
-    """A candidate on its way, with its mean loss on the runs looked at."""
+    """A candidate on its way, with its mean loss on the runs looked at.
+
+    `moves` whether any of its effect's parameters changes the force there: else no search leads on.
+    """
 
     model: Model
     cost: float
+    moves: bool = True
 
 
 def ranked_guesses(effect: str, context: SearchContext) -> list[Candidate]:
-    """Return an effect's starts after one linear step of all parameters, the best first."""
+    """Return an effect's starts after one linear step of all parameters, the best first.
+
+    Those from which nothing moves, as a softening spring where there is none to soften, are left
+    out: they would cost no more than the law alone, and so come before starts that are too large.
+    """
     screening = context.screening(effect)
     guesses = initial_guesses(effect, context.base, context.train)
     found = [_stepped(guess, effect, screening) for guess in guesses]
-    return sorted(found, key=lambda one: one.cost)
+    moving = [one for one in found if one.moves]
+    return sorted(moving or found, key=lambda one: one.cost)
 
 
 def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
@@ -202,16 +211,31 @@ def _stepped(start: Model, effect: str, screening: ScreeningData) -> Candidate:
     added = [name for name in start.free() if name.startswith(f"{effect}.")]
     own = Search(screening.problem, start, screening.expected, added)
     here = own.residuals(own.start)
-    J = np.hstack([screening.known, own.sensitivities()]) if added else screening.known
+    slopes = own.sensitivities() if added else np.zeros((len(here), 0))
+    moves = not added or bool(slopes.any())
+    J = np.hstack([screening.known, slopes])
     weight = np.minimum(1.0, HUBER / np.maximum(np.abs(here), 1e-12))
     normal, gradient = (J * weight[:, None]).T @ J, (J * weight[:, None]).T @ here
     size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     step = np.linalg.lstsq(normal / np.outer(size, size), gradient / size, rcond=1e-8)[0] / size
     whole = Search(screening.problem, start, screening.expected, [*base, *added])
-    best = Candidate(start, float(np.mean(loss(here))))
+    best = Candidate(start, float(np.mean(loss(here))), moves)
     for share in STEPS:
         theta = np.clip(whole.start - share * step, whole.low, whole.high)
         cost = float(np.mean(loss(whole.residuals(theta))))
         if cost < best.cost:
-            best = Candidate(whole.at(theta), cost)
+            there = whole.at(theta)
+            if not moves or _moves(there, effect, screening):
+                best = Candidate(there, cost, moves)
     return best
+
+
+def _moves(model: Model, effect: str, screening: ScreeningData) -> bool:
+    """Return whether an effect has a force at its values, or a parameter that gives it one."""
+    problem, expected = screening.problem, screening.expected
+    without = replace(model, effects=tuple(one for one in model.effects if one != effect))
+    with_it, bare = (residuals(problem, one, expected) for one in (model, without))
+    if not np.array_equal(with_it, bare):
+        return True
+    added = [name for name in model.free() if name.startswith(f"{effect}.")]
+    return bool(Search(problem, model, expected, added).sensitivities().any())

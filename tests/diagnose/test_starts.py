@@ -55,6 +55,20 @@ def springy():
     return SearchContext(identify(problem, "bingham", starts=2).model, problem)
 
 
+def test_a_start_from_which_nothing_moves_is_left_out():
+    # On a bench no spring is there to soften: k_3 < 0 has no force, and costs what the law costs.
+    small = 7e4  # N/m3, a fiftieth of the first guess
+    hidden = rig(("duffing",), {"duffing.k_3": small, "duffing.shape": 3.0})
+    context = SearchContext(refine(Model("bingham", values=LAW), hidden), hidden)
+    begun = ranked_guesses("duffing", context)
+    assert begun
+    assert all(one.model.value("duffing.k_3") > 0.0 for one in begun)
+    found = short_search("duffing", context, begun)
+    x = 0.01  # m
+    force = found.model.value("duffing.k_3") * x**3
+    assert force == pytest.approx(small * x**3, rel=0.5)
+
+
 def test_a_linear_effect_is_found_by_the_first_step(springy):
     (best,) = ranked_guesses("gas_spring", springy)
     others = [
