@@ -44,11 +44,12 @@ PAGES = {str(page.relative_to(ROOT)): page for page in snippets.all_pages()}
 
 
 LONG = {f"docs/{name}.md" for name in (
-    "compare_controllers", "elsewhere", "first_study", "learn", "limit", "native", "one_fmu",
-    "own_controller", "own_effect", "own_law", "plan", "tutorial_bench", "tutorial_building",
+    "compare_controllers", "elsewhere", "first_study", "flow", "learn", "limit", "native",
+    "one_fmu", "own_controller", "own_effect", "own_law", "plan", "tutorial_bench",
+    "tutorial_building",
 )}  # fmt: skip
-"""Pages whose commands search for effects, as the README's do, or compile what is a user's own, or
-build FMUs for a host."""
+"""Pages whose commands search for effects, as the README's do, run scenarios at several steps,
+compile what is a user's own, or build FMUs for a host."""
 
 
 @pytest.mark.parametrize(
