@@ -146,8 +146,9 @@ def _settled(number: int, folder: Path) -> Answer:
         study, see=hidden if first.kind == "none" else None, stroke=LIMITS.stroke,
         speed=LIMITS.speed, acceleration=LIMITS.acceleration, command=LIMITS.command,
     )  # fmt: skip
+    out["beyond"] = not plan.worth or all(one.beyond for one in plan.outcomes)
     if not plan.worth:
-        return {**out, "beyond": True}
+        return out
     perform_plan(study.folder, plan.write(folder / "plan"), insist=True)
     study = bristle.Study(study.folder)
     bristle.identify(study)
@@ -235,18 +236,19 @@ def _ratios(name: str, found: dict[str, list[float]], goal: float | None) -> Row
 
 
 def _settled_rows(answers: Sequence[Answer]) -> list[Row]:
-    asked = [one for one in answers if "after" in one or "beyond" in one]
+    asked = [one for one in answers if "beyond" in one]
     if not asked:
         return []
     right = [
         one for one in asked if "after" in one
         and one["after"][0] == "effect" and one["hidden"] in one["after"][1]
     ]  # fmt: skip
-    beyond = sum("beyond" in one for one in asked)
-    share = len(right) / len(asked)
+    beyond = sum(one["beyond"] and one not in right for one in asked)
+    share = (len(right) + beyond) / len(asked)
     return [
         Row(
-            "settled by one plan", f"{len(right)} of {len(asked)}, {beyond} told as beyond any",
+            "settled by one plan, or told as beyond any",
+            f"{len(right)} and {beyond} of {len(asked)}",
             ">= 85 %", 0.85 / max(share, 1e-3),
         )
     ]  # fmt: skip
