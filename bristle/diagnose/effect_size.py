@@ -67,8 +67,7 @@ class Known:
     @cached_property
     def counts(self) -> Array:
         """1 for each sample (n,), 0 where the command jumps: no clock says on which side it is."""
-        parts = [~jumps(run.V)[run.skip :] for run in self.problem.runs]
-        return np.concatenate(parts).astype(float)
+        return _counted_in(self.problem)
 
     @cached_property
     def plain(self) -> Array:
@@ -185,8 +184,7 @@ class Sized:
             values[name] = found.value(name) + moved
         two = (replace(found, values=values), self.without())
         with_it, without = (residuals(judging, one, expected) for one in two)
-        counts = np.concatenate([~jumps(run.V)[run.skip :] for run in judging.runs])
-        return np.asarray(counts * (with_it - without))
+        return _counted_in(judging) * (with_it - without)
 
     def _counted(self, model: Model) -> Array:
         known = self.known
@@ -207,6 +205,11 @@ class Sized:
     def with_value(self, value: float) -> Model:
         """Return the model with the effect at a value of its parameter [SI]."""
         return replace(self.model, values={**self.model.values, self.key: value})
+
+
+def _counted_in(problem: Problem) -> Array:
+    """Return 1 for each sample (n,) of a problem's runs, 0 where the command jumps."""
+    return np.concatenate([~jumps(run.V)[run.skip :] for run in problem.runs]).astype(float)
 
 
 def _first_guess(name: str, model: Model, problem: Problem) -> Model:

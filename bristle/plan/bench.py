@@ -17,7 +17,7 @@ from ..progress import tell
 from ..study.identification import as_model
 from ..study.study import Study
 from .goal import Measured, Purposes, Stated, stated
-from .knowledge import Question
+from .knowledge import DRAWS, Question
 from .motions import Waveform
 from .outcome import Outcome, outcomes
 from .plan import Plan
@@ -26,9 +26,6 @@ from .questions import SizedRival, effects_beside, open_parts, rivals
 from .rig_limits import RigLimits, limits_of_runs, with_given
 from .search import Planner
 from .wish import Wish, default_wish, errs, note_of_missing, parameters_of
-
-DRAWS = 12
-"""Draws of the motion's error that planned runs are judged with."""
 
 
 def plan_study(

@@ -21,10 +21,6 @@ UNSURE = 0.02
 """Standard deviation of a parameter, over its size, from which that is worth its cost."""
 
 
-OF_MEASURED = 12
-"""Draws of the motion's error from which the noise on a measured run is taken."""
-
-
 @dataclass(frozen=True)
 class Measured:
     """The runs at hand; none of them before the first measurement."""
@@ -116,7 +112,5 @@ def stated(purposes: Purposes, problem: Problem, measured: Measured, z: float, s
 
 
 def _known(asked: Asked, measured: Measured) -> Known:
-    train, held_out = (
-        asked.evidence(runs, OF_MEASURED) for runs in (measured.train, measured.held_out)
-    )
+    train, held_out = (asked.evidence(runs) for runs in (measured.train, measured.held_out))
     return Known(asked.question, train + held_out.judging())

@@ -17,9 +17,9 @@ from ..identify.model import REFERENCE, Model, Problem, Run, law_parameters
 from ..identify.smooth import posterior_draws
 from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.laws import DEFAULT, law_names
-from .bench import DRAWS, planned
+from .bench import planned
 from .goal import Measured, Purposes, stated
-from .knowledge import Question
+from .knowledge import DRAWS, Question
 from .motions import Command, Waveform
 from .plan import Plan
 from .planned_test import Test

@@ -29,6 +29,9 @@ SMALL = 0.0003
 SEEN = 0.003
 """Size, over that of a first guess, from which an effect that is seen is of no more use."""
 
+HELD = 1e-3
+"""Standard deviation of a curve, or of a force, over noise, from which less is of no more use."""
+
 HIDDEN = 1e6
 """What is not seen at all costs as much as a figure so many times what is enough."""
 
@@ -102,9 +105,9 @@ def sharpened(known: Known, names: Sequence[str]) -> list[Figure]:
 def learned(known: Known) -> list[Figure]:
     """Return how well a part without a form is held: over all the rig can do, or by coordinate."""
     if known.typical is not None:
-        return [Figure("learn", "force", known.of_force(), 1e-3)]
+        return [Figure("learn", "force", known.of_force(), HELD)]
     return [
-        Figure("learn", name, float(np.sqrt(np.mean(spread**2))), 1e-3)
+        Figure("learn", name, float(np.sqrt(np.mean(spread**2))), HELD)
         for name, spread in known.of_bases().items()
     ]
 

@@ -76,8 +76,8 @@ class Goal:
         known = []
         for k, one in enumerate(self.known):
             told = [test.shown[k] for test in tests if test.shown[k].samples]
-            typical = np.mean([each.normal / each.samples for each in told], axis=0)
-            known.append(replace(one, typical=typical if told else None))
+            normals = [each.normal / each.samples for each in told]
+            known.append(replace(one, typical=np.mean(normals, axis=0) if told else None))
         return replace(self, known=tuple(known))
 
     def value(self, tests: Sequence[Seen]) -> float:

@@ -16,10 +16,12 @@ from bristle.identify.fit import intervals_of
 from bristle.identify.model import Model, Problem, Run
 from bristle.plan.folder import read_plan
 from bristle.plan.knowledge import Asked, Evidence, Known, Question, Rival
+from bristle.plan.motions import Command, Waveform
+from bristle.plan.planned_test import Test
 from bristle.plan.purposes import Figure, cost_of, seen
 from bristle.plan.rig_limits import RigLimits
 from bristle.plan.search import Planner
-from bristle.plan.seen import Goal, roles_of
+from bristle.plan.seen import Goal, Seen, roles_of
 from bristle.plan.wish import Wish, default_wish
 
 SHEET = """schema = 1
@@ -141,6 +143,17 @@ def test_a_run_that_is_held_out_decides_and_is_not_fitted_to() -> None:
     more = one.with_runs([asked.evidence([run]).judging()])
     assert more.deviations() == one.deviations()
     assert (more.told.held_out, more.told.samples) == (one.told.samples, 2 * one.told.samples)
+
+
+def test_a_question_that_no_test_tells_of_has_no_typical_test() -> None:
+    asked = Asked(Question(PLAIN), Problem([a_run()]))
+    nothing = asked.evidence([])
+    signals = Test(Waveform("sine", 0.3, 1.0), Command("held", 0.0, 0.0)).signals(
+        RigLimits(stroke=0.02, speed=0.25)
+    )
+    still = Seen(Test(Waveform("sine", 0.3, 1.0), Command("held", 0.0, 0.0)), signals, (nothing,))
+    goal = Goal((asked,), (Known(asked.question, nothing),), 1, cost=len).among([still])
+    assert goal.known[0].typical is None
 
 
 def test_a_verdict_needs_half_of_the_tests_and_parameters_a_quarter() -> None:
