@@ -16,6 +16,7 @@ from page.browsing import Watched, needs_browser, shots
 from page.served import commands_that_tell, fit_told, page_on
 from study.made import write_runs
 
+from bristle.example.make import Choice, make_bench
 from bristle.study import Study, create_study
 
 VIEWS = (
@@ -167,6 +168,25 @@ def findings(page: Any, source: str) -> list[str]:
         if one["impact"] in WORST
         for node in one["nodes"]
     ]
+
+
+@pytest.mark.slow
+def test_files_that_are_clean_have_their_verdict_after_five_clicks(tmp_path: Path) -> None:
+    make_bench(tmp_path / "lab", Choice(nothing=True, law="bingham", seed=4))
+    files = sorted((tmp_path / "lab" / "data").glob("*.csv"))
+    home = tmp_path / "home"
+    home.mkdir()
+    clicks = "window.clicks = 0; addEventListener('click', (e) => { clicks += e.isTrusted; }, true)"
+    with page_on(home) as client, shots.chromium(1280) as page:
+        seen = Watched(page, client)
+        page.evaluate(clicks)
+        page.locator("#files").set_input_files(files)  # dropped
+        seen.press("Make the study")
+        page.get_by_role("link", name="Next: fit the model").wait_for(timeout=120_000)
+        page.get_by_role("link", name="What is missing").click()
+        seen.press("Diagnose")
+        page.get_by_text("Nothing found missing").wait_for(timeout=600_000)
+        assert 0 < page.evaluate("window.clicks") <= 5
 
 
 @pytest.mark.slow
