@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from ..data.command_limits import jumps
 from ..identify.model import Model, Problem
 from ..identify.residuals import BLOCK, Expected, drawn_noise, residuals
-from ..identify.search import HUBER
+from ..identify.search import HUBER, losses
 from ..identify.search_context import Search
 from ..identify.start_grid import initial_guesses
 from ..physics.effect import EFFECTS
@@ -28,6 +28,12 @@ KEPT = 8
 
 FEW = 4
 """Draws of the motion's error from which the noise on the runs that decide is taken."""
+
+REFITS = 10
+"""Steps of a robust fit of the model's own parameters, at most."""
+
+SETTLED = 0.05
+"""Fall of twice the logarithm of the likelihood that a further step is not taken for."""
 
 TOLD = 1e-3
 """Size of a direction, over the largest, in which the runs tell the model's parameters."""
@@ -117,6 +123,26 @@ class Known:
         """Return what of a change (n,) the model's own parameters do not take up."""
         kept: Array = change - self.basis @ (self.basis.T @ change)
         return kept
+
+    def refitted(self, left: Array) -> Array:
+        """Return normalised residuals (n,) after a fit of the model's own parameters to them.
+
+        A robust fit, as that of the model is: the force jumps where a sign law turns, by a hundred
+        times the noise, and least squares would bend the whole model after those few samples.
+        """
+        for _ in range(REFITS):
+            pull = self.basis.T @ np.clip(left, -HUBER, HUBER)
+            weight = np.minimum(1.0, HUBER / np.maximum(np.abs(left), HUBER))
+            if not pull.size or float(pull @ pull) <= SETTLED * float(np.mean(weight)):
+                break
+            normal = (self.basis * weight[:, None]).T @ self.basis
+            left = left - self.basis @ np.linalg.lstsq(normal, pull, rcond=TOLD)[0]
+        return left
+
+    @cached_property
+    def lowest(self) -> float:
+        """The robust loss of the model as it is."""
+        return float(np.sum(losses(self.refitted(self.plain))))
 
     def moved(self, change: Array) -> tuple[tuple[str, float], ...]:
         """Return by how much [SI] a fit moves the model's own parameters to take up a change (n,).

@@ -21,7 +21,8 @@ from ..identify.residuals import residuals
 from ..identify.search import loss
 from ..identify.search_context import refine
 from ..progress import Count
-from .effect_limits import ONE_SIDED, TWO_SIDED, EffectLimit
+from .allowed_size import ONE_SIDED, TWO_SIDED
+from .effect_limits import EffectLimit
 from .effect_size import Known, Sized
 
 Array = NDArray[np.float64]

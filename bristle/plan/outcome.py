@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, isfinite
 from typing import Any
 
-from ..diagnose.effect_limits import ONE_SIDED, TWO_SIDED
+from ..diagnose.allowed_size import ONE_SIDED, TWO_SIDED
 from ..diagnose.rule import BENCH
 from ..identify.model import parameter
 from ..quantity import plain, quantity

@@ -14,7 +14,7 @@ from math import inf, log
 
 import numpy as np
 
-from ..diagnose.effect_limits import named_distance
+from ..diagnose.named_size import named_distance
 from ..diagnose.rule import BENCH, DecisionRule
 from .knowledge import Known
 

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from ..diagnose.candidates import LONG, joinable, short_search
-from ..diagnose.effect_limits import SMALLEST, EffectLimit, limit_of, resolved
+from ..diagnose.effect_limits import EffectLimit, limit_of
 from ..diagnose.effect_size import Known as Fitted
 from ..diagnose.effect_size import Sized
 from ..diagnose.opening import Opening
+from ..diagnose.resolved_size import SMALLEST, resolved
 from ..errors import StudyError
 from ..findings import unknown
 from ..identify.fit import identify

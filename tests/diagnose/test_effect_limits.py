@@ -10,9 +10,11 @@ import pytest
 from bristle.cli.diagnose import _limits
 from bristle.diagnose.effect_limits import EffectLimit, effect_limits, limit_of
 from bristle.diagnose.effect_size import Known, Sized
+from bristle.diagnose.resolved_size import STANDS_OUT, resolved
 from bristle.diagnose.verdict_text import limit_rows
 from bristle.identify.fit import Model, intervals_of
 from bristle.identify.residuals import residuals
+from bristle.identify.search import HUBER
 from bristle.identify.search_context import refine
 from bristle.physics.effect import EFFECTS
 from tests.diagnose.test_limits import VALUES, problem_of, steady, steps
@@ -84,6 +86,44 @@ def test_no_play_is_limited_below_what_the_steps_of_the_integration_tell(known):
     assert (limit.share, limit.named) == (None, None)
     lag = limit_of(Sized("coil_lag", known))
     assert 1e-4 < lag.largest < 4e-3  # s; a sample is 2 ms
+
+
+@pytest.mark.parametrize("times", [1.5, 4.0])
+@pytest.mark.parametrize("name", ["mount_compliance", "presliding", "backlash"])
+def test_a_limit_allows_what_is_in_series_with_the_damper(known, name, times):
+    sized = Sized(name, known)
+    limit = limit_of(sized)
+    there = limit.largest / times if sized.falls else limit.largest * times
+    with_it, without = sized.with_value(there), sized.without()
+    problem = known.problem
+    runs = [
+        replace(run, force=run.force + problem.predict(with_it, run) - problem.predict(without, run))
+        for run in problem.runs
+    ]
+    added = problem.of(runs)
+    model = refine(known.model, added, 6)
+    told = limit_of(Sized(name, Known(added, model, added.expectation(model), 6000))).largest
+    assert told <= there if sized.falls else told >= there
+
+
+def test_a_joint_is_looked_at_from_where_it_stands_out_of_a_rigid_one(known):
+    sized = Sized("mount_compliance", known)
+    size = resolved(sized, 1e-9)
+    at, rigid = (np.clip(known.beyond(sized.change(one)), -HUBER, HUBER) for one in (size, 1e-3))
+    assert size < 0.1
+    assert np.linalg.norm(at) >= STANDS_OUT * np.linalg.norm(rigid)
+
+
+def test_a_few_samples_far_out_do_not_bend_the_model(known):
+    rng = np.random.default_rng(2)
+    change = 3.0 * known.basis[:, 0]
+    noise = rng.standard_normal(len(known.plain))
+    spiked = noise + change
+    spiked[:: len(noise) // 40] += 500.0
+    kept = known.refitted(spiked) - (noise - known.basis @ (known.basis.T @ noise))
+    kept[:: len(noise) // 40] = 0.0
+    assert np.linalg.norm(kept) < 3.0  # least squares leaves some hundred
+    assert np.linalg.norm(known.beyond(spiked - noise)) > 50.0
 
 
 def test_what_hides_an_effect_is_told():
