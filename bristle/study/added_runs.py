@@ -1,4 +1,4 @@
-"""Runs that were added to a study: which ones, and whether its model knows them."""
+"""What is new in the data of a study since its model was identified: runs, roles, corrections."""
 
 from __future__ import annotations
 
@@ -83,4 +83,25 @@ def added_text(study: Study) -> str:
     return (
         f"{len(names)} {what} added after the present model was identified: {', '.join(names)}. "
         f"Identify it again:  {command('identify', study.folder)}"
+    )
+
+
+def has_other_data(study: Study) -> bool:
+    """Return whether the present model was fitted to, or judged by, other data than there are now.
+
+    False where its step does not tell.
+    """
+    numbers = study.history.numbers()
+    known = study.history.data_of(numbers[-1]) if len(numbers) > 1 else ""
+    return known not in ("", study.settings.data)
+
+
+def changed_text(study: Study) -> str:
+    """Return the sentence that tells that the model is of other data, "" where it is not."""
+    if not has_other_data(study):
+        return ""
+    return (
+        "Runs, their roles, corrections or channels in study.toml are no longer those that the "
+        f"present model was identified with. Identify it again:  "
+        f"{command('identify', study.folder)}"
     )

@@ -22,12 +22,9 @@ from .reading import read_runs
 from .roles import roles_added
 from .run_facts import RunChoices, facts_of
 from .run_file import EXCLUDE, RunFile
-from .settings import read_settings
+from .settings import read_draft
 from .settings_text import with_runs
 from .study import Study
-
-EARLIER = "verdict_before_runs.json"
-"""Where a step keeps the verdict that was on fewer runs."""
 
 
 @dataclass(frozen=True)
@@ -170,7 +167,7 @@ def _written(study: Study, paths: Sequence[Path], runs: tuple[RunFile, ...]) -> 
                 for path in placed:
                     path.unlink(missing_ok=True)
                 _restore(added, before)
-        _set_verdict_aside(study)
+        study.history.set_verdict_aside()
 
 
 def _restore(file: Path, before: bytes | None) -> None:
@@ -183,10 +180,7 @@ def _restore(file: Path, before: bytes | None) -> None:
 
 def _refuse_wrong(folder: Path, draft: Path, runs: Sequence[RunFile]) -> None:
     """Refuse a study.toml with a mistake, too few roles, or a run that is one of the others."""
-    try:
-        settings = read_settings(draft)
-    except StudyError as error:
-        raise StudyError(str(error).replace(str(draft), str(folder / "study.toml"))) from None
+    settings = read_draft(draft, folder / "study.toml")
     roles = {run.role for run in settings.runs}
     lacking = [role for role in ("train", "holdout") if role not in roles]
     if lacking:
@@ -203,13 +197,3 @@ def _refuse_wrong(folder: Path, draft: Path, runs: Sequence[RunFile]) -> None:
                 f"{one.name} is the same measurement as {other}: it tells nothing new. Leave it "
                 "out."
             )
-
-
-def _set_verdict_aside(study: Study) -> None:
-    """Keep the verdict, which is on fewer runs, with the step of its model."""
-    verdict, numbers = study.folder / "verdict.json", study.history.numbers()
-    if not verdict.is_file():
-        return
-    if numbers:
-        write_whole(study.history.path(numbers[-1]) / EARLIER, verdict.read_bytes())
-    verdict.unlink()

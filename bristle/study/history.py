@@ -21,6 +21,9 @@ from .set_aside import free_number, kept_folder, set_aside
 
 _NUMBER = re.compile(r"\d{3,}")
 
+EARLIER = "verdict_before_runs.json"
+"""Where a step keeps the verdict that was on other runs, or on the same with other corrections."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -83,6 +86,11 @@ class History:
         path = self.path(number) / "step.json"
         return str(read_json(path).get("bristle", "")) if path.is_file() else ""
 
+    def data_of(self, number: int) -> str:
+        """Return the digest of the data that a step's model was fitted to, "" where not told."""
+        path = self.path(number) / "step.json"
+        return str(read_json(path).get("data", "")) if path.is_file() else ""
+
     def path(self, number: int) -> Path:
         """Return the folder of a step."""
         return self.folder / f"{number:03d}"
@@ -91,14 +99,20 @@ class History:
         """Return the model.toml of a step."""
         return self.path(number) / "model.toml"
 
-    def add(self, step: Step, model: str) -> None:
-        """Add a step with its model, make that the present one, and drop the present verdict."""
+    def add(self, step: Step, model: str, data: str = "") -> None:
+        """Add a step with its model, make that the present one, and drop the present verdict.
+
+        Parameters
+        ----------
+        step, model : the step, and the text of its model.toml
+        data : digest of the data that the model was fitted to, "" for none
+        """
         self._keep_verdict(step.number - 1)
         self._begin({"add": step.number})
         draft = Path(tempfile.mkdtemp(dir=self.folder, prefix=".draft-"))
         try:
             write_whole(draft / "model.toml", model)
-            made = {"schema": 1, "bristle": __version__}
+            made = {"schema": 1, "bristle": __version__, **({"data": data} if data else {})}
             write_json(draft / "step.json", {**made, **asdict(step)})
             draft.chmod(0o755)
             draft.replace(self.path(step.number))
@@ -119,7 +133,7 @@ class History:
         content = present.read_bytes()
         if content != self.model_file(numbers[-1]).read_bytes():
             step = Step(numbers[-1] + 1, "edited by hand", "model.toml was changed in an editor")
-            self.add(step, content.decode("utf-8-sig"))
+            self.add(step, content.decode("utf-8-sig"), self.data_of(numbers[-1]))
 
     def undo(self) -> Step:
         """Take the last step back and return it; it is kept in history/undone/.
@@ -205,6 +219,15 @@ class History:
             write_whole(self.study / "verdict.json", verdict.read_bytes())
         else:
             (self.study / "verdict.json").unlink(missing_ok=True)
+
+    def set_verdict_aside(self) -> None:
+        """Keep the present verdict, which is on other data, with the step of its model."""
+        verdict, numbers = self.study / "verdict.json", self.numbers()
+        if not verdict.is_file():
+            return
+        if numbers:
+            write_whole(self.path(numbers[-1]) / EARLIER, verdict.read_bytes())
+        verdict.unlink()
 
     def _keep_verdict(self, number: int) -> None:
         """Keep the present verdict with the step whose model it judges."""

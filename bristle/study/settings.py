@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from hashlib import sha256
 from pathlib import Path
 
 from ..data.channels import DRIVE, ChannelSpec, at_device
 from ..data.files import Toml, write_whole
 from ..data.labels import TEMPERATURE
 from ..data.pieces import wrong_split
-from ..errors import PhysicsError
+from ..errors import PhysicsError, StudyError
 from ..findings import written
 from ..physics.building import read_building
 from .channel_file import channel_as_toml, is_right_channel, read_channel, read_extra
 from .run_file import (
     EXCLUDE,
+    TEST,
     RunFile,
     check_levels,
     read_runs,
@@ -82,6 +85,21 @@ class Settings:
         return f'Left out by role = "{EXCLUDE}" in study.toml: {names}.' if names else ""
 
     @property
+    def data(self) -> str:
+        """A digest of what a fit and its judge see: their runs, corrected, and how they are read.
+
+        Titles, labels, the order of runs, and runs for tests or left out do not count.
+        """
+        runs = sorted(
+            [run.name, run.role, sorted(run.levels.items()), [[*one] for one in run.corrections]]
+            for run in self.runs
+            if run.role != TEST
+        )
+        channels = {name: channel_as_toml(spec) for name, spec in self.channels.items()}
+        seen = [runs, channels, self.device, self.cut_off, self.rate, self.mask, self.split]
+        return sha256(json.dumps(seen, sort_keys=True).encode()).hexdigest()[:16]
+
+    @property
     def has_building(self) -> bool:
         """Whether a building was measured with its damper; else a damper on a test bench."""
         return self.rig == "structure"
@@ -136,6 +154,20 @@ def read_settings(path: Path) -> Settings:
         rate=rate or 0.0, mask=bool(mask), split=split, law=law, excluded=excluded, extra=extra,
         device=device,
     )  # fmt: skip
+
+
+def read_draft(draft: Path, path: Path) -> Settings:
+    """Return the settings in a draft of a study.toml; what is wrong is told of the file itself.
+
+    Parameters
+    ----------
+    draft : in the folder of the study
+    path : of study.toml
+    """
+    try:
+        return read_settings(draft)
+    except StudyError as error:
+        raise StudyError(str(error).replace(str(draft), str(path))) from None
 
 
 def _law(toml: Toml) -> str:

@@ -25,14 +25,14 @@ from ..findings import command, written
 from ..physics.user import Loaded, waiting
 from ..shown import shown
 from ..trust import can_do_without, load
-from .added_runs import added_text
+from .added_runs import added_text, changed_text
 from .history import History, Step
 from .new import make_folder, parse_channel
 from .reading import place_of_run, read_runs
 from .role_changes import roles_by_place
 from .run_file import ROLES, TEST
 from .runs import Runs, refuse_twins, split_in_time, twins_within, usable
-from .settings import Settings, read_settings
+from .settings import Settings, read_draft, read_settings
 from .settings_text import with_corrections, with_excluded, with_mask, with_roles
 
 if TYPE_CHECKING:
@@ -192,8 +192,8 @@ class Study:
         idle = (*idle, *other)
         if self.settings.excluded:
             idle = (*idle, self.settings.excluded_text)
-        if added := added_text(self):
-            idle = (*idle, added)
+        if changed := added_text(self) or changed_text(self):
+            idle = (*idle, changed)
         if sum(run.role != TEST for run in self.settings.runs) == 1:
             split = split_in_time([*train, *holdout])
             return replace(split, notes=(*split.notes, *idle))
@@ -279,7 +279,8 @@ class Study:
             step = Step(
                 numbers[-1] + 1 if numbers else 0, what, why, {**(before or {})}, {**(after or {})}
             )
-            self.history.add(step, model_text(model, self.folder / "model.toml"))
+            text = model_text(model, self.folder / "model.toml")
+            self.history.add(step, text, self.settings.data)
             self._set_aside(step.number - 1)
             self._seen = self._state()
         return step
@@ -387,10 +388,20 @@ class Study:
         return Study(self.folder)
 
     def _with_settings(self, change: Callable[[str], str]) -> Study:
-        """Write study.toml with its text changed, and return the study as it is then."""
-        path = self.folder / "study.toml"
+        """Write study.toml with its text changed, and return the study as it is then.
+
+        A verdict on other data than there are then is set aside.
+        """
+        path, draft = self.folder / "study.toml", self.folder / ".study.toml"
         with self.writing():
-            write_whole(path, change(path.read_text(encoding="utf-8-sig")))
+            try:
+                write_whole(draft, change(path.read_text(encoding="utf-8-sig")))
+                now = read_draft(draft, path)
+                draft.replace(path)
+            finally:
+                draft.unlink(missing_ok=True)
+            if now.data != self.settings.data:
+                self.history.set_verdict_aside()
         return Study(self.folder)
 
     def verdict(self) -> dict[str, Any] | None:

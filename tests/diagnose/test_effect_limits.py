@@ -97,7 +97,9 @@ def test_a_limit_allows_what_is_in_series_with_the_damper(known, name, times):
     with_it, without = sized.with_value(there), sized.without()
     problem = known.problem
     runs = [
-        replace(run, force=run.force + problem.predict(with_it, run) - problem.predict(without, run))
+        replace(
+            run, force=run.force + problem.predict(with_it, run) - problem.predict(without, run)
+        )
         for run in problem.runs
     ]
     added = problem.of(runs)

@@ -14,8 +14,8 @@ from bristle.cli import main
 from bristle.errors import BristleError, StudyError
 from bristle.study.added_runs import FILE, added_text, additions, unknown_to_model
 from bristle.study.create import create_study
-from bristle.study.extend import EARLIER, extend_study
-from bristle.study.history import Step
+from bristle.study.extend import extend_study
+from bristle.study.history import EARLIER, Step
 from bristle.study.run_facts import RunChoices
 from bristle.study.study import Study
 

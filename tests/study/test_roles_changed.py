@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from study.made import write_runs
 
 from bristle.cli import main
+from bristle.data.corrections import Correction
 from bristle.errors import StudyError
 from bristle.study import Study, create_study
+from bristle.study.history import EARLIER
+from bristle.study.identification import identify_study
 
 
 @pytest.fixture
@@ -69,3 +73,73 @@ def test_one_run_has_one_role(study: Study, capsys: pytest.CaptureFixture[str]) 
     order = ["study", "roles", str(study.folder), "--test", "run_1", "--train", "run_1"]
     assert main(order) == 2
     assert "two roles" in capsys.readouterr().err
+
+
+def judged(study: Study) -> Study:
+    """Return a study with an identified model and a verdict on it."""
+    identified = identify_study(study, table=False)
+    assert identified.step is not None
+    now = Study(study.folder)
+    now.model()
+    now.write_verdict({"schema": 7, "kind": "none", "findings": [], "sensors": []})
+    return now
+
+
+def notes(study: Study) -> str:
+    return "\n".join(study.runs().notes)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda study: study.with_roles({"run_3": "holdout"}),
+        lambda study: study.with_excluded(["run_3"]),
+        lambda study: study.with_mask(),
+        lambda study: study.with_corrections({"run_1": [Correction("force", "bias", 1.0)]}),
+    ],
+)
+def test_other_data_set_the_verdict_aside_and_say_that_the_model_is_of_others(
+    study: Study, change: Callable[[Study], Study]
+) -> None:
+    study = judged(study)
+    assert "no longer" not in notes(study)
+    then = change(study)
+    assert not (then.folder / "verdict.json").is_file()
+    assert json.loads((then.folder / "history/001" / EARLIER).read_text())["kind"] == "none"
+    assert "no longer those that the present model was identified with" in notes(then)
+    assert "bristle identify" in notes(then)
+    identify_study(then, table=False)
+    assert "no longer" not in notes(Study(study.folder))
+
+
+def test_what_study_toml_cannot_hold_is_not_written(study: Study) -> None:
+    before = (study.folder / "study.toml").read_bytes()
+    with pytest.raises(StudyError, match=r"study\.toml, line \d+: there is no fault"):
+        study.with_corrections({"run_1": [Correction("force", "zero", 1.0)]})
+    assert (study.folder / "study.toml").read_bytes() == before
+    assert not (study.folder / ".study.toml").exists()
+
+
+def test_what_no_fit_and_no_judge_sees_leaves_verdict_and_model(study: Study) -> None:
+    study = judged(study.with_roles({"run_4": "test"}))
+    file = study.folder / "study.toml"
+    file.write_text(file.read_text().replace('title = "rig"', 'title = "another title"'))
+    then = Study(study.folder).with_roles({"run_4": "exclude"})
+    assert (then.folder / "verdict.json").is_file()
+    assert "no longer" not in notes(then)
+
+
+def test_a_step_that_is_undone_brings_back_the_data_of_the_one_before(study: Study) -> None:
+    study = judged(study)
+    then = study.with_roles({"run_3": "holdout"})
+    identify_study(then, table=False)
+    Study(study.folder).undo()
+    assert "no longer" in notes(Study(study.folder))
+    back = Study(study.folder).with_roles({"run_3": "train"})
+    assert "no longer" not in notes(back)
+
+
+def test_the_command_says_what_to_do_next(study: Study, capsys: pytest.CaptureFixture[str]) -> None:
+    judged(study)
+    assert main(["study", "roles", str(study.folder), "--holdout", "run_3"]) == 0
+    assert "Identify it again:  bristle identify" in capsys.readouterr().out
