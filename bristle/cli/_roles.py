@@ -29,7 +29,7 @@ def add_roles(parser: argparse.ArgumentParser) -> None:
 def _roles(arguments: argparse.Namespace) -> int:
     """Change the roles that are named; print those of all runs."""
     from ..errors import StudyError
-    from ..study.added_runs import changed_text
+    from ..study.added_runs import behind_data
     from ..study.study import Study
 
     study = Study(arguments.folder)
@@ -48,6 +48,6 @@ def _roles(arguments: argparse.Namespace) -> int:
         return 0
     for run in runs:
         print(f"{run.role:8} {run.name}")
-    if changed := changed_text(study):
+    if changed := behind_data(study):
         print(changed)
     return 0

@@ -11,6 +11,7 @@ from ..data.files import read_json
 from ..data.model import StudyModel
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS, base_and_variant
+from ..study.added_runs import other_data
 from ..study.study import Study
 
 ANSWER = "identify.json"
@@ -43,7 +44,7 @@ def answer(folder: Path, arguments: Mapping[str, Any]) -> dict[str, Any]:
         "identified": any(value.origin == "identified" for value in model.flat().values()),
         "parameters": rows_of(model, found if fresh else {}),
         "answer": found if fresh else None, "laws": sorted(LAWS),
-        "step": numbers[-1] if numbers else None,
+        "step": numbers[-1] if numbers else None, "other_data": other_data(study),
     }  # fmt: skip
 
 

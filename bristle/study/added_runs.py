@@ -74,34 +74,24 @@ def unknown_to_model(study: Study) -> list[str]:
     return [file for file in dict.fromkeys(found) if file in there]
 
 
-def added_text(study: Study) -> str:
-    """Return the sentence that tells which runs the present model does not know, "" for none."""
-    names = [stem_of(file) for file in unknown_to_model(study)]
-    if not names:
-        return ""
-    what = "run was" if len(names) == 1 else "runs were"
-    return (
-        f"{len(names)} {what} added after the present model was identified: {', '.join(names)}. "
-        f"Identify it again:  {command('identify', study.folder)}"
-    )
+def behind_data(study: Study) -> str:
+    """Return how the data are others than the present model knows, and what to do; "" if not."""
+    other = other_data(study)
+    return f"{other} Identify it again:  {command('identify', study.folder)}" if other else ""
 
 
-def has_other_data(study: Study) -> bool:
-    """Return whether the present model was fitted to, or judged by, other data than there are now.
-
-    False where its step does not tell.
-    """
+def other_data(study: Study) -> str:
+    """Return the sentence that tells how the data are others than the model knows, "" if not."""
+    if names := [stem_of(file) for file in unknown_to_model(study)]:
+        what = "run was" if len(names) == 1 else "runs were"
+        return (
+            f"{len(names)} {what} added after the present model was identified: {', '.join(names)}."
+        )
     numbers = study.history.numbers()
     known = study.history.data_of(numbers[-1]) if len(numbers) > 1 else ""
-    return known not in ("", study.settings.data)
-
-
-def changed_text(study: Study) -> str:
-    """Return the sentence that tells that the model is of other data, "" where it is not."""
-    if not has_other_data(study):
+    if known in ("", study.settings.data):  # "": its step does not tell
         return ""
     return (
         "Runs, their roles, corrections or channels in study.toml are no longer those that the "
-        f"present model was identified with. Identify it again:  "
-        f"{command('identify', study.folder)}"
+        "present model was identified with."
     )

@@ -18,7 +18,7 @@ from ..findings import command, unknown
 from ..identify.bench import compile_ahead
 from ..physics.laws import law_names
 from ..progress import tell, telling
-from .added_runs import has_other_data, unknown_to_model
+from .added_runs import other_data
 from .curves import LearnedEffect, learn_effect
 from .history import Step
 from .identification import FitTask, as_model, identify_model, identify_study
@@ -257,8 +257,7 @@ def complete(
     law = law_or_all(study, law)
     free = law == ALL
     other = None if law in (ALL, study.model().law) else law
-    other_data = has_other_data(study) or bool(unknown_to_model(study))
-    stale = other_data or not _is_identified(study.model())
+    stale = bool(other_data(study)) or not _is_identified(study.model())
     if not free and (other or stale):
         say("identifying the model")
         stepped(identify_study(study, law=other, table=False).step)

@@ -25,7 +25,7 @@ from ..findings import command, written
 from ..physics.user import Loaded, waiting
 from ..shown import shown
 from ..trust import can_do_without, load
-from .added_runs import added_text, changed_text
+from .added_runs import behind_data
 from .history import History, Step
 from .new import make_folder, parse_channel
 from .reading import place_of_run, read_runs
@@ -192,7 +192,7 @@ class Study:
         idle = (*idle, *other)
         if self.settings.excluded:
             idle = (*idle, self.settings.excluded_text)
-        if changed := added_text(self) or changed_text(self):
+        if changed := behind_data(self):
             idle = (*idle, changed)
         if sum(run.role != TEST for run in self.settings.runs) == 1:
             split = split_in_time([*train, *holdout])

@@ -116,6 +116,15 @@ def test_view_2_has_values_with_half_of_their_intervals(home: Path, tmp_path: Pa
     assert [row["half"] for row in held if row["name"] == "f_c"] == [None]
 
 
+def test_view_2_says_that_the_model_is_of_other_data(home: Path, tmp_path: Path) -> None:
+    study = Study(shutil.copytree(home / "rig", tmp_path / "rig"))
+    study.add_step("identify", "by hand", study.model())
+    assert fit_view.answer(study.folder, {})["other_data"] == ""
+    left = study.settings.runs[0].name
+    study.with_roles({left: "exclude"})
+    assert "no longer those" in fit_view.answer(study.folder, {})["other_data"]
+
+
 def test_view_4_says_that_nothing_was_diagnosed(home: Path) -> None:
     assert verdict_view.answer(home / "rig", {}) == {
         "verdict": None, "learned": [], "plans": [],

@@ -25,6 +25,7 @@ export async function show(page) {
   return [
     h("h1", {}, fit.identified ? `The model: ${name}` : `Not identified yet: ${name}`),
     fit.waiting.length ? consentPanel(page, { error: "" }) : null,
+    fit.other_data ? h("ul", { class: "findings" }, h("li", {}, h("span", { class: "level-warning" }, "Warning: "), fit.other_data)) : null,
     orders(page, fit),
     fitsAtWork(page),
     before,
