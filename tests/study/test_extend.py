@@ -12,7 +12,7 @@ from made import bench_run, write, write_runs
 
 from bristle.cli import main
 from bristle.errors import BristleError, StudyError
-from bristle.study.added_runs import FILE, added_text, additions, unknown_to_model
+from bristle.study.added_runs import FILE, additions, behind_data, unknown_to_model
 from bristle.study.create import create_study
 from bristle.study.extend import extend_study
 from bristle.study.history import EARLIER, Step
@@ -101,14 +101,14 @@ def test_the_next_command_says_that_the_model_does_not_know_them(rig: Path, tmp_
     assert unknown_to_model(extended.study) == []
     assert extended.study.runs().notes == ()
     extended.study.undo()
-    assert added_text(extended.study) == text
+    assert behind_data(extended.study) == text
     assert isinstance(extended.study.steps()[0], Step)
 
 
 def test_a_run_that_was_taken_out_again_is_not_told(rig: Path, tmp_path: Path) -> None:
     extended = extend_study(identified(rig), [new_run(tmp_path)])
     study = extended.study.with_excluded(["day_2"])
-    assert added_text(study) == ""
+    assert behind_data(study) == ""
 
 
 def _other_unit(path: Path) -> None:
