@@ -242,3 +242,28 @@ run_and_exit()
     command = [sys.executable, str(file), "undo", "rig"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=40, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "half a line", "interrupted\n")
+
+
+@pytest.mark.parametrize("chosen", [None, "3"])
+def test_products_of_matrices_take_one_thread_unless_the_environment_says_otherwise(
+    tmp_path: Path, chosen: str | None
+) -> None:
+    code = """
+import os, sys
+import bristle.cli.undo as command
+from bristle.cli import run_and_exit
+
+def work(arguments):
+    print("numpy" in sys.modules, os.environ["OPENBLAS_NUM_THREADS"])
+    return 0
+
+command.main = work
+run_and_exit()
+"""
+    file = tmp_path / "tells.py"
+    file.write_text(code)
+    given = {k: v for k, v in os.environ.items() if not k.endswith("_NUM_THREADS")}
+    given |= {"OPENBLAS_NUM_THREADS": chosen} if chosen else {}
+    command = [sys.executable, str(file), "undo", "rig"]
+    done = subprocess.run(command, capture_output=True, text=True, env=given, check=True)
+    assert done.stdout.split() == ["False", chosen or "1"]

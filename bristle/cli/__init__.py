@@ -19,6 +19,10 @@ from typing import NoReturn
 from ..errors import BristleError, TrustError
 from ._common import add_common
 
+_BLAS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""How many threads a product of matrices takes, read when numpy is imported. The matrices here are
+narrow, and laws, effects and runs have threads of their own: both together are slower."""
+
 _NAMES = {"list_": "list", "export_ssp": "export-ssp", "import_ssp": "import-ssp"}
 
 
@@ -152,9 +156,13 @@ def _with_consent(arguments: argparse.Namespace) -> int:
 def run_and_exit() -> NoReturn:
     """Run one command and end the process with its exit code; what the shell calls.
 
+    Products of matrices take one thread, unless the environment says another number.
+
     Taking down a process with FMUs and compiled code in it takes up to a second, after its work is
     done and written: such a process ends at once.
     """
+    for threads in _BLAS:
+        os.environ.setdefault(threads, "1")
     code = main()
     if code == 130:
         from ..interrupt import leave

@@ -69,15 +69,15 @@ def main(arguments: argparse.Namespace) -> int:
         from . import _building
 
         return _building.main(arguments)
-    from ..draw.style import png
     from ..interrupt import keeps
     from ..progress import Progress, tell
-    from ..study.budget_picture import draw_budget
-    from ..study.fit_picture import identify_png
     from ..study.identification import STAGES, identify_study
     from ..study.study import Study
+    from ._ahead import import_ahead
 
     study = Study(arguments.folder)
+    if not arguments.dry_run:
+        import_ahead("bristle.study.budget_picture", "bristle.study.fit_picture")
     with Progress("identifying", STAGES, True, even=False) as progress:
         found = identify_study(
             study,
@@ -94,6 +94,10 @@ def main(arguments: argparse.Namespace) -> int:
         keeps("The new step is kept in the study's history; its pictures were not all drawn.")
     picture = budget = None
     if not arguments.dry_run:
+        from ..draw.style import png
+        from ..study.budget_picture import draw_budget
+        from ..study.fit_picture import identify_png
+
         picture = study.write_report("identify.png", identify_png(found))
         budget = draw_budget(found.holdout or found.train, found.at.model)
         if budget is not None:
