@@ -23,6 +23,9 @@ _BLAS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """How many threads a product of matrices takes, read when numpy is imported. The matrices here are
 narrow, and laws, effects and runs have threads of their own: both together are slower."""
 
+_SLOW_TO_LEAVE = ("bristle.simulate.session", "numba")
+"""Modules with which a process takes half a second and more to be taken down."""
+
 _NAMES = {"list_": "list", "export_ssp": "export-ssp", "import_ssp": "import-ssp"}
 
 
@@ -168,7 +171,7 @@ def run_and_exit() -> NoReturn:
         from ..interrupt import leave
 
         leave(code)
-    if "bristle.simulate.session" in sys.modules:
+    if any(name in sys.modules for name in _SLOW_TO_LEAVE):
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(code)
