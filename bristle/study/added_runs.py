@@ -89,7 +89,7 @@ def other_data(study: Study) -> str:
         )
     numbers = study.history.numbers()
     known = study.history.data_of(numbers[-1]) if len(numbers) > 1 else ""
-    if known in ("", study.settings.data):  # "": its step does not tell
+    if not known or known == study.settings.data:  # "": its step does not tell
         return ""
     return (
         "Runs, their roles, corrections or channels in study.toml are no longer those that the "
