@@ -78,7 +78,8 @@ def chosen(
     cases, buildings, shared : how many on the bench, on buildings, and of the kind "shared"
     only : one of `plan.KINDS`, or "" for all
     """
-    tasks = [] if only in ("structure", "shared") else plan.make_plan(seed, cases, only)
+    apart = only in ("structure", "shared")  # which have numbers of cases of their own
+    tasks = [] if apart else plan.make_plan(seed, cases, only)
     if only in ("", "structure"):
         tasks = tasks + plan.make_structure_plan(seed, buildings)
     return tasks + (plan.make_shared_plan(seed, shared) if only in ("", "shared") else [])

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.independent.effects import LIBRARY, OUTSIDE, compatible, forms
+from tests.independent.effects import FURTHER, LIBRARY, OUTSIDE, compatible, forms
 from tests.independent.instruments import BENCH, FAULTS
 from tests.independent.rigs import LAWS, draw_rig
 
@@ -35,9 +35,12 @@ INVISIBLE = (
 )  # fmt: skip
 """Faults that the parameters of the base laws absorb without a trace: no method can report them."""
 
-KINDS = ("none", "effect", "outside", "fault", "pair", "structure", "shared")
-"""What `--only` takes; "structure" is the building, "shared" an effect of `SITES` in a damper on a
-bench. The cases of these two have plans of their own."""
+APART = ("structure", "shared", "further")
+"""Kinds whose cases have plans of their own: the building; an effect of `SITES` in a damper on a
+bench; effects outside the library beside those of the main plan."""
+
+KINDS = ("none", "effect", "outside", "fault", "pair", *APART)
+"""What `--only` takes."""
 
 BUILDINGS = ("structure_10N", "structure_2kN")
 SITES = ("base_friction", "duffing", "storey_softening", "end_stop")
@@ -96,6 +99,8 @@ def make_plan(seed: int, cases: int, only: str = "") -> list[Task]:
         return make_structure_plan(seed, cases)
     if only == "shared":
         return make_shared_plan(seed, cases)
+    if only == "further":
+        return make_further_plan(seed, cases)
     tasks: list[Task] = []
     for task in _endless(seed):
         if not only or task.kind == only:
@@ -137,6 +142,18 @@ def make_shared_plan(seed: int, cases: int) -> list[Task]:
         strength, case = STRENGTHS[turn % 2], int(rng.integers(2**31))
         tasks.append(Task("shared", name, form, strength, 0.01, rig, law, case))
     return tasks
+
+
+def make_further_plan(seed: int, cases: int) -> list[Task]:
+    """Return the first `cases` tasks with an effect of `FURTHER` at 15 and 40 % on a bench.
+
+    A longer plan begins with the shorter one; it draws nothing from the others.
+    """
+    rng = np.random.default_rng([seed, 28])
+    each = {name: _variants(name, rng, STRENGTHS[:2]) for name in FURTHER}
+    names = _shuffled(list(FURTHER), rng)
+    whats = (next(each[next(names)]) for _ in range(cases))
+    return [Task("further", noise=0.01, seed=int(rng.integers(2**31)), **what) for what in whats]
 
 
 def _in_buildings(seed: int, reconstructed: bool) -> Iterator[dict[str, Any]]:
@@ -206,7 +223,9 @@ def _bed(rig: str, law: str) -> Any:
     return draw_rig(rig, law, np.random.default_rng(0))
 
 
-def _variants(name: str, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+def _variants(
+    name: str, rng: np.random.Generator, strengths: tuple[float, ...] = STRENGTHS
+) -> Iterator[dict[str, Any]]:
     """Yield all laws, rigs, strengths, same and other form of an effect; forms drawn in these."""
     beds = [
         (rig, law, group)
@@ -215,11 +234,11 @@ def _variants(name: str, rng: np.random.Generator) -> Iterator[dict[str, Any]]:
         for group in _groups([f.name for f in forms(name, _bed(rig, law))], name)
     ]
     order = _shuffled(beds, rng)
-    turn = int(rng.integers(len(STRENGTHS)))
+    turn = int(rng.integers(len(strengths)))
     while True:
         for _ in beds:
             rig, law, group = next(order)
-            strength = STRENGTHS[turn % len(STRENGTHS)]
+            strength = strengths[turn % len(strengths)]
             turn += 1
             form = group[int(rng.integers(len(group)))]
             yield {"effect": name, "form": form, "strength": strength, "rig": rig, "law": law}

@@ -42,6 +42,8 @@ COORDINATES = {
     "velocity": ("velocity", "speed"),
     "rest": ("rest", "time_at_rest", "time_since_rest", "time_since_reversal"),
     "frequency": ("frequency",),
+    "travel": ("travel", "time_since_reversal"),
+    "voltage": ("voltage", "recent_voltage"),
 }
 """The generator's word for what organises an effect, and what a verdict may call it."""
 

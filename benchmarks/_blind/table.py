@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import score
-from .plan import SITES
+from .plan import APART, SITES
 from .score import Count, Line, count
 
 NOT_YET = "-"
@@ -83,10 +83,10 @@ def of_kind(lines: Iterable[Line], kind: str, noise: float) -> list[Line]:
 
 def figures(lines: list[Line], times: dict[str, float] | None = None) -> list[Figure]:
     """Return the rows of the table at 1 % noise, then the same by parts, then at 3 %."""
-    bench = [line for line in lines if line["task"]["kind"] not in ("structure", "shared")]
+    bench = [line for line in lines if line["task"]["kind"] not in APART]
     rows = main_rows(bench, 0.01, "main") + parameter_rows(bench, 0.01, "main")
-    rows += time_rows(bench, times or {}) + shared_rows(lines) + structure_rows(lines)
-    rows += part_rows(bench)
+    rows += time_rows(bench, times or {}) + shared_rows(lines) + further_rows(lines)
+    rows += structure_rows(lines) + part_rows(bench)
     if any(abs(line["task"]["noise"] - 0.03) < 1e-9 for line in bench):
         rows += main_rows(bench, 0.03, "3 % noise") + parameter_rows(bench, 0.03, "3 % noise")
     return rows + building_rows(lines)
@@ -232,6 +232,17 @@ def shared_rows(lines: list[Line]) -> list[Figure]:
         )
         for name in dict.fromkeys(line["task"]["effect"] for line in strong)
     ]  # fmt: skip
+
+
+def further_rows(lines: list[Line]) -> list[Figure]:
+    """Return the rows of the outside effects that the main plan leaves out, if there are any."""
+    strong = binned(of_kind(lines, "further", 0.01), "15 %", "40 %")
+    unknown = [line for line in strong if score.calls_unknown(line)]
+    rows = [
+        ("further outside effect unknown, 15 and 40 %", count(strong, score.calls_unknown)),
+        ("further: its coordinate right, of those unknown", count(unknown, score.coordinate_right)),
+    ]
+    return [share(name, found) for name, found in rows] if strong else []
 
 
 def structure_rows(lines: list[Line]) -> list[Figure]:

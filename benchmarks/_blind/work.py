@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from . import record
-from .plan import Task
+from .plan import APART, Task
 
 PARTS = ("diagnosis", "peers")
 
@@ -35,9 +35,9 @@ def finished(path: Path, tasks: list[Task], part: str) -> list[dict[str, Any]]:
 def parts_of(task: Task) -> tuple[str, ...]:
     """Return who is asked of a case: on buildings the package alone, for no peer takes one.
 
-    Nor has any peer a term for an end stop.
+    Nor has any peer a term for an end stop, or one for what only a learned curve finds.
     """
-    return ("diagnosis",) if task.kind in ("structure", "shared") else PARTS
+    return ("diagnosis",) if task.kind in APART else PARTS
 
 
 def do(part: str, task: Task, digest: str) -> dict[str, Any]:

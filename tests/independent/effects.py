@@ -645,5 +645,117 @@ def _(s, rng, rig, size):
     return _mode(s, rng, [0.6, 0.4])
 
 
+# --- outside the library too, with plans of their own: on a bench alone ----------------------------
+
+
+def _bumper(kind: int, s: float, rng: np.random.Generator, rig: Rig, size: Size) -> Fields:
+    gap = size["travel"] * rng.uniform(0.2, 0.6)
+    deep = size["travel"] - gap
+    k = 3.0 * s * rig.force / (deep if kind == 1 else deep**1.5)
+    return {"one_kind": kind, "one_k": k, "one_gap": gap, "one_side": rng.choice([-1.0, 1.0])}
+
+
+@form("one_sided_contact", "bumper", beds=("bench",), outside="displacement")
+def _(s, rng, rig, size):
+    """k max(x - d, 0) on one side of the stroke: a bumper of rubber. Dixon (2007), ch. 5."""
+    return _bumper(1, s, rng, rig, size)
+
+
+@form("one_sided_contact", "rounded", beds=("bench",), outside="displacement")
+def _(s, rng, rig, size):
+    """k max(x - d, 0)^1.5 on one side: a rounded bumper. Hertz (1882), J. reine angew. Math. 92."""
+    return _bumper(2, s, rng, rig, size)
+
+
+def _after_reversal(kind: int, s: float, rng: np.random.Generator, rig: Rig) -> Fields:
+    return {"brk_kind": kind, "brk_s": 3.0 * s, "brk_len": rng.uniform(0.05, 0.25) * rig.stroke}
+
+
+@form("breakaway", "fall", laws=("bingham",), beds=("bench",), outside="travel")
+def _(s, rng, rig, size):
+    """Y (1 + g exp(-q/l)), q the way since the last reversal: chains break over l. Own form."""
+    return _after_reversal(1, s, rng, rig)
+
+
+@form("breakaway", "hump", beds=("bench",), outside="travel")
+def _(s, rng, rig, size):
+    """Y (1 + g q/l exp(1 - q/l)): the same, the chains stretched before they break. Own form."""
+    return _after_reversal(2, s, rng, rig)
+
+
+def _by_acceleration(kind: int, top: float, rng: np.random.Generator, rig: Rig) -> Fields:
+    usual = rig.speed**2 / rig.stroke
+    at, width = rng.uniform(0.5, 2.0) * usual, 0.3 * rig.values["v_n"]
+    return {"acc_kind": kind, "acc_s": top, "acc_a": at, "acc_w": width}
+
+
+@form("acceleration_yield", "sense", beds=("bench",), outside="acceleration")
+def _(s, rng, rig, size):
+    """Y (1 + g tanh((a/A) tanh(w/w_a))): more where it speeds up, less where it slows. Own form."""
+    return _by_acceleration(1, 0.95 * s, rng, rig)
+
+
+@form("acceleration_yield", "size", beds=("bench",), outside="acceleration")
+def _(s, rng, rig, size):
+    """Y (1 + g q/(1 + q)), q = (a/A)^2: particles lag the carrier in both senses. Own form."""
+    return _by_acceleration(2, 4.0 * s, rng, rig)
+
+
+@form("command_map", "steep", beds=("bench",), outside="voltage")
+def _(s, rng, rig, size):
+    """E' = E (E/8 V)^g: yield over field. Ginder, Davis & Elie (1996), IJMP B 10, 3293."""
+    return {"bend_kind": 1, "bend_s": 2.0 * s, "bend_v": V_MAX}
+
+
+@form("command_map", "parabola", beds=("bench",), outside="voltage")
+def _(s, rng, rig, size):
+    """E' = E (1 - g (1 - E/8 V)): the quadratic start of the same curve."""
+    return {"bend_kind": 2, "bend_s": s, "bend_v": V_MAX}
+
+
+def _with_heat(kind: int, s: float, rng: np.random.Generator, rig: Rig) -> Fields:
+    fields = {"heat_kind": kind, "heat_k": 2.0 * s * rig.force / rig.stroke, "heat_c": 0.4}
+    return {
+        **fields,
+        "heat_tau": rng.uniform(0.1, 0.6),
+        "heat_len": rng.uniform(2.0, 3.5) * rig.stroke,
+    }
+
+
+@form("warm_accumulator", "relaxing", beds=("bench",), outside="displacement")
+def _(s, rng, rig, size):
+    """k (x + 0.4 (x - r)), r' = (x - r)/tau: isothermal to adiabatic. Pourmovahed & Otis (1990)."""
+    return _with_heat(1, s, rng, rig)
+
+
+@form("warm_accumulator", "gas", beds=("bench",), outside="displacement")
+def _(s, rng, rig, size):
+    """p A ((1 + h)/(1 - x/l) - 1), h' = 0.4 (1 + h) v/(l - x) - h/tau: J. Dyn. Sys. Meas. 112, 116."""
+    return _with_heat(2, s, rng, rig)
+
+
+def _vapour(kind: int, top: float, rng: np.random.Generator, rig: Rig) -> Fields:
+    at = rng.uniform(0.08, 0.3) * rig.speed
+    fields = {"cav_kind": kind, "cav_s": top, "cav_w": at, "cav_d": 0.15 * at}
+    return {**fields, "cav_len": rng.uniform(0.05, 0.2) * rig.stroke}
+
+
+@form("cavitation", "choked", beds=("bench",), outside="velocity")
+def _(s, rng, rig, size):
+    """Whole force (1 - g/(1 + exp((w_c - w)/d))): in one direction alone. In kind, Duym (2000)."""
+    return _vapour(1, 0.95 * s, rng, rig)
+
+
+@form("cavitation", "void", beds=("bench",), outside="velocity")
+def _(s, rng, rig, size):
+    """Whole force (1 - g q/(q + l)), q' = w - w_c while that is positive; w < 0 closes it. Own form."""
+    return _vapour(2, 0.95 * s, rng, rig)
+
+
 LIBRARY = tuple(name for name, group in FORMS.items() if not next(iter(group.values())).outside)
-OUTSIDE = tuple(name for name in FORMS if name not in LIBRARY)
+FURTHER = (
+    "one_sided_contact", "breakaway", "acceleration_yield", "command_map", "warm_accumulator",
+    "cavitation",
+)  # fmt: skip
+"""Outside the library; the plans of the other outside effects stay what they are without them."""
+OUTSIDE = tuple(name for name in FORMS if name not in (*LIBRARY, *FURTHER))

@@ -1,7 +1,7 @@
 """From the commanded voltage to the voltage that the fluid feels.
 
-Coil first, then the iron's memory, then its saturation. All of it depends on the command alone,
-so it is done before the mechanics.
+The curve of the amplifier or of the fluid's field first, then the coil, the iron's memory and its
+saturation. All of it depends on the command alone, so it is done before the mechanics.
 """
 
 from __future__ import annotations
@@ -19,6 +19,10 @@ Array = NDArray[np.float64]
 def felt_voltage(command: Array, step: float, fields: dict[str, Any]) -> Array:
     """Felt voltage (n, FINE + 1) V at the points of the command, step s between samples."""
     felt = np.ascontiguousarray(command, dtype=float).copy()
+    if bend := int(fields.get("bend_kind", 0)):
+        part = felt / fields["bend_v"]
+        size = fields["bend_s"]
+        felt *= part**size if bend == 1 else 1.0 - size * (1.0 - part)
     kinds = [int(fields.get(f"{name}_kind", 0)) for name in ("coil", "rem", "sat")]
     if not any(kinds):
         return felt

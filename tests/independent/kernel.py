@@ -33,6 +33,11 @@ INTEGERS = [
     "rip_kind",
     "age_kind",
     "thick_kind",
+    "one_kind",
+    "brk_kind",
+    "acc_kind",
+    "heat_kind",
+    "cav_kind",
     "building",
     "bf_kind",
     "du_kind",
@@ -50,6 +55,8 @@ INTEGERS = [
     "i_q",
     "i_bw",
     "i_bf",
+    "i_heat",
+    "i_void",
 ]
 REALS = [
     "y0",
@@ -101,6 +108,22 @@ REALS = [
     "thick_w",
     "thick_d",
     "thick_v",
+    "one_k",
+    "one_gap",
+    "one_side",
+    "brk_s",
+    "brk_len",
+    "acc_s",
+    "acc_a",
+    "acc_w",
+    "heat_k",
+    "heat_c",
+    "heat_tau",
+    "heat_len",
+    "cav_s",
+    "cav_w",
+    "cav_d",
+    "cav_len",
     "ff_d",
     "vf_d",
     "mb",
@@ -193,13 +216,14 @@ def _bristle_rate(p, w, z, reach):
 
 
 @njit(cache=True)
-def _fluid(p, x, w, d, e, z, hot, age):
+def _fluid(p, x, w, d, e, z, hot, age, more):
     """Force of the fluid between piston and wall, and the bristle's rate.
 
-    d is the sense of sliding where w = 0 leaves it open; e the voltage that the fluid feels.
+    d is the sense of sliding where w = 0 leaves it open; e the voltage that the fluid feels;
+    more a factor of the yield force.
     """
     u = abs(w)
-    grip = p.y0 + p.y1 * e
+    grip = (p.y0 + p.y1 * e) * more
     drag = (p.c0 + p.c1 * e) * exp(-u / p.wn)
     reach = 1.0
     if p.st_kind > 0:
@@ -256,6 +280,50 @@ def _fluid(p, x, w, d, e, z, hot, age):
 
 
 @njit(cache=True)
+def _more(p, way, w, a):
+    """Factor of the yield force by the way since the last reversal, and by acceleration."""
+    more = 1.0
+    if p.brk_kind == 1:
+        more += p.brk_s * exp(-way / p.brk_len)
+    elif p.brk_kind == 2:
+        more += p.brk_s * way / p.brk_len * exp(1.0 - way / p.brk_len)
+    if p.acc_kind == 1:
+        more += p.acc_s * tanh(a / p.acc_a * tanh(w / p.acc_w))
+    elif p.acc_kind == 2:
+        q = (a / p.acc_a) ** 2
+        more += p.acc_s * q / (1.0 + q)
+    return more
+
+
+@njit(cache=True)
+def _kept(p, w, void):
+    """Share of the fluid's force that a vapour space leaves."""
+    if p.cav_kind == 1:
+        return 1.0 - p.cav_s / (1.0 + exp(-(w - p.cav_w) / p.cav_d))
+    if p.cav_kind == 2:
+        return 1.0 - p.cav_s * void / (void + p.cav_len)
+    return 1.0
+
+
+@njit(cache=True)
+def _voids(p, w, void):
+    """Rate at which the vapour space grows in one direction, beyond a speed, and closes again."""
+    if w > 0.0:
+        return max(w - p.cav_w, 0.0)
+    return w * void / (void + 0.1 * p.cav_len)
+
+
+@njit(cache=True)
+def _accumulator(p, q, x, v):
+    """Force of a gas that exchanges heat with its wall, and the rate of its state q."""
+    if p.heat_kind == 1:
+        return p.heat_k * (x + p.heat_c * (x - q)), (x - q) / p.heat_tau
+    left = p.heat_len - x
+    force = p.heat_k * p.heat_len * ((1.0 + q) * p.heat_len / left - 1.0)
+    return force, p.heat_c * (1.0 + q) * v / left - q / p.heat_tau
+
+
+@njit(cache=True)
 def _stop(p, x, v):
     """Push of a buffer behind a gap to either side."""
     dent = abs(x) - p.es_gap
@@ -275,6 +343,10 @@ def _beside(p, x, w):
     f = 0.0
     if p.building == 0 and p.es_kind > 0:
         f += _stop(p, x, w)
+    if p.one_kind > 0:
+        dent = p.one_side * x - p.one_gap
+        if dent > 0.0:
+            f += p.one_side * p.one_k * (dent if p.one_kind == 1 else dent**1.5)
     if p.gas_kind == 1:
         f += p.gas_k * x + p.gas_f
     elif p.gas_kind == 2:
@@ -312,7 +384,7 @@ def _link(p, u, rel, r):
 
 @njit(cache=True)
 def _excess(p, w, d, y, v, u, r, e, z, hot, age):
-    f, _ = _fluid(p, y, w, d, e, z, hot, age)
+    f, _ = _fluid(p, y, w, d, e, z, hot, age, 1.0)
     return f + _beside(p, y, w) - _link(p, u, v - w, r)
 
 
@@ -377,11 +449,12 @@ def _remember(mem, lens, y):
 
 
 @njit(cache=True)
-def _device(p, s, ds, play, mem, lens, x, v, d, e, free):
+def _device(p, s, ds, play, mem, lens, x, v, a, d, e, free):
     """Force of the whole damper without its inertia; fills the rates of its states.
 
-    Returns force, piston position, piston speed, and the force that the free piston's contact
-    would carry (used by the events of a joint with play).
+    a is the acceleration of a prescribed motion; no free motion has what depends on it. Returns
+    force, piston position, piston speed, and the force that the free piston's contact would carry
+    (used by the events of a joint with play).
     """
     z = d
     if p.i_z >= 0:
@@ -404,8 +477,16 @@ def _device(p, s, ds, play, mem, lens, x, v, d, e, free):
         shown = 1
     if p.pre_kind == 3:
         z = _memory(mem, lens, y)
-    f, rate = _fluid(p, y, w, side, e, z, hot, age)
+    more = _more(p, abs(y - mem[lens.size]), w, a)
+    f, rate = _fluid(p, y, w, side, e, z, hot, age, more)
+    if p.cav_kind > 0:
+        f *= _kept(p, w, s[p.i_void] if p.i_void >= 0 else 0.0)
     total = f + _beside(p, y, w)
+    if p.i_heat >= 0:
+        push, flow = _accumulator(p, s[p.i_heat], y, w)
+        total += push
+        if not free:
+            ds[p.i_heat] = flow
     inner = total
     if shown == 1:
         total = 0.0
@@ -434,6 +515,8 @@ def _device(p, s, ds, play, mem, lens, x, v, d, e, free):
             ds[p.i_age] = (1.0 - age) / p.age_tau - abs(w) * age / p.age_len
         else:
             ds[p.i_age] = 1.0 - abs(w) * age / p.age_len
+    if p.i_void >= 0:
+        ds[p.i_void] = _voids(p, w, s[p.i_void])
     return total, y, w
 
 
@@ -504,8 +587,8 @@ def _grasp(p, s, ds, mode, mem, lens, x, e):
 
     A rod that only pushes on its piston cannot pull: beyond that end the joint opens.
     """
-    lo, _, _ = _device(p, s, ds, mode[1], mem, lens, x, 0.0, -1.0, e, True)
-    hi, _, _ = _device(p, s, ds, mode[1], mem, lens, x, 0.0, 1.0, e, True)
+    lo, _, _ = _device(p, s, ds, mode[1], mem, lens, x, 0.0, 0.0, -1.0, e, True)
+    hi, _, _ = _device(p, s, ds, mode[1], mem, lens, x, 0.0, 0.0, 1.0, e, True)
     if p.series_kind == 4 and p.law == 0:
         if mode[1] > 0.0:
             lo = 0.0
@@ -571,7 +654,7 @@ def _flow(p, t, k, h, s, ds, mode, mem, lens, filt, mot, volt, ground, row):
         d = mode[2]
         if row.size > 0:
             d = 0.0 if v == 0.0 else copysign(1.0, v)
-        f, y, w = _device(p, s, ds, mode[1], mem, lens, x, v, d, e, False)
+        f, y, w = _device(p, s, ds, mode[1], mem, lens, x, v, a, d, e, False)
         f += (p.mass + _carried(p, mode)) * a + old
     else:
         i = p.i_q
@@ -583,7 +666,7 @@ def _flow(p, t, k, h, s, ds, mode, mem, lens, filt, mot, volt, ground, row):
             v = 0.0
             held = _base_balance(p, s, ag, v, old)
             lo, hi = _grasp(p, s, ds, mode, mem, lens, x, e)
-            _mid, y, w = _device(p, s, ds, mode[1], mem, lens, x, v, 0.0, e, False)
+            _mid, y, w = _device(p, s, ds, mode[1], mem, lens, x, v, 0.0, 0.0, e, False)
             bf = _dry(p, 0.0)
             span = hi - lo + 2.0 * bf
             part = (held - lo + bf) / span if span > 0.0 else 0.5
@@ -593,7 +676,7 @@ def _flow(p, t, k, h, s, ds, mode, mem, lens, filt, mot, volt, ground, row):
             d = copysign(1.0, v) if v != 0.0 else 0.0
             if dry:
                 d = mode[0]
-            f, y, w = _device(p, s, ds, mode[1], mem, lens, x, v, d, e, False)
+            f, y, w = _device(p, s, ds, mode[1], mem, lens, x, v, 0.0, d, e, False)
             if dry:
                 friction = _dry(p, v) * d
             mass = p.mass + _carried(p, mode)
@@ -689,7 +772,7 @@ def _margin(p, t, k, h, s, ds, mode, mem, lens, mot, volt, ground):
         if mode[1] == 0:
             g = (p.se_gap - abs(x - s[p.i_y])) / p.se_gap
         else:
-            f, _, _ = _device(p, s, ds, mode[1], mem, lens, x, v, d, e, True)
+            f, _, _ = _device(p, s, ds, mode[1], mem, lens, x, v, a, d, e, True)
             m = _carried(p, mode)
             if p.building == 1:
                 a = (held - f - friction) / (p.mb + p.mass + m)
@@ -958,7 +1041,10 @@ def march(plant, s, scale, rtol, h, stops, where, wanted, lens, filt, mot, volt,
         end = stops[j + 1] if j + 1 < stops.size else t
         if p.building == 0 and end > t:
             v = _motion(mot, k, 0.5 * (t + end) - k * h)[1]
+            was = mode[2]
             mode[2] = copysign(1.0, v) if v != 0.0 else 0.0
+            if p.brk_kind > 0 and mode[2] * was < 0.0:
+                mem[lens.size] = _motion(mot, k, t - k * h)[0]
         elif p.pre_kind == 3 and p.building == 1 and s[p.i_q + 3] != 0.0:
             mode[2] = copysign(1.0, s[p.i_q + 3])
         if eventful and end > t:

@@ -143,6 +143,10 @@ def _layout(rig: Rig, p: Any, fields: dict[str, Any]) -> dict[str, tuple[list, l
             groups["i_bw"] = ([0.0] * 2, [1.0] * 2)
         if p["bf_kind"] == 3:
             groups["i_bf"] = ([0.0], [1.0])
+    if p["heat_kind"] > 0:
+        groups["i_heat"] = ([0.0], [0.1 * x if p["heat_kind"] == 1 else 0.1])
+    if p["cav_kind"] == 2:
+        groups["i_void"] = ([0.0], [0.1 * p["cav_len"]])
     return groups
 
 
@@ -152,7 +156,7 @@ def _steepest_fall(p: Any, rig: Rig) -> float:
     z = 1.0 if p["law"] == 0 else 1.0 / p["kap"]
     worst = 0.0
     for e in (0.0, V_MAX):
-        f = np.array([_fluid(p, 0.0, u, 1.0, e, z, 0.0, 1.0)[0] for u in w])
+        f = np.array([_fluid(p, 0.0, u, 1.0, e, z, 0.0, 1.0, 1.0)[0] for u in w])
         worst = max(worst, float(-np.min(np.diff(f) / np.diff(w))))
     return worst
 

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import ast
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from .effects import FORMS, FURTHER
 from .generate import make_case
+from .kernel import _accumulator
+from .specimen import Specimen
 
 HERE = Path(__file__).parent
 
@@ -31,3 +35,52 @@ def test_a_seed_gives_the_same_case_again():
     first, second = (make_case(3, "none", None, 0.15, 0.01, "bench_10N", "lugre") for _ in "ab")
     for one, other in zip(first.runs, second.runs, strict=True):
         assert np.array_equal(one["force"], other["force"])
+
+
+@pytest.mark.parametrize(
+    ("name", "form", "law"),
+    [(n, f, law) for n in FURTHER for f, one in FORMS[n].items() for law in one.laws],
+)
+def test_a_further_effect_changes_a_bench_by_what_was_asked_for_or_by_its_most(name, form, law):
+    case = make_case(11, name, form, 0.05, 0.01, "bench_10N", law, duration=6.0)
+    assert case.truth["kind"] == "outside"
+    assert case.truth["share"] == pytest.approx(0.05, abs=0.005)
+
+
+def test_a_contact_on_one_side_pushes_there_alone():
+    case = make_case(5, "one_sided_contact", "bumper", 0.15, 0.01, "bench_10N", "bingham")
+    side = case.truth["effects"][0]["parameters"]["one_side"]
+    gap = case.truth["effects"][0]["parameters"]["one_gap"]
+    with_it = case.specimen.answer(case.plan[0])
+    without = Specimen(case.specimen.rig, {}).answer(case.plan[0])
+    more, x = with_it["force"] - without["force"], side * with_it["displacement"]
+    assert np.all(more[x <= gap] == 0.0)
+    assert np.all(side * more[x > gap] > 0.0)
+
+
+def test_a_breakaway_fades_with_the_way_since_the_last_reversal():
+    case = make_case(5, "breakaway", "fall", 0.15, 0.01, "bench_10N", "bingham")
+    fields = case.truth["effects"][0]["parameters"]
+    run = case.plan[0]
+    with_it, without = (Specimen(case.specimen.rig, one).answer(run) for one in (fields, {}))
+    v, x = with_it["velocity"], with_it["displacement"]
+    grip = case.specimen.rig.values["f_c"] + case.specimen.rig.values["f_v"] * with_it["voltage"]
+    share = (with_it["force"] - without["force"]) / grip * np.sign(v)
+    for turn, end in pairwise(np.flatnonzero(v[1:] * v[:-1] < 0.0) + 1):
+        way = np.abs(x[turn:end] - x[turn - 1])  # from the last sample before the reversal
+        wanted = fields["brk_s"] * np.exp(-way / fields["brk_len"])
+        assert np.allclose(share[turn:end], wanted, atol=0.1 * fields["brk_s"])
+
+
+def test_an_accumulator_is_stiffer_fast_than_slow():
+    """Adiabatic over isothermal stiffness is 1.4, the ratio of a diatomic gas's heats."""
+    rig = make_case(5, "none", None, 0.15, 0.01, "bench_10N", "bingham").specimen.rig
+    fields = {"heat_kind": 1, "heat_k": 100.0, "heat_c": 0.4, "heat_tau": 0.3, "heat_len": 1.0}
+    x, h = 0.01, 1e-6
+    for held, stiffness in ((0.0, 140.0), (x, 100.0)):  # the state lags behind, or has followed
+        plant = Specimen(rig, fields).plant[0]
+        assert _accumulator(plant, held, x, 0.0)[0] == pytest.approx(stiffness * x)
+    gas = Specimen(rig, fields | {"heat_kind": 2}).plant[0]
+    assert _accumulator(gas, 0.0, h, 0.0)[0] == pytest.approx(100.0 * h, rel=1e-5)
+    grown = _accumulator(gas, 0.0, 0.0, 1.0)[1] * h  # what heats up while it moves by h
+    assert _accumulator(gas, grown, h, 0.0)[0] == pytest.approx(140.0 * h, rel=1e-5)
