@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from .effects import FORMS, FURTHER
-from .generate import make_case
-from .kernel import _accumulator
-from .specimen import Specimen
+from tests.independent.effects import FORMS, FURTHER
+from tests.independent.generate import make_case
+from tests.independent.kernel import _accumulator
+from tests.independent.specimen import Specimen
 
 HERE = Path(__file__).parent
 
