@@ -4,11 +4,13 @@
 
 makes what is missing of `--each` cases per fault, with the generator of the blind benchmark, and
 prints how many are named with channel, run and value; without a number it prints what is there.
-Each case is checked as it is, too: what is said of those is a false alarm. Only the last
-four faults need a model, which is fitted.
+Each case is checked as it is, too: what is said of those is a false alarm. The last six
+faults need a model, which is fitted; the last two are told by a verdict.
 
 hum       a sinusoid at 50 or 60 Hz, off by up to 0.04 %, of 3 to 10 % of the channel's RMS
 line      the same at a frequency between 25 and 200 Hz that is none of the mains
+folded    the same at 360 or 720 Hz, beyond half the rate of 500 samples per second: aliased
+coarse    a channel that was measured at 1/2 to 1/5 of the rate, straight lines in between
 average   a mean of 3 to 30 samples, noise included
 gain      one run's channel, noise included, times 0.7, 0.85, 1.15 or 1.4
 sign      one run's channel turned
@@ -17,15 +19,19 @@ clock     the clock of the force's logger 100 to 1000 ppm fast or slow
 apart     one run's force 4 to 20 ms late or early: two loggers that did not start together
 slew      a command that reaches the coil no faster than 5 to 40 V/s, recorded before that
 range     one that reaches it up to 50 to 80 % of the largest command only
+cell      a load cell or its amplifier with a low-pass of second order, corner at 8 to 30 Hz
+warm      runs between 15 and 35 degC, measured; the force falls by 0.5 to 1.5 % per kelvin
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import re
 import traceback
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,9 +40,15 @@ from bristle.data.checks.differing_runs import check_differing_runs
 from bristle.data.checks.finding import Finding
 from bristle.data.checks.recording import check_recording
 from bristle.data.measurement import Measurement
+from bristle.diagnose.damper import look_at_damper
 from bristle.diagnose.faults import SensorFault
+from bristle.diagnose.low_pass import low_pass_text
 from bristle.diagnose.opening import opening
 from bristle.identify.model import Model
+from bristle.quantity import plain
+from tests.independent.generate import Case
+from tests.independent.rigs import Rig
+from tests.independent.specimen import Specimen
 
 from ._answers import Answer, Answers
 from ._blind import cases, score
@@ -47,13 +59,19 @@ from ._rows import Row
 Array = NDArray[np.float64]
 
 SEED = 23
-FAULTS = ("hum", "line", "average", "gain", "sign", "zero", "clock", "apart", "slew", "range")
+FAULTS = (
+    "hum", "line", "folded", "coarse", "average", "gain", "sign", "zero", "clock", "apart", "slew",
+    "range", "cell", "warm",
+)  # fmt: skip
 BY_MODEL = ("clock", "apart")
 """Faults that show only beside a model, which is fitted."""
 
 OF_COMMAND = ("slew", "range")
 """Faults of the command, which show beside a model too; what the damper does with it is made anew.
 """
+
+BY_VERDICT = ("cell", "warm")
+"""Faults that the verdict tells: the delay with its filter, the measured temperature's effect."""
 
 CLEAN = "clean"
 GOAL = 0.9
@@ -66,6 +84,8 @@ NEAR = {
     "delay": 0.2,
     "slew": 0.1,
     "range": 0.05,
+    "cell": 0.15,
+    "warm": 0.15,
 }
 """Share by which a told value may be off."""
 
@@ -114,6 +134,8 @@ def _answered(fault: str, number: int) -> Answer:
         rng = np.random.default_rng([SEED, number, len(fault)])
         if fault in OF_COMMAND:
             return _limits(fault, number, rng)
+        if fault in BY_VERDICT:
+            return _by_verdict(fault, number, rng)
         runs = _runs(number)
         if fault == CLEAN:
             found = _found(runs)
@@ -167,6 +189,63 @@ def _limits(fault: str, number: int, rng: np.random.Generator) -> Answer:
     right = len(told) == 1 and (told[0].channel, told[0].fault) == ("voltage", fault) and near[0]
     said = [[one.run, one.channel, one.words] for one in told]
     return {"right": right, "planted": ["", "voltage", fault, size], "said": said}
+
+
+def _by_verdict(fault: str, number: int, rng: np.random.Generator) -> Answer:
+    """Return whether the verdict tells what a load cell filters, or that the rig warms up."""
+    case = cases.make(_task(number))
+    if fault == "cell":
+        wanted = float(rng.uniform(8.0, 30.0))
+        specimen = Specimen(case.specimen.rig, low_pass(wanted))
+        runs = _performed(case, [specimen] * len(case.plan), number)
+    else:
+        wanted = float(rng.uniform(0.005, 0.015))
+        warm = rng.permutation(np.linspace(15.0, 35.0, len(case.plan)))
+        specimens = [_warmed(case.specimen.rig, wanted * (T - 25.0)) for T in warm]
+        runs = [
+            replace(run, labels={"temperature": float(T)})
+            for run, T in zip(_performed(case, specimens, number), warm, strict=True)
+        ]
+    train, held = ([run for run in runs if run.name.startswith(r)] for r in ("train", "holdout"))
+    found, _ = look_at_damper(opening(train, held, Model(_task(number).law)))
+    said = [found.kind, *found.effects, low_pass_text(found)]
+    told = 0.0
+    if fault == "cell" and (corner := re.search(r"corner near ([\d.]+) Hz", said[-1])):
+        told = float(corner[1])
+    if fault == "warm" and found.effects == ("measured_temperature",) and found.after:
+        told = found.after.model.value("measured_temperature.c_yield")
+    right = abs(told - wanted) <= NEAR[fault] * wanted
+    return {"right": right, "planted": ["", "force", fault, wanted], "told": told, "said": said}
+
+
+def low_pass(corner: float) -> dict[str, Any]:
+    """Return the generator's filter of the force: Butterworth's of second order.
+
+    Parameters
+    ----------
+    corner : frequency at which half the power is left [Hz]
+    """
+    w = 2.0 * np.pi * corner
+    box = np.zeros((6, 4))
+    box[:2, :2] = [[0.0, w], [-w, -np.sqrt(2.0) * w]]
+    box[4, 1], box[5, 0] = w, 1.0
+    return {"force_filter": box, "ff_d": 0.0}
+
+
+def _warmed(rig: Rig, fall: float) -> Specimen:
+    """Return a rig whose whole force is exp(-fall) of what it was."""
+    forces = ("f_c", "f_v", "c_0", "c_v", "sigma_a", "sigma_0", "sigma_1", "sigma_2", "sigma_b")
+    values = {k: v * np.exp(-fall) if k in forces else v for k, v in rig.values.items()}
+    return Specimen(replace(rig, values=values), {})
+
+
+def _performed(case: Case, specimens: list[Specimen], number: int) -> list[Measurement]:
+    """Return the runs of a case's plan, each on a specimen of its own."""
+    made = [
+        replace(case, specimen=one).perform(run, 100 * number + k, shown["name"])
+        for k, (one, run, shown) in enumerate(zip(specimens, case.plan, case.runs, strict=True))
+    ]
+    return measurements(made, case.channels)
 
 
 def _felt(volts: Array, step: float, fault: str, size: float) -> Array:
@@ -233,6 +312,11 @@ def _names(found: Finding, run: str, wanted: tuple[str, str, float]) -> bool:
         return False
     if fault == "average":
         return f"average of {value:.0f} samples" in found.text
+    if fault == "coarse":
+        return f"interpolated: {plain(value, 3)} samples per second" in found.text
+    if fault == "folded" and "aliased" not in found.text:
+        return False
+    fault = "line" if fault == "folded" else fault
     told = [one for one in found.corrections if one.fault == fault]
     return any(abs(one.value - value) <= NEAR[fault] * abs(value) for one in told)
 
@@ -253,6 +337,17 @@ def _planted(
         turns = 2.0 * np.pi * frequency * one.time + rng.uniform(0.0, 2.0 * np.pi)
         y = y + rng.uniform(0.03, 0.1) * float(np.std(y)) * np.sin(turns)
         wanted = (channel, "line", frequency)
+    elif fault == "folded":
+        rate = 1.0 / one.step
+        order = int(rng.choice([6, 12]))
+        frequency = 60.0 * order * float(1.0 + rng.uniform(-4e-4, 4e-4))
+        turns = 2.0 * np.pi * frequency * one.time + rng.uniform(0.0, 2.0 * np.pi)
+        y = y + rng.uniform(0.03, 0.1) * float(np.std(y)) * np.sin(turns)
+        wanted = (channel, fault, abs(frequency - rate * round(frequency / rate)))
+    elif fault == "coarse":
+        every = int(rng.integers(2, 6))
+        y = np.interp(one.time, one.time[::every], y[::every])
+        wanted = (channel, fault, 1.0 / (one.step * every))
     elif fault == "average":
         length = int(rng.integers(3, 31))
         y = np.convolve(np.pad(y, (length - 1, 0), mode="edge"), np.ones(length) / length, "valid")

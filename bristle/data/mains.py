@@ -6,17 +6,23 @@ MAINS = (50.0, 60.0)
 """Frequencies of the mains [Hz]."""
 
 MAINS_OFF = 2e-3  # share by which the mains may be off; a grid keeps to a fifth of that
-_MAINS_ORDERS = 5  # harmonics of the mains that are looked for beyond half the sampling rate
+_BEYOND = (1, 2, 3, 4, 5, 6, 12)
+"""Harmonics of the mains that are looked for beyond half the sampling rate.
+
+The sixth and the twelfth are the ripple of rectifiers on three phases (6 and 12 pulses a period):
+that of the amplifiers which drive rig and coil.
+"""
 
 
 def mains_lines(step: float) -> list[float]:
     """Return where the harmonics of the mains show at a sampling step [s], in Hz."""
-    half = 0.5 / step
-    return [
-        _folded(order * mains, step)
-        for mains in MAINS
-        for order in range(1, max(int(half / mains), _MAINS_ORDERS) + 1)
-    ]
+    return [_folded(order * mains, step) for mains in MAINS for order in _orders(mains, step)]
+
+
+def _orders(mains: float, step: float) -> list[int]:
+    """Return the harmonics that are looked for: all up to half the rate, and those of `_BEYOND`."""
+    below = range(1, int(0.5 / (step * mains)) + 1)
+    return [*below, *(order for order in _BEYOND if order not in below)]
 
 
 def _folded(frequency: float, step: float) -> float:
@@ -42,9 +48,9 @@ def mains_of(frequency: float, step: float, width: float) -> tuple[float, int, b
     half = 0.5 / step
     for folded in (False, True):
         for mains in MAINS:
-            for order in range(1, max(int(half / mains), _MAINS_ORDERS) + 1):
+            for order in _orders(mains, step):
                 whole = order * mains
-                if (whole > half) is not folded or (folded and order > _MAINS_ORDERS):
+                if (whole > half) is not folded:
                     continue
                 if abs(_folded(whole, step) - frequency) <= max(MAINS_OFF * whole, width):
                     return mains, order, folded
