@@ -12,16 +12,16 @@ EVERYWHERE = {
     "--quiet": "no progress messages",
     "--debug": "the traceback of an error",
 }
-"""Options of every command, told once."""
+"""Options of every command, listed once."""
 
 PROGRESS = (
-    "On a terminal a command tells on stderr what it is at, with the time left as soon as the work "
-    "done tells it; in a pipe a plain line comes now and then. The first run on a machine compiles "
-    "the laws, and says so. `--quiet` silences all of it; stdout holds the answer alone. Ctrl-C "
-    "ends a command with one line, which says what is kept and how to go on: files are whole or "
-    "not there, an ensemble and `bristle study auto` go on where they were."
+    "On a terminal a command shows its progress on stderr, with the remaining time once it can be "
+    "estimated; in a pipe it prints a plain line now and then. The first run on a machine compiles "
+    "the laws, and reports this. `--quiet` suppresses all of it; stdout contains only the answer. "
+    "Ctrl-C ends a command with one line that states what is kept and how to continue: every file "
+    "is complete or absent; an ensemble and `bristle study auto` continue where they stopped."
 )
-"""What every command shows on its way."""
+"""The progress that every command shows."""
 
 
 def command_page() -> str:

@@ -39,7 +39,7 @@ def component_index() -> str:
     ]
     return (
         "# Components\n\nThe FMUs that come with bristle; `bristle list components` prints the "
-        "same. Each is built on first use, stands alone, and has an Integer output `fault` "
+        "same. Each is built on first use, is self-contained, and has an Integer output `fault` "
         "([its codes](../elsewhere.md#faults)).\n\n" + table(["component", "what it is"], rows)
     )
 

@@ -95,7 +95,7 @@ def law_index() -> str:
     variants = ", ".join(f"`{name}`" for name in law_names() if name not in LAWS)
     return (
         "# Laws\n\nThe base models of a damper, each in one file. Effects join them. "
-        f"A study begins with `{DEFAULT}` unless you say another one.\n\n"
+        f"A study begins with `{DEFAULT}` unless you name another one.\n\n"
         + table(["law", "what it is"], rows)
         + f"\n\nVariants: {variants}.\n"
     )
@@ -110,7 +110,7 @@ def _use_of(name: str, site: str, told: dict[str, Any]) -> list[str]:
             "## Use it",
             "In a study, beside the damper's own effects: `bristle add STUDY "
             f"{name}`. It acts on the {EFFECTS[name].shows} channel of the measurement; no "
-            "exported damper carries it.",
+            "exported damper contains it.",
         ]
     text = f'[components.{site}]\nparameters = {{ "{name}.on" = true, "{name}.{first}" = {value} }}'
     return [
@@ -128,7 +128,7 @@ def _properties(told: dict[str, Any]) -> str:
         if told["passive"]
         else "It can give energy to the motion."
         if told["site"] != "sensor"
-        else "It changes what is shown, not the motion.",
+        else "It changes the reading, not the motion.",
         "It exerts a force at rest too."
         if not told["zero_at_rest"]
         else "At rest and without history it exerts no force."

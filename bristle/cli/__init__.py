@@ -33,8 +33,10 @@ def build_parser() -> argparse.ArgumentParser:
     """Return the parser with one subcommand per module of this package."""
     parser = argparse.ArgumentParser(
         prog="bristle",
-        description="Simulate base-isolated buildings with MR dampers as FMUs.",
-        epilog="Exit codes: 0 done, 1 failed on its way, 2 the input is wrong, 130 interrupted.",
+        description="Find the physics that a damper model misses; simulate buildings with MR "
+        "dampers as FMUs.",
+        epilog="Exit codes: 0 done, 1 failed during the work, 2 the input is wrong, 130 "
+        "interrupted.",
     )
     parser.add_argument("--version", action="version", version=_version())
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)

@@ -18,18 +18,18 @@ def add_channels(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
         "--channel", action="append", default=[], metavar="CHANNEL=COLUMN@UNIT",
-        help="where a channel is from now on; a minus before COLUMN turns its sign: "
-        "--channel 'force=-Ch3@kN'; without @UNIT it stays, or is that of the title",
+        help="new column of a channel; a minus before COLUMN reverses its sign: --channel "
+        "'force=-Ch3@kN'; without @UNIT the unit stays, or is that of the title",
     )  # fmt: skip
     parser.add_argument(
         "--without", action="append", default=[], metavar="CHANNEL",
-        help="this channel is no longer read",
+        help="do not read this channel any more",
     )  # fmt: skip
     parser.add_argument(
         "--step", type=float, metavar="S", help="sampling step in s of files without a time"
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="say what would change, and write nothing"
+        "--dry-run", action="store_true", help="show the changes, and write nothing"
     )
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(act=_channels)

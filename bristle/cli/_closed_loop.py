@@ -17,31 +17,32 @@ def add_closed_loop(parser: argparse.ArgumentParser) -> None:
     """Add the options of a closed-loop prediction."""
     group = parser.add_argument_group(
         "closed loop",
-        "simulate building and identified damper under the runs' ground motions alone: error of "
-        "peak and RMS of each response, with a 95 % band",
+        "simulate building and identified damper under the ground motion and command of each run: "
+        "error of peak and RMS of each response, with a 95 % band",
     )
     group.add_argument("--closed-loop", action="store_true", help="simulate the building as well")
     group.add_argument(
         "--in", dest="house", type=Path, metavar="FILE",
-        help="a damper from a bench in the building of this file, under --ground or --data",
+        help="simulate a damper from a bench in the building of this file, under --ground or "
+        "--data",
     )  # fmt: skip
     group.add_argument(
         "--ground", metavar="RECORD",
-        help="with --in: a ground motion by name or file; with it there is a prediction alone, and "
-        "with --data a measurement of that building to compare with",
+        help="with --in: name or file of a ground motion, for a prediction; --data gives a "
+        "measurement of that building instead",
     )  # fmt: skip
     group.add_argument(
         "--level", type=float, metavar="V",
-        help="with --in: the damper's command where the ground motion has none; else 0",
+        help="with --in: the damper's constant command if the ground motion has none; else 0",
     )  # fmt: skip
     group.add_argument(
         "--draws", type=int, metavar="N",
-        help="draws of the parameters for the band; 0 for none; else 20",
+        help="number of draws of the parameters for the band; 0 for no band; else 20",
     )  # fmt: skip
     group.add_argument(
         "--with-limits", action="store_true",
-        help="widen the band by the effects that the verdict's limits leave open, and tell which "
-        "part of it each is",
+        help="widen the band by the effects that the verdict's limits do not exclude, and list "
+        "the part of each",
     )  # fmt: skip
 
 

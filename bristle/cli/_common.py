@@ -26,7 +26,7 @@ def add_overrides(
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help=f"take a value in place of the {of}'s, e.g. --set {example}",
+        help=f"use this value instead of the {of}'s, e.g. --set {example}",
     )
 
 

@@ -11,7 +11,9 @@ from ..errors import TrustError
 
 def add_trust(parser: argparse.ArgumentParser) -> None:
     """Add --trust to a command that may run effects of somebody's own."""
-    text = "consent to effects and laws that came with a study or scenario; it is remembered"
+    text = (
+        "consent to run effects and laws that came with a study or scenario; bristle remembers it"
+    )
     parser.add_argument("--trust", action="store_true", help=text)
 
 

@@ -24,17 +24,20 @@ ANSWER = "answer.json"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what a comparison of one's own takes."""
-    own = parser.add_argument_group("a comparison of your own")
+    own = parser.add_argument_group("your own comparison")
     own.add_argument(
         "--motions", nargs="+", metavar="RECORD",
-        help="ground motions: names or files, with values: el_centro_1940_ns,peak=0.4g,factor=0.5",
+        help="ground motions: names or files, with values, e.g. "
+        "el_centro_1940_ns,peak=0.4g,factor=0.5",
     )  # fmt: skip
     own.add_argument(
         "--controller", nargs="+", action="extend", metavar="WHAT",
-        help="stock names, files of `bristle design` (.json) or for it (.toml), components of your "
-        "own (.py), FMUs, with values: Skyhook,gain=80,label=mine",
+        help="stock names, controller files (.json) or design files (.toml) of `bristle design`, "
+        "your own components (.py), FMUs, with values, e.g. Skyhook,gain=80,label=mine",
     )  # fmt: skip
-    own.add_argument("--building", metavar="FILE", help="building file; else the library's own")
+    own.add_argument(
+        "--building", metavar="FILE", help="building file; else the library's building"
+    )
     own.add_argument(
         "--damper", metavar="WHAT",
         help="a component, a law, the folder of a study or a model.toml, an FMU, with values; "
@@ -42,32 +45,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     text = "device of the building that the controllers command; else the damper on the first level"
     own.add_argument("--device", metavar="NAME", help=text)
-    text = "output that is judged; else the top level's absolute acceleration"
+    text = "judged output; else the top level's absolute acceleration"
     own.add_argument("--output", metavar="NAME", help=text)
     own.add_argument("--statistic", choices=("peak", "rms"), help="its statistic; else peak")
-    text = "constant voltages that are tried; else 17"
+    text = "number of constant voltages to try; else 17"
     own.add_argument("--grid", type=int, metavar="N", help=text)
     own.add_argument(
         "--limit", action="store_const", const=True,
-        help="compute how far any voltage could go under each motion: up to a minute each",
+        help="compute the limit of any voltage under each motion: up to a minute each",
     )  # fmt: skip
     own.add_argument(
         "--ensemble", type=int, metavar="N",
-        help="run each case with N buildings, dampers and sensors, for its worst case",
+        help="run each case with N varied buildings, dampers and sensors, to find the worst case",
     )  # fmt: skip
-    text = "how far masses, stiffnesses, damper parameters vary to either side; else 10%%"
+    text = "variation of masses, stiffnesses and damper parameters to either side; else 10%%"
     own.add_argument("--spread", metavar="SHARE", help=text)
     text = "noise of the sensors, a share of each signal's RMS; else 1%%"
     own.add_argument("--noise", metavar="SHARE", help=text)
     text = "longest delay of the sensors [s]; else 0.004"
     own.add_argument("--delay", type=float, metavar="S", help=text)
-    text = "rows of the runs and step of FMUs [s]; else 0.002, or a share of a sample period"
+    text = "interval of the rows and step of FMUs [s]; else 0.002, or a share of a sample period"
     own.add_argument("--step", type=float, metavar="S", help=text)
-    text = "solve what is built in (compiled), or step FMUs throughout (fmu)"
+    text = "solve built-in components together (compiled), or step all as FMUs (fmu)"
     own.add_argument("--engine", choices=("compiled", "fmu"), help=text)
-    own.add_argument("--fmus", choices=("python", "native"), help="which FMUs are stepped")
-    own.add_argument("--workers", type=int, metavar="N", help="processes; else one per core")
-    own.add_argument("--no-figure", action="store_true", help="write tables alone, no report")
+    own.add_argument("--fmus", choices=("python", "native"), help="kind of FMUs")
+    own.add_argument(
+        "--workers", type=int, metavar="N", help="number of processes; else one per core"
+    )
+    own.add_argument("--no-figure", action="store_true", help="write only tables, no report")
     add_trust(parser)
 
 

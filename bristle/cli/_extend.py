@@ -22,13 +22,13 @@ def add_extend(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--holdout", nargs="+", action="extend", default=[], metavar="GLOB",
-        help="which of them are held out, by name; else the plan says it, or the names do, or "
-        "every third is",
+        help="held-out runs among them, by file name; else those of the plan, or by the usual "
+        "names, or every third run",
     )  # fmt: skip
     add_run_facts(parser)
     parser.add_argument(
         "--plan", type=Path, metavar="PLAN",
-        help="the plan that they were measured by: its roles, and what differs from it",
+        help="the plan of these tests: take its roles, and report differences from it",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
     parser.set_defaults(act=_extend)

@@ -17,7 +17,7 @@ def add_run_facts(parser: argparse.ArgumentParser) -> None:
     for option, value, text in (
         ("--level", "PATTERN", "the command's level in the names of files, {} in its place: "
          "--level 'I{}A'"),
-        ("--label", "NAME=PATTERN", "what else names tell of a run: --label 'oil=batch{}'"),
+        ("--label", "NAME=PATTERN", "other labels in the names of files: --label 'oil=batch{}'"),
     ):  # fmt: skip
         parser.add_argument(option, action="append", default=[], metavar=value, help=text)
     parser.add_argument(

@@ -23,11 +23,11 @@ def add_native(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="NAME",
         help="with --native: linux64, win64, darwin64, aarch64-linux or aarch64-darwin, several "
-        "with commas between; else all of them",
+        "separated by commas; else all",
     )
-    text = "with --native: put the C into the FMU too, for hosts that compile it themselves"
+    text = "with --native: include the C sources in the FMU, for hosts that compile them"
     parser.add_argument("--sources", action="store_true", help=text)
-    text = "version of FMI; 3 goes with --native (default: 2)"
+    text = "version of FMI; 3 needs --native (default: 2)"
     parser.add_argument("--fmi", type=int, choices=(2, 3), default=2, help=text)
 
 

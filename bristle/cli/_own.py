@@ -39,7 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser, word: str) -> None:
     """Add the arguments of the command for effects or laws."""
     a = f"an {word}" if word[0] in "aeiou" else f"a {word}"
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    text = f"{a}; else all, briefly; or one of the words new, check"
+    text = f"{a}; without it, a list of all; or one of the words new, check"
     parser.add_argument("name", nargs="?", metavar="NAME", help=text)
     text = f"with new: the name of your {word}; with check: its file"
     parser.add_argument("target", nargs="?", metavar="NAME_OR_FILE", help=text)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 ROLES = {
     "train": "fitted to",
-    "holdout": "held out: they judge, and no fit sees them",
-    "test": "test runs, which neither a fit nor a verdict sees",
+    "holdout": "held out: they test the model, and no fit uses them",
+    "test": "test runs, which neither a fit nor a verdict uses",
     "exclude": "left out",
 }
 """The roles, with what is said of runs that get them."""

@@ -14,7 +14,9 @@ from ._consent import add_trust
 if TYPE_CHECKING:
     from ..study.learning import Added
 
-HELP = "add an effect to a study's model: refit, error before and after, a step in the history"
+HELP = (
+    "add an effect to a study's model and refit it: error before and after, a step in the history"
+)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

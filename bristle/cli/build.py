@@ -1,4 +1,4 @@
-"""Build a component into an FMU of its own: another building, a record or controller baked in."""
+"""Build an FMU of a component, with another building, a record or a controller inside."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "component",
         metavar="COMPONENT",
-        help="a name of `bristle list components`, or the Python file of one of your own, which "
-        "is run",
+        help="a name of `bristle list components`, or the Python file of your own component (this "
+        "runs it)",
     )
     parser.add_argument(
         "--from", dest="building", type=Path, metavar="FILE", help="building file, for a Structure"
@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--record",
         type=Path,
         metavar="FILE",
-        help="ground motion (PEER AT2, CSV or a name) to bake into a GroundMotion",
+        help="ground motion (PEER AT2, CSV or a name), for a GroundMotion",
     )
     parser.add_argument(
         "--controller",
@@ -49,15 +49,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="file with an effect of your own, for a damper or a Structure; may be repeated",
+        help="file with your own effect, for a damper or a Structure; may be repeated",
     )
-    parser.add_argument("--name", help="the model's name and the file's; else the component's")
+    parser.add_argument("--name", help="name of the model and its file; else the component's")
     parser.add_argument(
         "--out",
         type=Path,
         default=Path(),
         metavar="FOLDER",
-        help="where NAME.fmu goes, in place of an older one; else the current folder",
+        help="folder of NAME.fmu; an older one is replaced; else the current folder",
     )
     add_native(parser)
     add_trust(parser)

@@ -1,4 +1,4 @@
-"""Hold a study's model against runs that it has not seen, or any FMU against a measurement."""
+"""Compare a study's model with held-out runs, or any FMU with a measurement."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..compare.comparison import Comparison
     from ..study.study import Study
 
-HELP = "show where a model, or any FMU, deviates from measurements: in text, then in figures"
+HELP = "show where a model, or any FMU, deviates from measurements: text and figures"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -36,8 +36,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--role",
         choices=("holdout", "train", "test"),
         default="holdout",
-        help="which runs of the study: those held out, those that the model was fitted to, or the "
-        "test runs, whose openings the study counts",
+        help="runs of the study: held-out runs, training runs, or the test runs (the study counts "
+        "each use)",
     )
     # The name until 0.1; here for one release.
     parser.add_argument(
@@ -46,14 +46,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     _add_fmu(parser)
     add_closed_loop(parser)
-    parser.add_argument("--out", type=Path, metavar="FILE", help="where the picture goes")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="file of the picture")
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 
 
 def _add_fmu(parser: argparse.ArgumentParser) -> None:
     """Add what goes with an FMU."""
-    parser.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="an FMU, anybody's")
+    parser.add_argument("--fmu", type=Path, metavar="FILE.fmu", help="an FMU of any tool")
     parser.add_argument(
         "--data", type=Path, metavar="FILE", help="with --fmu or --in: the measurement"
     )
@@ -71,21 +71,21 @@ def _add_fmu(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="PORT=CHANNEL@UNIT",
-        help="with --fmu: the channel for an input, or the channel to compare an output with",
+        help="with --fmu: the channel that feeds an input, or that an output is compared with",
     )
     parser.add_argument(
         "--channel",
         action="append",
         default=[],
         metavar="CHANNEL=COLUMN@UNIT",
-        help="with --fmu: where a channel is in the file, in place of the guess",
+        help="with --fmu: the column of a channel in the file, instead of the guess",
     )
     parser.add_argument(
         "--timeout",
         type=float,
         default=300.0,
         metavar="S",
-        help="with --fmu: limit of the run in s",
+        help="with --fmu: time limit of the run in s",
     )
 
 

@@ -1,4 +1,4 @@
-"""List the built-in components, or start a controller of your own.
+"""List the built-in components, or start your own controller.
 
 bristle components new NAME writes NAME.py; bristle build NAME.py makes an FMU of it.
 """
@@ -15,9 +15,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle components`."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument(
-        "action", nargs="?", choices=("new",), help="else the components are listed"
+        "action",
+        nargs="?",
+        choices=("new",),
+        help="write a new controller; without it, list the components",
     )
-    parser.add_argument("name", nargs="?", metavar="NAME", help="with new: of your controller")
+    parser.add_argument(
+        "name", nargs="?", metavar="NAME", help="with new: the name of your controller"
+    )
     parser.add_argument("--json", action="store_true", help="print as JSON")
 
 

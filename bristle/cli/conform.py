@@ -1,4 +1,4 @@
-"""Judge any FMU of FMI 2.0 or 3.0: what was tried, what was seen, what the standard says."""
+"""Check any FMU of FMI 2.0 or 3.0: the tests, their results, and the rules of the standard."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle conform`."""
     parser.epilog = (
         "Exit codes: 0 no rule is broken (a lack of robustness is reported; it counts with "
-        "--strict), 1 one is, "
+        "--strict), 1 a rule is broken, "
         "2 the file cannot be opened, or is not safe to open. The FMU's code runs on this machine: "
         "in separate processes, with a time limit, with your rights."
     )
-    parser.add_argument("fmu", metavar="FILE.fmu", help="the FMU, anybody's")
+    parser.add_argument("fmu", metavar="FILE.fmu", help="an FMU of any tool")
     parser.add_argument("--json", action="store_true", help="print the table as JSON")
     parser.add_argument(
         "--strict", action="store_true", help="exit with 1 for a lack of robustness as well"

@@ -1,7 +1,7 @@
 """Compare controllers: those of the paper, or your own on your building and ground motions.
 
-Without options the paper's comparison is run: Tables IV and V, figures, a ledger of its claims.
-With --motions and --controller any controllers are compared, beside constant voltages, on any
+Without options the command runs the paper's comparison: Tables IV and V, figures, a list of its
+claims. With --motions and --controller it compares any controllers and constant voltages on any
 building and damper: tables, a report, and a scenario of each case.
 """
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from ..paper.comparison.make import Report
 
-HELP = "compare controllers: the paper's, or your own on your building and motions"
+HELP = "compare controllers: those of the paper, or any on your building and ground motions"
 
 _WIDTH = 14
 """Of a column of numbers."""
@@ -32,14 +32,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FOLDER",
-        help="where report, tables and figures go, in place of older ones; else "
+        help="folder of report, tables and figures; older ones are replaced; else "
         "results/controllers/, or results/comparison/BUILDING/ for your own",
     )
     parser.add_argument(
         "--newhall",
         type=Path,
         metavar="FILE.AT2",
-        help="record of Newhall Fire Station 360 deg, Northridge 1994; no package has it",
+        help="record of Newhall Fire Station 360 deg, Northridge 1994; no package contains it",
     )
     _controllers.add_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")

@@ -1,6 +1,6 @@
-"""Design a controller from a design file: verified, written as a controller file, drawn.
+"""Design a controller from a design file, verify it, and write a controller file and a figure.
 
-What was found, with the curves of the figure, stands beside it as NAME_answer.json.
+NAME_answer.json contains the results with the curves of the figure.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from ..findings import command
 if TYPE_CHECKING:
     from ..design import DesignResult
 
-HELP = "design a controller, and say what it is worth"
+HELP = "design a controller and verify it"
 
 _COMPONENTS = {"hinf": "HinfInverse or ClippedOptimal", "lpv": "Lpv", "lqg": "LqgClipped"}
 _COMPONENTS["policy"] = "TrainedPolicy"
@@ -24,13 +24,13 @@ _COMPONENTS["policy"] = "TrainedPolicy"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle design`."""
-    parser.add_argument("kind", choices=tuple(_COMPONENTS), help="what is designed")
+    parser.add_argument("kind", choices=tuple(_COMPONENTS), help="kind of controller")
     parser.add_argument("file", type=Path, metavar="FILE", help="design file, TOML")
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FILE.json",
-        help="the controller file, its figure and answer beside it; else the design file's name",
+        help="controller file, with figure and answer beside it; else named after the design file",
     )
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 

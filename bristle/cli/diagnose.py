@@ -1,4 +1,4 @@
-"""What a study's model is missing, how sure that is, and what else it could be."""
+"""Find the effects that a study's model misses, with confidence and alternatives."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ._table import aligned
 if TYPE_CHECKING:
     from ..diagnose.verdict_text import Verdict
 
-HELP = "what a study's model is missing, how sure, what else it could be"
+HELP = "find the effects that a study's model misses, with confidence and alternatives"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,12 +24,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
         "--law",
-        help="all: try every law, and name the law together with the effects that it misses, as "
-        "where no law was chosen; the model's law: keep it",
+        help="all: search for the law together with its missing effects (default if no law was "
+        "chosen); the model's law: keep it",
     )
     parser.add_argument(
         "--limits", action="store_true",
-        help="fit the model again at the limit of every effect: exact where it is far from linear",
+        help="refit the model at the limit of every effect: exact also if the model is far from "
+        "linear",
     )  # fmt: skip
     parser.add_argument(
         "--dry-run", action="store_true", help="show the verdict; do not change verdict.json"

@@ -1,6 +1,6 @@
-"""List the physical effects that a damper, structure or sensor can have, or tell all of one.
+"""List the physical effects that a damper, structure or sensor can have, or describe one.
 
-bristle effects new NAME starts an effect of your own; bristle effects check FILE tests it.
+bristle effects new NAME starts your own effect; bristle effects check FILE tests it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Run an ensemble: many runs of one scenario, with what is uncertain drawn anew each time."""
+"""Run an ensemble: many runs of one scenario, each with new draws of the uncertain values."""
 
 from __future__ import annotations
 
@@ -18,9 +18,13 @@ HELP = "run a scenario hundreds of times with varied parameters"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle ensemble`."""
     parser.add_argument("file", metavar="FILE", help="ensemble file, or name of a stock ensemble")
-    parser.add_argument("--runs", type=int, metavar="N", help="in place of the file's number")
+    parser.add_argument(
+        "--runs", type=int, metavar="N", help="number of runs, instead of the file's"
+    )
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--workers", type=int, metavar="N", help="processes; else one per core")
+    where.add_argument(
+        "--workers", type=int, metavar="N", help="number of processes; else one per core"
+    )
     where.add_argument(
         "--cluster", metavar="ADDRESS", help="run on a Dask cluster, e.g. tcp://host:8786"
     )
@@ -28,15 +32,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FOLDER",
-        help="where runs, quantiles and figure go; a stopped ensemble continues there; "
-        "else results/NAME/",
+        help="folder of runs, quantiles and figure; a stopped ensemble continues there; else "
+        "results/NAME/",
     )
-    parser.add_argument("--fresh", action="store_true", help="start again, replace earlier runs")
+    parser.add_argument("--fresh", action="store_true", help="start again and replace earlier runs")
     parser.add_argument("--retry", action="store_true", help="repeat failed runs")
     parser.add_argument(
         "--with-limits", action="store_true",
-        help="widen the quantiles by the effects that the verdict of [identified] leaves open, and "
-        "tell which part of the variance each is",
+        help="widen the quantiles by the effects that the verdict of [identified] does not "
+        "exclude, and list the part of each in the variance",
     )  # fmt: skip
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_trust(parser)

@@ -1,4 +1,4 @@
-"""Make a study of a rig with something hidden in it, to try the commands on."""
+"""Make an example study of a rig with a hidden effect, to try the commands."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from pathlib import Path
 
 from ._common import add_common_to_actions
 
-HELP = "studies to try things on: measurements of a rig with a hidden effect"
+HELP = "make an example study: measurements of a rig with a hidden effect"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle example`."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    shown = commands.add_parser("list", help="what can be hidden in which rig")
+    shown = commands.add_parser("list", help="list the effects that each rig can hide")
     shown.add_argument("--json", action="store_true", help="print as JSON")
     shown.set_defaults(act=_list)
     bench = commands.add_parser("bench", help="an MR damper on a test bench")
     _add_choices(bench)
     bench.add_argument(
         "--held", action="store_true",
-        help="hold the voltage in each run, at 2 or 6 V, as many laboratories do",
+        help="keep the voltage constant in each run, at 2 or 6 V, as many laboratories do",
     )  # fmt: skip
     bench.set_defaults(act=_bench)
     building = commands.add_parser("building", help="a base-isolated building on a shake table")
@@ -33,15 +33,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     reveal.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
     reveal.add_argument("--json", action="store_true", help="print the answer as JSON")
     reveal.set_defaults(act=_reveal)
-    performing = commands.add_parser("perform", help="let the true rig perform a plan")
+    performing = commands.add_parser("perform", help="perform a plan on the simulated rig")
     performing.add_argument("folder", type=Path, metavar="FOLDER", help="the example")
     performing.add_argument("plan", type=Path, metavar="PLAN", help="the folder of the plan")
     performing.add_argument(
         "--as-runs", default="", metavar="NAME",
-        help="call the runs NAME_1, NAME_2 ...; else they have the names of the plan",
+        help="name the runs NAME_1, NAME_2 ...; else they have the names of the plan",
     )  # fmt: skip
     performing.add_argument(
-        "--insist", action="store_true", help="although the plan was made for another study"
+        "--insist",
+        action="store_true",
+        help="perform the plan even if it was made for another study",
     )
     performing.add_argument("--json", action="store_true", help="print the answer as JSON")
     performing.set_defaults(act=_perform)
@@ -49,17 +51,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_choices(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study's folder to make")
+    parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the new study")
     parser.add_argument(
         "--effect",
         action="append",
         default=[],
         metavar="NAME",
-        help="hide this, see bristle example list; give it twice for two; else the seed draws one",
+        help="effect to hide, see bristle example list; give it twice for two; else the seed "
+        "draws one",
     )
     parser.add_argument("--none", action="store_true", help="hide nothing")
     parser.add_argument(
-        "--outside", action="store_true", help="hide something that no effect of the library is"
+        "--outside", action="store_true", help="hide an effect that is not in the library"
     )
     parser.add_argument(
         "--law", default="", help="law of the damper: bingham or lugre; in a building lugre"

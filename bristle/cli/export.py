@@ -1,8 +1,8 @@
 """Write a study's present model as an FMU, with a scenario; a scenario as one FMU or a web page.
 
-A study's values are baked into the FMU. `--native --as-one` writes a scenario of built-in
-components as one FMU: its parts are solved together, as by the engine `compiled`. `--web` writes
-it, or a study's, as a WebAssembly module, a loader and a page with sliders, which needs no server.
+The FMU contains the study's values. `--native --as-one` writes a scenario of built-in components as
+one FMU, which solves its parts together like the engine `compiled`. `--web` writes a scenario, or
+that of a study, as a WebAssembly module, a loader and a page with sliders that needs no server.
 """
 
 from __future__ import annotations
@@ -23,27 +23,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle export`."""
     text = (
         "the study; with --as-one a scenario file, or the name of a scenario; with --web a study, "
-        "that, or the name of a component"
+        "a scenario, or the name of a component"
     )
     parser.add_argument("what", metavar="FOLDER", help=text)
     parser.add_argument(
         "--out",
         type=Path,
         metavar="DIR",
-        help="where to write; else export/ in the study, with --as-one the current folder",
+        help="output folder; else export/ in the study, with --as-one the current folder",
     )
     text = "write the whole scenario as one FMU, with --native"
     parser.add_argument("--as-one", action="store_true", help=text)
     text = (
-        "a port, or a number of a source, that becomes an input, with --as-one: "
-        "--input structure.ground_acceleration"
+        "a port, or a parameter of a source, that becomes an input, with --as-one: --input "
+        "structure.ground_acceleration"
     )
     parser.add_argument(
         "--input", dest="inputs", action="append", default=[], metavar="PART.PORT", help=text
     )
     text = "write the scenario as a WebAssembly module with a page that computes it"
     parser.add_argument("--web", type=Path, metavar="DIR", help=text)
-    text = "a number that the page moves, with --web: --slider voltage.level=0..8"
+    text = "a parameter with a slider, with --web: --slider voltage.level=0..8"
     parser.add_argument("--slider", action="append", default=[], metavar="NAME[=A..B]", help=text)
     add_overrides(parser)
     add_native(parser)

@@ -1,7 +1,7 @@
-"""Write a scenario as an SSP package for other tools, and say how far off they will be.
+"""Write a scenario as an SSP package for other tools, and estimate their coupling error.
 
-OMSimulator, libcosim, Ecos and others run it where bristle is not installed. They hold inputs over
-a step, which makes a coupling error: its size is printed, with a step that keeps it below 0.5 %.
+OMSimulator, libcosim, Ecos and others run it without bristle. They hold inputs over a step, which
+causes a coupling error: the command prints its size, and a step that keeps it below 0.5 %.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle export-ssp`."""
     text = "scenario file, or name of a stock scenario"
     parser.add_argument("scenario", metavar="SCENARIO", help=text)
-    text = "the package, in place of an older one; else NAME.ssp in the current folder"
+    text = "file of the package; an older one is replaced; else NAME.ssp in the current folder"
     parser.add_argument("-o", "--out", type=Path, metavar="FILE.ssp", help=text)
-    text = "write OspSystemStructure.xml with the FMUs beside it as well"
+    text = "also write OspSystemStructure.xml with the FMUs beside it"
     parser.add_argument("--osp", type=Path, metavar="FOLDER", help=text)
     add_overrides(parser)
-    text = "run nothing: do not estimate the coupling error in other tools"
+    text = "do not estimate the coupling error in other tools (runs nothing)"
     parser.add_argument("--no-coupling-error", action="store_true", help=text)
     add_native(parser)
     add_trust(parser)

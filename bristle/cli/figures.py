@@ -1,4 +1,4 @@
-"""Draw figures of Shirazi et al. (2012) anew, from stock scenarios, with the numbers in them."""
+"""Draw the figures of Shirazi et al. (2012) from stock scenarios, with their numbers as CSV."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         default=Path("results", "figures"),
         metavar="FOLDER",
-        help="where NAME.png and NAME.csv go, in place of older ones; else results/figures/",
+        help="folder of NAME.png and NAME.csv; older ones are replaced; else results/figures/",
     )
     parser.add_argument(
         "--engine",

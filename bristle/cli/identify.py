@@ -1,4 +1,4 @@
-"""Fit the model of a study to its training runs, and judge it on those held out."""
+"""Fit the model of a study to its training runs, and test it on the held-out runs."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
         "--law",
-        help="another law than the model's: bingham, lugre, ..._standard; all: keep the model's, "
-        "and show how every law does",
+        help="another law than the model's: bingham, lugre, ..._standard; all: keep the model's "
+        "law, and compare all laws",
     )
     parser.add_argument(
         "--command",
         dest="form",
         metavar="FORM",
-        help="how the command enters: linear, quadratic or table; several with commas, or all, are "
-        "compared by their errors on held-out runs; else as the model has it",
+        help="how the command enters: linear, quadratic or table; several with commas, or all, to "
+        "compare their errors on held-out runs; else the form of the model",
     )
     parser.add_argument(
         "--cutoff",
@@ -45,7 +45,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "study.toml's cut_off (18 Hz)",
     )
     parser.add_argument(
-        "--starts", type=int, default=4, metavar="N", help="starting points of the fit; else 4"
+        "--starts",
+        type=int,
+        default=4,
+        metavar="N",
+        help="number of starting points of the fit; else 4",
     )
     parser.add_argument(
         "--no-table", action="store_true", help="leave out the table that compares the laws"
@@ -56,8 +60,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--structure",
         action="store_true",
-        help="of a building's study: the building alone, its stiffnesses, frequencies and damping "
-        "ratios from its response, as a building file",
+        help="for a building: identify only the building (stiffnesses, frequencies and damping "
+        "ratios from its response) and write a building file",
     )
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")

@@ -1,6 +1,6 @@
-"""Write an SSP package of another tool as a scenario, with its FMUs beside it.
+"""Convert an SSP package of another tool to a scenario, with its FMUs beside it.
 
-`bristle run FILE.ssp` runs a package as it is; a scenario can be changed, checked and extended.
+`bristle run FILE.ssp` runs a package directly; you can change, check and extend a scenario.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ from pathlib import Path
 
 from ..findings import command
 
-HELP = "write an SSP package of another tool as a scenario"
+HELP = "convert an SSP package of another tool to a scenario"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle import-ssp`."""
     parser.add_argument("package", type=Path, metavar="FILE.ssp", help="SSP 1.0 or 2.0")
-    text = "where scenario and FMUs go; else NAME/ in the current folder"
+    text = "folder of scenario and FMUs; else NAME/ in the current folder"
     parser.add_argument("-o", "--out", type=Path, metavar="FOLDER", help=text)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
 

@@ -1,6 +1,6 @@
-"""List the laws that a damper can have, or tell all of one.
+"""List the laws that a damper can have, or describe one.
 
-bristle laws new NAME starts a law of your own; bristle laws check FILE tests it.
+bristle laws new NAME starts your own law; bristle laws check FILE tests it.
 """
 
 from __future__ import annotations

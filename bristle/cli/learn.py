@@ -1,9 +1,9 @@
-"""Learn what no known effect explains: a curve inside the model, as an effect of the study.
+"""Learn an unknown effect from a study's measurements, as a curve inside the model.
 
-A spline along displacement, speed, acceleration, the command, a memory of these or an extra
-channel acts as an added force, a factor of a part of the law, or a map of the command. In the
-isolation layer or a storey of a building it acts as an added force, friction or damping, or a
-factor of the stiffness. It is kept where it lowers the error on held-out runs beyond chance.
+A spline along displacement, speed, acceleration, the command, a memory of these or an extra channel
+acts as an added force, a factor of a part of the law, or a map of the command. In the isolation
+layer or a storey of a building it acts as an added force, friction or damping, or a factor of the
+stiffness. The command keeps it if it lowers the error on held-out runs beyond chance.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 from ..findings import command
 from ._consent import add_trust
 
-HELP = "learn what no known effect explains, as an effect of the study"
+HELP = "learn an unknown effect from a study's measurements, as a curve or a formula"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -29,21 +29,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--as", dest="parts", metavar="PART[,PART]", default="",
-        help="on which part it may act: force, friction, yield, viscous, fluid, yield_field, "
-        "fluid_field, command, slip, resonance; in a layer or storey force, friction, spring, "
-        "damping, slip; default all",
+        help="parts that the curve may act on: force, friction, yield, viscous, fluid, "
+        "yield_field, fluid_field, command, slip, resonance; in a layer or storey force, "
+        "friction, spring, damping, slip; default all",
     )  # fmt: skip
     parser.add_argument(
         "--at", metavar="SITE", default="",
-        help="where in a building: damper, layer, storey1, storey2 ...; default where the verdict "
-        "is unknown, or else where the model errs most",
+        help="site in a building: damper, layer, storey1, storey2 ...; by default the site whose "
+        "verdict is unknown, or else the one with the largest error",
     )  # fmt: skip
-    parser.add_argument("--name", default="", help="of the effect; default learned_1, learned_2")
     parser.add_argument(
-        "--table", action="store_true", help="keep the table where a formula does as well"
+        "--name", default="", help="name of the effect; default learned_1, learned_2"
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="show what is learned; write no effect"
+        "--table", action="store_true", help="keep the table even if a formula fits as well"
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="show the learned effect; write nothing"
     )
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")

@@ -1,8 +1,8 @@
-"""Compute the least peak or RMS that any voltage of a scenario's damper could reach.
+"""Compute the smallest peak or RMS that any voltage of a scenario's damper can give.
 
-The ground motion is known in advance; the damper does what it can do at its velocity between no and
-its largest voltage. No controller comes below it: what lies between a controller and the limit is
-what there is to gain.
+The ground motion is known in advance; the voltage is free between zero and its largest value. No
+controller can get below this limit: the gap between a controller and the limit is the possible
+gain.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from ._consent import add_trust
 if TYPE_CHECKING:
     from ..limit import Limit
 
-HELP = "compute how far any control of a scenario's damper could lower a peak or RMS"
+HELP = "compute the smallest peak or RMS that any control of a scenario's damper can give"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -45,16 +45,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=float,
         default=[0.0, 0.1, 0.5],
         metavar="S",
-        help="times [s] that a receding horizon sees ahead; none: no such runs; else 0 0.1 0.5",
+        help="preview times [s] of a receding horizon; none: no such runs; else 0 0.1 0.5",
     )
     parser.add_argument(
-        "--starts", type=int, default=3, metavar="N", help="starts of the search; else 3"
+        "--starts", type=int, default=3, metavar="N", help="number of starts of the search; else 3"
     )
     parser.add_argument(
         "--out",
         type=Path,
         metavar="FOLDER",
-        help="where voltage, scenario, results and picture go; else results/limit/SCENARIO/",
+        help="folder of voltage, scenario, results and picture; else results/limit/SCENARIO/",
     )
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_overrides(parser, "scenario", "ground.peak=3.924")

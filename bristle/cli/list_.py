@@ -1,4 +1,4 @@
-"""List what there is: components, their ports, records, stock scenarios, effects."""
+"""List components, their ports, records, stock scenarios and effects."""
 
 from __future__ import annotations
 

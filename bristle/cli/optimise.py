@@ -1,4 +1,4 @@
-"""Optimise what a scenario leaves open: the best constant voltage for a set of ground motions."""
+"""Find the best constant voltage of a scenario for a set of ground motions."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ HELP = "find the best constant voltage for a set of ground motions"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle optimise`."""
-    parser.add_argument("what", choices=("passive",), help="what is optimised")
+    parser.add_argument("what", choices=("passive",), help="quantity to optimise")
     _add_problem(parser)
     parser.add_argument(
         "--out",
         type=Path,
         default=Path("results", "optimise"),
         metavar="FOLDER",
-        help="where passive.csv, .json and .png go; else results/optimise/",
+        help="folder of passive.csv, .json and .png; else results/optimise/",
     )
     parser.add_argument("--no-figure", action="store_true", help="draw nothing")
     add_trust(parser)
@@ -38,7 +38,8 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
         "--scenario",
         default="el_centro_0p6g_constant_voltage",
         metavar="FILE",
-        help="with a GroundMotion and a ConstantVoltage; else El Centro with a LuGre damper",
+        help="scenario with a GroundMotion and a ConstantVoltage; else El Centro with a LuGre "
+        "damper",
     )
     parser.add_argument(
         "--motions",
@@ -52,7 +53,7 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=float,
         metavar="G",
-        help="peaks [g] that each is scaled to, 0: as recorded; else 0.2 0.4 0.6 0.8",
+        help="peaks [g] to which each motion is scaled, 0: as recorded; else 0.2 0.4 0.6 0.8",
     )
     parser.add_argument(
         "--output",
@@ -64,7 +65,7 @@ def _add_problem(parser: argparse.ArgumentParser) -> None:
         "--statistic", choices=("peak", "rms"), default="peak", help="statistic to minimise"
     )
     parser.add_argument(
-        "--grid", type=int, default=17, metavar="N", help="voltages that are run first; else 17"
+        "--grid", type=int, default=17, metavar="N", help="number of voltages in the grid; else 17"
     )
     add_overrides(parser, "scenario", "damper.sigma_a=600")
 

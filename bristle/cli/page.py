@@ -1,7 +1,7 @@
-"""Open a local page on a study, or on a folder of studies: look, fit, diagnose, simulate.
+"""Open a local page for a study, or for a folder of studies: data, fit, diagnosis, simulation.
 
-The page listens on 127.0.0.1 alone and needs the address that is printed here. What it does it does
-by the commands that it shows; what they did is in the study's folder. Ctrl-C ends it.
+The page listens only on 127.0.0.1 and needs the printed address. It runs the commands that it
+shows; their results are in the study's folder. Ctrl-C ends it.
 """
 
 from __future__ import annotations
@@ -9,16 +9,18 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-HELP = "a local page: look at data, watch the error fall, move a slider and see the building answer"
+HELP = "open a local page in the browser: data, fit, diagnosis, and simulation with sliders"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle page`."""
     parser.add_argument(
         "folder", nargs="?", type=Path, default=Path(), metavar="FOLDER",
-        help="a study, or a folder for studies; else the present one",
+        help="a study, or a folder of studies; else the current folder",
     )  # fmt: skip
-    parser.add_argument("--port", type=int, default=0, metavar="N", help="else a free one")
+    parser.add_argument(
+        "--port", type=int, default=0, metavar="N", help="port of the server; else a free one"
+    )
     parser.add_argument("--no-browser", action="store_true", help="print the address; open nothing")
 
 

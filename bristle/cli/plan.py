@@ -1,10 +1,12 @@
-"""Write the next tests of a rig: motions and commands for its controller, and what they will show.
+"""Plan the next tests of a rig: motions and commands for its controller, and their expected result.
 
-Each test is a CSV file that begins and ends at rest, with a picture. Half of them are to fit to,
-half to judge by. Without a purpose, they settle what the verdict leaves open: rivals where it is
-ambiguous, a part without a form where it is unknown, or else all effects and parameters.
+Each test is a CSV file that begins and ends at rest, with a picture. Half of the tests are for
+training, half are held out. Without a purpose, they answer the open question of the verdict: the
+alternatives if it is ambiguous, an unknown part if it is unknown, or else all effects and
+parameters.
 
-On a building the tests are ground motions and commands, and sensors are named that would show more.
+On a building the tests are ground motions and commands, and the plan names sensors that would show
+more.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ from ._consent import add_trust
 if TYPE_CHECKING:
     from ..plan.plan import Plan
 
-HELP = "the next tests of a rig: what to measure, as files for its controller"
+HELP = "plan the next tests of a rig: motions and commands as files for its controller"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -32,31 +34,34 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--separate", nargs="+", metavar="NAME",
-        help="tell rivals apart: effects, laws, or none for the model as it is",
+        help="distinguish alternatives: effects, laws, or none for the present model",
     )  # fmt: skip
     parser.add_argument(
-        "--see", nargs="*", metavar="EFFECT", help="make effects visible; all if none is named"
+        "--see",
+        nargs="*",
+        metavar="EFFECT",
+        help="make effects visible; without names, all effects",
     )
     parser.add_argument(
         "--sharpen", nargs="*", metavar="PARAMETER",
-        help="know parameters better, or those of an effect; all if none is named",
+        help="narrow the intervals of parameters, or of those of an effect; without names, of all",
     )  # fmt: skip
     parser.add_argument(
         "--learn", nargs="*", metavar="COORDINATE",
-        help="cover coordinates on which an unknown part may depend; the usual if none is named",
+        help="cover coordinates on which an unknown part may depend; without names, the usual ones",
     )  # fmt: skip
     parser.add_argument("--rig", type=Path, metavar="FILE", help="a rig.toml with [limits]")
     for name, text in LIMITS.items():
         parser.add_argument(f"--{name.replace('_', '-')}", metavar="QUANTITY", help=text)
     parser.add_argument(
         "--record", nargs="+", default=[], metavar="FILE",
-        help="further ground motions that may be scaled: files, or names; of a building",
+        help="for a building: more ground motions that the plan may scale, files or names",
     )  # fmt: skip
-    parser.add_argument("--runs", type=int, metavar="N", help="how many tests; 4 by default")
-    parser.add_argument("--seed", type=int, default=1, help="draws the tests that are looked at")
+    parser.add_argument("--runs", type=int, metavar="N", help="number of tests; 4 by default")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the candidate tests")
     parser.add_argument(
         "-o", "--output", type=Path, metavar="FOLDER",
-        help="where the files go; by default plan, plan_2 ... in the study",
+        help="folder of the files; by default plan, plan_2 ... in the study",
     )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="show the plan; write no files")
     add_trust(parser)
@@ -64,11 +69,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 LIMITS = {
-    "stroke": 'motion to either side, such as "20 mm"; by default what the runs have done',
-    "speed": 'such as "200 mm/s"; by default what the runs have done',
-    "acceleration": 'such as "10 m/s2"; by default what the runs have done',
+    "stroke": 'motion to either side, such as "20 mm"; by default that of the runs',
+    "speed": 'such as "200 mm/s"; by default that of the runs',
+    "acceleration": 'such as "10 m/s2"; by default that of the runs',
     "force": 'of the actuator, such as "2 kN"',
-    "heat": 'energy that the damper may take up in a test, such as "200 J"',
+    "heat": 'energy that the damper may absorb in a test, such as "200 J"',
     "duration": 'of a test, such as "20 s"; 12 s by default',
     "rate": 'samples per second of the controller, such as "500 Hz"',
     "damper_stroke": "of a building: motion of the damper to either side, such as 10mm",

@@ -9,23 +9,28 @@ from pathlib import Path
 
 from ._consent import add_trust
 
-HELP = "one HTML file of a study: verdict, history, loops, parameters, data"
+HELP = "write a study's report as one HTML file: verdict, history, loops, parameters, data"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle report`."""
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
-        "--out", type=Path, metavar="FILE", help="where it goes; else FOLDER/reports/report.html"
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="file of the report; else FOLDER/reports/report.html",
     )
     parser.add_argument(
         "--keep-test-closed", action="store_true", help="leave the study's test runs closed"
     )
-    text = "add sliders for the model's numbers, computed in the page (needs bristle[native])"
+    text = (
+        "add sliders for the model's parameters; the page computes the run (needs bristle[native])"
+    )
     parser.add_argument("--what-if", action="store_true", help=text)
     parser.add_argument(
         "--static", action="store_true",
-        help="leave out the pictures in which samples can be chosen, and with them all scripts",
+        help="leave out the interactive pictures and all scripts",
     )  # fmt: skip
     add_trust(parser)
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from rich.table import Table
 
-HELP = "run a scenario and draw what happens"
+HELP = "run a scenario: results, a figure, peaks and RMS"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="FOLDER",
-        help="where results, figure and log go, in place of older ones; else results/NAME/, "
-        "or results/NAME_a.b=value/ with --set a.b=value",
+        help="folder of results, figure and log; older ones are replaced; else results/NAME/, or "
+        "results/NAME_a.b=value/ with --set a.b=value",
     )
     add_overrides(parser)
     parser.add_argument(
@@ -38,20 +38,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="fmu",
         help="step FMUs (fmu), or solve built-in components together (compiled)",
     )
-    text = "what is stepped: FMUs that run in Python, or native ones, which a compiler makes"
+    text = "kind of FMUs: those that run in Python, or compiled native ones"
     parser.add_argument("--fmus", choices=("python", "native"), default="python", help=text)
     parser.add_argument(
-        "--format", choices=("csv", "parquet"), default="csv", help="of the results"
+        "--format", choices=("csv", "parquet"), default="csv", help="format of the results"
     )
     parser.add_argument(
         "--coupling-error",
         action="store_true",
-        help="estimate the error that the step causes, output by output, by runs besides",
+        help="estimate the coupling error of every output with additional runs",
     )
     parser.add_argument(
         "--tolerance",
         metavar="SHARE",
-        help="find the step at which this error stays below a share of the peaks, e.g. 0.2%%",
+        help="find the step at which the coupling error stays below a share of the peaks, e.g. "
+        "0.2%%",
     )
     parser.add_argument(
         "--spectrum",

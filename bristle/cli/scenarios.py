@@ -14,7 +14,12 @@ HELP = "list the stock scenarios, or copy one to edit"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle scenarios`."""
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("action", nargs="?", choices=("copy",), help="else scenarios are listed")
+    parser.add_argument(
+        "action",
+        nargs="?",
+        choices=("copy",),
+        help="copy a scenario; without it, list the scenarios",
+    )
     parser.add_argument("name", nargs="?", metavar="NAME", help="with copy: a stock scenario")
     text = "with copy: the file that is written; else NAME.toml in the current folder"
     parser.add_argument("file", nargs="?", type=Path, metavar="FILE", help=text)

@@ -1,4 +1,4 @@
-"""Studies of measurements: make one from files, check the data before any model."""
+"""Make a study from measurement files, check its data before any model, and change its runs."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
     from ..study.create import Created
     from ..study.data_check import DataCheck
 
-HELP = "studies of measurements: new, extend, check, roles, channels, auto"
+HELP = "make and change studies of measurements: new, extend, check, roles, channels, auto"
 _OLD = "first-look"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of `bristle study`."""
     commands = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
-    _add_new(commands.add_parser("new", help="make a study's folder from measurement files"))
+    _add_new(commands.add_parser("new", help="make a study from measurement files"))
     add_extend(commands.add_parser("extend", help="add measured runs to a study"))
     _add_check(commands.add_parser("check", help="check the data, before any model"))
-    add_roles(commands.add_parser("roles", help="show or change what the runs are for"))
+    add_roles(commands.add_parser("roles", help="show or change the roles of the runs"))
     add_channels(commands.add_parser("channels", help="show or correct columns, units and signs"))
     # The name until 0.1; here for one release.
     _add_check(commands.add_parser(_OLD, description="The old name of `study check`."))
@@ -38,16 +38,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     auto.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     auto.add_argument(
         "--learn", action="store_true",
-        help="where no known effect explains the error, learn a curve and go on",
+        help="if no known effect explains the error, learn a curve and continue",
     )  # fmt: skip
     auto.add_argument(
         "--law",
-        help="all: seek the law together with its effects, as where no law was chosen; a name: "
-        "take that law first",
+        help="all: search for the law together with its effects (default if no law was chosen); a "
+        "name: begin with that law",
     )
     auto.add_argument(
         "--greedy", action="store_true",
-        help="where no effect explains the error, add the one that lowers it most, and go on",
+        help="if no effect explains the error, add the one that lowers it most, and continue",
     )  # fmt: skip
     add_trust(auto)
     auto.add_argument("--json", action="store_true", help="print steps and verdict as JSON")
@@ -63,22 +63,23 @@ def main(arguments: argparse.Namespace) -> int:
 def _add_check(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="the study")
     parser.add_argument(
-        "--mask", action="store_true", help="from now on isolated spikes count as not measured"
+        "--mask", action="store_true", help="treat isolated spikes as not measured from now on"
     )
     parser.add_argument(
         "--correct", action="store_true",
-        help="set right what can be: lines, and gain, zero or sign of a run that differs",
+        help="correct the faults that can be corrected: lines, and gain, zero or sign of a run "
+        "that differs",
     )  # fmt: skip
     parser.add_argument(
         "--exclude", nargs="+", action="extend", default=[], metavar="RUN",
-        help="from now on these runs are left out: role = \"exclude\" in study.toml",
+        help="leave these runs out from now on: role = \"exclude\" in study.toml",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the findings as JSON")
     parser.set_defaults(act=_check)
 
 
 def _add_new(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", type=Path, metavar="NAME", help="the folder to make")
+    parser.add_argument("name", type=Path, metavar="NAME", help="folder of the new study")
     parser.add_argument(
         "--data", nargs="+", action="extend", required=True, metavar="GLOB",
         help="measurement files, or a folder of them; quote a pattern: 'lab/*.csv'",
@@ -92,14 +93,14 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
         help="the structure's data file, with --rig structure",
     )  # fmt: skip
     parser.add_argument(
-        "--device", metavar="NAME", help="of a building's several devices the one to identify"
+        "--device", metavar="NAME", help="device to identify, if the building has several"
     )
     parser.add_argument(
         "--channel",
         action="append",
         default=[],
         metavar="CHANNEL=COLUMN@UNIT",
-        help="where a channel is, in place of the guess; a minus before COLUMN turns its sign: "
+        help="column of a channel, instead of the guess; a minus before COLUMN reverses its sign: "
         "--channel 'force=-Ch3@kN'",
     )
     parser.add_argument(
@@ -107,13 +108,13 @@ def _add_new(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--test", nargs="+", action="extend", default=[], metavar="GLOB",
-        help="test runs, which no fit and no verdict sees: names among the data, or more files",
+        help="test runs, which no fit and no verdict uses: names among the data, or more files",
     )  # fmt: skip
     _add_runs(parser)
     parser.add_argument(
         "--law",
-        help="the law that the model begins with; else lugre, and on a test bench diagnose seeks "
-        "the law together with its effects",
+        help="law of the first model; else lugre, and on a test bench diagnose searches for the "
+        "law together with its effects",
     )
     parser.add_argument("--title", default="", help="the study's title; else its name")
     parser.add_argument("--json", action="store_true", help="print the answer as JSON")
@@ -131,7 +132,7 @@ def _add_runs(parser: argparse.ArgumentParser) -> None:
         "--rate", type=float, metavar="HZ",
         help="decimate faster runs to this rate; 0 keeps all samples; else 500 Hz from 1 kHz on",
     )  # fmt: skip
-    parser.add_argument("--mask", action="store_true", help="isolated spikes count as not measured")
+    parser.add_argument("--mask", action="store_true", help="treat isolated spikes as not measured")
 
 
 def _new(arguments: argparse.Namespace) -> int:

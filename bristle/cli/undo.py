@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-HELP = "take back the last step of a study's model"
+HELP = "undo the last step of a study's model"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
