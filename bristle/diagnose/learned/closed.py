@@ -29,8 +29,9 @@ class Form:
     """A formula c + m h(s), with a scale d or without, or c + m h(s) + n k(s).
 
     `text` for readers; `columns` h and k as Python, of {s} and {d}, which a hook and numpy both
-    take; `scales` gives the values of d to look at for a span and the least distance of knots,
-    None where there is none.
+    take, and of {top}, the last knot of a command's map; `scales` gives the values of d to look at
+    for a span and the least distance of knots, None where there is none. `bent` where it is for a
+    line, or for a force along displacement, alone; `sized` where m is sought, else m = 1.
     """
 
     name: str
@@ -38,10 +39,11 @@ class Form:
     columns: tuple[str, ...]
     scales: Callable[[float, float], Array] | None = None
     bent: bool = False
+    sized: bool = True
 
     def count(self) -> int:
         """Return how many numbers it has, the constant included."""
-        return 1 + len(self.columns) + (self.scales is not None)
+        return 1 + len(self.columns) * self.sized + (self.scales is not None)
 
     @property
     def grows(self) -> bool:
@@ -52,10 +54,11 @@ class Form:
         """Return h, and k, where the signal is zero: they are the same at every scale."""
         return tuple(map(float, self.at(np.zeros(1), 1.0)[0, 1:]))
 
-    def at(self, s: Array, d: float) -> Array:
+    def at(self, s: Array, d: float, top: float = 1.0) -> Array:
         """Return the columns (n, 1 + k) of a signal (n,), that of the constant first."""
         given = [
-            eval(one.format(s="s", d="d"), dict(_NUMPY), {"s": s, "d": d}) for one in self.columns
+            eval(one.format(s="s", d="d", top="top"), dict(_NUMPY), {"s": s, "d": d, "top": top})
+            for one in self.columns
         ]
         return np.stack([np.ones_like(s), *given], axis=1)
 
@@ -70,12 +73,13 @@ _NUMPY: dict[str, Any] = {
 class ClosedForm:
     """A form fitted to a curve: `left` the share of its variation that remains, as RMS.
 
-    `values` in the order c, m, d (and what the form has more), SI.
+    `values` in the order c, m, d (and what the form has more), SI; `top` the last knot.
     """
 
     form: Form
     values: tuple[float, ...]
     left: float
+    top: float = 1.0
 
     @property
     def name(self) -> str:
@@ -85,7 +89,9 @@ class ClosedForm:
     def at(self, s: Array) -> Array:
         """Return the form's value (n,) along its signal (n,)."""
         scale = self.values[2] if self.form.scales is not None else 1.0
-        found: Array = self.form.at(s, scale) @ np.array(self.values[:2] + self.values[3:])
+        found: Array = self.form.at(s, scale, self.top) @ np.array(
+            self.values[:2] + self.values[3:]
+        )
         return found
 
 
@@ -145,6 +151,20 @@ FORMS = (
 )  # fmt: skip
 
 
+MAPS = (
+    Form("parabola", "c + m s (s/{top} - 1)", ("{s} * ({s} / {top} - 1.0)",)),
+    Form(
+        "power", "c + {top} (s/{top})^d - s",
+        ("({top} * copysign(1.0, {s}) * abs({s} / {top}) ** {d} - {s})",), _powers, sized=False,
+    ),
+    Form(
+        "levelling off", "c + {top} tanh(s/d)/tanh({top}/d) - s",
+        ("({top} * tanh({s} / {d}) / tanh({top} / {d}) - {s})",), _lengths, sized=False,
+    ),
+)  # fmt: skip
+"""Forms of a command's map s + g: the law has its scale already, so that it ends where s does."""
+
+
 def name_of(forms: Sequence[ClosedForm], rule: LearnRule = LEARN) -> ClosedForm | None:
     """Return the form that names a curve, the first of `forms`; None where it leaves too much."""
     return forms[0] if forms and forms[0].left <= rule.follows else None
@@ -170,12 +190,19 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     size = _spread(curve, y, weight)
     if not size > 0.0:
         return []
-    straight = curve.of_line
-    forms = [one for one in FORMS if not (one.columns == LINE if straight else one.bent)]
-    able = [one for one in forms if one.count() + curve.of_line + 1 <= len(s)]
+    able = [one for one in forms_for(curve) if one.count() + curve.of_line + 1 <= len(s)]
     found = [_fitted(form, curve, y, weight, size) for form in able]
     # Less than the weights' own share tells no forms apart.
     return sorted(found, key=lambda one: (one.left + LEAST) * 1.25 ** one.form.count())
+
+
+def forms_for(curve: Curve) -> list[Form]:
+    """Return the forms that a curve may have."""
+    if curve.part == "command":
+        return [FORMS[0], *MAPS]
+    if curve.of_line:
+        return [one for one in FORMS if one.columns != LINE]
+    return [one for one in FORMS if not one.bent or curve.along == "displacement"]
 
 
 def formula_of(found: ClosedForm, curve: Curve) -> Formula:
@@ -190,21 +217,24 @@ def formula_of(found: ClosedForm, curve: Curve) -> Formula:
         s = f"min(max({s}, {curve.knots[0]:.6g}), {curve.knots[-1]:.6g})"
     unit, along = curve.unit, curve.along_unit
     per = _POWERS.get(found.name, 0)
-    slope = canonical(unit + f"/({along})" * per)
+    slope = canonical(unit + f"/({along})" * per) if found.form not in MAPS else "1"
     if found.name == "line" and (curve.part, curve.along) in _PHYSICAL:
         slope = _PHYSICAL[curve.part, curve.along][1]
     found_at = dict(zip("cm", found.values[:2], strict=False))
     names = [f"p.{n}" for n, _ in zip("mn", found.form.columns, strict=False)]
-    terms = [one.format(s=s, d="p.d") for one in found.form.columns]
+    top = f"{found.top:.6g}"
+    terms = [one.format(s=s, d="p.d", top=top) for one in found.form.columns]
     rest = found.form.at_rest() if curve.rests else (0.0,) * len(terms)
     terms = [f"({t} - {r!r})" if r else t for t, r in zip(terms, rest, strict=True)]
     g = " + ".join(f"{n} * {term}" for n, term in zip(names, terms, strict=True)) or "0.0"
     given = [("m", found_at["m"], slope)] if terms else []
+    if not found.form.sized:
+        g, given = terms[0], []
     if found.form.scales is not None:
         given.append(("d", found.values[2], "1" if found.name == "power" else along))
     if len(terms) > 1:
         given.append(("n", found.values[3], unit))
-    text = found.form.text
+    text = found.form.text.format(top=top)
     if curve.of.level:  # the law's own strength is the constant
         text = text.removeprefix("c + ")
         text += "".join(f" - {n}" for n, r in zip("mn", rest, strict=False) if r)
@@ -217,19 +247,27 @@ def _fitted(form: Form, curve: Curve, y: Array, weight: Array, size: float) -> C
     """Return a form at its best scale, its constants by weighted least squares."""
     best: ClosedForm | None = None
     s, beside = np.array(curve.knots), int(curve.of_line)
-    span, step = float(np.max(np.abs(s))), float(np.min(np.diff(s)))
+    span, step, top = float(np.max(np.abs(s))), float(np.min(np.diff(s))), float(s[-1])
     for d in form.scales(span, step) if form.scales else [1.0]:
-        A = np.hstack([form.at(s, float(d)), s[:, None][:, :beside]])
-        size_of = np.maximum(np.max(np.abs(A), axis=0), 1e-300)  # a cube of 1e6 Pa dwarfs the 1
-        found = np.linalg.lstsq(A / size_of * weight[:, None], y * weight, rcond=1e-12)[0] / size_of
+        A = np.hstack([form.at(s, float(d), top), s[:, None][:, :beside]])
+        found = _constants(A, y, weight, form.sized)
         at = A @ found
         left = float(np.sqrt(np.sum((weight * (y - at)) ** 2) / np.sum(weight**2))) / size
         if best is None or left < best.left:
             own = tuple(map(float, found[: len(found) - beside]))
             values = (*own[:2], *(() if len(own) < 2 else (float(d),)), *own[2:])
-            best = ClosedForm(form, values, left)
+            best = ClosedForm(form, values, left, top)
     assert best is not None
     return best
+
+
+def _constants(A: Array, y: Array, weight: Array, sized: bool) -> Array:
+    """Return the factors (k,) of columns (n, k) by weighted least squares; not sized, m is 1."""
+    if not sized:
+        return np.array([float(np.average(y - A[:, 1], weights=weight**2)), 1.0])
+    size_of = np.maximum(np.max(np.abs(A), axis=0), 1e-300)  # a cube of 1e6 Pa dwarfs the 1
+    found = np.linalg.lstsq(A / size_of * weight[:, None], y * weight, rcond=1e-12)[0]
+    return np.asarray(found / size_of)
 
 
 def _spread(curve: Curve, y: Array, weight: Array) -> float:

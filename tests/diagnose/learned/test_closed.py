@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+import math
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from bristle.diagnose.learned.closed import FORMS, closed_forms, formula_of, in_words, name_of
+from bristle.diagnose.learned.closed import (
+    FORMS,
+    MAPS,
+    closed_forms,
+    formula_of,
+    in_words,
+    name_of,
+)
 from bristle.diagnose.learned.curve import Curve
+from bristle.diagnose.learned.effect_file import MATH
 
 KNOTS = np.linspace(-0.015, 0.015, 13)  # m
-SCALES = {"power": 1.6, "dead band": 0.004, "ripple": 0.011}
+GAP = 0.004  # m
+SCALES = {
+    "power": 1.6, "dead band": GAP, "contact above": GAP, "contact below": GAP, "ripple": 0.011,
+}  # fmt: skip
 
 
 def curve_of(values, along="displacement", part="force", knots=KNOTS):
     return Curve(part, along, (), tuple(knots), tuple(values))
 
 
-@pytest.mark.parametrize("form", [f for f in FORMS[1:] if not f.bent], ids=lambda f: f.name)
+@pytest.mark.parametrize("form", FORMS[1:], ids=lambda f: f.name)
 def test_a_form_without_noise_comes_back(form):
     d = SCALES.get(form.name, 0.006)
     c, m, n = 0.4, 2.0, -1.1
@@ -75,6 +89,39 @@ def test_what_the_law_has_already_is_no_number_of_the_formula():
     assert best.name == "bell"
     assert [n for n, _, _ in formula.parameters] == ["m", "d"]
     assert not formula.text.startswith("c")
+
+
+def test_a_contact_on_one_side_is_none_along_a_speed():
+    values = 800.0 * np.maximum(KNOTS - GAP, 0.0)
+    best = closed_forms(curve_of(values), [0.01] * 13)[0]
+    assert best.name == "contact above"
+    assert best.values[1:] == pytest.approx((800.0, GAP), rel=0.01)
+    along_speed = closed_forms(curve_of(values, "velocity"), [0.01] * 13)
+    assert not [one for one in along_speed if one.form.bent]
+
+
+VOLTS = np.linspace(0.0, 7.5, 12)
+
+
+@pytest.mark.parametrize(
+    ("form", "given"),
+    [(MAPS[0], {"m": 0.7}), (MAPS[1], {"d": 1.7}), (MAPS[2], {"d": 3.0})],
+    ids=lambda one: getattr(one, "name", ""),
+)
+def test_a_map_of_the_command_has_a_formula_that_ends_where_the_command_does(form, given):
+    values = form.at(VOLTS, given.get("d", 1.0), 7.5) @ np.array([0.0, given.get("m", 1.0)])
+    curve = curve_of(values, "voltage", "command", VOLTS)
+    best = closed_forms(curve, [0.01] * 12)[0]
+    assert best.name == form.name
+    formula = formula_of(best, curve)
+    assert {n: value for n, value, _ in formula.parameters} == pytest.approx(given, rel=0.03)
+    units = {"m": "1", "d": "1" if form.name == "power" else "V"}
+    assert all(unit == units[n] for n, _, unit in formula.parameters)
+    known = {one: getattr(math, one) for one in MATH}
+    p = SimpleNamespace(**{n: value for n, value, _ in formula.parameters})
+    for V, value in zip(VOLTS, values, strict=True):
+        q = SimpleNamespace(V=float(V))
+        assert eval(formula.g, known | {"p": p, "q": q}) == pytest.approx(value, abs=0.03)
 
 
 def test_a_flat_curve_has_no_forms():
