@@ -30,6 +30,9 @@ TRIED = 4
 CLOSED = 2
 """Closed forms that are fitted in the place of a curve, until one does as well."""
 
+AWAKE = 0.1
+"""Smallest share of the command that a map leaves where its fit begins."""
+
 SWEEPS = 12
 """Jacobians of such a fit, at the most."""
 
@@ -227,7 +230,7 @@ def _fitted(
 def _inside(curve: Curve, own: str, base: Model, train: Problem, held_out: Problem) -> Fitted:
     """Return a curve fitted inside a model, as the effect `own`."""
     entries = [f"{own}.{entry}" for entry in curve.entries]
-    values = dict(zip(entries, curve.values, strict=True))
+    values = dict(zip(entries, begun(curve), strict=True))
     values |= {f"{own}.{n}": value for n, value in curve.memory}
     joined = replace(base, effects=(*base.effects, own))
     ends = [
@@ -243,6 +246,20 @@ def _inside(curve: Curve, own: str, base: Model, train: Problem, held_out: Probl
     trial = judge(model, train, held_out)
     deviations = tuple(std.get(entry, 0.0) for entry in entries)
     return Fitted(fitted, deviations, trial, _left_out(train, model))
+
+
+def begun(curve: Curve) -> tuple[float, ...]:
+    """Return the values (k,) from which a fit of a curve begins, in its unit.
+
+    A map of the command begins above zero: below it the damper sees none, whatever the value, and
+    no small step leads back.
+    """
+    if curve.part != "command":
+        return curve.values
+    return tuple(
+        value if k in curve.held else max(value, (AWAKE - 1.0) * max(knot, 0.0))
+        for k, (knot, value) in enumerate(zip(curve.knots, curve.values, strict=True))
+    )
 
 
 def _laws(base: Model, train: Problem) -> list[dict[str, float]]:

@@ -13,6 +13,7 @@ from bristle.diagnose.learned.along import ALONG
 from bristle.diagnose.learned.closed import closed_forms, formula_of
 from bristle.diagnose.learned.curve import PARTS, Curve, may_change
 from bristle.diagnose.learned.effect_file import effect_text
+from bristle.diagnose.learned.fit import begun
 from bristle.diagnose.learned.slip import SLIP, slips
 from bristle.errors import PhysicsError
 from bristle.identify.fit import Problem, Run
@@ -196,3 +197,10 @@ def test_the_values_of_a_learned_effect_are_not_scaled_to_the_rig():
             > 1e3
             > EFFECTS["gas_spring"].parameters["k"].value
         )
+
+
+def test_a_fit_of_a_command_map_begins_where_the_damper_sees_a_command():
+    knots, values = (0.0, 2.0, 5.0, 8.0), (0.0, -3.0, -4.0, 0.0)
+    curve = Curve("command", "voltage", (), knots, values, held=(0, 3))
+    assert begun(curve) == pytest.approx((0.0, -1.8, -4.0, 0.0))
+    assert begun(replace(curve, part="force")) == values
