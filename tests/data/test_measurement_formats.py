@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import subprocess
 import sys
 from pathlib import Path
 
@@ -227,3 +228,26 @@ def test_a_format_is_one_file(tmp_path, another_format):
     np.testing.assert_array_equal(table.values["force [N]"], [1.5, -2.0])
     path.write_text("time [s],force [N]\n0,1.5\n0.1,-2\n0.2,1\n", encoding="utf-8")
     np.testing.assert_array_equal(read_table(path).values["force [N]"], [1.5, -2.0, 1.0])
+
+
+def test_a_file_of_numbers_is_read_without_pandas(tmp_path):
+    """Its import takes as long as the rest of what is done with a file."""
+    file = tmp_path / "run.csv"
+    rows = "".join(f"{0.01 * k:.2f},{k},{-k}\n" for k in range(200))
+    file.write_text("time [s],displacement [mm],force [N]\n" + rows)
+    code = (
+        "import sys; from bristle.data.read import read_table\n"
+        "read_table(sys.argv[1]); print('pandas' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(file)], capture_output=True, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.stdout == "False\n", done.stderr
+
+
+def test_an_empty_field_is_no_number(tmp_path):
+    file = tmp_path / "run.csv"
+    file.write_text("time [s],force [N]\n0,1\n1,\n2,-3\n")
+    force = read_table(file).values["force [N]"]
+    assert np.isnan(force[1])
+    assert force[[0, 2]].tolist() == [1.0, -3.0]

@@ -7,6 +7,7 @@ import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,10 +96,21 @@ def read_fast(lines: list[str], first: int, layout: Layout) -> Body | None:
         read = read_csv(body, ReadOptions(column_names=names), parse, convert)
     except pa.ArrowInvalid:
         return None
-    values = [read[name].to_numpy().astype(float) for name in names]
+    values = [_floats(read[name]) for name in names]
     if any(np.isinf(array).any() for array in values) or len(read) != last - first:
         return None
     return Body(values, np.arange(first + 1, last + 1))
+
+
+def _floats(column: Any) -> Array:
+    """Return a column of pyarrow's (n,), what is empty as nan.
+
+    Its `to_numpy` imports pandas, which takes as long as all else that is done with a file.
+    """
+    whole = column.combine_chunks()
+    if whole.null_count:
+        return np.asarray(column.to_numpy(), dtype=float)
+    return np.array(np.from_dlpack(whole), dtype=float)
 
 
 def read_slow(lines: list[str], first: int, layout: Layout, name: str) -> Body:
