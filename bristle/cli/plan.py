@@ -84,6 +84,8 @@ def main(arguments: argparse.Namespace) -> int:
 
     if (arguments.folder is None) == (arguments.new is None):
         raise StudyError("name a study, or a rig.toml with --new; one of the two.")
+    if arguments.new is not None and not arguments.new.is_file():
+        raise StudyError(f"{arguments.new}: there is no such file.")
     given: dict[str, Any] = {
         name: getattr(arguments, name)
         for name in (*LIMITS, "runs")

@@ -10,6 +10,7 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 
 import bristle
+from bristle.cli import main
 from bristle.errors import StudyError
 from bristle.example.make import Choice, make_bench
 from bristle.identify.fit import intervals_of
@@ -190,6 +191,18 @@ def test_force_and_heat_are_kept_by_the_model_or_the_plan_is_refused(sheet: Path
         bristle.plan(sheet, sharpen=True, force="1 N")
 
 
+def test_a_sheet_that_is_not_there_is_no_study(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", "--new", str(tmp_path / "rig.toml")]) == 2
+    assert "rig.toml: there is no such file." in capsys.readouterr().err
+
+
+def test_the_pause_between_tests_is_told(sheet: Path, tmp_path: Path) -> None:
+    found = bristle.plan(sheet, sharpen="f_c", pause="30 s").write(tmp_path / "plan")
+    assert "rests for 30 s between" in (found / "plan.md").read_text()
+
+
 def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
     rig: bristle.Study, tmp_path: Path
 ) -> None:
@@ -243,6 +256,8 @@ def test_parts_without_a_form_are_covered_along_their_coordinates(sheet: Path) -
         ({"see": "gas_sprin"}, "gas_spring"), ({"separate": "gas_spring"}, "two or more"),
         ({"sharpen": "nothing"}, "parameter"), ({"learn": "colour"}, "displacement"),
         ({"stroke": "3 kg"}, "stroke"), ({"strok": 1.0}, "stroke"), ({"runs": 0}, "1 or more"),
+        ({"seed": -1}, "from 0 on"), ({"drift": "5 mm"}, "drift is for a building"),
+        ({"record": "el_centro_1940_ns"}, "record is for a building"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_planned_is_refused(
@@ -256,7 +271,7 @@ def test_what_cannot_be_planned_is_refused(
     ("old", "new", "told"),
     [
         ('max_force = "2 kN"', 'max_force = "2 mm"', "max_force"),
-        ('max_force = "2 kN"\n', "", "max_force is missing"),
+        ('max_force = "2 kN"\n', "", "lacks max_force"),
         ('stroke = "20 mm"\n', "", "lacks stroke"), ("bingham", "bengham", "bingham"),
         ('max_force = "2 kN"', 'max_force = "-2 kN"', "more than 0"),
     ],
