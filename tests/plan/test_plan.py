@@ -191,6 +191,12 @@ def test_force_and_heat_are_kept_by_the_model_or_the_plan_is_refused(sheet: Path
         bristle.plan(sheet, sharpen=True, force="1 N")
 
 
+def test_a_refusal_names_the_limits_that_allow_no_motion(sheet: Path) -> None:
+    with pytest.raises(StudyError, match=r"acceleration of 0.001 m/s2 allow .* of 20 mm") as told:
+        bristle.plan(sheet, sharpen=True, acceleration="1 mm/s2")
+    assert "heat" not in str(told.value)
+
+
 def test_a_sheet_that_is_not_there_is_no_study(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
