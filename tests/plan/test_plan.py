@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -246,6 +247,25 @@ def test_rivals_that_no_test_tells_apart_are_said_to_be_so(rig: bristle.Study) -
     assert not found.worth  # on this rig neither has a size
     assert "no test within these limits tells them apart" in found.sentences()[0]
     assert "Nothing is left to gain" in found.sentences()[-1]
+
+
+def test_a_command_that_does_not_move_shows_no_lag_and_is_said_to(sheet: Path) -> None:
+    held = ("2 V", "2 V")
+    found = bristle.plan(sheet, see="coil_lag", command=held)
+    why = "coil_lag: no test within these limits shows it: the command does not move."
+    assert found.sentences()[0] == why
+    apart = bristle.plan(sheet, separate=["coil_lag", "none"], command=held, duration="4 s")
+    assert "differ by 0 standard deviations" in apart.sentences()[0]
+    assert apart.outcomes[0].cells()[-1] == "0 std"
+
+
+def test_a_folder_that_is_there_is_refused_before_the_search(
+    sheet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    public = import_module("bristle.plan.public")
+    monkeypatch.setattr(public, "plan", lambda *_, **__: pytest.fail("searched"))
+    assert main(["plan", "--new", str(sheet), "-o", str(tmp_path)]) == 2
+    assert "is there already" in capsys.readouterr().err
 
 
 def test_parts_without_a_form_are_covered_along_their_coordinates(sheet: Path) -> None:
