@@ -118,7 +118,7 @@ def _names(names: Names) -> tuple[str, ...] | None:
 
 def _refuse_seed(seed: int) -> None:
     if seed < 0:
-        raise StudyError(f"seed = {seed}: a whole number from 0 on is right.")
+        raise StudyError(f"seed = {seed}: 0 or a positive whole number is right.")
 
 
 def _refuse_of_building(bench: str | Path, limits: Mapping[str, Any], record: Any) -> None:

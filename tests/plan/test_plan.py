@@ -20,7 +20,7 @@ from bristle.plan.folder import read_plan
 from bristle.plan.knowledge import Asked, Evidence, Known, Question, Rival
 from bristle.plan.motions import Command, Waveform
 from bristle.plan.planned_test import Test
-from bristle.plan.purposes import Figure, cost_of, seen
+from bristle.plan.purposes import LEAST, Figure, cost_of, seen
 from bristle.plan.rig_limits import RigLimits
 from bristle.plan.search import Planner
 from bristle.plan.seen import Goal, Seen, roles_of
@@ -84,6 +84,17 @@ def test_deviations_and_distances_are_those_of_least_squares() -> None:
     # A dashpot of its own takes the thicker oil up whole; the model as it is does not.
     assert known.raw()["thicker"] == pytest.approx(3.0 * np.linalg.norm(J[:, 1]), rel=1e-3)
     assert known.distances()["thicker"] < 0.02 * known.raw()["thicker"]
+
+
+def test_what_a_parameter_takes_up_whole_is_not_seen_on_short_runs_either() -> None:
+    run = a_run(noise=1.0)
+    more = Model("bingham", values={**PLAIN.values, "c_0": 23.0}, fixed=PLAIN.fixed)
+    asked = Asked(Question(PLAIN, (Rival("thicker", more, PLAIN),)), Problem([run]))
+    known = Known(asked.question, asked.evidence([run]) + asked.evidence([run]).judging())
+    # What is known of the dashpot beforehand would tell of thicker oil.
+    assert known.distances()["thicker"] > LEAST * known.raw()["thicker"] > 0.0
+    assert known.kept()["thicker"] < LEAST
+    assert seen(known)[0].value == np.inf
 
 
 def test_runs_add_up_and_never_tell_less() -> None:
@@ -282,7 +293,7 @@ def test_parts_without_a_form_are_covered_along_their_coordinates(sheet: Path) -
         ({"see": "gas_sprin"}, "gas_spring"), ({"separate": "gas_spring"}, "two or more"),
         ({"sharpen": "nothing"}, "parameter"), ({"learn": "colour"}, "displacement"),
         ({"stroke": "3 kg"}, "stroke"), ({"strok": 1.0}, "stroke"), ({"runs": 0}, "1 or more"),
-        ({"seed": -1}, "from 0 on"), ({"drift": "5 mm"}, "drift is for a building"),
+        ({"seed": -1}, "0 or a positive"), ({"drift": "5 mm"}, "drift is for a building"),
         ({"record": "el_centro_1940_ns"}, "record is for a building"),
     ],
 )  # fmt: skip
