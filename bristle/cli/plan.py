@@ -85,10 +85,15 @@ LIMITS = {
 def main(arguments: argparse.Namespace) -> int:
     """Plan, write the files, print the tests and what they will show."""
     from ..errors import StudyError
+    from ..plan.folder import refuse_existing
     from ..plan.public import plan
 
     if (arguments.folder is None) == (arguments.new is None):
         raise StudyError("name a study, or a rig.toml with --new; one of the two.")
+    if arguments.new is not None and not arguments.new.is_file():
+        raise StudyError(f"{arguments.new}: there is no such file.")
+    if arguments.output is not None and not arguments.dry_run:
+        refuse_existing(arguments.output)  # before the search, not after it
     given: dict[str, Any] = {
         name: getattr(arguments, name)
         for name in (*LIMITS, "runs")

@@ -141,7 +141,9 @@ def open_effects(
             if name not in EFFECTS or any(_clash(name, other) for other in model.effects):
                 continue
             if one.get("why"):
-                unlimited.append(name)
+                # What a parameter of a known effect takes up is in the band of that parameter.
+                if str(one["why"]).partition(".")[0] not in model.effects:
+                    unlimited.append(name)
                 continue
             label = name if name not in found else f"{name} ({finding['site']})"
             found[label] = OpenEffect(

@@ -16,6 +16,9 @@ Rates = Callable[[float, list[float]], list[float]]
 FINE, ROUGH = 1e-6, 1e-4
 """Relative tolerances: 1e-6 errs by 2e-5 of the RMS of a building's channels, 1e-4 by 1e-3."""
 
+LONGEST = 0.02
+"""Longest step [s]: where all is at rest the integrator would leap over a command that rises."""
+
 
 def integrate(
     rates: Rates,
@@ -54,7 +57,7 @@ def integrate(
         asked = np.minimum(time[inside], end - 1e-8)
         solution = solve_ivp(
             lambda t, y: rates(t, y.tolist()), (begin, end - 1e-8), state, method="LSODA",
-            t_eval=asked, rtol=rtol, atol=0.1 * rtol * np.array(scales),
+            t_eval=asked, rtol=rtol, atol=0.1 * rtol * np.array(scales), max_step=LONGEST,
         )  # fmt: skip
         if not solution.success or not np.all(np.isfinite(solution.y)):
             raise RunError(

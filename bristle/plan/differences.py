@@ -18,6 +18,8 @@ OFF = 0.1
 """Share of a command's range by which it may differ at any instant."""
 LATEST = 0.5
 """Seconds up to which a command may come late, or early."""
+AS_GOOD = 0.01
+"""Correlation by which a nearer peak may be lower than the highest one."""
 
 
 def share_reached(measured: Array, planned: Array) -> float:
@@ -82,10 +84,24 @@ def _off(measured: Array, goal: Array) -> float:
 
 
 def _late(measured: Array, goal: Array, step: float) -> int:
-    """Return by how many samples a command is late, less than 0 where it is early."""
+    """Return by how many samples a command is late, less than 0 where it is early.
+
+    By the correlation, which neither clipping nor a weaker command moves. Of peaks alike, as a
+    periodic command has them, the nearest one.
+    """
     most = min(round(LATEST / step), goal.size // 4)
-    lags = sorted(range(-most, most + 1), key=abs)
-    return min(lags, key=lambda lag: _off(*_shifted(measured, goal, lag)))
+    lags = np.arange(-most, most + 1)
+    alike = np.array([_likeness(*_shifted(measured, goal, int(lag))) for lag in lags])
+    beside = np.pad(alike, 1, constant_values=-np.inf)
+    peaks = (alike >= beside[:-2]) & (alike >= beside[2:]) & (alike >= np.max(alike) - AS_GOOD)
+    return int(min(lags[peaks], key=abs))
+
+
+def _likeness(measured: Array, goal: Array) -> float:
+    """Return the correlation of two signals, 0 where one is constant."""
+    own, other = measured - np.mean(measured), goal - np.mean(goal)
+    size = float(np.linalg.norm(own) * np.linalg.norm(other))
+    return float(own @ other) / size if size > 0.0 else 0.0
 
 
 def _shifted(measured: Array, goal: Array, late: int) -> tuple[Array, Array]:

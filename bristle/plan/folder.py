@@ -163,8 +163,7 @@ def write_plan(
         can have, channels that differ.
     """
     path = Path(path)
-    if path.exists():
-        raise StudyError(f"{path}: is there already. Take another name, or remove it.")
+    refuse_existing(path)
     _refuse_wrong(folder)
     files = {FILE: _toml_text(folder), **(others or {})}
     files |= {f"{run.name}.csv": _csv_text(run) for run in folder.runs}
@@ -182,6 +181,18 @@ def write_plan(
     finally:
         if draft is not None:
             shutil.rmtree(draft, ignore_errors=True)
+
+
+def refuse_existing(path: Path) -> None:
+    """Refuse a folder that is there already: a plan is written into a new one.
+
+    Raises
+    ------
+    StudyError
+        If there is such a folder, or a file.
+    """
+    if path.exists():
+        raise StudyError(f"{path}: is there already. Take another name, or remove it.")
 
 
 def _listed(toml: Toml, folder: Path) -> list[dict[str, str]]:

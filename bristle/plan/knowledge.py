@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 SPREAD = 0.3
 """Standard deviation at most, over its size, of a parameter that is drawn."""
 
+ROUNDING = 1e-10
+"""Of normal equations of columns of length one: directions that weigh less tell nothing."""
+
 DRAWS = 12
 """Draws of the motion's error from which the noise on a planned run is taken."""
 
@@ -245,6 +248,21 @@ class Known:
         p = self._own
         return {
             rival.name: float(np.sqrt(max(self.told.normal[p + i, p + i], 0.0)))
+            for i, rival in enumerate(self.question.rivals)
+        }
+
+    def kept(self) -> dict[str, float]:
+        """Return the share of each rival's change that no parameter takes up, by the runs alone.
+
+        What is known of a parameter beforehand would tell of an effect that it takes up entirely.
+        """
+        p = self._own
+        size = np.sqrt(np.maximum(np.diag(self.told.normal), 1e-300))
+        normal = self.told.normal / np.outer(size, size)
+        across, own = normal[:p, p:], normal[:p, :p] + ROUNDING * np.eye(p)
+        left = np.diag(normal[p:, p:]) - np.sum(across * np.linalg.solve(own, across), axis=0)
+        return {
+            rival.name: float(np.sqrt(max(left[i], 0.0)))
             for i, rival in enumerate(self.question.rivals)
         }
 

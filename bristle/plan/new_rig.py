@@ -32,7 +32,7 @@ from .questions import (
     rivals_of,
     sized_rival,
 )
-from .rig_limits import RigLimits, read_quantity, read_rig, with_given
+from .rig_limits import RigLimits, limits_given, read_quantity, read_rig, with_given
 from .search import Planner
 from .wish import Wish, parameters_of
 
@@ -83,12 +83,12 @@ def read_new_rig(path: Path, given: Mapping[str, Any] | None = None) -> NewRig:
         toml.error(("damper", "law"), unknown("law", law, law_names()))
     force = 0.0
     if "max_force" not in damper:
-        toml.error(("damper",), 'max_force is missing; max_force = "2 kN" is right.')
+        toml.error(("damper",), '[damper] lacks max_force; max_force = "2 kN" is right.')
     else:
         force = _positive(toml, ("damper", "max_force"), damper["max_force"], "N")
     noise = _noise(toml)
     toml.check()
-    limits = {**read_rig(path, drive), **(given or {})}
+    limits = {**read_rig(path, drive), **limits_given(given or {}, drive)}
     lacking = [name for name in ("stroke", "speed", "command") if name not in limits]
     if lacking == ["command"] and "levels" in limits:
         lacking = []

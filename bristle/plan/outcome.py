@@ -18,6 +18,12 @@ from .purposes import seen, separated
 OUTCOMES = "outcomes.json"
 """The file of a plan's folder with the table."""
 
+NEAR = 0.01
+"""Distance of rivals below which it is none."""
+
+EXCITED = 1e-3
+"""Standard deviations that an effect of its asked size changes where anything of it moves."""
+
 HEADER = ("question", "figure", "now", "with these tests")
 
 
@@ -28,7 +34,7 @@ class Outcome:
     `purpose` one of `purposes.PURPOSES`; `name` of effect, rivals, parameter or coordinate;
     `what` the quantity is, in `unit`; `now` from the runs at hand, `then` with the tests too;
     infinite where no run shows it. `settled` whether a verdict will be able to tell; `beyond`
-    whether no test that was looked at would.
+    whether no test that was looked at would; `excited` whether the tests change anything of it.
     """
 
     purpose: str
@@ -39,6 +45,7 @@ class Outcome:
     then: float
     settled: bool = True
     beyond: bool = False
+    excited: bool = True
 
     def cells(self) -> list[str]:
         """Return the row of a table."""
@@ -49,7 +56,7 @@ class Outcome:
         if not isfinite(value):
             return "not visible"
         if self.purpose == "separate":
-            return f"{plain(value, 2)} std"
+            return f"{plain(value, 2) if value >= NEAR else 0} std"
         if self.purpose == "sharpen" and self.unit == "%":
             return f"{plain(100.0 * value, 2)} %"
         return quantity(value, self.unit, 2, fine=True)
@@ -98,6 +105,7 @@ def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
     before = {one.name: one.value for one in seen(now, purposes.rule)}
     after = {one.name: one.value for one in seen(then, purposes.rule)}
     near = [known.distances() for known in (now, then)]
+    raw = then.raw()
     out = []
     for one in purposes.effects:
         sized, name = one.sized, one.sized.name
@@ -114,7 +122,12 @@ def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
         if visible[1] and not sized.ended(found):
             side = "above" if not sized.falls else "below"
             text += f"; named {side} {quantity(sized.value(found), unit, 2, fine=True)}"
-        out.append(Outcome("see", name, text, unit, limits[0], limits[1], visible[1]))
+        out.append(
+            Outcome(
+                "see", name, text, unit, limits[0], limits[1], visible[1],
+                excited=raw[name] > EXCITED,
+            )
+        )  # fmt: skip
     return out
 
 

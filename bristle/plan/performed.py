@@ -111,6 +111,8 @@ def performed(study: Study, files: Sequence[Path | str], plan: PlanFolder) -> Pe
             there = {plan.motion, *channels}
             kept = {name: x for name, x in planned.signals.items() if name in there}
             pairs.append(compared(run, replace(planned, signals=kept), plan.motion))
+    if plan.study not in ("", study.name):
+        notes.append(f"the plan was made for the study {plan.study}, and this one is {study.name}")
     missing = [one.name for one in plan.runs if one not in found]
     if missing:
         notes.append(f"planned, and not among the files: {', '.join(missing)}")

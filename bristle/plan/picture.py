@@ -9,6 +9,7 @@ import numpy as np
 
 from ..draw.style import BLUE, VERMILION, Page, look, png
 from ..physics.drive import DRIVES
+from ..quantity import quantity
 from .outcome import HEADER, OUTCOMES
 
 if TYPE_CHECKING:
@@ -37,7 +38,10 @@ def outcomes_json(plan: Plan) -> str:
 
 def plan_text(plan: Plan, limits: list[str]) -> str:
     """Return the plan as a page of text; `limits` says what it asks of the rig."""
-    lines = [f"# Tests for {plan.study or 'a new rig'}", "", *limits, "", "## Runs", ""]
+    lines = [f"# Tests for {plan.study or 'a new rig'}", "", *limits]
+    if plan.limits.pause:
+        lines.append(f"The rig rests for {quantity(plan.limits.pause, 's')} between two of them.")
+    lines += ["", "## Runs", ""]
     lines += ["| run | for | what |", "|---|---|---|"]
     lines += [
         f"| [{run.name}]({run.name}.csv) | {'fitting' if run.role == 'train' else 'judging'} | "

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from ..diagnose.rule import BENCH
 from ..errors import StudyError
 from ..physics.drive import DRIVES
+from ..physics.effect import EFFECTS, plain_name
 from ..quantity import plain
 from ..shown import shown
 from .folder import PlanFolder, PlannedRun, write_plan
-from .outcome import Outcome
+from .outcome import NEAR, Outcome
 from .planned_test import Signals, Test
 from .rig_limits import RigLimits
 
@@ -126,11 +127,25 @@ class Plan:
         if not one.beyond:
             return f"not settled by these tests; --{one.purpose} it alone."
         if one.purpose != "separate":
-            return "no test within these limits shows it; the model takes it up."
+            return self._why_hidden(one)
+        differ = plain(one.then, 2) if one.then >= NEAR else "0"
         return (
             "no test within these limits tells them apart; at best they differ by "
-            f"{plain(one.then, 2)} standard deviations{self._more(one)}."
+            f"{differ} standard deviations{self._more(one)}."
         )
+
+    def _why_hidden(self, one: Outcome) -> str:
+        """Return why no test shows an effect: the model takes it up, or nothing moves it."""
+        none = "no test within these limits shows it"
+        if one.excited:
+            return f"{none}; the model takes it up."
+        held = self.limits.command[0] == self.limits.command[1] or {*self.limits.commands} == {
+            "held"
+        }
+        effect = EFFECTS[plain_name(one.name.rpartition(": ")[2])]
+        if held and "V" in effect.needs:
+            return f"{none}: the command does not move."
+        return f"{none}: none excites it."
 
     def _more(self, one: Outcome) -> str:
         """Return how many tests of this kind would tell rivals apart, "" where far too many."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from .bench import plan_study
 from .building import plan_building
 from .new_rig import plan_new
 from .plan import Plan
-from .rig_limits import SIZES, RigLimits, read_quantity, read_rig
+from .rig_limits import limits_given, read_rig
 from .wish import Wish
 
 Names = str | Sequence[str] | bool | None
@@ -91,20 +91,19 @@ def plan(
     ['train', 'holdout']
     """
     wish = Wish(*(_names(one) for one in (separate, see, sharpen, learn)))
-    given = {name: _limit(name, value) for name, value in limits.items()}
+    _refuse_seed(seed)
     if isinstance(study, str | Path) and Path(study).is_file():
         if rig is not None:
             raise StudyError(f"{study} is a rig.toml itself; rig = {written(rig)} is one too many.")
-        return plan_new(Path(study), wish, limits=given, seed=seed)
+        _refuse_of_building(study, limits, record)
+        return plan_new(Path(study), wish, limits=limits, seed=seed)
     opened = study if isinstance(study, Study) else Study(study)
+    given = limits_given(limits, opened.drive)
     of_file = read_rig(Path(rig), opened.drive) if rig is not None else {}
     if opened.settings.has_building:
         names = [str(one) for one in ((record,) if isinstance(record, str | Path) else record)]
         return plan_building(opened, wish, limits={**of_file, **given}, records=names, seed=seed)
-    if record:
-        raise StudyError(
-            f"{opened.folder}: a damper on a bench has no ground motion; record is for a building."
-        )
+    _refuse_of_building(opened.folder, limits, record)
     return plan_study(opened, wish, limits={**of_file, **given}, seed=seed)
 
 
@@ -117,19 +116,15 @@ def _names(names: Names) -> tuple[str, ...] | None:
     return (names,) if isinstance(names, str) else tuple(names)
 
 
-def _limit(name: str, value: Any) -> Any:
-    """Return a limit in SI.
+def _refuse_seed(seed: int) -> None:
+    if seed < 0:
+        raise StudyError(f"seed = {seed}: 0 or a positive whole number is right.")
 
-    Raises
-    ------
-    StudyError
-        If there is no such limit.
-    """
-    from dataclasses import fields
 
-    from ..findings import unknown
-
-    known = [one.name for one in fields(RigLimits)]
-    if name not in known:
-        raise StudyError(unknown("limit", name, known))
-    return read_quantity(value, SIZES[name], name) if name in SIZES else value
+def _refuse_of_building(bench: str | Path, limits: Mapping[str, Any], record: Any) -> None:
+    """Refuse what a damper on a bench does not have, in place of leaving it out."""
+    wrong = [name for name in ("damper_stroke", "drift") if name in limits]
+    if record or wrong:
+        what = "ground motion; record" if record else f"storeys; {' and '.join(wrong)}"
+        are = "is" if record or len(wrong) == 1 else "are"
+        raise StudyError(f"{bench}: a damper on a bench has no {what} {are} for a building.")

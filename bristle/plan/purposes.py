@@ -73,11 +73,11 @@ def seen(
     least = least or {}
     held_out = known.told.held_out
     wanted = named_distance(known.told.samples, held_out, rule) if held_out else inf
-    left, raw = known.distances(), known.raw()
+    left, kept = known.distances(), known.kept()
     return [
         Figure(
             "see", name,
-            wanted / left[name] if left[name] > LEAST * raw[name] > 0.0 else inf,
+            wanted / left[name] if kept[name] > LEAST and left[name] > 0.0 else inf,
             max(SEEN, least.get(name, 0.0)),
         )
         for name in left

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from math import inf, isfinite
@@ -122,6 +123,13 @@ class RigLimits:
             raise StudyError(f"runs = {self.runs}: 1 or more is right.")
         if self.duration < 2.0:
             raise StudyError(f"duration = {self.duration:g} s: 2 s or more is right.")
+        if not self.pause >= 0.0:
+            raise StudyError(f"pause = {self.pause:g} s: 0 or more is right.")
+        if self.band[1] * self.duration < 1.0:
+            raise StudyError(
+                f"band = {self.band[0]:g} to {self.band[1]:g} Hz: a test of {self.duration:g} s "
+                "holds not one period of it; a longer duration, or a higher band, is right."
+            )
         if self.rate * self.duration < 400.0:
             raise StudyError(
                 f"{self.rate:g} samples per second in {self.duration:g} s are "
@@ -167,10 +175,34 @@ def with_given(limits: RigLimits, given: Mapping[str, Any]) -> RigLimits:
         If they allow no test.
     """
     out = replace(limits, **given)
-    if out.levels and "command" not in given:
-        out = replace(out, command=(min(out.levels), max(out.levels)))
     out.check()
-    return out
+    if not out.levels:
+        return out
+    low, high = out.command if "command" in given else (min(out.levels), max(out.levels))
+    levels = tuple(level for level in out.levels if low <= level <= high)
+    if not levels:
+        wrong = ", ".join(f"{level:g}" for level in out.levels)
+        raise StudyError(f"levels = {wrong}: none of them is in command = {low:g} to {high:g}.")
+    return replace(out, levels=levels, command=(min(levels), max(levels)))
+
+
+def limits_given(given: Mapping[str, Any], drive: str = "") -> dict[str, Any]:
+    """Return limits as arguments of `RigLimits`, from what a user gives for each of them.
+
+    Parameters
+    ----------
+    given : by name, numbers in SI or texts with a unit, as in rig.toml
+    drive : the channel of the command, "" where none is known: its unit is that of levels
+
+    Raises
+    ------
+    StudyError
+        If there is no such limit, or a value is none.
+    """
+    for name in given:
+        if name not in _NAMES:
+            raise StudyError(unknown("limit", name, _NAMES))
+    return {name: _read(name, value, drive) for name, value in given.items()}
 
 
 def read_quantity(text: str | float, unit: str, what: str) -> float:
@@ -182,18 +214,20 @@ def read_quantity(text: str | float, unit: str, what: str) -> float:
         If it is no number with a unit of that kind.
     """
     right = f'a number with its unit is right, such as "{_example(unit)}"'
-    number, _, own = str(text).strip().partition(" ")
-    if not own:
-        split = len(number.rstrip("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZµ/%²^"))
-        number, own = number[:split], number[split:]
+    found = _QUANTITY.fullmatch(str(text))
+    if found is None or (isinstance(text, str) and not found[2]):
+        raise StudyError(f"{what} = {written(text)}: {right}.")
     try:
-        value = convert(float(number), own.strip() or unit, unit)
-    except (ValueError, UnitError) as error:
-        why = "" if isinstance(error, ValueError) else f" ({error})"
-        raise StudyError(f"{what} = {written(text)}: {right}{why}.") from None
+        value = convert(float(found[1]), found[2] or unit, unit)
+    except UnitError as error:
+        raise StudyError(f"{what} = {written(text)}: {right} ({error}).") from None
     if not isfinite(value):
         raise StudyError(f"{what} = {written(text)}: {right}.")
     return value
+
+
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+"""A number, and its unit if there is one."""
 
 
 def _example(unit: str) -> str:
@@ -218,23 +252,14 @@ def read_rig(path: Path, drive: str = "") -> dict[str, Any]:
     toml.schema()
     toml.known((), toml.data, ("schema", "limits", "damper", "noise"))
     table = toml.table((), toml.data, "limits")
-    toml.known(("limits",), table, [*_NAMES, "band", "command", "slew", "levels"])
-    unit = DRIVES.get(drive, VOLTAGE).unit
-    units = {**SIZES, "slew": f"{unit}/s"}
+    toml.known(("limits",), table, _NAMES)
     out: dict[str, Any] = {}
     for key, value in table.items():
-        try:
-            if key in units:
-                out[key] = read_quantity(value, units[key], key)
-            elif key in ("band", "command", "levels"):
-                own = "Hz" if key == "band" else unit
-                out[key] = _several(value, own, key)
-            elif key == "runs":
-                out[key] = _whole(value)
-            elif key in ("motions", "commands"):
-                out[key] = _kinds(value, key)
-        except StudyError as error:
-            toml.error(("limits", key), str(error))
+        if key in _NAMES:
+            try:
+                out[key] = _read(key, value, drive)
+            except StudyError as error:
+                toml.error(("limits", key), str(error))
     toml.check()
     return out
 
@@ -242,14 +267,30 @@ def read_rig(path: Path, drive: str = "") -> dict[str, Any]:
 _NAMES = tuple(one.name for one in fields(RigLimits))
 
 
+def _read(name: str, value: Any, drive: str) -> Any:
+    """Return a limit [SI] from what a user gives for it."""
+    unit = DRIVES.get(drive, VOLTAGE).unit
+    if name in ("band", "command", "levels"):
+        return _several(value, "Hz" if name == "band" else unit, name)
+    if name in ("motions", "commands"):
+        return _kinds(value, name)
+    if name == "runs":
+        return _whole(value)
+    return read_quantity(value, f"{unit}/s" if name == "slew" else SIZES[name], name)
+
+
 def _several(value: Any, unit: str, what: str) -> tuple[float, ...]:
     """Return the quantities of a list."""
-    if not isinstance(value, list) or (what != "levels" and len(value) != 2) or not value:
-        raise StudyError(
-            f"{what} is {written(value)}; a list is right, such as "
-            + ('["0.2 Hz", "10 Hz"].' if unit == "Hz" else f'["0 {unit}", "5 {unit}"].')
-        )
+    right = '["0.2 Hz", "10 Hz"]' if unit == "Hz" else f'["0 {unit}", "5 {unit}"]'
+    if not isinstance(value, list | tuple) or not value:
+        raise StudyError(f"{what} is {_no_list(value)}; a list is right, such as {right}.")
+    if what != "levels" and len(value) != 2:
+        raise StudyError(f"{what} is a list of {len(value)}; two are right, such as {right}.")
     return tuple(read_quantity(one, unit, what) for one in value)
+
+
+def _no_list(value: Any) -> str:
+    return written(value) if value or not isinstance(value, list | tuple) else "empty"
 
 
 def _whole(value: Any) -> int:
@@ -261,8 +302,8 @@ def _whole(value: Any) -> int:
 def _kinds(value: Any, what: str) -> tuple[str, ...]:
     """Return the names of waveforms."""
     known = MOTIONS if what == "motions" else COMMANDS
-    if not isinstance(value, list) or not value:
-        raise StudyError(f'{what} is {written(value)}; a list is right, such as ["sine"].')
+    if not isinstance(value, list | tuple) or not value:
+        raise StudyError(f'{what} is {_no_list(value)}; a list is right, such as ["sine"].')
     for one in value:
         if one not in known or one == "record":
             raise StudyError(unknown(what[:-1], one, [name for name in known if name != "record"]))

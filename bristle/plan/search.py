@@ -18,6 +18,7 @@ from ..data.noise import white_noise
 from ..errors import StudyError
 from ..identify.model import Run
 from ..progress import Count, tell
+from ..quantity import quantity
 from .knowledge import Asked
 from .motions import Command, Waveform
 from .planned_test import Signals, Test
@@ -110,7 +111,7 @@ class Planner:
         with ThreadPoolExecutor(cpu_count()) as pool:
             found = [one for one in pool.map(look, tests) if one is not None]
         if not found:
-            raise StudyError(self.nothing_kept)
+            raise StudyError(self._why_nothing(tests))
         roles = roles_of(self.limits.runs, self.goal.judged)
         goal, picked = self.goal.among(found), list[Seen]()
         for own, following in pairwise([*roles, False]):
@@ -144,6 +145,22 @@ class Planner:
             return [best]
         twin = self.see(self.twin(best.test)) or best
         return [best, replace(twin, held_out=True)]
+
+    def _why_nothing(self, tests: Sequence[Test]) -> str:
+        """Return why the limits allow none of the tests."""
+        rig = self.limits
+        most = max(float(np.max(np.abs(one.signals(rig, self.rate).x))) for one in tests)
+        if most >= LEAST * rig.stroke:
+            return self.nothing_kept
+        kept = f"a speed of {quantity(rig.speed, 'm/s')}"
+        if np.isfinite(rig.acceleration):
+            kept += f" and an acceleration of {quantity(rig.acceleration, 'm/s2')}"
+        return (
+            f"no test stays within the limits: {kept} allow {quantity(most, 'm')} from "
+            f"{rig.usable_band[0]:.3g} Hz on, less than {100.0 * LEAST:.0f} % of the stroke of "
+            f"{quantity(rig.stroke, 'm')}. More of these, a lower band or a smaller stroke is "
+            "needed."
+        )
 
     def looked_at(self) -> list[Seen]:
         """Return the tests that were looked at and keep the limits."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -38,6 +38,9 @@ class TablePlanner(Planner):
         "no ground motion stays within the limits and moves the building: a larger stroke, speed "
         "or acceleration of the table, or a larger stroke of the damper or drift, is needed."
     )
+
+    def _why_nothing(self, tests: Sequence[Test]) -> str:
+        return self.nothing_kept
 
     def response(self, one: Seen) -> Shaken:
         """Return what a test prescribes, and every output of the simulation."""

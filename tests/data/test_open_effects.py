@@ -79,6 +79,14 @@ def test_what_has_no_limit_or_is_in_the_model_is_not_open() -> None:
     assert open_effects({}, model) == ([], [])
 
 
+def test_what_a_known_effect_takes_up_is_in_the_band_of_its_parameters() -> None:
+    taken = {"effect": "duffing", "why": "gas_spring.k_3 of the model takes it up"}
+    by_law = {"effect": "saturation", "why": "f_v of the model takes it up"}
+    assert open_effects(verdict(taken, by_law), new_model("bingham", ("gas_spring",)))[1] == [
+        "saturation"
+    ]
+
+
 def test_a_storeys_limit_is_of_that_storey() -> None:
     soft = {
         **SPRING, "effect": "storey_softening", "parameter": "d_half", "side": "above",

@@ -13,8 +13,8 @@ import pytest
 from bristle.cli import main
 from bristle.data.measurement import read_measurement
 from bristle.errors import StudyError
-from bristle.example import rigs, tower
-from bristle.example.damper import in_library_names
+from bristle.example import bench, excitation, rigs, tower
+from bristle.example.damper import Damper, in_library_names
 from bristle.example.make import Choice, make_bench
 from bristle.example.perform import perform_plan
 from bristle.example.planned import ground_of, motion_of, programme_of, seconds_of
@@ -152,6 +152,18 @@ def test_a_command_is_held_before_a_jump_and_straight_elsewhere() -> None:
     assert volts.jumps == (0.02,)
     shown = [volts.value(now) for now in (0.0, 0.0199, 0.02, 0.03, 0.035, 0.05)]
     assert shown == pytest.approx([0.0, 0.0, 4.0, 4.0, 4.25, 5.0])
+
+
+def test_slow_ramps_of_a_command_that_begins_at_zero_reach_the_coil() -> None:
+    t = np.arange(4001) / 500.0
+    ramps = np.clip(20.0 * np.abs((t + 0.5) % 1.0 - 0.5) - 4.5, 0.0, 5.0)
+    volts = programme_of(t, ramps)
+    assert not volts.jumps
+    damper = Damper("bingham", rigs.CENTRE["bingham"], {"coil_tau": 0.03})
+    slide = excitation.Motion(t, lambda q: (0.02 * q, 0.02, 0.0))
+    run = bench.perform(damper, slide, volts, rigs.scales_of("bench", "bingham"))
+    yields = damper.values["Y_1"] * 5.0  # what the largest command adds
+    assert np.ptp(run["force"]) > 0.7 * yields
 
 
 def test_a_motion_goes_through_its_samples() -> None:

@@ -94,6 +94,18 @@ def test_a_command_that_came_late_is_told() -> None:
     assert other == "plan_1: the voltage was another one than planned for 88 % of the run"
 
 
+def test_a_periodic_command_is_held_against_the_period_that_it_belongs_to() -> None:
+    plan = planned()
+    plan.signals["voltage"] = wave = 3.0 - 3.0 * np.cos(2.0 * np.pi * T / 0.358)
+    (clipped,) = differences(measured(plan, voltage=np.minimum(wave, 3.6)), plan)
+    assert clipped == "plan_1: the voltage was clipped at 3.6 V, 60 % of what was planned"
+    (late,) = differences(measured(plan, voltage=np.roll(wave, 50)), plan)
+    assert late.startswith("plan_1: the voltage came 100 ms late")
+    clipped, late = differences(measured(plan, voltage=np.roll(np.minimum(wave, 3.6), 50)), plan)
+    assert "clipped at 3.6 V" in clipped
+    assert "100 ms late" in late
+
+
 def test_a_recording_that_ends_early_is_told() -> None:
     run = measured(planned()).part(0, 1500, "plan_1")
     assert differences(run)[-1] == "plan_1: the recording covers 60 % of the 5 s that were planned"
@@ -179,6 +191,18 @@ def test_what_cannot_be_held_against_a_plan_is_refused(
     study.settings = replace(study.settings, split="restart")
     with pytest.raises(StudyError, match="files of one run"):
         performed(study, [], PlanFolder("bench", "", RATE, (planned(),)))
+
+
+def test_a_plan_of_another_study_is_told(lab: tuple[Path, Path], tmp_path: Path) -> None:
+    study, file = Study(lab[0]), written(tmp_path / "plan_1.csv", measured(planned()))
+    notes = {
+        name: performed(study, [file], PlanFolder("bench", name, RATE, (planned(),))).notes
+        for name in ("", study.name, "rig_b")
+    }
+    assert notes == {
+        "": (), study.name: (),
+        "rig_b": (f"the plan was made for the study rig_b, and this one is {study.name}",),
+    }  # fmt: skip
 
 
 def test_many_runs_are_paired_in_order_with_the_most_alike() -> None:

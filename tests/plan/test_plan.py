@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from scipy.ndimage import uniform_filter1d
 
 import bristle
+from bristle.cli import main
 from bristle.errors import StudyError
 from bristle.example.make import Choice, make_bench
 from bristle.identify.fit import intervals_of
@@ -18,7 +20,7 @@ from bristle.plan.folder import read_plan
 from bristle.plan.knowledge import Asked, Evidence, Known, Question, Rival
 from bristle.plan.motions import Command, Waveform
 from bristle.plan.planned_test import Test
-from bristle.plan.purposes import Figure, cost_of, seen
+from bristle.plan.purposes import LEAST, Figure, cost_of, seen
 from bristle.plan.rig_limits import RigLimits
 from bristle.plan.search import Planner
 from bristle.plan.seen import Goal, Seen, roles_of
@@ -82,6 +84,17 @@ def test_deviations_and_distances_are_those_of_least_squares() -> None:
     # A dashpot of its own takes the thicker oil up whole; the model as it is does not.
     assert known.raw()["thicker"] == pytest.approx(3.0 * np.linalg.norm(J[:, 1]), rel=1e-3)
     assert known.distances()["thicker"] < 0.02 * known.raw()["thicker"]
+
+
+def test_what_a_parameter_takes_up_whole_is_not_seen_on_short_runs_either() -> None:
+    run = a_run(noise=1.0)
+    more = Model("bingham", values={**PLAIN.values, "c_0": 23.0}, fixed=PLAIN.fixed)
+    asked = Asked(Question(PLAIN, (Rival("thicker", more, PLAIN),)), Problem([run]))
+    known = Known(asked.question, asked.evidence([run]) + asked.evidence([run]).judging())
+    # What is known of the dashpot beforehand would tell of thicker oil.
+    assert known.distances()["thicker"] > LEAST * known.raw()["thicker"] > 0.0
+    assert known.kept()["thicker"] < LEAST
+    assert seen(known)[0].value == np.inf
 
 
 def test_runs_add_up_and_never_tell_less() -> None:
@@ -190,6 +203,24 @@ def test_force_and_heat_are_kept_by_the_model_or_the_plan_is_refused(sheet: Path
         bristle.plan(sheet, sharpen=True, force="1 N")
 
 
+def test_a_refusal_names_the_limits_that_allow_no_motion(sheet: Path) -> None:
+    with pytest.raises(StudyError, match=r"acceleration of 0.001 m/s2 allow .* of 20 mm") as told:
+        bristle.plan(sheet, sharpen=True, acceleration="1 mm/s2")
+    assert "heat" not in str(told.value)
+
+
+def test_a_sheet_that_is_not_there_is_no_study(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plan", "--new", str(tmp_path / "rig.toml")]) == 2
+    assert "rig.toml: there is no such file." in capsys.readouterr().err
+
+
+def test_the_pause_between_tests_is_told(sheet: Path, tmp_path: Path) -> None:
+    found = bristle.plan(sheet, sharpen="f_c", pause="30 s").write(tmp_path / "plan")
+    assert "rests for 30 s between" in (found / "plan.md").read_text()
+
+
 def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
     rig: bristle.Study, tmp_path: Path
 ) -> None:
@@ -229,6 +260,25 @@ def test_rivals_that_no_test_tells_apart_are_said_to_be_so(rig: bristle.Study) -
     assert "Nothing is left to gain" in found.sentences()[-1]
 
 
+def test_a_command_that_does_not_move_shows_no_lag_and_is_said_to(sheet: Path) -> None:
+    held = ("2 V", "2 V")
+    found = bristle.plan(sheet, see="coil_lag", command=held)
+    why = "coil_lag: no test within these limits shows it: the command does not move."
+    assert found.sentences()[0] == why
+    apart = bristle.plan(sheet, separate=["coil_lag", "none"], command=held, duration="4 s")
+    assert "differ by 0 standard deviations" in apart.sentences()[0]
+    assert apart.outcomes[0].cells()[-1] == "0 std"
+
+
+def test_a_folder_that_is_there_is_refused_before_the_search(
+    sheet: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    public = import_module("bristle.plan.public")
+    monkeypatch.setattr(public, "plan", lambda *_, **__: pytest.fail("searched"))
+    assert main(["plan", "--new", str(sheet), "-o", str(tmp_path)]) == 2
+    assert "is there already" in capsys.readouterr().err
+
+
 def test_parts_without_a_form_are_covered_along_their_coordinates(sheet: Path) -> None:
     found = bristle.plan(sheet, learn=["displacement"])
     (row,) = found.outcomes
@@ -243,6 +293,8 @@ def test_parts_without_a_form_are_covered_along_their_coordinates(sheet: Path) -
         ({"see": "gas_sprin"}, "gas_spring"), ({"separate": "gas_spring"}, "two or more"),
         ({"sharpen": "nothing"}, "parameter"), ({"learn": "colour"}, "displacement"),
         ({"stroke": "3 kg"}, "stroke"), ({"strok": 1.0}, "stroke"), ({"runs": 0}, "1 or more"),
+        ({"seed": -1}, "0 or a positive"), ({"drift": "5 mm"}, "drift is for a building"),
+        ({"record": "el_centro_1940_ns"}, "record is for a building"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_planned_is_refused(
@@ -256,7 +308,7 @@ def test_what_cannot_be_planned_is_refused(
     ("old", "new", "told"),
     [
         ('max_force = "2 kN"', 'max_force = "2 mm"', "max_force"),
-        ('max_force = "2 kN"\n', "", "max_force is missing"),
+        ('max_force = "2 kN"\n', "", "lacks max_force"),
         ('stroke = "20 mm"\n', "", "lacks stroke"), ("bingham", "bengham", "bingham"),
         ('max_force = "2 kN"', 'max_force = "-2 kN"', "more than 0"),
     ],

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,14 @@ import pytest
 from bristle.errors import StudyError
 from bristle.plan.motions import COMMANDS, MOTIONS, Command, Waveform, command_of, shape_of
 from bristle.plan.planned_test import Test
-from bristle.plan.rig_limits import RESERVE, RigLimits, read_quantity, read_rig, with_given
+from bristle.plan.rig_limits import (
+    RESERVE,
+    RigLimits,
+    limits_given,
+    read_quantity,
+    read_rig,
+    with_given,
+)
 
 LIMITS = RigLimits(
     stroke=20e-3, speed=0.25, acceleration=8.0, command=(0.0, 5.0), duration=5.0, rate=200.0
@@ -67,7 +75,9 @@ def test_an_amplifier_with_a_slew_gets_ramps_and_one_with_levels_gets_these() ->
         ({"stroke": 0.0}, "allow no motion"), ({"band": (5.0, 1.0)}, "lowest frequency first"),
         ({"command": (5.0, 0.0)}, "least value first"), ({"slew": 0.0}, "cannot change"),
         ({"runs": 0}, "1 or more"), ({"duration": 1.0}, "2 s or more"),
-        ({"rate": 20.0}, "400 or more"),
+        ({"rate": 20.0}, "400 or more"), ({"pause": -1.0}, "0 or more"),
+        ({"band": (0.01, 0.05)}, "not one period"),
+        ({"command": (0.2, 0.8), "levels": (0.0, 1.0, 2.0)}, "levels = 0, 1, 2: none of them"),
     ],
 )  # fmt: skip
 def test_limits_that_allow_no_test_are_refused(wrong: dict[str, object], told: str) -> None:
@@ -77,16 +87,45 @@ def test_limits_that_allow_no_test_are_refused(wrong: dict[str, object], told: s
 
 @pytest.mark.parametrize(
     ("text", "unit", "value"),
-    [("20 mm", "m", 0.02), ("20mm", "m", 0.02), (0.02, "m", 0.02), ("2 kN", "N", 2000.0)],
-)
+    [("20 mm", "m", 0.02), ("20mm", "m", 0.02), (0.02, "m", 0.02), ("2 kN", "N", 2000.0),
+     ("10m/s2", "m/s2", 10.0), ("5V/s", "V/s", 5.0), ("2e-3m", "m", 0.002)],
+)  # fmt: skip
 def test_a_quantity_is_a_number_with_its_unit(text: str, unit: str, value: float) -> None:
     assert read_quantity(text, unit, "stroke") == pytest.approx(value)
 
 
-@pytest.mark.parametrize("text", ["twenty mm", "20 kg", "nan m", "inf m", ""])
+@pytest.mark.parametrize("text", ["twenty mm", "20 kg", "20", "nan m", "inf m", ""])
 def test_what_is_no_quantity_is_refused_with_an_example(text: str) -> None:
     with pytest.raises(StudyError, match=r'stroke = .*"20 mm"'):
         read_quantity(text, "m", "stroke")
+
+
+def test_a_command_takes_no_level_outside_its_range() -> None:
+    limits = with_given(LIMITS, {"command": (0.0, 1.6), "levels": (0.0, 1.0, 2.0)})
+    assert (limits.levels, limits.command) == ((0.0, 1.0), (0.0, 1.0))
+    test = Test(Waveform("sine", 0.5, 0.5), Command("switched", 0.0, limits.nearest(1.6), 1.0))
+    assert test.signals(limits).V.max() == 1.0
+
+
+def test_limits_from_python_are_read_as_those_of_a_file() -> None:
+    given = {"band": ("0.2 Hz", "4 Hz"), "slew": "20 A/s", "levels": [0, "2 A"], "speed": 0.1}
+    assert limits_given(given, "current") == {
+        "band": (0.2, 4.0), "slew": 20.0, "levels": (0.0, 2.0), "speed": 0.1
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"runs": "6"}, "whole number"), ({"band": 5.0}, "a list is right"),
+        ({"band": ("1 Hz",)}, "two are right"), ({"motions": "sine"}, "a list is right"),
+        ({"motions": ["sinus"]}, '"sine"'), ({"commands": []}, "empty"),
+        ({"command": (0.0, np.nan)}, "command = nan"), ({"strok": 1.0}, "stroke"),
+    ],
+)  # fmt: skip
+def test_limits_from_python_that_are_none_are_refused(wrong: dict[str, Any], told: str) -> None:
+    with pytest.raises(StudyError, match=told):
+        limits_given(wrong)
 
 
 def test_a_rig_file_is_read_with_every_mistake_and_its_line(tmp_path: Path) -> None:
