@@ -18,6 +18,7 @@ from ..identify.residuals import BLOCK, Expected, drawn_noise, residuals
 from ..identify.search import HUBER, losses
 from ..identify.search_context import Search
 from ..identify.start_grid import initial_guesses
+from ..physics.drive import DRIVES, unit_for
 from ..physics.effect import EFFECTS
 from .rule import BENCH, DecisionRule
 
@@ -182,6 +183,12 @@ class Sized:
         self.signed = self.low < 0.0 and not self.falls
         self._without = self._counted(self.without())
         self._changes: dict[float, Array] = {}
+
+    @property
+    def unit(self) -> str:
+        """Return the parameter's unit with the command of the runs: A, not V, with a current."""
+        drive = DRIVES[self.known.problem.runs[0].drive]
+        return unit_for(EFFECTS[self.name].parameters[self.parameter].unit, drive)
 
     def value(self, size: float) -> float:
         """Return the parameter's value [SI] at a size, within its bounds."""

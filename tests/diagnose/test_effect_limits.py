@@ -42,6 +42,14 @@ def test_the_limit_of_a_linear_effect_is_that_of_a_fit_with_it(known):
     assert (limit.parameter, limit.unit, limit.falls, limit.coarse) == ("k", "N/m", False, False)
 
 
+def test_a_limit_on_the_command_has_the_unit_of_the_runs(known):
+    runs = [replace(run, drive="current") for run in known.problem.runs]
+    driven = Known(known.problem.of(runs), known.model, known.expected, 6000)
+    assert limit_of(Sized("saturation", driven)).unit == "A"
+    assert limit_of(Sized("saturation", known)).unit == "V"
+    assert limit_of(Sized(SPRING, driven)).unit == "N/m"
+
+
 def test_a_tenth_of_the_noise_allows_a_tenth(known):
     problem = problem_of(steps, noise=1e-3)
     model = refine(Model("bingham", (), VALUES), problem)
