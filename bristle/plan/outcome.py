@@ -10,7 +10,7 @@ from typing import Any
 from ..diagnose.allowed_size import ONE_SIDED, TWO_SIDED
 from ..diagnose.rule import BENCH
 from ..identify.model import parameter
-from ..physics.drive import DRIVES, unit_for
+from ..physics.drive import drive_named, unit_for
 from ..quantity import plain, quantity
 from .goal import Purposes
 from .knowledge import Asked, Known
@@ -121,11 +121,10 @@ def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
 
 def _sharpened(purposes: Purposes, asked: Asked, now: Known, then: Known) -> list[Outcome]:
     before, after = now.deviations(), then.deviations()
-    drive = DRIVES[now.problem.runs[0].drive]
     out = []
     for name in purposes.parameters:
         size, as_share = asked.spread(name)
-        unit = unit_for(parameter(purposes.model.law, name).unit, drive)
+        unit = unit_for(parameter(purposes.model.law, name).unit, drive_named(purposes.drive))
         value = abs(purposes.model.value(name))
         share = 1.0 if as_share else size / value if value else 0.0
         factor, unit = (share, "%") if share else (size, unit)

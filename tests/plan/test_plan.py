@@ -190,6 +190,16 @@ def test_force_and_heat_are_kept_by_the_model_or_the_plan_is_refused(sheet: Path
         bristle.plan(sheet, sharpen=True, force="1 N")
 
 
+def test_a_plan_in_ampere_tells_no_volts(tmp_path: Path) -> None:
+    file = tmp_path / "rig.toml"
+    text = SHEET.replace("max_force", 'command = "current"\nmax_force')
+    file.write_text(text.replace('["0 V", "5 V"]', '["0 A", "2 A"]'))
+    found = bristle.plan(file, see=["saturation"], sharpen=["f_c", "f_v"])
+    units = {one.name: one.unit for one in found.outcomes}
+    assert units["saturation"] == "A"
+    assert "V" not in "".join(units.values())
+
+
 def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
     rig: bristle.Study, tmp_path: Path
 ) -> None:
