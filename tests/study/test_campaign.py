@@ -340,3 +340,17 @@ def test_a_given_channel_of_the_command_keeps_names_out(lab, tmp_path) -> None:
     created = create_study(tmp_path / "rig", runs, channels=spec)
     assert not created.study.settings.runs[0].levels
     assert created.study.drive == "current"
+
+
+def test_a_column_of_words_is_told_with_the_first_of_them(tmp_path) -> None:
+    columns = one_run(1.0, 0.0)
+    path = write(tmp_path / "a.csv", columns)
+    at = list(columns).index(next(title for title in columns if "F" in title))
+    lines = path.read_text().splitlines()
+    for k in range(1, len(lines)):
+        fields = lines[k].split(",")
+        fields[at] = '"1,234.5"'
+        lines[k] = ",".join(fields)
+    path.write_text("\n".join(lines))
+    with pytest.raises(StudyError, match=r'Not used: .* \(line 2: "1,234.5" is no number\)'):
+        create_study(tmp_path / "rig", [path])
