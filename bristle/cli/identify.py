@@ -127,7 +127,7 @@ def _as_json(answer: dict[str, Any]) -> str:
 
 def text(found: Identified, folder: Path) -> str:
     """Return the tables as text."""
-    from ..data.equation import equations
+    from ..data.equation import equations, symbols
     from ..physics.forms import shown_law, split_form
 
     title = " + ".join([shown_law(found.model.law), *found.model.effects])
@@ -140,7 +140,7 @@ def text(found: Identified, folder: Path) -> str:
             "the first one, each other the rise from the knot before."
         )
     if told := equations(found.model):
-        lines += ["", *(f"  {one.numbers}" for one in told), "  In SI units."]
+        lines += ["", *(f"  {one.numbers}" for one in told), f"  {symbols(found.model, told)}"]
     if found.unidentified:
         lines += ["", f"The data do not identify: {', '.join(found.unidentified)}."]
     lines += ["", *_errors(found)]

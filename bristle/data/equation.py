@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from ..physics.drive import VOLTAGE, drive_named
 from ..physics.effect import EFFECTS, plain_name
 from ..physics.laws import LAWS, base_and_variant
 from ..quantity import with_interval
@@ -79,6 +80,13 @@ def equations(model: StudyModel) -> list[Equation]:
         own = {n.removeprefix(begin): t for n, t in texts.items() if n.startswith(begin)}
         out += _with(effect, known.__doc__ or "", own)
     return out
+
+
+def symbols(model: StudyModel, told: Sequence[Equation]) -> str:
+    """Return the sentence about units: formulas call the command V, whatever it is."""
+    drive = drive_named(model.drive)
+    named = drive != VOLTAGE and any(re.search(r"\bV\b", one.formula) for one in told)
+    return f"In SI units; V is the {drive.name} [{drive.unit}]." if named else "In SI units."
 
 
 def _with(of: str, docstring: str, texts: Mapping[str, tuple[str, str]]) -> list[Equation]:

@@ -107,7 +107,7 @@ def limit_of(sized: Sized) -> EffectLimit:
         if name != sized.parameter and sized.model.value(f"{sized.name}.{name}")
     )
     return EffectLimit(
-        sized.name, sized.parameter, effect.parameters[sized.parameter].unit, sized.falls,
+        sized.name, sized.parameter, sized.unit, sized.falls,
         sized.value(size), None if coarse else share,
         *((None, None) if coarse else named_size(sized, size)), coarse, others, "",
         known.moved(change),

@@ -18,6 +18,7 @@ from ..identify.residuals import BLOCK, Expected, drawn_noise, residuals
 from ..identify.search import HUBER, losses
 from ..identify.search_context import Search
 from ..identify.start_grid import initial_guesses
+from ..physics.drive import DRIVES, unit_for
 from ..physics.effect import EFFECTS
 from .rule import BENCH, DecisionRule
 
@@ -37,6 +38,12 @@ SETTLED = 0.05
 
 TOLD = 1e-3
 """Size of a direction, over the largest, in which the runs tell the model's parameters."""
+
+NEAR = 1.0
+"""Change of a parameter's logarithm beyond which its sensitivity says little of what it does."""
+
+SMALL = 0.02
+"""Change of a parameter's logarithm that is in proportion to its sensitivity."""
 
 
 @dataclass(frozen=True)
@@ -147,15 +154,32 @@ class Known:
     def moved(self, change: Array) -> tuple[tuple[str, float], ...]:
         """Return by how much [SI] a fit moves the model's own parameters to take up a change (n,).
 
+        A parameter that the runs hardly tell would have to move beyond what its sensitivity says:
+        it stays, and the others take up what they can.
+
         Parameters
         ----------
         change : of the normalised residuals
         """
+        stay = np.zeros(len(self.search.start), bool)
+        steps = self.steps(change)
+        while (far := np.where(self.search.log, np.abs(steps), 0.0)).max(initial=0.0) > NEAR:
+            stay[np.argmax(far)] = True
+            taken = np.linalg.pinv(self.own[:, ~stay], rcond=TOLD) @ change
+            steps = np.zeros(len(stay))
+            steps[~stay] = -taken / self._scaled[1][~stay]
+        there = self.stepped(steps)
+        return tuple((n, there.value(n) - self.model.value(n)) for n in self.search.names)
+
+    def steps(self, change: Array) -> Array:
+        """Return the steps (p,) of the search that take up a change (n,), by least squares."""
+        steps: Array = -(self.taken @ change) / self._scaled[1]
+        return steps
+
+    def stepped(self, steps: Array) -> Model:
+        """Return the model with its own parameters moved by steps (p,) within their bounds."""
         search = self.search
-        steps = -(self.taken @ change) / self._scaled[1]
-        theta = np.clip(search.start + steps, search.low, search.high)
-        there = search.at(theta)
-        return tuple((name, there.value(name) - self.model.value(name)) for name in search.names)
+        return search.at(np.clip(search.start + steps, search.low, search.high))
 
     def scatter(self, direction: Array) -> float:
         """Return the standard deviation of a direction's (n,) product with the residual."""
@@ -183,6 +207,12 @@ class Sized:
         self._without = self._counted(self.without())
         self._changes: dict[float, Array] = {}
 
+    @property
+    def unit(self) -> str:
+        """Return the parameter's unit with the command of the runs: A, not V, with a current."""
+        drive = DRIVES[self.known.problem.runs[0].drive]
+        return unit_for(EFFECTS[self.name].parameters[self.parameter].unit, drive)
+
     def value(self, size: float) -> float:
         """Return the parameter's value [SI] at a size, within its bounds."""
         return float(np.clip(self._wanted(size), self.low, self.high))
@@ -200,17 +230,26 @@ class Sized:
         """Return what is left (n,) of the effect on the runs that decide, the model refitted.
 
         Of the normalised residuals there; the model's parameters take up of the effect what they
-        can on the runs that are fitted to.
+        can on the runs that are fitted to. Where that is far, it is what a small part of the way
+        changes, in proportion: sensitivities said how far, so that they say what it does.
         """
+        known, found, none = self.known, self.with_value(self.value(size)), self.without()
+        search, steps = known.search, known.steps(self.change(size))
+        far = float(np.abs(steps[search.log]).max(initial=0.0))
+        part = 1.0 if far <= NEAR else SMALL / far
+        there = known.stepped(steps) if part == 1.0 else search.at(search.start + part * steps)
+        moved = {name: there.value(name) for name in search.names}
+        if part == 1.0:
+            return self._there(replace(found, values={**found.values, **moved}), none)
+        own = self._there(replace(none, values={**none.values, **moved}), none)
+        return self._there(found, none) + own / part
+
+    def _there(self, one: Model, other: Model) -> Array:
+        """Return by how much two models differ (n,) on the runs that decide, over the noise."""
         judging, expected = self.known.judging, self.known.expected_there
         assert judging is not None
-        found = self.with_value(self.value(size))
-        values = dict(found.values)
-        for name, moved in self.known.moved(self.change(size)):
-            values[name] = found.value(name) + moved
-        two = (replace(found, values=values), self.without())
-        with_it, without = (residuals(judging, one, expected) for one in two)
-        return _counted_in(judging) * (with_it - without)
+        first, second = (residuals(judging, model, expected) for model in (one, other))
+        return _counted_in(judging) * (first - second)
 
     def _counted(self, model: Model) -> Array:
         known = self.known

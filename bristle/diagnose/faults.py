@@ -40,8 +40,11 @@ class SensorFault:
 
 
 def instruments_of(sensors: Sequence[SensorFault]) -> tuple[str, ...]:
-    """Return the sensor effects that the faults of channels are."""
-    found = (instrument_of(fault.channel, fault.fault) for fault in sensors)
+    """Return the sensor effects that the faults of channels are.
+
+    What one run alone has is no effect of a model, which all runs share: it is corrected there.
+    """
+    found = (instrument_of(one.channel, one.fault) for one in sensors if not one.run)
     return tuple(dict.fromkeys(name for name in found if name))
 
 

@@ -9,8 +9,10 @@ from itertools import chain
 from ..data.corrections import LEFT_OUT
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.model import Run
+from ..identify.rig import DAMPER
 from ..identify.search import z_scale
 from ..identify.search_context import residuals
+from ..quantity import plain
 from .candidates import Trial
 from .decision import Z
 from .finding import Finding
@@ -43,7 +45,10 @@ def contradicted(found: Finding, opened: Opening) -> Finding:
     if found.kind == "unknown":
         reasons = (*found.reasons, HELD_OUT_DIFFER)
     else:
-        reasons = (inconsistent_runs(found.after.model, opened.problem, opened.held_out, rule),)
+        told = inconsistent_runs(
+            found.after.model, opened.problem, opened.held_out, rule, found.site == DAMPER
+        )
+        reasons = (told,)
     return replace(found, kind=kind, reasons=reasons)
 
 
@@ -64,7 +69,7 @@ def kind_of(kind: str, before: Trial, best: Trial, rule: DecisionRule = BENCH) -
 
 
 def inconsistent_runs(
-    model: Model, train: Problem, held_out: Problem, rule: DecisionRule = BENCH
+    model: Model, train: Problem, held_out: Problem, rule: DecisionRule = BENCH, zeros: bool = True
 ) -> str:
     """Return, in words, which runs a model leaves unexplained and which it explains.
 
@@ -76,6 +81,7 @@ def inconsistent_runs(
     model : the model as fitted to `train`
     train, held_out : runs that it was fitted to, and the others
     rule : the numbers that decide
+    zeros : whether the force is a measured one, whose zero may be another one in a run
 
     Returns
     -------
@@ -92,10 +98,41 @@ def inconsistent_runs(
     if not bad:
         return ""
     worst = ", ".join(f"{name} ({z[name]:.3g})" for name in bad)
-    return (
+    shifted = [
+        _zero(model, problem.of([run]), rule)
+        for problem in (train, held_out)
+        for run in problem.runs
+        if zeros and run.name in bad
+    ]
+    return " ".join([
         f"One model does not explain all runs: its {Z} is largest in {worst}, while it explains "
-        f"{_list(good)}. Were they taken on one rig, with one setting? If a run does not belong, "
-        f"{LEFT_OUT}."
+        f"{_list(good)}.",
+        *filter(None, shifted),
+        "Were they taken on one rig, with one setting? If a run does not belong, "
+        f"{LEFT_OUT}.",
+    ])  # fmt: skip
+
+
+def _zero(model: Model, one: Problem, rule: DecisionRule) -> str:
+    """Return the sentence about another zero of a run's force, "" where more than that is wrong.
+
+    Parameters
+    ----------
+    model : as fitted to the runs
+    one : the run
+    rule : the numbers that decide
+    """
+    (run,), expected = one.runs, one.expectation(model)
+    per_newton = 1.0 / expected[0][1][run.skip :]
+    left = residuals(one, model, expected)
+    zero = float(left @ per_newton / (per_newton @ per_newton))
+    if z_scale(left - zero * per_newton) > rule.misfit:
+        return ""
+    way = "more" if zero > 0.0 else "less"
+    return (
+        f"In {run.name} the force shows {plain(abs(zero), 3)} N {way} throughout, and nothing else "
+        "is wrong there: its zero is another one. Set it right in study.toml: correct = "
+        f'[{{channel = "force", fault = "bias", value = {zero:.3g}}}].'
     )
 
 

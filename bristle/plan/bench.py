@@ -109,7 +109,7 @@ def _purposes(wish: Wish, opened: Opening, limits: RigLimits, drive: str) -> Pur
     if wish.learn is not None:
         parts = open_parts(model, limits, wish.learn, drive or "voltage")
     parameters = () if wish.sharpen is None else parameters_of(model.free(), wish.sharpen)
-    return Purposes(model, effects, others, parameters, parts)
+    return Purposes(model, effects, others, parameters, parts, drive=drive)
 
 
 def planned(name: str, found: Stated, planner: Planner, drive: str) -> Plan:

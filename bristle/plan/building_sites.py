@@ -124,7 +124,7 @@ def purposes_at(
     for site, opened in sites.items():
         tell(f"looking at effects: {site}")
         own = [one.wish for one in wishes if not one.sites or site in one.sites]
-        found = Purposes(opened.before.model, rule=opened.rule)
+        found = Purposes(opened.before.model, rule=opened.rule, drive=drive)
         for wish in own:
             found = _with_wish(found, wish, site, opened, able[site])
         if any(wish.learn is not None for wish in own) and site in _learned_at(wishes, sites):

@@ -35,7 +35,7 @@ class Purposes:
 
     `effects` to be seen; `rivals` questions whose rivals are each other; `parameters` to be
     sharpened; `parts` the question with a part without a form, None where nothing is to be learned;
-    `rule` the numbers that decide there.
+    `rule` the numbers that decide there; `drive` the channel of the command, "" for none.
     """
 
     model: Model
@@ -44,6 +44,7 @@ class Purposes:
     parameters: tuple[str, ...] = ()
     parts: Question | None = None
     rule: DecisionRule = BENCH
+    drive: str = ""
 
     @property
     def judged(self) -> bool:

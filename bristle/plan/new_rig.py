@@ -150,7 +150,7 @@ def plan_new(
     effects, others = _beside(wish, model, problem)
     parameters = () if wish.sharpen is None else parameters_of(model.free(), wish.sharpen)
     parts = None if wish.learn is None else open_parts(model, rig.limits, wish.learn, rig.drive)
-    purposes = Purposes(model, effects, others, parameters, parts)
+    purposes = Purposes(model, effects, others, parameters, parts, drive=rig.drive)
     found = stated(purposes, problem, Measured(), 1.0, seed)
     planner = Planner(
         found.goal, rig.limits, stand_in.noise, stand_in.draws, 1.0 / stand_in.dt, None, seed,

@@ -10,6 +10,7 @@ from typing import Any
 from ..diagnose.allowed_size import ONE_SIDED, TWO_SIDED
 from ..diagnose.rule import BENCH
 from ..identify.model import parameter
+from ..physics.drive import drive_named, unit_for
 from ..quantity import plain, quantity
 from .goal import Purposes
 from .knowledge import Asked, Known
@@ -109,7 +110,7 @@ def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
     out = []
     for one in purposes.effects:
         sized, name = one.sized, one.sized.name
-        unit = parameter(sized.model.law, sized.key).unit
+        unit = sized.unit
         apart = one.size * (TWO_SIDED if sized.signed else ONE_SIDED)
         seen_now = one.limit is not None and not one.limit.why and isfinite(before[name])
         visible = (seen_now, isfinite(after[name]))
@@ -136,7 +137,7 @@ def _sharpened(purposes: Purposes, asked: Asked, now: Known, then: Known) -> lis
     out = []
     for name in purposes.parameters:
         size, as_share = asked.spread(name)
-        unit = parameter(purposes.model.law, name).unit
+        unit = unit_for(parameter(purposes.model.law, name).unit, drive_named(purposes.drive))
         value = abs(purposes.model.value(name))
         share = 1.0 if as_share else size / value if value else 0.0
         factor, unit = (share, "%") if share else (size, unit)

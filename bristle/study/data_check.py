@@ -18,6 +18,7 @@ from ..data.checks.motion import (
 )
 from ..data.checks.recording import check_recording
 from ..data.checks.runs import Excitation, check_runs, excitation_of
+from ..data.checks.sizes import check_sizes
 from ..data.corrections import Correction
 from ..data.measurement import Measurement
 from ..data.relation import band
@@ -186,6 +187,8 @@ def check_data(study: Study, show: Callable[[int], None] | None = None) -> DataC
     findings += [Finding("split", "warning", note) for note in (test.notes if test else ())]
     for done, run in enumerate(every, 1):
         findings += _check_run(run, at_damper)
+        if not study.settings.has_building:
+            findings += check_sizes(run, velocity_of_run(run))
         if show:
             show(done)
     recorded = every

@@ -270,7 +270,10 @@ def _refuse_incomplete(
             )
     if wrong:
         seen = "".join(f"\n    {guess}" for guess in guesses)
-        unused = left_out(table, guesses)
+        unused = [
+            f"{text} ({table.not_numeric[text]})" if text in table.not_numeric else text
+            for text in left_out(table, guesses)
+        ]
         rest = f"\n  Not used: {', '.join(unused)}." if unused else ""
         raise StudyError(
             f"{table.source}: some channels cannot be guessed."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..data.checks.finding import grouped, sentence
-from ..data.equation import equations
+from ..data.equation import equations, symbols
 from ..draw import html
 from ..draw.figure import DPI
 from ..draw.style import Page, percent, png, short_z
@@ -57,9 +57,11 @@ def identified_html(found: Identified) -> str:
         if f"z_{role}" in found.after
     ]  # fmt: skip
     header = ["runs", "error / noise (z)", f"RMS error [N]{low}", "of the force"]
+    told = equations(found.model)
     return html.fragment(
         title,
-        *(html.formula(one.intervals) for one in equations(found.model)),
+        *(html.formula(one.intervals) for one in told),
+        *([html.paragraphs(symbols(found.model, told), kind="soft")] if told else []),
         html.table(["parameter", "value", "95 % interval", "unit"], rows, numbers=(1, 2)),
         html.table(header, errors, numbers=(1, 2, 3)),
         _forms(found),

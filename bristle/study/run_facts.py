@@ -10,11 +10,13 @@ from math import isfinite
 from pathlib import Path
 
 from ..data.channels import DRIVE, PLAIN
+from ..data.formats.delimited import decoded
 from ..data.labels import UNITS, Label, label_text
 from ..data.titles import title, unit_or_none
-from ..errors import StudyError, UnitError
+from ..errors import RecordError, StudyError, UnitError
 from ..units import convert, same_dimension
 from .run_file import EXCLUDE, ROLES
+from .run_titles import counted_names
 
 _NUMBER = r"\d+(?:[.,p]\d+)?"  # "1p5" stands for 1.5 where a point would end a name
 _UNITS_IN_NAMES = "mA|A|mV|V|mT|pct|percent|%|Hz|mm|cm|um|degC|C"
@@ -77,11 +79,13 @@ def facts_of(
     """
     found, notes = _offered(files, choices, commanded)
     for pattern in choices.levels:
-        found = _joined(found, [_matched(file, pattern, level=True) for file in files])
+        rows = [_matched(file, pattern, level=True) for file in files]
+        found = _joined(found, rows)
+        notes.append(_levels_found(rows, pattern))
     for pattern in choices.labels:
         found = _joined(found, [_matched(file, pattern, level=False) for file in files])
     if choices.table is not None:
-        rows = rows_of_table(choices.table, files)
+        rows = rows_of_table(choices.table, files, commanded)
         found = _joined(found, rows)
         named = {name for row in rows for name in (*row.levels, *row.labels)}
         if named:
@@ -95,6 +99,14 @@ def facts_of(
     if len(asked) > 1:
         raise StudyError(f"{' and '.join(sorted(asked))} both as levels; one command is right.")
     return found, notes
+
+
+def _levels_found(rows: Sequence[Facts], pattern: str) -> str:
+    """Return the sentence that tells which levels a pattern found."""
+    (name,) = rows[0].levels
+    values = sorted({row.levels[name] for row in rows})
+    levels = ", ".join(label_text(name, value, PLAIN[name]) for value in values)
+    return f"{name} of each run: from the names of the files, by '{pattern}': {levels}"
 
 
 def _joined(first: list[Facts], more: list[Facts]) -> list[Facts]:
@@ -222,12 +234,19 @@ def _quantity_or_none(unit: str) -> str:
 # -- a table beside the files
 
 
-def rows_of_table(path: Path, files: Sequence[Path]) -> list[Facts]:
-    """Return the rows of a table in the order of the files; StudyError for what is not right."""
+def rows_of_table(path: Path, files: Sequence[Path], commanded: bool = False) -> list[Facts]:
+    """Return the rows of a table in the order of the files; StudyError for what is not right.
+
+    `commanded` tells whether the files hold a channel of the command.
+    """
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise StudyError(f"--runs {path}: cannot be read ({error}).") from None
+        text, _ = decoded(path.read_bytes(), str(path))
+    except OSError as error:
+        raise StudyError(f"--runs {path}: cannot be read ({error.strerror or error}).") from None
+    except RecordError:
+        raise StudyError(
+            f"--runs {path}: this is no text. Save the table of runs as CSV."
+        ) from None
     lines = [line for line in text.splitlines() if line.strip() and line.lstrip()[0] != "#"]
     if len(lines) < 2:
         raise StudyError(f"--runs {path}: a line of titles and a line per run are right.")
@@ -242,6 +261,7 @@ def rows_of_table(path: Path, files: Sequence[Path]) -> list[Facts]:
     twice = next((name for name in named if named.count(name) > 1), "")
     if twice:
         raise StudyError(f'--runs {path}: {named.count(twice)} columns are called "{twice}".')
+    names = counted_names(header, commanded)
     found: dict[str, Facts] = {}
     for number, row in enumerate(rows, 2):
         where = f"--runs {path}, row {number}"
@@ -250,7 +270,7 @@ def rows_of_table(path: Path, files: Sequence[Path]) -> list[Facts]:
         file = Path(row[at[0]].strip()).name
         if file in found:
             raise StudyError(f"{where}: there is a row of {file} above; one is right.")
-        found[file] = _facts(header, row, at[0], where)
+        found[file] = _facts(header, names, row, at[0], where)
     return [_row_of(file, found, path) for file in files]
 
 
@@ -261,15 +281,16 @@ def _row_of(file: Path, rows: Mapping[str, Facts], path: Path) -> Facts:
     raise StudyError(f"--runs {path}: no row is of {file.name}; every run needs one.")
 
 
-def _facts(header: Sequence[str], row: Sequence[str], file: int, where: str) -> Facts:
+def _facts(
+    header: Sequence[str], names: Sequence[str], row: Sequence[str], file: int, where: str
+) -> Facts:
     """Return what a row says: numbers in the unit of their title, words as they are."""
     found = Facts()
-    for k, (text, field_text) in enumerate(zip(header, row, strict=True)):
+    for k, (text, name, field_text) in enumerate(zip(header, names, row, strict=True)):
         value = field_text.strip()
         if k == file or not value:
             continue
         column = title(k, text)
-        name = column.name.strip().lower().replace(" ", "_")
         if name == "role":
             if value not in (*ROLES, EXCLUDE):
                 right = f"{', '.join(ROLES)} or {EXCLUDE}"

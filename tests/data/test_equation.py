@@ -2,7 +2,7 @@
 
 import pytest
 
-from bristle.data.equation import equations, formulas
+from bristle.data.equation import equations, formulas, symbols
 from bristle.data.study_model import StudyModel, Value
 from bristle.physics.effect import EFFECTS
 from bristle.physics.laws import laws_of
@@ -27,6 +27,14 @@ def test_numbers_stand_in_place_of_names_in_si_with_their_intervals():
     assert found.numbers == ("f = (1.500 + 0.7500 V) sgn(v) + (40 + 5.00 V) v exp(-|v|/0.0200)")
     assert "(1.500 ± 0.020)" in found.intervals
     assert "/(0.0200 ± 0.0020)" in found.intervals  # mm/s in the model's file
+
+
+def test_what_v_stands_for_is_told_where_the_command_is_no_voltage():
+    assert symbols(bingham(), equations(bingham())) == "In SI units."
+    driven = bingham().with_drive("current")
+    told = equations(driven)
+    assert symbols(driven, told) == "In SI units; V is the current [A]."
+    assert symbols(driven, [one._replace(formula="f = k x") for one in told]) == "In SI units."
 
 
 def test_effects_have_their_own_names_and_negative_numbers_their_brackets():

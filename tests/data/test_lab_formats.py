@@ -66,6 +66,24 @@ def test_a_workbook_gives_its_values(tmp_path: Path) -> None:
     same(table)
 
 
+def test_a_log_of_the_test_before_the_measurement_is_not_read(tmp_path: Path) -> None:
+    def more(sheet, book) -> None:
+        log = book.create_sheet("Log", 0)
+        for row in (["Specimen", 7], ["Oil", 23.5], ["Made", "=TODAY()"]):
+            log.append(row)
+
+    table = read_table(workbook(tmp_path / "a.xlsx", more))
+    assert table.rows > 10
+    assert any('sheet "Data" is read, and not Log' in note for note in table.notes)
+
+    def uncomputed(sheet, book) -> None:
+        for row in range(5, 17):
+            sheet.cell(row, 1).value = "=ROW()"
+
+    with pytest.raises(RecordError, match=r'sheet "Data", cell A5: the formula has no stored'):
+        read_table(workbook(tmp_path / "b.xlsx", uncomputed))
+
+
 def test_the_sheet_with_numbers_is_read(tmp_path: Path) -> None:
     def more(sheet, book) -> None:
         book.create_sheet("About", 0).append(["nothing", "but words"])

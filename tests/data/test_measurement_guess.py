@@ -93,6 +93,14 @@ def test_force_that_dissipates_is_preferred() -> None:
     assert '"Normal force [N]" 0.0' in found["force"].reason
 
 
+def test_of_forces_of_like_names_the_one_that_dissipates_is_taken() -> None:
+    dead = GENERATOR.standard_normal(len(TIME))
+    found = guessed(**{"t [s]": TIME, "x [m]": X, "Force 0 [N]": dead, "Force 1 [N]": F})
+    assert found["force"].column == "Force 1 [N]"
+    assert '"Force 0 [N]" 0.0' in found["force"].reason
+    assert not found["force"].doubt
+
+
 def test_signals_in_volts_are_no_forces() -> None:
     table = from_arrays({"t [s]": TIME, "x [m]": X, "F [V]": F, "F [N]": F, "U [V]": U}, "run.csv")
     found = {guess.channel: guess.column for guess in guess_channels(table)}

@@ -11,7 +11,7 @@ from shaken import measured
 from bristle.diagnose.candidates import judge
 from bristle.diagnose.clocks import clock_faults, clocks_of
 from bristle.diagnose.corrected import corrected
-from bristle.diagnose.faults import SensorFault
+from bristle.diagnose.faults import SensorFault, instruments_of
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, fit
 
@@ -103,3 +103,9 @@ def test_a_fault_of_one_run_corrects_that_run_alone():
     assert fast["force"][:4000] == pytest.approx(1.001 * ramp[:4000])
     assert late.as_dict()["run"] == "two"
     assert "run" not in SensorFault("force", "clock", 1e-3, 0.0, "").as_dict()
+
+
+def test_a_run_that_began_apart_is_no_effect_of_the_model():
+    late = SensorFault("force", "delay", 0.008, 1e-5, "")
+    assert instruments_of([late]) == ("delay",)
+    assert instruments_of([replace(late, run="run1")]) == ()

@@ -42,6 +42,14 @@ def test_the_limit_of_a_linear_effect_is_that_of_a_fit_with_it(known):
     assert (limit.parameter, limit.unit, limit.falls, limit.coarse) == ("k", "N/m", False, False)
 
 
+def test_a_limit_on_the_command_has_the_unit_of_the_runs(known):
+    runs = [replace(run, drive="current") for run in known.problem.runs]
+    driven = Known(known.problem.of(runs), known.model, known.expected, 6000)
+    assert limit_of(Sized("saturation", driven)).unit == "A"
+    assert limit_of(Sized("saturation", known)).unit == "V"
+    assert limit_of(Sized(SPRING, driven)).unit == "N/m"
+
+
 def test_a_tenth_of_the_noise_allows_a_tenth(known):
     problem = problem_of(steps, noise=1e-3)
     model = refine(Model("bingham", (), VALUES), problem)
@@ -71,6 +79,23 @@ def test_what_is_named_is_what_the_runs_that_decide_show(known):
     halved = limit_of(Sized(SPRING, replace(known, judging=half)))
     assert halved.named == pytest.approx(2.0 * alone, rel=0.15)
     assert halved.largest == limit_of(sized).largest  # all that is fitted to says that
+
+
+def test_a_parameter_that_the_runs_hardly_tell_is_not_moved_beyond_its_sensitivity():
+    straight = {**VALUES, "v_n": 90.0}  # its exponential is one at the speeds of these runs
+    problem = problem_of(steps, values=straight)
+    model = replace(refine(Model("bingham", (), straight, ("v_n",)), problem), fixed=())
+    known = Known(problem, model, problem.expectation(model), 6000)
+    sized = Sized("quadratic_damping", known)  # what v_n would take up, moved by many powers of ten
+    alone = limit_of(sized)
+    change = sized.change(alone.named / sized.one)
+    assert abs(known.steps(change)[known.search.names.index("v_n")]) > 2.0
+    moved = dict(known.moved(change))
+    assert moved["v_n"] == 0.0
+    assert moved["c_0"] != 0.0
+    decided = limit_of(Sized("quadratic_damping", replace(known, judging=problem)))
+    assert decided.named == pytest.approx(alone.named, rel=0.2)
+    assert decided.named > decided.largest
 
 
 def test_an_effect_that_vanishes_as_its_parameter_grows_is_limited_from_below(known):

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
-from bristle.diagnose.inconsistent_runs import groups
+from bristle.diagnose.inconsistent_runs import groups, inconsistent_runs
 from bristle.identify.fit import identify
 from tests.identify.truths import hidden_case, true_case
 
@@ -35,3 +38,17 @@ def test_one_odd_run_is_no_second_rig():
     first, _, truth = true_case(3, "bingham")
     second, _, _ = true_case(4, "bingham", "bench_2kN")
     assert groups(truth, first.of([*first.runs[:3], second.runs[0]]), second.of([])) == ""
+
+
+def test_another_zero_of_the_force_in_one_run_is_told_with_its_value():
+    first, _, truth = true_case(3, "bingham")
+    one, *others = first.runs
+    size = 0.05 * float(np.std(one.force))
+    higher = replace(one, force=one.force + size)
+    told = inconsistent_runs(truth, first.of([higher, *others]), first.of([]))
+    assert f"In {one.name} the force shows {size:.3g}"[:-1] in told
+    assert "N more throughout" in told
+    stronger = replace(one, force=1.2 * one.force)
+    told = inconsistent_runs(truth, first.of([stronger, *others]), first.of([]))
+    assert f"largest in {one.name}" in told
+    assert "throughout" not in told

@@ -21,7 +21,7 @@ TITLES = {"displacement": "m", "velocity": "m/s", "voltage": "V", "force": "N"}
 DRIVEN = ("coil_lag", "remanence", "saturation")
 
 
-def problem_of(voltage, noise=0.01):
+def problem_of(voltage, noise=0.01, values=VALUES):
     """Return two runs of a Bingham damper as they would be fitted, with white noise."""
     runs = []
     for seed in (1, 2):
@@ -31,7 +31,7 @@ def problem_of(voltage, noise=0.01):
         size = 0.04 / w
         x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
         V = voltage(seed)
-        F = Bench("bingham", []).force(x, v, a, V, STEP, VALUES)
+        F = Bench("bingham", []).force(x, v, a, V, STEP, values)
         columns = dict(zip(TITLES, (x, v, V, F), strict=True))
         std = {name: noise * float(np.sqrt(np.mean(y**2))) for name, y in columns.items()}
         noisy = {

@@ -221,6 +221,16 @@ def test_the_pause_between_tests_is_told(sheet: Path, tmp_path: Path) -> None:
     assert "rests for 30 s between" in (found / "plan.md").read_text()
 
 
+def test_a_plan_in_ampere_tells_no_volts(tmp_path: Path) -> None:
+    file = tmp_path / "rig.toml"
+    text = SHEET.replace("max_force", 'command = "current"\nmax_force')
+    file.write_text(text.replace('["0 V", "5 V"]', '["0 A", "2 A"]'))
+    found = bristle.plan(file, see=["saturation"], sharpen=["f_c", "f_v"])
+    units = {one.name: one.unit for one in found.outcomes}
+    assert units["saturation"] == "A"
+    assert "V" not in "".join(units.values())
+
+
 def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
     rig: bristle.Study, tmp_path: Path
 ) -> None:

@@ -124,6 +124,9 @@ def test_a_pattern_gives_the_level(lab, tmp_path) -> None:
     choices = RunChoices(levels=["current=_c{}"], labels=["oil=oil{}"])
     created = create_study(tmp_path / "rig", files(data), runs=choices)
     assert [run.levels["current"] for run in created.study.settings.runs] == [0.0, 1.0, 2.0]
+    assert "current of each run: from the names of the files, by 'current=_c{}': 0 A, 1 A, 2 A" in (
+        created.notes
+    )
     assert [run.labels["oil"] for run in created.study.settings.runs] == ["A", "B", "A"]
     assert [one.labels["oil"] for one in created.study.read()] == ["A", "B", "A"]
 
@@ -202,6 +205,28 @@ def test_a_table_of_runs_with_two_columns_of_one_name_is_refused(tmp_path) -> No
     table = tmp_path / "runs.csv"
     table.write_text("file;current [A];current [A]\na.csv;1;2\n")
     with pytest.raises(StudyError, match=r'2 columns are called "current \[A\]"'):
+        rows_of_table(table, [Path("a.csv")])
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
+def test_a_table_of_runs_in_the_words_of_the_lab(tmp_path, encoding) -> None:
+    table = tmp_path / "runs.csv"
+    table.write_text("Datei;I [mA];T (°C);gap [mm]\na.csv;500;23,5;1\n", encoding=encoding)
+    (found,) = rows_of_table(table, [Path("a.csv")])
+    assert found.levels == pytest.approx({"current": 0.5})
+    assert found.labels == {"temperature": 23.5, "gap": 1.0}
+    (beside,) = rows_of_table(table, [Path("a.csv")], commanded=True)
+    assert not beside.levels  # the files hold the command: the nominal one is a label
+    table.write_text("file;I [A];supply voltage [V];oil [degC];room [degC]\na.csv;1;2;3;4\n")
+    (several,) = rows_of_table(table, [Path("a.csv")])
+    assert not several.levels
+    assert "temperature" not in several.labels
+
+
+def test_a_table_of_runs_that_is_no_text_is_refused(tmp_path) -> None:
+    table = tmp_path / "runs.xlsx"
+    table.write_bytes(b"PK\x03\x04\0\0\0")
+    with pytest.raises(StudyError, match="Save the table of runs as CSV"):
         rows_of_table(table, [Path("a.csv")])
 
 
@@ -315,3 +340,17 @@ def test_a_given_channel_of_the_command_keeps_names_out(lab, tmp_path) -> None:
     created = create_study(tmp_path / "rig", runs, channels=spec)
     assert not created.study.settings.runs[0].levels
     assert created.study.drive == "current"
+
+
+def test_a_column_of_words_is_told_with_the_first_of_them(tmp_path) -> None:
+    columns = one_run(1.0, 0.0)
+    path = write(tmp_path / "a.csv", columns)
+    at = list(columns).index(next(title for title in columns if "F" in title))
+    lines = path.read_text().splitlines()
+    for k in range(1, len(lines)):
+        fields = lines[k].split(",")
+        fields[at] = '"1,234.5"'
+        lines[k] = ",".join(fields)
+    path.write_text("\n".join(lines))
+    with pytest.raises(StudyError, match=r'Not used: .* \(line 2: "1,234.5" is no number\)'):
+        create_study(tmp_path / "rig", [path])

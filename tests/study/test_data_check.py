@@ -70,6 +70,28 @@ def late(samples: float) -> Spoil:
 
 
 @pytest.mark.parametrize(
+    ("title", "factor", "said"),
+    [
+        ("x [mm]", 1e3, "unit of the displacement"),  # mm in a column of m
+        ("x [mm]", 1e-3, "unit of the displacement"),
+        ("time [s]", 1e3, "unit of the time"),
+        ("U [V]", 1e3, "unit of the voltage"),
+        ("U [V]", -1.0, "voltage goes down to -6 V and never above zero: is its sign turned?"),
+    ],
+)
+def test_what_no_damper_does_is_doubted(tmp_path: Path, title, factor, said) -> None:
+    def spoil(data: Columns) -> None:
+        del data["v [mm/s]"]
+        data[title] = factor * data[title]
+
+    look = look_at(tmp_path, spoil)
+    (doubt, *_) = [*found(look, "size"), *found(look, "command sign")]
+    assert doubt.level == "warning"
+    assert said in doubt.text
+    assert f"--channel {doubt.channel}=" in doubt.do
+
+
+@pytest.mark.parametrize(
     ("spoil", "kind", "level", "told"),
     [
         (scaled("v [mm/s]", 1.05), "gain", "warning", "velocity is 1.0[45]"),

@@ -9,9 +9,10 @@ from __future__ import annotations
 import io
 import re
 import zipfile
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date, datetime, time
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 from ...errors import RecordError
@@ -23,6 +24,9 @@ from ._extra import library
 ENTRY = "xl/workbook.xml"
 LARGEST = 512 * 1024**2
 """Largest content of a workbook that is unpacked [bytes]."""
+
+ROWS = 10
+"""Rows of numbers that tell a measurement's sheet from a log of the test."""
 
 _MERGED = re.compile(rb'<mergeCell [^>]*ref="([A-Z]+)(\d+):([A-Z]+)(\d+)"')
 _CELL = re.compile(rb"<c [^>]*[^>/]>.*?</c>", re.DOTALL)
@@ -43,7 +47,7 @@ def recognises(content: bytes, suffix: str) -> bool:
 
 
 def read(content: bytes, name: str) -> Table:
-    """Return the table in a workbook: the values of its first sheet that holds rows of numbers.
+    """Return the table in a workbook: the values of its first sheet of ten rows of numbers or more.
 
     Of formulas the values count that were stored with them. Macros are not run.
 
@@ -68,21 +72,51 @@ def read(content: bytes, name: str) -> Table:
     ) as error:  # fmt: skip
         raise RecordError(f"{name}: no Excel workbook, or damaged ({error}).") from None
     notes = ["the workbook holds macros, which are not run"] if macros else []
-    reasons = []
-    for sheet, text in texts:
-        part = parts.get(sheet.title, b"")
-        where = f'{name}, sheet "{sheet.title}"'
-        _refuse_without_values(part, where)
+    read = [
+        _Sheet(one.title, parts.get(one.title, b""), text, f'{name}, sheet "{one.title}"')
+        for one, text in texts
+    ]
+    sheet, table = _chosen(read, name)
+    _refuse_without_values(sheet.part, sheet.where)
+    lines = ["", *delimited.lines_of(sheet.text)]
+    _refuse_merged(sheet.part, table, lines[int(table.lines[0]) - 1], sheet.where)
+    return _with_notes(table, sheet.part, notes, [one.title for one in read], sheet.title)
+
+
+class _Sheet(NamedTuple):
+    """A sheet: its title, XML and text, and what messages call it."""
+
+    title: str
+    part: bytes
+    text: str
+    where: str
+
+
+def _chosen(sheets: Sequence[_Sheet], name: str) -> tuple[_Sheet, Table]:
+    """Return the first sheet with as many rows of numbers as a measurement has, and its table.
+
+    Where none has, the first with any. A log of the test, with a number here and there, often
+    stands before the measurement. A sheet whose formulas were never computed may be the one.
+    """
+    reasons, few = [], []
+    for sheet in sheets:
+        if len(_without_values(sheet.part)) >= ROWS:
+            _refuse_without_values(sheet.part, sheet.where)
         try:
-            table = delimited.read(text.encode(), where)
+            table = delimited.read(sheet.text.encode(), sheet.where)
         except RecordError as error:
             reasons.append(str(error))
             continue
-        lines = ["", *delimited.lines_of(text)]
-        _refuse_merged(part, table, lines[int(table.lines[0]) - 1], where)
-        return _with_notes(table, part, notes, [one.title for one, _ in texts], sheet.title)
-    first = reasons[0] if len(reasons) == 1 else f"{name}: no sheet holds rows of numbers."
-    raise RecordError(first)
+        if table.rows >= ROWS:
+            return sheet, table
+        few.append((sheet, table))
+    if few:
+        return few[0]
+    for sheet in sheets:
+        _refuse_without_values(sheet.part, sheet.where)
+    raise RecordError(
+        reasons[0] if len(reasons) == 1 else f"{name}: no sheet holds rows of numbers."
+    )
 
 
 def _with_notes(table: Table, part: bytes, notes: list[str], titles: list[str], own: str) -> Table:
@@ -157,16 +191,20 @@ def _formulas(part: bytes) -> list[bytes]:
     return [cell for cell in _CELL.findall(part) if _ANY_FORMULA.search(cell)]
 
 
+def _without_values(part: bytes) -> list[bytes]:
+    """Return the cells of a sheet's XML whose formulas were never computed."""
+    return [cell for cell in _formulas(part) if not _VALUE.search(cell)]
+
+
 def _refuse_without_values(part: bytes, where: str) -> None:
     """Refuse formulas that were never computed: nothing here computes them."""
-    for cell in _formulas(part):
-        if not _VALUE.search(cell):
-            place = _PLACE.search(cell)
-            at = f", cell {place.group(1).decode()}" if place else ""
-            raise RecordError(
-                f"{where}{at}: the formula has no stored value, and formulas are not computed "
-                "here. Open the workbook in a spreadsheet and save it, or paste values."
-            )
+    for cell in _without_values(part):
+        place = _PLACE.search(cell)
+        at = f", cell {place.group(1).decode()}" if place else ""
+        raise RecordError(
+            f"{where}{at}: the formula has no stored value, and formulas are not computed "
+            "here. Open the workbook in a spreadsheet and save it, or paste values."
+        )
 
 
 def _refuse_merged(part: bytes, table: Table, above: str, where: str) -> None:

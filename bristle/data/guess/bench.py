@@ -64,6 +64,10 @@ def _best_force(search: Search, forces: list[Candidate], chosen: dict[str, Candi
     share = {
         one.column.text: power_factor(search.column(one.column.text), velocity)[0] for one in forces
     }
+    equal = [one for one in forces if one.rank == best.rank]
+    by_power = max(equal, key=lambda one: abs(share[one.column.text]))
+    if abs(share[by_power.column.text]) >= abs(share[best.column.text]) + _ALIKE:
+        best = by_power
     by_power = max(forces, key=lambda one: abs(share[one.column.text]))
     rest = [one for one in forces if one is not best]
     others = ", ".join(

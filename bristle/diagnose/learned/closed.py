@@ -217,7 +217,7 @@ def formula_of(found: ClosedForm, curve: Curve) -> Formula:
         s = f"min(max({s}, {curve.knots[0]:.6g}), {curve.knots[-1]:.6g})"
     unit, along = curve.unit, curve.along_unit
     per = _POWERS.get(found.name, 0)
-    slope = canonical(unit + f"/({along})" * per) if found.form not in MAPS else "1"
+    slope = canonical(unit + f"/({_by(along)})" * per) if found.form not in MAPS else "1"
     if found.name == "line" and (curve.part, curve.along) in _PHYSICAL:
         slope = _PHYSICAL[curve.part, curve.along][1]
     found_at = dict(zip("cm", found.values[:2], strict=False))
@@ -281,6 +281,11 @@ def _spread(curve: Curve, y: Array, weight: Array) -> float:
     return float(np.sqrt(np.sum((weight * (y - known)) ** 2) / np.sum(weight**2)))
 
 
+def _by(along: str) -> str:
+    """Return the unit of a signal as one divides by it: K of a temperature in degC."""
+    return "K" if along == "degC" else along
+
+
 def in_words(found: ClosedForm, curve: Curve) -> str:
     """Return a form with its numbers, for a sentence: "a line, 320 N/m"."""
     unit, along = curve.unit, curve.along_unit
@@ -290,7 +295,7 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
     if curve.measured:  # per kPa or MPa, not per Pa
         factor, along = scale(along, max(map(abs, curve.knots)))
         m, d = m / factor, d if found.name == "power" else factor * d
-    rate = unit if along == "1" else canonical(f"{unit}/({along})")
+    rate = unit if along == "1" else canonical(f"{unit}/({_by(along)})")
     if found.name == "line":
         physical = _PHYSICAL.get((curve.part, curve.along))
         if physical:
@@ -298,7 +303,7 @@ def in_words(found: ClosedForm, curve: Curve) -> str:
                 f"proportional to {curve.signal.words}: {physical[0]} of {plain(m)} {physical[1]}"
             )
         if unit == "1":
-            return f"a line of slope {plain(m)}" + ("" if along == "1" else f" per {along}")
+            return f"a line of slope {plain(m)}" + ("" if along == "1" else f" per {_by(along)}")
         return f"a line, {plain(m)} {rate}"
     over = {
         "ripple": f", pitch {quantity(d, along)}",

@@ -40,6 +40,12 @@ SMOOTH = tuple(10.0**k for k in range(-6, 5))
 FEWEST = 4
 """Knots of a curve at the least."""
 
+APART = 0.03
+"""Share of a signal's range without a sample that parts two levels."""
+
+NARROW = 0.25
+"""Share of a signal's range that its levels cover at the most, noise included."""
+
 NEAR_REST = 0.5
 """Displacement, or velocity, over its RMS up to which a line's slope counts as that near rest."""
 
@@ -160,19 +166,34 @@ def _stroke(residual: Residual) -> float:
 def knots_of(values: Array, count: int) -> Array:
     """Return up to `count` knots for values (n,): between equal steps and equal shares of samples.
 
-    At levels that a signal holds, such as those of a command, stands a knot and none between.
+    At levels that a signal holds, such as those of a command, stands a knot and none between. So it
+    does where every run has a temperature of its own and noise on it: nothing tells what lies
+    between, and the curve is straight there.
     """
     levels, counts = np.unique(
         np.round(values / max(np.ptp(values), 1e-300), 4), return_counts=True
     )
     if len(levels) <= count and counts.min() > 20:
         return np.asarray(levels * np.ptp(values))
+    held = _held_levels(values)
+    if 1 < len(held) <= count:
+        return held
     low, high = np.quantile(values, [0.003, 0.997])
     even = np.linspace(low, high, count)
     shares = np.quantile(values, np.linspace(0.003, 0.997, count))
     knots = 0.6 * even + 0.4 * shares
     apart = np.append(True, np.diff(knots) > 1e-3 * (high - low))
     return np.asarray(knots[apart])
+
+
+def _held_levels(values: Array) -> Array:
+    """Return the levels about which values (n,) lie within narrow bands, none where they do not."""
+    ordered = np.sort(values)
+    span = float(ordered[-1] - ordered[0])
+    bands = np.split(ordered, 1 + np.flatnonzero(np.diff(ordered) > APART * span))
+    if min(map(len, bands)) <= 20 or sum(map(np.ptp, bands)) > NARROW * span:
+        return np.zeros(0)
+    return np.array([np.median(band) for band in bands])
 
 
 def _promise(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -56,6 +57,16 @@ def test_a_curve_without_a_unit_along_one_without_has_a_slope():
     curve = curve_of(0.22 * (knots - 1.5), "age", "yield", knots)
     best = closed_forms(curve, [0.01] * 9)[0]
     assert in_words(best, curve) == "a line of slope 0.22"
+
+
+def test_a_slope_over_a_temperature_is_per_kelvin():
+    knots = np.array([20.0, 25.0, 30.0, 45.0])  # °C
+    curve = replace(
+        curve_of(-0.006 * (knots - 30.0), "temperature", "yield", knots), measured="degC"
+    )
+    best = closed_forms(curve, [0.001] * 4)[0]
+    assert in_words(best, curve) == "a line of slope -0.006 per K"
+    assert [unit for _, _, unit in formula_of(best, curve).parameters] == ["1/K"]
 
 
 def test_chance_has_no_form():

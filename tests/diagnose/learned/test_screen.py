@@ -209,3 +209,12 @@ def test_one_curve_of_a_kind_is_fitted():
     assert kinds[0] == ("fluid", "displacement")
     assert len(set(kinds)) == len(kinds) <= 4
     assert ("fluid", "stroke") not in kinds  # it contains the one along displacement
+
+
+def test_a_level_per_run_with_noise_is_a_knot_and_none_stands_between():
+    random = np.random.default_rng(1)
+    levels = np.array([20.0, 30.0, 35.0, 45.0])  # °C, each for a run
+    warm = np.repeat(levels, 500) + random.normal(0.0, 0.2, 2000)
+    assert knots_of(warm, 13) == pytest.approx(levels, abs=0.1)
+    drifting = np.linspace(20.0, 45.0, 2000) + random.normal(0.0, 0.2, 2000)
+    assert len(knots_of(drifting, 13)) == 13
