@@ -195,7 +195,8 @@ def test_a_damper_that_a_study_has_identified_on_a_building_of_ones_own(
         assert damper["law"] == "lugre"
         assert damper["effects"] == ["gas_spring"]
         assert {name: damper["parameters"][name] for name in found} == found
-    assert capsys.readouterr().err == ""
+    told = capsys.readouterr().err.splitlines()
+    assert [line for line in told if not line.endswith("...")] == []  # a slow machine's progress
 
 
 @pytest.mark.parametrize(

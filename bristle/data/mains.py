@@ -5,7 +5,9 @@ from __future__ import annotations
 MAINS = (50.0, 60.0)
 """Frequencies of the mains [Hz]."""
 
-MAINS_OFF = 2e-3  # share by which the mains may be off; a grid keeps to a fifth of that
+MAINS_OFF = 2e-3  # share by which the mains may be off
+_GRID_OFF = 4e-4  # what a grid keeps to: of the ripple of rectifiers, aliased, or chance names it
+_LOW = 5  # the highest harmonic that is no such ripple
 _BEYOND = (1, 2, 3, 4, 5, 6, 12)
 """Harmonics of the mains that are looked for beyond half the sampling rate.
 
@@ -52,6 +54,7 @@ def mains_of(frequency: float, step: float, width: float) -> tuple[float, int, b
                 whole = order * mains
                 if (whole > half) is not folded:
                     continue
-                if abs(_folded(whole, step) - frequency) <= max(MAINS_OFF * whole, width):
+                off = _GRID_OFF if folded and order > _LOW else MAINS_OFF
+                if abs(_folded(whole, step) - frequency) <= max(off * whole, width):
                     return mains, order, folded
     return 0.0, 0, False

@@ -108,6 +108,12 @@ def test_hum_beyond_half_the_rate_is_said_to_be_aliased():
     assert mains_of(41.0, 1.0 / 80.0, 0.05)[0] == 0.0
 
 
+def test_the_ripple_of_a_rectifier_is_named_where_it_is_aliased():
+    """Six pulses a period of 60 Hz are 360 Hz, which 500 samples per second show at 140 Hz."""
+    assert mains_of(140.03, 0.002, 0.05) == (60.0, 6, True)
+    assert mains_of(139.5, 0.002, 0.05)[0] == 0.0
+
+
 def test_what_is_taken_off_is_the_line_alone():
     t, channels = run(2)
     y = channels["force"]
