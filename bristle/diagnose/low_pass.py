@@ -10,20 +10,13 @@ from ..quantity import plain
 from .finding import Finding
 
 MOSTLY = 0.6
-"""Share of the lateness that a filter takes from which on the load cell is said to low-pass.
-
-Two equal lags take all of it. Butterworth's filter of second order is fitted as 0.70 of it and a
-delay, its corner then 11 % too high (`python -m benchmarks lab`, fault `cell`).
-"""
-
-_HALF_POWER = sqrt(sqrt(2.0) - 1.0)  # corner of two equal lags in series, by that of one
+"""Share of the lateness that a filter takes from which on the load cell is said to low-pass."""
 
 
 def low_pass_text(found: Finding) -> str:
     """Return what filter makes the force late, "" where the force is not late or only delayed.
 
-    The filter is of second order, two equal lags in series, each of half the time that it takes.
-    Its corner is where half the power is left.
+    The filter is of second order; its corner is where half the power is left.
 
     Parameters
     ----------
@@ -32,12 +25,16 @@ def low_pass_text(found: Finding) -> str:
     if found.kind != "effect" or found.after is None:
         return ""
     for name in late_effects([one for one in found.effects if one in EFFECTS]):
-        time, share = (found.after.model.value(f"{name}.{one}") for one in EFFECTS[name].late)
+        time, share, *more = (
+            found.after.model.value(f"{name}.{one}") for one in EFFECTS[name].late
+        )
+        d = more[0] if more else 1.0  # else two equal lags
         if share >= MOSTLY and time > 0.0:
-            corner = _HALF_POWER / (2.0 * pi * 0.5 * share * time)
+            natural = d / (pi * share * time)
+            corner = natural * sqrt(1.0 - 2.0 * d * d + sqrt((1.0 - 2.0 * d * d) ** 2 + 1.0))
             return (
                 f"{plain(100.0 * share, 2)} % of the {plain(1e3 * time)} ms by which the force is "
-                f"late are a low-pass of second order, with its corner near {plain(corner, 2)} Hz: "
-                "a filter of the load cell or its amplifier."
+                f"late are a low-pass of second order (damping ratio {plain(d, 2)}), with its "
+                f"corner near {plain(corner, 2)} Hz: a filter of the load cell or its amplifier."
             )
     return ""

@@ -65,7 +65,7 @@ def pure_delay(
     total, left = 0.0, values
     for effect in sensors(effects, "force"):
         if effect.late:
-            time, share = (f"{effect.name}.{name}" for name in effect.late)
+            time, share, *_ = (f"{effect.name}.{name}" for name in effect.late)
             known = {f"{effect.name}.{n}": p.value for n, p in effect.parameters.items()} | values
             total += (1.0 - known[share]) * known[time]
             left = {**left, time: known[share] * known[time], share: 1.0}

@@ -156,8 +156,9 @@ class Effect:
     shows
         Of a sensor's effect: the channel whose instrument it is, "force" or "velocity".
     late
-        Of a sensor's effect: the parameter that says how late [s] it shows its signal, and the one
-        with the share of that time which a filter takes; the rest is a pure delay.
+        Of a sensor's effect: the parameter that says how late [s] it shows its signal, the one with
+        the share of that time which a filter of second order takes, and that with its damping
+        ratio; the rest is a pure delay.
     joint
         Of a series element: the names of two states, the travel between rod and fluid [m] and the
         velocity across the fluid [m/s]; the integrator finds both, from the second one's `rate`.

@@ -1,6 +1,6 @@
 """The recorder shows the force late."""
 
-from math import exp
+from math import cos, exp, sin, sqrt
 
 from ..effect import Effect, Parameter
 
@@ -11,8 +11,10 @@ LAST = SLOTS - 1.001
 class Delay(Effect):
     """Delay: the force channel reaches the recorder late, by buffers, filters and transmission.
 
-        shown(t) = force(t - time),   a share `filtered` of the time in a low-pass of second order
+        shown(t) = force(t - time),   a share `filtered` of the time in a low-pass of second order,
+        y'' + 2 d w y' + w^2 y = w^2 u,   2 d/w = filtered time,   d the damping ratio
 
+    Its damping ratio is 1 for two equal lags, 0.87 for Bessel's filter, 0.71 for Butterworth's.
     The ring holds 64 samples; what is older is shown as the oldest. Between samples the force is
     taken as linear. Leaves out a clock that drifts: doubt it when the lag grows through a run.
     """
@@ -20,7 +22,7 @@ class Delay(Effect):
     name = "delay"
     sites = ("sensor",)
     shows = "force"
-    late = ("time", "filtered")
+    late = ("time", "filtered", "damping")
     needs = ("value", "dt")
     passive = False
     zero_at_rest = True
@@ -35,6 +37,7 @@ class Delay(Effect):
     parameters = {
         "time": Parameter(0.005, "s", (0.0, 0.2), "how late the force is shown"),
         "filtered": Parameter(0.5, "1", (0.0, 1.0), "share of the time that a filter takes"),
+        "damping": Parameter(1.0, "1", (0.4, 1.0), "damping ratio of that filter"),
     }
     start_grid = {"time": (0.02, 0.1, 0.4, 1.0, 2.5), "filtered": (0.0, 0.2, 1.0)}
     faults = ("delay",)
@@ -49,10 +52,15 @@ class Delay(Effect):
 
     @staticmethod
     def advance(q, z, p):
-        lag = 0.5 * p.filtered * p.time
+        d, lag = p.damping, 0.5 * p.filtered * p.time / p.damping
         if lag < 0.1 * q.dt:
             return (q.value, q.value, q.value, *z[2:-1])
-        fade = exp(-q.dt / lag)
-        half = q.value + (z.half - q.value) * fade
-        low = q.value + (z.low - q.value) * fade + (z.half - q.value) * (q.dt / lag) * fade
+        # Exact for a force that is held: with half = low + lag low', both relax by one matrix.
+        angle, turn = q.dt / lag, sqrt(1.0 - d * d)
+        fade = exp(-d * angle)
+        kept = fade * cos(turn * angle)
+        mixed = fade * (sin(turn * angle) / turn if turn > 1e-6 else angle)
+        off, more = z.low - q.value, z.half - q.value
+        low = q.value + kept * off + mixed * (more - (1.0 - d) * off)
+        half = q.value + kept * more + mixed * (1.0 - d) * (more - 2.0 * off)
         return (half, low, low, *z[2:-1])
