@@ -232,6 +232,11 @@ def left_open(
         )
     found = open_effects(verdict, model)
     if not (found.effects or found.unresolved):
+        if verdict["kind"] == "insufficient":
+            raise StudyError(
+                f"{folder}: the data do not allow a verdict, so that there are no limits for "
+                "--with-limits. The verdict says why."
+            )
         raise StudyError(f"{folder}: the verdict has no limits of effects. First:  {again}")
     return found.effects, found.notes(folder)
 

@@ -18,6 +18,7 @@ from bristle.data.open_effects import (
     simulated_whole,
     widest,
 )
+from bristle.errors import StudyError
 
 SPRING = {
     "effect": "gas_spring", "parameter": "k", "unit": "N/m", "side": "below", "limit95": 40.0,
@@ -101,6 +102,12 @@ def test_a_limit_of_the_sampling_is_none_of_the_damper() -> None:
         "the limit of backlash is only the smallest size that the sampling of the runs resolves: "
         "it widens no band"
     ]
+
+
+def test_a_verdict_that_the_data_do_not_allow_has_no_limits() -> None:
+    told = {"kind": "insufficient", "effects": [], "findings": []}
+    with pytest.raises(StudyError, match="the data do not allow a verdict"):
+        left_open(told, new_model("bingham"), Path("my_rig"))
 
 
 def test_an_effect_is_drawn_whole_or_not_at_all() -> None:
