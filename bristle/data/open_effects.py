@@ -147,9 +147,11 @@ class LeftOpen(NamedTuple):
         """
         said = []
         if self.unresolved:
+            several = len(self.unresolved) > 1
             said.append(
-                f"the limit of {', '.join(self.unresolved)} is only the smallest size that the "
-                "sampling of the runs resolves: it widens no band"
+                f"the limit{'s' * several} of {', '.join(self.unresolved)} "
+                f"{'are' if several else 'is'} only the smallest size that the sampling of the "
+                f"runs resolves: {'they widen' if several else 'it widens'} no band"
             )
         if self.unlimited:
             said.append(

@@ -11,6 +11,7 @@ import pytest
 from bristle.data.model import new_model
 from bristle.data.model_draws import has_covariance, joint_errors
 from bristle.data.open_effects import (
+    LeftOpen,
     OpenEffect,
     in_short,
     left_open,
@@ -101,6 +102,11 @@ def test_a_limit_of_the_sampling_is_none_of_the_damper() -> None:
     assert notes == [
         "the limit of backlash is only the smallest size that the sampling of the runs resolves: "
         "it widens no band"
+    ]
+    two = LeftOpen([], ["backlash", "coil_lag"], [])
+    assert two.notes(Path("my_rig")) == [
+        "the limits of backlash, coil_lag are only the smallest size that the sampling of the runs "
+        "resolves: they widen no band"
     ]
 
 
