@@ -14,6 +14,7 @@ _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
     "N": ((0.0, 1.0, "N"), (2e3, 1e-3, "kN"), (2e6, 1e-6, "MN")),
     "J": ((0.0, 1.0, "J"), (2e3, 1e-3, "kJ"), (2e6, 1e-6, "MJ")),
     "Pa": ((0.0, 1.0, "Pa"), (2e3, 1e-3, "kPa"), (2e6, 1e-6, "MPa")),
+    "T": ((0.0, 1e3, "mT"), (0.1, 1.0, "T")),
 }
 
 # The same for a value that stands alone, and may be small.
@@ -23,6 +24,8 @@ _FINE: dict[str, tuple[tuple[float, float, str], ...]] = {
     "s": ((0.0, 1e6, "µs"), (1e-4, 1e3, "ms"), (1.0, 1.0, "s")),
     "kg": ((0.0, 1e3, "g"), (1.0, 1.0, "kg")),
     "V": ((0.0, 1e3, "mV"), (0.1, 1.0, "V")),
+    "A": ((0.0, 1e3, "mA"), (0.1, 1.0, "A")),
+    "T": ((0.0, 1e6, "µT"), (1e-3, 1e3, "mT"), (0.1, 1.0, "T")),
     "N/m": ((0.0, 1.0, "N/m"), (1e3, 1e-3, "kN/m"), (1e6, 1e-6, "MN/m")),
 }
 

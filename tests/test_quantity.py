@@ -34,6 +34,11 @@ def test_the_rigs_size_decides_on_the_unit() -> None:
     assert quantity(5.2e4, "N") == "52 kN"
     assert quantity(0.11, "m/s", 2) == "110 mm/s"
     assert quantity(0.3, "1") == "0.3"
+    assert quantity(0.35, "T") == "0.35 T"
+    assert quantity(0.05, "T") == "50 mT"
+    assert quantity(8.4e-5, "T", 2, 0.6) == "0.000084 T"
+    assert quantity(8.4e-5, "T", fine=True) == "84 µT"
+    assert quantity(2.5e-3, "A", fine=True) == "2.5 mA"
     assert scale("N", 3.0) == (1.0, "N")
     assert scale("V", 3e9) == (1.0, "V")
     assert short_z(1.234) == "1.23"

@@ -16,7 +16,7 @@ from ..progress import Progress
 from ..shown import shown
 from .file import read_ensemble
 from .plan import Outcome, Plan
-from .quantiles import Failure, failures, parts, quantiles
+from .quantiles import Failure, failures, notes, parts, quantiles
 from .table import NAME, RunsTable
 from .worker import prepare
 
@@ -66,6 +66,11 @@ class Ensemble:
         """By output, which share of its variance is from what; empty without limits."""
         return parts(self.plan, self.runs)
 
+    @property
+    def notes(self) -> list[str]:
+        """What is left out of the quantiles that limits leave open, and why; empty without."""
+        return notes(self.plan, self.runs)
+
     def plot(self) -> Figure:
         """Return the figure: how each output is spread, and what moves it.
 
@@ -85,7 +90,7 @@ class Ensemble:
         failed = [f"{one.count} failed: {one.reason}" for one in self.failures]
         about = f"{self.plan.title}, {done} of {self.plan.runs} runs done"
         table = self.quantiles.to_string(float_format="%.4g").splitlines()
-        return shown(self, about, [*table, *failed])
+        return shown(self, about, [*table, *failed, *self.notes])
 
     def _repr_html_(self) -> str:
         from .notebook import ensemble_html

@@ -32,7 +32,7 @@ def ensemble_html(found: Ensemble) -> str:
         found.plan.title,
         html.paragraphs(f"{done} of {found.plan.runs} runs are done."),
         html.table(["output", *columns], rows, range(2, len(columns) + 1)),
-        html.items(failures),
+        html.items([*failures, *found.notes]),
         picture,
     )
 

@@ -146,9 +146,11 @@ class Plan:
 class Outcome:
     """What became of a run: the kept numbers in the order of `Plan.outputs`, or why there are none.
 
-    `reason` is "" for a run that is done.
+    `reason` is "" for a run that is done. `lost` says of such a run why it could not be simulated
+    with the effect that joins it.
     """
 
     run: int
     numbers: tuple[float, ...] = ()
     reason: str = ""
+    lost: str = ""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data.open_effects import POINT, reach
+from ..data.open_effects import POINT, reach, simulated_whole
 from .plan import Outcome, Plan
 from .table import EFFECT
 
@@ -73,21 +73,32 @@ def parts(plan: Plan, frame: pd.DataFrame) -> dict[str, dict[str, float]]:
     return found
 
 
-def unable(plan: Plan, frame: pd.DataFrame) -> list[str]:
-    """Return the effects with which not one run could be made."""
-    if not plan.left:
+def notes(plan: Plan, frame: pd.DataFrame) -> list[str]:
+    """Return what is said of effects that the quantiles do not have."""
+    if plan.identified is None:
         return []
-    done = frame[frame["status"] == "done"]
-    made = done[done[plan.columns[-1]].notna()]
-    tried, there = (list(dict.fromkeys(one[EFFECT[0]])) for one in (done, made))
-    return [name for name in tried if name not in there]
+    lost = _simulated(plan, frame[frame["status"] == "done"])[1] if plan.left else {}
+    return [
+        *(f"with {name} not every run could be made ({why}): the quantiles are without it"
+          for name, why in lost.items()),
+        *plan.identified.notes,
+    ]  # fmt: skip
+
+
+def _simulated(plan: Plan, done: pd.DataFrame) -> tuple[dict[str, list[int]], dict[str, str]]:
+    """Return the runs of each effect, and of others why they could not all be made with it."""
+    tried: dict[str, list[int | str]] = {}
+    made = done[plan.columns[-1]].notna()
+    for run, name, why in zip(done.index, done[EFFECT[0]], done["reason"], strict=True):
+        tried.setdefault(str(name), []).append(int(run) if made[run] else str(why))
+    return simulated_whole(tried)
 
 
 def _reaches(plan: Plan, done: pd.DataFrame, output: str) -> dict[str, tuple[float, float]]:
     """Return by effect how far it takes an output down, and up, at 95 %."""
-    changes = (done[f"{output} with it"] - done[output]).dropna()
-    names = done[EFFECT[0]][changes.index]
-    return {str(name): reach(changes[names == name].to_numpy()) for name in dict.fromkeys(names)}
+    changes = done[f"{output} with it"] - done[output]
+    whole, _ = _simulated(plan, done)
+    return {name: reach(changes[runs].to_numpy()) for name, runs in whole.items()}
 
 
 def _widened(found: Array, reaches: list[tuple[float, float]]) -> Array:

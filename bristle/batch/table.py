@@ -139,7 +139,7 @@ def _row(plan: Plan, outcome: Outcome) -> list[Any]:
     status = FAILED if outcome.reason else DONE
     numbers = outcome.numbers or (None,) * len(plan.columns)
     drawn = [*plan.values(outcome.run).values(), *(plan.effect(outcome.run) if plan.left else ())]
-    return [outcome.run, status, outcome.reason, *drawn, *numbers]
+    return [outcome.run, status, outcome.reason or outcome.lost, *drawn, *numbers]
 
 
 def _line(plan: Plan, outcome: Outcome) -> bytes:
@@ -191,7 +191,7 @@ def _read(plan: Plan, path: Path) -> dict[int, Outcome]:
             if status == FAILED:
                 outcomes[run] = Outcome(run, reason=reason)
             else:
-                outcomes[run] = Outcome(run, tuple(map(float, numbers)))
+                outcomes[run] = Outcome(run, tuple(map(float, numbers)), lost=reason)
     except (ValueError, IndexError, csv.Error) as error:
         raise EnsembleError(
             f"{path}: damaged ({error}). Use --fresh to start again, or another folder."

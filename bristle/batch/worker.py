@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ..data.open_effects import in_short
 from ..errors import BristleError, ScenarioError
 from ..scenario.parameters import Wrong, typed
 from ..scenario.scenario import Component, Scenario, load_scenario
@@ -50,7 +51,7 @@ def run_one(plan: Plan, run: int) -> Outcome:
         with tempfile.TemporaryDirectory(prefix="bristle_") as scratch:
             values = plan.values(run)
             numbers = _numbers(plan, scenario_of(plan, values, Path(scratch)))
-            more = _with_effect(plan, run, values, Path(scratch)) if plan.left else ()
+            more, lost = _with_effect(plan, run, values, Path(scratch)) if plan.left else ((), "")
     except BristleError as error:
         return Outcome(run, reason=_one_line(error))
     except Exception as error:  # whatever a user's effect or a foreign FMU raises, runs go on
@@ -58,19 +59,22 @@ def run_one(plan: Plan, run: int) -> Outcome:
     for output, number in zip(plan.outputs, numbers, strict=True):
         if not isfinite(number):
             return Outcome(run, reason=f"RunError: {output.name} is not finite.")
-    return Outcome(run, (*numbers, *more))
+    return Outcome(run, (*numbers, *more), lost=lost)
 
 
 def _with_effect(
     plan: Plan, run: int, values: Mapping[str, Value], scratch: Path
-) -> tuple[float, ...]:
-    """Return the numbers of a run with the effect that joins it; NaN where it cannot be run."""
+) -> tuple[tuple[float, ...], str]:
+    """Return the numbers of a run with the effect that joins it, or NaN and why there are none."""
     assert plan.identified is not None
     joined = {**values, **plan.identified.with_effect(values, plan.seed, run)}
     try:
-        return _numbers(plan, scenario_of(plan, joined, scratch))
-    except BristleError:
-        return (nan,) * len(plan.outputs)
+        found = _numbers(plan, scenario_of(plan, joined, scratch))
+        wrong = [o.name for o, one in zip(plan.outputs, found, strict=True) if not isfinite(one)]
+        lost = f"{wrong[0]} is not finite" if wrong else ""
+    except BristleError as error:
+        lost = in_short(error)
+    return (found, "") if not lost else ((nan,) * len(plan.outputs), lost)
 
 
 def scenario_of(plan: Plan, values: Mapping[str, Value], scratch: Path) -> Scenario:

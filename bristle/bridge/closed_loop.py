@@ -209,7 +209,8 @@ def _predicted(
     before, step = _before(study)
     judged = history_steps(study.steps())
     rows: list[Predicted] = []
-    strokes, failed, unable = [], 0, dict.fromkeys(one.label for one in effects)
+    strokes, failed = [], 0
+    lost: dict[str, tuple[str, list[str]]] = {}
     for number, trial in enumerate(trials):
         tell(f"simulating {trial.shaking.name}")
         now = figures_of(model, place, trial, draws, number, judged[-1].missed, effects)
@@ -220,7 +221,8 @@ def _predicted(
         rows += now.rows(trial, then)
         strokes.append(now.stroke)
         failed += now.failed
-        unable = {label: None for label in unable if label not in now.left}
+        for label, why in now.lost.items():
+            lost.setdefault(label, (why, []))[1].append(trial.shaking.name)
     notes = [f"{failed} of the draws could not be simulated"] if failed else []
     last = judged[-1]
     if draws and last.missed and last.z is not None:
@@ -228,8 +230,12 @@ def _predicted(
             f"on held-out runs the error of the model is {short_z(last.z)} times the noise; what "
             f"it misses, {percent(last.missed)} of the force, widens the band"
         )
-    if unable:
-        notes.append(f"with {', '.join(unable)} the building cannot be simulated: no band has it")
+    for label, (why, names) in lost.items():
+        of = "" if len(names) == len(trials) else f" of {', '.join(names)}"
+        notes.append(
+            f"with {label} the building cannot be simulated at each of its sizes ({why}): no band"
+            f"{of} has it"
+        )
     said = ClosedLoop(tuple(rows), draws, step, tuple(notes), tuple(strokes))
     return replace(said, folder=str(study.folder))
 

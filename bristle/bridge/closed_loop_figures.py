@@ -35,7 +35,8 @@ class Figures:
     """Peak and RMS by response, of the model as it is and of draws (draws,) of its errors.
 
     `missed` is the share of the force that the model misses beyond noise: it is taken to miss as
-    much of a response. `left` are the changes by effects that the runs do not exclude.
+    much of a response. `left` are the changes by effects that the runs do not exclude, `lost` says
+    of others of them why they cannot be simulated.
     """
 
     best: dict[Key, float]
@@ -44,6 +45,7 @@ class Figures:
     failed: int
     missed: float = 0.0
     left: Left = field(default_factory=dict)
+    lost: dict[str, str] = field(default_factory=dict)
 
     def band(self, key: Key) -> tuple[float, float] | None:
         """Return the 95 % band of what would be measured, None with too few draws."""
@@ -139,8 +141,10 @@ def figures_of(
                 continue
             for key, values in sizes_of(one, names, trial, generator, 1).items():
                 collected[key] += values
-    left = changes_left_open(model, place, trial, effects, number) if effects else {}
+    changes, lost = (
+        ({}, {}) if not effects else changes_left_open(model, place, trial, effects, number)
+    )
     across = studied_ports(house.building).displacement
     stroke = float(np.max(np.abs(columns[f"structure.{across}"])))
     drawn = {key: np.array(values) for key, values in collected.items()}
-    return Figures(best, drawn, stroke, failed, missed, left)
+    return Figures(best, drawn, stroke, failed, missed, changes, lost)

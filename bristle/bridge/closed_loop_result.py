@@ -10,6 +10,7 @@ import numpy as np
 
 from ..compare.names import name_of
 from ..data.channels import channel_unit
+from ..data.open_effects import widest
 from ..draw.style import percent
 from ..findings import command
 from ..quantity import plain, scale
@@ -19,8 +20,6 @@ KINDS = {"peak": "Peak", "rms": "RMS"}
 PARAMETERS, MISSED = "the parameters", "what the model misses"
 CAUSES = (PARAMETERS, MISSED)
 """Causes of a band beside effects that the runs do not exclude."""
-WORTH = 0.1
-"""Share of the variance of bands from which an effect is worth a test."""
 
 
 @dataclass(frozen=True)
@@ -140,17 +139,12 @@ class ClosedLoop:
             f"{least.told()}; {percent(share, 0)} of the band's variance is "
             f"{first}{', which the runs do not exclude' if open_effect else ''}."
         )
-        total: dict[str, float] = {}
-        for row in rows:
-            for name, part in row.parts.items():
-                if name not in CAUSES:
-                    total[name] = total.get(name, 0.0) + part / len(rows)
-        most = max(total, key=lambda name: total[name], default="")
-        if not most or total[most] < WORTH:
+        most, share = widest([row.parts for row in rows], CAUSES)
+        if not most:
             return (said, "No effect that the runs do not exclude widens the bands by much.")
         return (
             said,
-            f"Over all figures {most} widens the bands most, by {percent(total[most], 0)} of the "
+            f"Over all figures {most} widens the bands most, by {percent(share, 0)} of the "
             f"variance. A test that shows it would narrow them:  "
             f"{command('plan', self.folder, '--see', most.partition(' ')[0])}",
         )

@@ -97,8 +97,8 @@ class Simulator:
 
     def without_noise(
         self, scenario: Scenario, models: list[StudyModel]
-    ) -> Iterator[dict[str, Array] | None]:
-        """Yield the responses of other values under the ground motion as it is; None for failures.
+    ) -> Iterator[dict[str, Array] | RunError]:
+        """Yield the responses of other values under the ground motion as it is, or why not.
 
         Parameters
         ----------
@@ -108,8 +108,8 @@ class Simulator:
         for model in models:
             try:
                 yield self.response(self._with_values(scenario, model))
-            except RunError:
-                yield None
+            except RunError as error:
+                yield error
 
     def _with_values(self, scenario: Scenario, model: StudyModel) -> Scenario:
         own = loads(model, self.house.building, self.bench)

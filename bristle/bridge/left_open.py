@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..data.model import StudyModel
 from ..data.model_draws import drawn_models
-from ..data.open_effects import OpenEffect
+from ..data.open_effects import OpenEffect, in_short, simulated_whole
 from ..errors import PhysicsError, RunError, ScenarioError
 from ..progress import tell
 from .closed_loop_runs import Trial
@@ -36,10 +36,11 @@ def changes_left_open(
     trial: Trial,
     effects: Sequence[OpenEffect],
     number: int,
-) -> Left:
+) -> tuple[Left, dict[str, str]]:
     """Return what effects would change of peaks and RMS, by their labels.
 
-    An effect with which the building cannot be simulated has no changes.
+    An effect with which the building cannot be simulated at one of its sizes has no changes: why
+    comes second.
 
     Parameters
     ----------
@@ -51,7 +52,7 @@ def changes_left_open(
     """
     models = drawn_models(model, SIZES, np.random.default_rng([9, number]))
     without = _figures(model, models, place, trial)
-    left: Left = {}
+    tried: dict[str, list[dict[Key, float] | str]] = {}
     for k, effect in enumerate(effects, 1):
         tell(
             f"simulating {trial.shaking.name} with what its limits leave open: {effect.label} "
@@ -60,33 +61,32 @@ def changes_left_open(
         joined = [
             effect.joined(one, part) for one, part in zip(models, effect.parts(SIZES), strict=True)
         ]
-        pairs = [
-            (plain, other)
+        tried[effect.label] = [
+            other if isinstance(other, str) else {key: other[key] - plain[key] for key in plain}
             for plain, other in zip(without, _tried(joined, place, trial), strict=True)
-            if plain is not None and other is not None
+            if not isinstance(plain, str)
         ]
-        if pairs:
-            left[effect.label] = {
-                key: np.array([other[key] - plain[key] for plain, other in pairs])
-                for key in pairs[0][0]
-            }
-    return left
+    whole, lost = simulated_whole(tried)
+    return {
+        label: {key: np.array([one[key] for one in draws]) for key in draws[0]}
+        for label, draws in whole.items()
+    }, lost
 
 
 def _tried(
     models: list[StudyModel], place: tuple[House, bool], trial: Trial
-) -> list[dict[Key, float] | None]:
-    """Return the figures of models, None for those that cannot be simulated."""
+) -> list[dict[Key, float] | str]:
+    """Return the figures of models, or why they cannot be simulated."""
     try:
         return _figures(models[-1], models, place, trial)
-    except (PhysicsError, RunError, ScenarioError):
-        return [None] * len(models)
+    except (PhysicsError, RunError, ScenarioError) as error:
+        return [in_short(error)] * len(models)
 
 
 def _figures(
     model: StudyModel, models: list[StudyModel], place: tuple[House, bool], trial: Trial
-) -> list[dict[Key, float] | None]:
-    """Return peaks and RMS of models without noise, under a run's ground motion.
+) -> list[dict[Key, float] | str]:
+    """Return peaks and RMS of models without noise, or why not, under a run's ground motion.
 
     Parameters
     ----------
@@ -99,10 +99,10 @@ def _figures(
     with tempfile.TemporaryDirectory() as folder:
         simulator = Simulator(model, house, bench, trial.shaking, Path(folder))
         scenario = simulator.scenario()
-        found: list[dict[Key, float] | None] = []
+        found: list[dict[Key, float] | str] = []
         for columns in simulator.without_noise(scenario, models):
-            if columns is None:
-                found.append(None)
+            if isinstance(columns, RunError):
+                found.append(in_short(columns))
                 continue
             sizes = sizes_of(columns, names_of(columns, trial), trial, quiet, 0)
             found.append({key: values[0] for key, values in sizes.items()})

@@ -119,6 +119,7 @@ def _answer(found: Ensemble, files: dict[str, Path]) -> dict[str, Any]:
         "wall_time": round(found.wall_time, 3),
         "quantiles": outputs,
         "parts": found.parts,
+        "notes": found.notes,
         "failures": [asdict(failure) for failure in found.failures],
         "files": {name: str(path.absolute()) for name, path in files.items()},
     }
@@ -145,6 +146,8 @@ def _print(found: Ensemble, files: dict[str, Path]) -> None:
     Console(highlight=False, markup=False, width=width).print(table)
     for line in _limits(found):
         print(line)
+    for note in found.notes:
+        print(f"{note[:1].upper()}{note[1:]}.")
     for failure in found.failures:
         print(f"failed {failure.count} times, first in run {failure.run}: {failure.reason}")
     before = f", {found.continued} of them from before" if found.continued else ""
@@ -155,24 +158,21 @@ def _print(found: Ensemble, files: dict[str, Path]) -> None:
 
 def _limits(found: Ensemble) -> list[str]:
     """Return what of each output's variance is from effects that are left open; none without."""
-    from ..batch.quantiles import VARIES, unable
+    from ..batch.quantiles import VARIES
+    from ..data.open_effects import widest
     from ..draw.style import percent
     from ..findings import command
 
-    plan = found.plan
-    if plan.identified is None or not plan.left:
+    plan, parts = found.plan, found.parts
+    if plan.identified is None or not parts:
         return []
-    lines, total = ["Of the variance:"], dict[str, float]()
-    for output, parts in found.parts.items():
-        shown = ", ".join(f"{name} {percent(part, 0)}" for name, part in [*parts.items()][:3])
+    lines = ["Of the variance:"]
+    for output, own in parts.items():
+        shown = ", ".join(f"{name} {percent(part, 0)}" for name, part in [*own.items()][:3])
         lines.append(f"  {output}: {shown}")
-        for name, part in parts.items():
-            total[name] = total.get(name, 0.0) + part
-    total.pop(VARIES, None)
-    if total:
-        most = max(total, key=lambda name: total[name]).partition(" ")[0]
-        see = command("plan", plan.identified.folder, "--see", most)
-        lines.append(f"{most} widens them most, which the runs do not exclude. To see it:  {see}")
-    if lost := unable(plan, found.runs):
-        lines.append(f"With {', '.join(lost)} no run could be made: the table is without it.")
-    return [*lines, *(f"{note[:1].upper()}{note[1:]}." for note in plan.identified.notes)]
+    most, _ = widest([*parts.values()], (VARIES,))
+    if not most:
+        return [*lines, "No effect that the runs do not exclude widens them by much."]
+    name = most.partition(" ")[0]
+    see = command("plan", plan.identified.folder, "--see", name)
+    return [*lines, f"{name} widens them most, which the runs do not exclude. To see it:  {see}"]

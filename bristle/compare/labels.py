@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,9 @@ STEADY = 1e-3
 
 APART = 1.5
 """By what factor z with one value of a label exceeds that with the others to be worth a word."""
+
+FEW = 3
+"""Ranges of a label's values that a sentence names; of more it says between which they lie."""
 
 _DIGITS = 4  # of a level, to which runs have the same
 
@@ -86,7 +90,7 @@ def label_errors(predictions: Sequence[RunPrediction]) -> tuple[LabelError, ...]
     found = []
     for name in varying(known):
         values = {one[name] for one in known}
-        for value in sorted(values, key=lambda one: (isinstance(one, str), one)):
+        for value in sorted(values, key=_order):
             own = [p for p, one in zip(predictions, known, strict=True) if one[name] == value]
             z = z_scale(np.concatenate([one.normalised for one in own]))
             unit = DRIVES[name].unit if name in DRIVES else ""
@@ -107,12 +111,40 @@ def label_sentence(errors: Sequence[LabelError]) -> str:
     own = sorted((one for one in errors if one.name == best[1]), key=lambda one: -one.z)
     far = [one for one in own if one.z > CLOSE and one.z * APART > own[0].z]
     rest = [one for one in own if one not in far]
-    where = joined([one.text for one in far])
+    where = _values(far, own)
     label = "" if far[0].unit else f"{name_of(far[0].name)} "
-    others = f"z = {short_z(rest[0].z)} at most at {joined([one.text for one in rest])}"
+    others = f"z = {short_z(rest[0].z)} at most at {_values(rest, own)}"
     if rest[0].z <= CLOSE:
         return f"Only the runs at {label}{where} are wrong: z = {short_z(own[0].z)}, and {others}."
     return f"It is worst in the runs at {label}{where}: z = {short_z(own[0].z)}, and {others}."
+
+
+def _values(some: Sequence[LabelError], whole: Sequence[LabelError]) -> str:
+    """Return values of a label in order: "0 V and 2 V", "28.2 °C to 29.4 °C and 31 °C".
+
+    Those in a row are a range where most runs have a value of their own, as of a temperature.
+
+    Parameters
+    ----------
+    some : the values to name
+    whole : all values of the label, which part ranges
+    """
+    order = sorted(some, key=lambda one: _order(one.value))
+    numbers = not any(isinstance(one.value, str) for one in whole)
+    if not numbers or 2 * len(whole) <= sum(one.runs for one in whole):
+        return joined([one.text for one in order])
+    texts: list[str] = []
+    among = sorted(whole, key=lambda one: _order(one.value))
+    for named, group in groupby(among, lambda one: one in some):
+        row = [one.text for one in group] if named else []
+        texts += [f"{row[0]} to {row[-1]}"] if len(row) > 2 else row
+    if len(texts) <= FEW:
+        return joined(texts)
+    return f"{order[0].text} to {order[-1].text} ({len(some)} of {len(whole)} values)"
+
+
+def _order(value: Label) -> tuple[bool, Label]:
+    return isinstance(value, str), value
 
 
 def _split(own: Sequence[LabelError]) -> float:

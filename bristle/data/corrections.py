@@ -57,7 +57,7 @@ class Correction(NamedTuple):
         value, unit = self.value, channel_unit(self.channel)
         return {
             "gain": f"{self.channel} is divided by {plain(value, 4)}",
-            "bias": f"{quantity(value, unit, 3)} is taken off {self.channel}",
+            "bias": f"{quantity(value, unit, 3, fine=True)} is taken off {self.channel}",
             "sign": f"{self.channel} is turned",
             "delay": f"{self.channel} is moved ahead by {plain(1e3 * value)} ms",
             "clock": f"the clock of {self.channel} is set right by {plain(1e6 * value)} ppm",

@@ -7,12 +7,12 @@ which move along with the draw.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from pathlib import Path
 from statistics import NormalDist
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ Array = NDArray[np.float64]
 
 POINT = 1.96
 """Standard deviations of a normal size at its limit: 95 % are smaller, whatever their sign."""
+WORTH = 0.1
+"""Share of the variance of bands from which an effect is worth a test."""
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -123,10 +127,42 @@ def reach(changes: Array) -> tuple[float, float]:
     return below, above
 
 
-def open_effects(
-    verdict: Mapping[str, Any], model: StudyModel
-) -> tuple[list[OpenEffect], list[str]]:
-    """Return the effects that a verdict's runs do not exclude, and those without a limit.
+class LeftOpen(NamedTuple):
+    """What a verdict leaves open of effects.
+
+    `effects` with a limit of their own; names of those whose limit is that of the sampling
+    (`unresolved`), and of those that have none (`unlimited`).
+    """
+
+    effects: list[OpenEffect]
+    unresolved: list[str]
+    unlimited: list[str]
+
+    def notes(self, folder: Path) -> list[str]:
+        """Return what is said of the effects that no band has.
+
+        Parameters
+        ----------
+        folder : of the study
+        """
+        said = []
+        if self.unresolved:
+            several = len(self.unresolved) > 1
+            said.append(
+                f"the limit{'s' * several} of {', '.join(self.unresolved)} "
+                f"{'are' if several else 'is'} only the smallest size that the sampling of the "
+                f"runs resolves: {'they widen' if several else 'it widens'} no band"
+            )
+        if self.unlimited:
+            said.append(
+                f"the runs cannot show {', '.join(self.unlimited)}: no band has them. To make them "
+                f"visible:  {command('plan', folder, '--see', *self.unlimited)}"
+            )
+        return said
+
+
+def open_effects(verdict: Mapping[str, Any], model: StudyModel) -> LeftOpen:
+    """Return the effects that a verdict's runs do not exclude.
 
     Parameters
     ----------
@@ -134,7 +170,7 @@ def open_effects(
     model : which they may join
     """
     found: dict[str, OpenEffect] = {}
-    unlimited = []
+    unlimited, unresolved = [], []
     for finding in verdict.get("findings") or []:
         for one in finding.get("limits") or []:
             name = str(one["effect"])
@@ -145,12 +181,17 @@ def open_effects(
                 if str(one["why"]).partition(".")[0] not in model.effects:
                     unlimited.append(name)
                 continue
+            if one.get("coarse"):
+                unresolved.append(name)
+                continue
             label = name if name not in found else f"{name} ({finding['site']})"
             found[label] = OpenEffect(
                 name, label, one["parameter"], float(one["limit95"]), one["side"] == "above",
                 _others(finding["site"], name, one["others"]), one["moved"],
             )  # fmt: skip
-    return list(found.values()), [name for name in dict.fromkeys(unlimited) if name not in found]
+    coarse = [name for name in dict.fromkeys(unresolved) if name not in found]
+    none = [name for name in dict.fromkeys(unlimited) if name not in (*found, *coarse)]
+    return LeftOpen([*found.values()], coarse, none)
 
 
 def left_open(
@@ -191,15 +232,61 @@ def left_open(
             f"{folder}: an older version of bristle made the verdict, and it does not tell how its "
             f"effects move the model's parameters. First:  {again}"
         )
-    effects, unlimited = open_effects(verdict, model)
-    if not effects:
+    found = open_effects(verdict, model)
+    if not (found.effects or found.unresolved):
+        if verdict["kind"] == "insufficient":
+            raise StudyError(
+                f"{folder}: the data do not allow a verdict, so that there are no limits for "
+                "--with-limits. The verdict says why."
+            )
         raise StudyError(f"{folder}: the verdict has no limits of effects. First:  {again}")
-    if not unlimited:
-        return effects, []
-    return effects, [
-        f"the runs cannot show {', '.join(unlimited)}: no band has them. To make them visible:  "
-        f"{command('plan', folder, '--see', *unlimited)}"
-    ]
+    return found.effects, found.notes(folder)
+
+
+def simulated_whole(
+    tried: Mapping[str, Sequence[T | str]],
+) -> tuple[dict[str, list[T]], dict[str, str]]:
+    """Return the draws of effects of which each could be simulated, and why not those of others.
+
+    The draws that are left of an effect are not its sizes: they tell nothing of its reach.
+
+    Parameters
+    ----------
+    tried : by effect, what each draw gave, or the reason why it could not be simulated
+    """
+    whole: dict[str, list[T]] = {}
+    lost: dict[str, str] = {}
+    for name, draws in tried.items():
+        reasons = [one for one in draws if isinstance(one, str)]
+        if reasons:
+            lost[name] = reasons[0]
+        elif draws:
+            whole[name] = [one for one in draws if not isinstance(one, str)]
+    return whole, lost
+
+
+def in_short(error: Exception | str) -> str:
+    """Return the first sentence of an error, without its full stop, to stand in a note."""
+    return str(error).partition("\n")[0].strip().rstrip(".")
+
+
+def widest(parts: Sequence[Mapping[str, float]], causes: Collection[str]) -> tuple[str, float]:
+    """Return the effect that widens bands most, with its share of the variance over all of them.
+
+    "" where no effect is worth a test.
+
+    Parameters
+    ----------
+    parts : of each band, which share of its variance is from what
+    causes : those that are no effects
+    """
+    total: dict[str, float] = {}
+    for one in parts:
+        for name, part in one.items():
+            if name not in causes:
+                total[name] = total.get(name, 0.0) + part / len(parts)
+    most = max(total, key=lambda name: total[name], default="")
+    return (most, total[most]) if most and total[most] >= WORTH else ("", 0.0)
 
 
 def _clash(name: str, other: str) -> bool:

@@ -96,7 +96,10 @@ def spikes_text(spikes: tuple[Spike, ...]) -> str:
     """Return the spikes of one channel as people say it, the largest first."""
     ordered = sorted(spikes, key=lambda one: -abs(one.size))
     unit = channel_unit(spikes[0].channel)
-    told = [f"{quantity(one.size, unit)} at {plain(one.time, 5)} s" for one in ordered[:_TOLD]]
+    told = [
+        f"{quantity(one.size, unit, fine=True)} at {plain(one.time, 5)} s"
+        for one in ordered[:_TOLD]
+    ]
     more = f" and {len(spikes) - _TOLD} more" if len(spikes) > _TOLD else ""
     what = "an isolated spike" if len(spikes) == 1 else f"{len(spikes)} isolated spikes"
     return f"{spikes[0].channel} has {what}: {', '.join(told)}{more}"

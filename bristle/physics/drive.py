@@ -68,9 +68,15 @@ def unit_for(unit: str, drive: Drive, declared: str = VOLTAGE.unit) -> str:
 
 
 def text_for(text: str, drive: Drive) -> str:
-    """Return a text of a law or effect as it is with a command: "per ampere", "the current"."""
+    """Return a text of a law or effect as it is with a command: "per ampere", "the current".
+
+    What a text on the voltage calls by the name of the command, as the field behind a coil, is
+    another one: that in the damper.
+    """
     if drive.name == VOLTAGE.name:
         return text
+    if re.search(r"\bvoltage\b", text):
+        text = re.sub(rf"\bthe {drive.name}\b", r"\g<0> in the damper", text)
     text = re.sub(r"\bvolts?\b", drive.word, re.sub(r"\bvoltage\b", drive.name, text))
     return re.sub(r"\bV\b", drive.unit, text.replace("Voltage", drive.name.capitalize()))
 

@@ -25,6 +25,7 @@ from ..identify.model import Model
 from ..identify.rig import DAMPER
 from ..identify.site_fit import joined
 from ..identify.structure import StructureRun
+from ..physics.drive import VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
 from ..physics.laws import LAWS
 from ..progress import tell
@@ -35,6 +36,7 @@ from .questions import (
     NONE,
     SizedRival,
     able_beside,
+    coordinates_of,
     fitted_with,
     open_parts,
     rivals_of,
@@ -282,11 +284,9 @@ def _parts(
     )  # fmt: skip
     place = Place(site)
     able = [name for name in ranges(there) if place.offers(ALONG[name].needs)]
-    for name in names:
-        if name.replace(drive or "voltage", "voltage") not in able:
-            raise StudyError(unknown("coordinate", name, sorted(able)))
-    own = list(names) or [name for name in USUAL if name in able]
-    return open_parts(opened.before.model, there, own, drive or "voltage")
+    drive = drive or VOLTAGE.name
+    own = coordinates_of(names, able, there, drive) or [name for name in USUAL if name in able]
+    return open_parts(opened.before.model, there, own, drive)
 
 
 def largest_motion(runs: Sequence[Any]) -> tuple[float, float]:

@@ -32,7 +32,8 @@ from .questions import (
     rivals_of,
     sized_rival,
 )
-from .rig_limits import RigLimits, limits_given, read_quantity, read_rig, with_given
+from .rig_file import limits_given, read_quantity, read_rig
+from .rig_limits import RigLimits, with_given
 from .search import Planner
 from .wish import Wish, parameters_of
 

@@ -13,7 +13,7 @@ from .bench import plan_study
 from .building import plan_building
 from .new_rig import plan_new
 from .plan import Plan
-from .rig_limits import limits_given, read_rig
+from .rig_file import limits_given, read_rig
 from .wish import Wish
 
 Names = str | Sequence[str] | bool | None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -10,6 +10,7 @@ from ..diagnose.candidates import LONG, joinable, short_search
 from ..diagnose.effect_limits import EffectLimit, limit_of
 from ..diagnose.effect_size import Known as Fitted
 from ..diagnose.effect_size import Sized
+from ..diagnose.learned.along import ALONG
 from ..diagnose.opening import Opening
 from ..diagnose.resolved_size import SMALLEST, resolved
 from ..errors import StudyError
@@ -18,9 +19,11 @@ from ..identify.fit import identify
 from ..identify.model import Model, Problem
 from ..identify.search_context import refine
 from ..identify.start_grid import SearchContext, ranked_guesses
+from ..physics.drive import DRIVES, VOLTAGE
 from ..physics.effect import EFFECTS, exclude, plain_name
 from ..physics.laws import LAWS
 from ..progress import tell
+from ..quantity import quantity
 from .basis import USUAL, basis_along, ranges
 from .knowledge import Question, Rival
 from .rig_limits import RigLimits
@@ -184,9 +187,41 @@ def open_parts(
     drive : the channel of the command, as a study names it
     """
     able = ranges(limits)
-    known = {name.replace("voltage", drive): name for name in able}
-    for name in names:
-        if name not in known and name not in able:
-            raise StudyError(unknown("coordinate", name, sorted(known)))
-    own = [known.get(name, name) for name in names] or [name for name in USUAL if name in able]
+    own = coordinates_of(names, able, limits, drive) or [name for name in USUAL if name in able]
     return Question(model, bases=tuple(basis_along(name, limits) for name in own))
+
+
+def coordinates_of(
+    names: Sequence[str], able: Collection[str], limits: RigLimits, drive: str
+) -> list[str]:
+    """Return the coordinates that are meant, as `ALONG` names them.
+
+    Parameters
+    ----------
+    names : as they are asked for, those of the command by the name of the study's
+    able : the coordinates that tests can cover
+    limits : of the rig
+    drive : the channel of the command
+
+    Raises
+    ------
+    StudyError
+        If one cannot be covered: there is none of that name, or the command does not move.
+    """
+    known = {name.replace(VOLTAGE.name, drive): name for name in able}
+    found = []
+    for name in names:
+        own = known.get(name, name)
+        if own not in able:
+            plain = own.replace(drive, VOLTAGE.name)
+            held = limits.command[0] == limits.command[1]
+            if held and plain in ALONG and "V" in ALONG[plain].needs:
+                level = quantity(limits.command[0], DRIVES[drive].unit)
+                raise StudyError(
+                    f"nothing can be learned along {name}: the {drive} does not move, it is "
+                    f"{level} throughout. Where the rig can move it, a rig.toml says so with "
+                    "command in [limits]."
+                )
+            raise StudyError(unknown("coordinate", name, sorted(known)))
+        found.append(own)
+    return found

@@ -113,7 +113,7 @@ def data_words(measured: Sequence[Measurement]) -> tuple[list[str], list[list[st
         )
         unit = having[0].units[channel]
         of = percent(noise / size, 2) if size > 0.0 else "-"
-        rows.append([channel, quantity(noise, unit), of, "; ".join(found)])
+        rows.append([channel, quantity(noise, unit, fine=True), of, "; ".join(found)])
     return header, rows
 
 

@@ -83,7 +83,7 @@ def noise_floor(verdict: Verdict | None) -> str:
     """Return the noise floor of a verdict as a sentence; "" where it is not told."""
     floor = (verdict or {}).get("noise_floor") or {}
     parts = [
-        f"{name} {quantity(value, channel_unit(name) if is_channel(name) else '')}".strip()
+        f"{name} {quantity(value, channel_unit(name) if is_channel(name) else '1', fine=True)}"
         for name, value in floor.items()
         if isinstance(value, int | float)
     ]

@@ -11,15 +11,17 @@ import numpy as np
 import pytest
 
 import bristle
-from bristle.batch import read_ensemble
+from bristle.batch import read_ensemble, worker
 from bristle.batch.identified import Places, _fixed
-from bristle.batch.quantiles import LEVELS, VARIES, quantiles, unable
+from bristle.batch.plan import Plan
+from bristle.batch.quantiles import LEVELS, VARIES, notes, quantiles
 from bristle.batch.worker import scenario_of
 from bristle.cli import main
 from bristle.data.model import StudyModel, new_model
 from bristle.data.model_text import model_text
-from bristle.errors import BristleError, EnsembleError
+from bristle.errors import BristleError, EnsembleError, RunError
 from bristle.physics.user import defined
+from bristle.scenario.scenario import Scenario
 
 Write = Callable[..., Path]
 MASSES = '"structure.building.masses.2" = { uniform = [1.1, 1.4] }\n'
@@ -156,10 +158,59 @@ def test_limits_widen_the_quantiles_and_their_share_is_told(write: Write, tmp_pa
     before, after = (one.quantiles.loc[PEAK, levels].astype(float) for one in (plain, found))
     assert after["50 %"] == before["50 %"]
     assert after["95 %"] - after["5 %"] > 1.3 * (before["95 %"] - before["5 %"])
-    assert unable(found.plan, found.runs) == []
-    found.runs.loc[sprung, [f"{one.name} with it" for one in found.plan.outputs]] = np.nan
-    assert unable(found.plan, found.runs) == ["gas_spring"]
+    cannot = "the runs cannot show coil_lag"
+    assert [note[: len(cannot)] for note in found.notes] == [cannot]
+    first = found.runs.index[sprung][0]
+    found.runs.loc[first, [f"{one.name} with it" for one in found.plan.outputs]] = np.nan
+    found.runs.loc[first, "reason"] = "it stops"
+    assert notes(found.plan, found.runs)[0] == (
+        "with gas_spring not every run could be made (it stops): the quantiles are without it"
+    )
+    assert "gas_spring" not in found.parts[PEAK]
     assert quantiles(found.plan, found.runs).loc[PEAK, "done"] == 12
+
+
+COARSE = {**TINY, "effect": "backlash", "parameter": "gap", "limit95": 3e-6, "coarse": True}
+
+
+def test_a_limit_of_the_sampling_joins_no_run(
+    write: Write, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    a_study(tmp_path, None, TINY, COARSE)
+    path = with_study(write, (MASSES, ""), (STEADY, ""))
+    plan = read_ensemble(path, 4, with_limits=True)
+    assert plan.identified is not None
+    assert [one.name for one in plan.identified.left] == ["quadratic_damping"]
+    asked = ["ensemble", str(path), "--with-limits", "--no-figure", "--workers", "1"]
+    assert main([*asked, "--runs", "4", "--out", str(tmp_path / "out")]) == 0
+    said = capsys.readouterr().out
+    assert "The limit of backlash is only the smallest size that the sampling" in said
+    assert "No effect that the runs do not exclude widens them by much." in said
+    assert "--see" not in said
+
+
+def test_why_an_effect_could_not_be_simulated_is_kept(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a_study(tmp_path, None, SPRING)
+    path = with_study(write, (MASSES, ""), (STEADY, ""))
+    made = worker._numbers
+
+    def numbers(plan: Plan, scenario: Scenario) -> tuple[float, ...]:
+        if scenario.component("damper").parameters.get("gas_spring.k", 0.0) > 80.0:
+            raise RunError("it stops.\n  A shorter step would be right.")
+        return made(plan, scenario)
+
+    monkeypatch.setattr(worker, "_numbers", numbers)
+    asked: dict[str, Any] = {"out": tmp_path / "out", "workers": 1, "with_limits": True}
+    for _ in range(2):  # the second time from the table
+        found = bristle.ensemble(path, runs=8, **asked)
+        assert (found.runs["status"] == "done").all()
+        assert set(found.runs["reason"]) == {"", "it stops"}
+        assert found.failures == []
+        assert found.parts[PEAK] == {VARIES: 1.0}
+        assert "(it stops)" in found.notes[0]
+        assert found.notes[0] in repr(found)
 
 
 def test_the_command_tells_the_parts_and_continues(

@@ -193,5 +193,34 @@ def test_an_effect_with_which_nothing_can_be_simulated_is_in_no_band(
 
     monkeypatch.setattr(left_open, "_figures", figures)
     found = closed_loop(Study(rig), draws=6, with_limits=True)
-    assert "with quadratic_damping the building cannot be simulated: no band has it" in found.notes
+    assert found.notes[-1] == (
+        "with quadratic_damping the building cannot be simulated at each of its sizes (it does not "
+        "come to rest): no band has it"
+    )
     assert set(row(found).parts) == {"gas_spring", "the parameters"}
+
+
+def test_an_effect_that_stops_one_of_its_draws_is_left_out_whole(
+    rig: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Study(rig).write_verdict(verdict(SPRING, SMALL))
+    simulated = left_open._figures
+
+    def figures(model: StudyModel, *rest: Any) -> Any:
+        found = simulated(model, *rest)
+        return ["it stops", *found[1:]] if "gas_spring" in model.effects else found
+
+    monkeypatch.setattr(left_open, "_figures", figures)
+    found = closed_loop(Study(rig), draws=6, with_limits=True)
+    assert "gas_spring" not in row(found).parts
+    assert any("with gas_spring" in note and "(it stops)" in note for note in found.notes)
+
+
+def test_a_limit_that_is_the_samplings_resolution_widens_no_band(
+    rig: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Study(rig).write_verdict(verdict({**SPRING, "coarse": True}, SMALL))
+    found = closed_loop(Study(rig), draws=6, with_limits=True)
+    assert "gas_spring" not in row(found).parts
+    assert any("the limit of gas_spring is only" in note for note in found.notes)
+    assert not any("--see" in text for text in found.sentences())

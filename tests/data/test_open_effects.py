@@ -3,13 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from bristle.data.model import new_model
 from bristle.data.model_draws import has_covariance, joint_errors
-from bristle.data.open_effects import OpenEffect, open_effects
+from bristle.data.open_effects import (
+    LeftOpen,
+    OpenEffect,
+    in_short,
+    left_open,
+    open_effects,
+    simulated_whole,
+    widest,
+)
+from bristle.errors import StudyError
 
 SPRING = {
     "effect": "gas_spring", "parameter": "k", "unit": "N/m", "side": "below", "limit95": 40.0,
@@ -63,7 +73,7 @@ def test_a_parameter_that_is_not_free_does_not_move() -> None:
 
 
 def test_an_effect_that_vanishes_as_its_parameter_grows() -> None:
-    (core,), _ = open_effects(verdict(CORE), new_model("bingham"))
+    (core,), *_ = open_effects(verdict(CORE), new_model("bingham"))
     assert (core.falls, core.signed) == (True, False)
     assert core.own(0.5)["V_s"] == 40.0
     assert core.own(2.0)["V_s"] == 10.0
@@ -73,18 +83,59 @@ def test_an_effect_that_vanishes_as_its_parameter_grows() -> None:
 
 def test_what_has_no_limit_or_is_in_the_model_is_not_open() -> None:
     model = new_model("bingham", ("gas_spring",))
-    found, unlimited = open_effects(verdict(SPRING, LAG, CORE), model)
+    found, _, unlimited = open_effects(verdict(SPRING, LAG, CORE), model)
     assert [one.name for one in found] == ["saturation"]
     assert unlimited == ["coil_lag"]
-    assert open_effects({}, model) == ([], [])
+    assert open_effects({}, model) == ([], [], [])
+
+
+def test_a_limit_of_the_sampling_is_none_of_the_damper() -> None:
+    play = {**SPRING, "effect": "backlash", "parameter": "gap", "limit95": 3e-6, "coarse": True}
+    model = new_model("bingham")
+    found = open_effects(verdict(SPRING, play), model)
+    assert [one.name for one in found.effects] == ["gas_spring"]
+    assert found.unresolved == ["backlash"]
+    effects, notes = left_open(
+        {**verdict(play), "kind": "none", "effects": []}, model, Path("my_rig")
+    )
+    assert effects == []
+    assert notes == [
+        "the limit of backlash is only the smallest size that the sampling of the runs resolves: "
+        "it widens no band"
+    ]
+    two = LeftOpen([], ["backlash", "coil_lag"], [])
+    assert two.notes(Path("my_rig")) == [
+        "the limits of backlash, coil_lag are only the smallest size that the sampling of the runs "
+        "resolves: they widen no band"
+    ]
+
+
+def test_a_verdict_that_the_data_do_not_allow_has_no_limits() -> None:
+    told = {"kind": "insufficient", "effects": [], "findings": []}
+    with pytest.raises(StudyError, match="the data do not allow a verdict"):
+        left_open(told, new_model("bingham"), Path("my_rig"))
+
+
+def test_an_effect_is_drawn_whole_or_not_at_all() -> None:
+    whole, lost = simulated_whole({"spring": [1.0, 2.0], "play": [1.0, "it stops"], "none": []})
+    assert whole == {"spring": [1.0, 2.0]}
+    assert lost == {"play": "it stops"}
+    assert in_short("it stops.\n  A shorter step would be right.") == "it stops"
+
+
+def test_the_widest_effect_is_worth_a_test_from_a_tenth_of_the_variance_on() -> None:
+    parts = [{"all": 0.7, "spring": 0.3}, {"all": 1.0}]
+    assert widest(parts, ("all",)) == ("spring", pytest.approx(0.15))
+    assert widest([*parts, {"all": 1.0}, {"all": 1.0}], ("all",)) == ("", 0.0)
+    assert widest([], ("all",)) == ("", 0.0)
 
 
 def test_what_a_known_effect_takes_up_is_in_the_band_of_its_parameters() -> None:
     taken = {"effect": "duffing", "why": "gas_spring.k_3 of the model takes it up"}
     by_law = {"effect": "saturation", "why": "f_v of the model takes it up"}
-    assert open_effects(verdict(taken, by_law), new_model("bingham", ("gas_spring",)))[1] == [
-        "saturation"
-    ]
+    assert open_effects(
+        verdict(taken, by_law), new_model("bingham", ("gas_spring",))
+    ).unlimited == ["saturation"]
 
 
 def test_a_storeys_limit_is_of_that_storey() -> None:
@@ -93,7 +144,7 @@ def test_a_storeys_limit_is_of_that_storey() -> None:
         "limit95": 0.02, "others": {"shape": 2.0}, "moved": {},
     }  # fmt: skip
     both = {"findings": [{"site": f"storey{k}", "limits": [soft]} for k in (1, 2)]}
-    found, _ = open_effects(both, new_model("lugre"))
+    found, *_ = open_effects(both, new_model("lugre"))
     assert [one.label for one in found] == ["storey_softening", "storey_softening (storey2)"]
     assert [one.own(1.0)["which"] for one in found] == [1.0, 2.0]
 

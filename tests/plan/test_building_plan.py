@@ -30,7 +30,8 @@ from bristle.plan.ground import displacement_of, records_at_hand, scalable
 from bristle.plan.motions import Command, Waveform, shape_of
 from bristle.plan.outcome import Outcome
 from bristle.plan.planned_test import Signals, Test
-from bristle.plan.rig_limits import RESERVE, RigLimits, read_rig
+from bristle.plan.rig_file import read_rig
+from bristle.plan.rig_limits import RESERVE, RigLimits
 from bristle.plan.seen import Goal
 from bristle.plan.shaking_limits import limits_of_shaking
 from bristle.plan.shaking_table import Columns, ShakingTable

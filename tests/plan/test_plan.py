@@ -21,6 +21,7 @@ from bristle.plan.knowledge import Asked, Evidence, Known, Question, Rival
 from bristle.plan.motions import Command, Waveform
 from bristle.plan.planned_test import Test
 from bristle.plan.purposes import LEAST, Figure, cost_of, seen
+from bristle.plan.questions import open_parts
 from bristle.plan.rig_limits import RigLimits
 from bristle.plan.search import Planner
 from bristle.plan.seen import Goal, Seen, roles_of
@@ -295,6 +296,24 @@ def test_parts_without_a_form_are_covered_along_their_coordinates(sheet: Path) -
     assert row.name == "along displacement"
     assert row.then < 0.5 * row.now
     assert max(np.max(np.abs(one.x)) for one in found.signals) > 0.7 * 0.9 * 20e-3
+
+
+@pytest.mark.parametrize(
+    ("drive", "name", "held"),
+    [
+        ("voltage", "voltage", "the voltage does not move, it is 2 V throughout"),
+        ("current", "recent_current", "the current does not move, it is 2 A throughout"),
+    ],
+)
+def test_a_command_that_is_held_is_no_unknown_coordinate(drive: str, name: str, held: str) -> None:
+    limits = RigLimits(0.02, 0.2, 10.0, command=(2.0, 2.0))
+    with pytest.raises(StudyError, match=f"nothing can be learned along {name}: {held}"):
+        open_parts(Model("bingham", {}), limits, [name], drive)
+    with pytest.raises(StudyError, match=r'no coordinate "colour".*displacement'):
+        open_parts(Model("bingham", {}), limits, ["colour"], drive)
+    moving = replace(limits, command=(0.0, 2.0))
+    (along,) = open_parts(Model("bingham", {}), moving, [name], drive).bases
+    assert along.name == name.replace(drive, "voltage")
 
 
 @pytest.mark.parametrize(

@@ -133,7 +133,7 @@ def test_the_page_says_what_the_study_holds(page, folder):
     )
     assert "A sine of 12 mm at 3 Hz &amp; 6 V tells the two apart." in text
     assert "Sensor: gain of velocity, 1.05." in text
-    assert "displacement 0.042 mm" in text
+    assert "displacement 42 µm" in text
     for name in Study(folder).model().flat():
         assert f" {name} " in text
     assert "1.300 ± 0.020 N identified" in text

@@ -18,7 +18,8 @@ from bristle.compare.labels import LabelError, label_sentence
 from bristle.data.channels import ChannelSpec
 from bristle.errors import StudyError
 from bristle.fmu.description import read_description
-from bristle.physics.drive import DRIVES, VOLTAGE, text_for, unit_for
+from bristle.physics.drive import DRIVES, VOLTAGE, declared_for, text_for, unit_for
+from bristle.physics.effect import EFFECTS
 from bristle.study.create import create_study
 from bristle.study.run_facts import RunChoices, rows_of_table
 from bristle.study.study import Study
@@ -305,6 +306,21 @@ def test_words_and_units_of_a_command() -> None:
     assert unit_for("N/A", VOLTAGE, "A") == "N/V"
     assert text_for("yield force per volt", DRIVES["field"]) == "yield force per tesla"
     assert text_for("the voltage V", VOLTAGE) == "the voltage V"
+
+
+def test_a_field_that_is_the_command_is_told_from_the_one_in_the_damper() -> None:
+    texts = {name: text_for(EFFECTS[name].first_line(), DRIVES["field"]) for name in ABOUT_FIELD}
+    assert texts["coil_lag"].startswith("Coil lag: the field in the damper follows the field with")
+    assert texts["saturation"].endswith(
+        "the field in the damper grows less and less with the field."
+    )
+    assert texts["remanence"].startswith("Remanence: the field in the damper lags behind the field")
+    core = declared_for(EFFECTS["saturation"].parameters["V_s"], DRIVES["field"])
+    assert (core.unit, core.text) == ("T", "field at which the field in the damper saturates")
+    assert "in the damper" not in text_for(EFFECTS["coil_lag"].first_line(), DRIVES["current"])
+
+
+ABOUT_FIELD = ("coil_lag", "saturation", "remanence")
 
 
 def test_a_verdict_speaks_of_its_own_command() -> None:

@@ -71,7 +71,8 @@ def _of_lines(run: Measurement, lines: Sequence[SpectralLine]) -> Finding:
     channel, unit = ordered[0].channel, run.units[ordered[0].channel]
     rms = float(np.std(run[channel])) or 1.0
     told = [
-        f"{plain(one.frequency, 4)} Hz of {quantity(one.amplitude, unit, 2)} ({_origin(one, run)})"
+        f"{plain(one.frequency, 4)} Hz of {quantity(one.amplitude, unit, 2, fine=True)} "
+        f"({_origin(one, run)})"
         for one in ordered
     ]
     what = "a line at" if len(told) == 1 else "lines at"

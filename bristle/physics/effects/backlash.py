@@ -9,7 +9,9 @@ class Backlash(Effect):
         force outside = k s' + c ds'/dt,   s' = s beyond +-gap,   s = x_rod - x_joint
 
     A small joint mass lets the fluid spring back inside the gap. Leaves out the rattle of the
-    impacts: doubt it when the force rings after a gap has closed.
+    impacts: doubt it when the force rings after a gap has closed. With c above 0 the force jumps as
+    the gap closes: beside a building no force may agree with the motion then, however short the
+    step, and the run stops. With c = 0 it goes on.
     """
 
     name = "backlash"
