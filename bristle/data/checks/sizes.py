@@ -27,6 +27,9 @@ SLOW = 5.0
 NEVER = 0.02
 """Share of its largest value, positive, that a command which is turned does not pass."""
 
+MOSTLY = 0.2
+"""Share of its lowest value that the mean of such a command is below: noise about zero is not."""
+
 
 def check_sizes(run: Measurement, velocity: Array | None) -> Iterator[Finding]:
     """Yield what no damper does: the sizes of motion, force, command and time of a run on a bench.
@@ -64,7 +67,7 @@ def _unit(run: Measurement, channel: str, what: str) -> Finding:
 def _turned(run: Measurement, channel: str, values: Array) -> Iterator[Finding]:
     """Report a command that is below zero and never above: laws take more of it for more force."""
     low = float(values.min())
-    if low < 0.0 and float(values.max()) <= -NEVER * low and float(np.mean(values)) < 0.2 * low:
+    if low < 0.0 and float(values.max()) <= -NEVER * low and float(np.mean(values)) < MOSTLY * low:
         yield Finding(
             "command sign", "warning",
             f"{channel} goes down to {quantity(low, run.units[channel], 3)} and never above zero: "

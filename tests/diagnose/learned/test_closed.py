@@ -9,16 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bristle.diagnose.learned.closed import (
-    FORMS,
-    MAPS,
-    closed_forms,
-    formula_of,
-    in_words,
-    name_of,
-)
+from bristle.diagnose.learned.closed import closed_forms, formula_of, in_words, name_of
 from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.effect_file import MATH
+from bristle.diagnose.learned.forms import FORMS, MAPS
 
 KNOTS = np.linspace(-0.015, 0.015, 13)  # m
 GAP = 0.004  # m
