@@ -1,6 +1,7 @@
 """What is learned where no effect of the library explains the error, and on runs that hide nothing.
 
-    python -m benchmarks learned --outside 24 --further 24 --none 24 --building 14 --clean 6
+    python -m benchmarks learned --outside 24 --further 24 --crossed 8 --none 24
+    python -m benchmarks learned --building 14 --clean 6
 
 makes what is missing of these figures, with the generator of the blind benchmark, and prints them;
 without a number it prints what is there.
@@ -9,6 +10,8 @@ outside    bench cases at 15 and 40 % with an effect that the library does not h
            runs before and after, and the closed form
 further    the same for contact on one side, breakaway after reversal, a yield force that follows
            acceleration, a curved command, an accumulator that exchanges heat, cavitation
+crossed    the same for what depends on two signals at once: friction that differs with place and
+           speed, a yield force with an edge that the command moves
 none       bench cases that hide nothing: nothing must be learned
 building   buildings that hide something in the isolation layer or a storey: the same figures
 clean      buildings that hide nothing: nothing must be learned at any of their lines
@@ -81,7 +84,7 @@ def run() -> list[Row]:
 
 def main(given: list[str]) -> int:
     """Make what is missing of the figures, print them."""
-    kinds = ("outside", "further", "none", "building", "clean")
+    kinds = ("outside", "further", "crossed", "none", "building", "clean")
     return ask("learned", __doc__, kinds, _answered, rows, given)
 
 
@@ -93,7 +96,7 @@ def rows(done: dict[str, Answer]) -> list[Row]:
     out = []
     for kind, what in (
         ("outside", "outside effects"), ("further", "further outside effects"),
-        ("building", "what a building hides"),
+        ("crossed", "outside effects of two signals"), ("building", "what a building hides"),
     ):  # fmt: skip
         out += _of_hidden(of.get(kind, []), what)
     for kind, what in (("none", "curves"), ("clean", "curves in a building")):
@@ -116,7 +119,9 @@ def _of_hidden(hidden: list[Answer], what: str) -> list[Row]:
     text = f"{share:.0%} of {len(hidden)}"
     out.append(Row(f"learned: z <= 1.5 of {what}", text, ">= 80 %", 0.8 / max(share, 1e-3)))
     able = [one for one in hidden if one.get("form") in RIGHT]
-    named = float(np.mean([bool(one.get("named")) for one in able])) if able else 0.0
+    if not able:
+        return out
+    named = float(np.mean([bool(one.get("named")) for one in able]))
     text = f"{named:.0%} of {len(able)}"
     out.append(Row(f"learned: closed form of {what}", text, ">= 60 %", 0.6 / max(named, 1e-3)))
     return out
@@ -134,7 +139,9 @@ def _answered(kind: str, number: int) -> Answer:
 
 def _of_bench(kind: str, number: int) -> tuple[Answer, Callable[[], Answer]]:
     """Return a case of a bench, and what gives the answer to it."""
-    many = number + 1 if kind == "further" else 3 * (number + 1) + 12  # of which some do not count
+    many = (
+        number + 1 if kind in ("further", "crossed") else 3 * (number + 1) + 12
+    )  # of which some do not count
     able = [
         task
         for task in make_plan(SEED, many, kind)
@@ -205,6 +212,8 @@ def _closed(
     """Return what is told of a curve, its effect's text, and the trial of the model with it."""
     assert found.after is not None
     out: Answer = {"part": curve.part, "along": curve.along, "z_table": found.after.z}
+    if curve.across:
+        out["across"] = curve.across
     forms, trial, formula = closed_forms(curve, found.std), found.after, None
     if forms:
         closed = close(opened, found, forms)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.independent.effects import FURTHER, LIBRARY, OUTSIDE, compatible, forms
+from tests.independent.effects import CROSSED, FURTHER, LIBRARY, OUTSIDE, compatible, forms
 from tests.independent.instruments import BENCH, FAULTS
 from tests.independent.rigs import LAWS, draw_rig
 
@@ -35,9 +35,9 @@ INVISIBLE = (
 )  # fmt: skip
 """Faults that the parameters of the base laws absorb without a trace: no method can report them."""
 
-APART = ("structure", "shared", "further")
+APART = ("structure", "shared", "further", "crossed")
 """Kinds whose cases have plans of their own: the building; an effect of `SITES` in a damper on a
-bench; effects outside the library beside those of the main plan."""
+bench; effects outside the library beside those of the main plan, and such of two signals."""
 
 KINDS = ("none", "effect", "outside", "fault", "pair", *APART)
 """What `--only` takes."""
@@ -99,8 +99,8 @@ def make_plan(seed: int, cases: int, only: str = "") -> list[Task]:
         return make_structure_plan(seed, cases)
     if only == "shared":
         return make_shared_plan(seed, cases)
-    if only == "further":
-        return make_further_plan(seed, cases)
+    if only in ("further", "crossed"):
+        return make_further_plan(seed, cases, only)
     tasks: list[Task] = []
     for task in _endless(seed):
         if not only or task.kind == only:
@@ -144,16 +144,22 @@ def make_shared_plan(seed: int, cases: int) -> list[Task]:
     return tasks
 
 
-def make_further_plan(seed: int, cases: int) -> list[Task]:
-    """Return the first `cases` tasks with an effect of `FURTHER` at 15 and 40 % on a bench.
+def make_further_plan(seed: int, cases: int, kind: str = "further") -> list[Task]:
+    """Return the first `cases` tasks with a further outside effect at 15 and 40 % on a bench.
+
+    `kind` is "further", for one of `FURTHER`, or "crossed", for one of `CROSSED`.
 
     A longer plan begins with the shorter one; it draws nothing from the others.
     """
-    rng = np.random.default_rng([seed, 28])
-    each = {name: _variants(name, rng, STRENGTHS[:2]) for name in FURTHER}
-    names = _shuffled(list(FURTHER), rng)
+    rng, own = (
+        (np.random.default_rng([seed, 28]), FURTHER)
+        if kind == "further"
+        else (np.random.default_rng([seed, 29]), CROSSED)
+    )
+    each = {name: _variants(name, rng, STRENGTHS[:2]) for name in own}
+    names = _shuffled(list(own), rng)
     whats = (next(each[next(names)]) for _ in range(cases))
-    return [Task("further", noise=0.01, seed=int(rng.integers(2**31)), **what) for what in whats]
+    return [Task(kind, noise=0.01, seed=int(rng.integers(2**31)), **what) for what in whats]
 
 
 def _in_buildings(seed: int, reconstructed: bool) -> Iterator[dict[str, Any]]:

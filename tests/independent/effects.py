@@ -752,10 +752,57 @@ def _(s, rng, rig, size):
     return _vapour(2, 0.95 * s, rng, rig)
 
 
+# --- outside the library, and along two signals at once ------------------------------------------
+
+
+def _patch(kind: int, s: float, rng: np.random.Generator, rig: Rig) -> Fields:
+    fields = {"pat_kind": kind, "pat_f": 3.0 * s * rig.force, "pat_w": 0.3 * rig.values["v_n"]}
+    return {
+        **fields,
+        "pat_x": rng.uniform(-0.3, 0.3) * rig.stroke,
+        "pat_len": rng.uniform(0.2, 0.4) * rig.stroke,
+        "pat_d": rng.uniform(0.1, 0.3) * rig.speed,
+    }
+
+
+@form("sticking_patch", "patch", beds=("bench",), outside="displacement")
+def _(s, rng, rig, size):
+    """F exp(-((x - x_0)/l)^2) exp(-|w|/w_d) tanh(w/w_0): dry there, and slow alone. Own form."""
+    return _patch(1, s, rng, rig)
+
+
+@form("sticking_patch", "half", beds=("bench",), outside="displacement")
+def _(s, rng, rig, size):
+    """F (1 + tanh((x - x_0)/l))/2 exp(-|w|/w_d) tanh(w/w_0): one half of the stroke. Own form."""
+    return _patch(2, s, rng, rig)
+
+
+def _edge(kind: int, s: float, rng: np.random.Generator, rig: Rig) -> Fields:
+    at = rng.uniform(0.1, 0.3) * rig.stroke
+    return {
+        "edge_kind": kind, "edge_s": 0.95 * s, "edge_x": at, "edge_w": 0.1 * rig.stroke,
+        "edge_v": V_MAX,
+    }  # fmt: skip
+
+
+@form("field_edge", "both", beds=("bench",), outside="displacement")
+def _(s, rng, rig, size):
+    """Y (1 - g/(1 + exp((x_e (1 + E/8) - |x|)/l))): the field reaches further with the command."""
+    return _edge(1, s, rng, rig)
+
+
+@form("field_edge", "one", beds=("bench",), outside="displacement")
+def _(s, rng, rig, size):
+    """The same at one end of the stroke, x in the place of |x|. Own form."""
+    return _edge(2, s, rng, rig)
+
+
 LIBRARY = tuple(name for name, group in FORMS.items() if not next(iter(group.values())).outside)
 FURTHER = (
     "one_sided_contact", "breakaway", "acceleration_yield", "command_map", "warm_accumulator",
     "cavitation",
 )  # fmt: skip
 """Outside the library; the plans of the other outside effects stay what they are without them."""
-OUTSIDE = tuple(name for name in FORMS if name not in (*LIBRARY, *FURTHER))
+CROSSED = ("sticking_patch", "field_edge")
+"""The same, of two signals at once."""
+OUTSIDE = tuple(name for name in FORMS if name not in (*LIBRARY, *FURTHER, *CROSSED))

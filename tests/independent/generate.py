@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import experiments as ex
-from .effects import FORMS, FURTHER, LIBRARY, OUTSIDE, Form, compatible, forms
+from .effects import CROSSED, FORMS, FURTHER, LIBRARY, OUTSIDE, Form, compatible, forms
 from .instruments import BENCH, FAULTS, Fault, plant_fault, record, rms
 from .refit import BaseLaw
 from .rigs import LAWS, RIGS, Rig, draw_rig
@@ -276,8 +276,8 @@ def make_case(
     Parameters
     ----------
     effect : str
-        "none", a name of LIBRARY, OUTSIDE or FURTHER, two joined by "+", or a name of FAULTS (then
-        `form` is the channel).
+        "none", a name of LIBRARY, OUTSIDE, FURTHER or CROSSED, two joined by "+", or a name of
+        FAULTS (then `form` is the channel).
     form : str, optional
         Functional form, two joined by "+"; drawn if absent.
     strength : float
@@ -394,7 +394,7 @@ def _kind(effect: str, names: list[str]) -> str:
         return "fault"
     if len(names) > 1:
         return "pair"
-    return "outside" if names[0] in (*OUTSIDE, *FURTHER) else "effect"
+    return "outside" if names[0] in (*OUTSIDE, *FURTHER, *CROSSED) else "effect"
 
 
 def _faulty(kind: str) -> list[str]:
@@ -501,7 +501,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--list", action="store_true", help="effects and their forms")
     a = parser.parse_args(arguments)
     if a.list:
-        for group in (LIBRARY, OUTSIDE, FURTHER):
+        for group in (LIBRARY, OUTSIDE, FURTHER, CROSSED):
             for name in group:
                 print(f"{name}: {', '.join(FORMS[name])}")
         print(f"faults (form: {', '.join(BENCH)}): {', '.join(FAULTS)}")

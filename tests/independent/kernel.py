@@ -38,6 +38,8 @@ INTEGERS = [
     "acc_kind",
     "heat_kind",
     "cav_kind",
+    "pat_kind",
+    "edge_kind",
     "building",
     "bf_kind",
     "du_kind",
@@ -124,6 +126,15 @@ REALS = [
     "cav_w",
     "cav_d",
     "cav_len",
+    "pat_f",
+    "pat_x",
+    "pat_len",
+    "pat_w",
+    "pat_d",
+    "edge_s",
+    "edge_x",
+    "edge_w",
+    "edge_v",
     "ff_d",
     "vf_d",
     "mb",
@@ -249,6 +260,9 @@ def _fluid(p, x, w, d, e, z, hot, age, more):
         grip *= 1.0 + p.pos_s * x / p.pos_x
     if p.rip_kind == 2:
         grip *= 1.0 + p.rip_s * sin(6.283185307179586 * x / p.rip_len + p.rip_phase)
+    if p.edge_kind > 0:
+        out = (abs(x) if p.edge_kind == 1 else x) - p.edge_x * (1.0 + e / p.edge_v)
+        grip *= 1.0 - p.edge_s / (1.0 + exp(-out / p.edge_w))
     rate = 0.0
     if p.law == 1:
         rate = _bristle_rate(p, w, z, reach)
@@ -347,6 +361,10 @@ def _beside(p, x, w):
         dent = p.one_side * x - p.one_gap
         if dent > 0.0:
             f += p.one_side * p.one_k * (dent if p.one_kind == 1 else dent**1.5)
+    if p.pat_kind > 0:
+        at = (x - p.pat_x) / p.pat_len
+        place = exp(-at * at) if p.pat_kind == 1 else 0.5 * (1.0 + tanh(at))
+        f += p.pat_f * place * tanh(w / p.pat_w) * exp(-abs(w) / p.pat_d)
     if p.gas_kind == 1:
         f += p.gas_k * x + p.gas_f
     elif p.gas_kind == 2:

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.independent.effects import FORMS, FURTHER
+from tests.independent.effects import CROSSED, FORMS, FURTHER
 from tests.independent.generate import make_case
 from tests.independent.kernel import _accumulator
 from tests.independent.specimen import Specimen
@@ -39,7 +39,7 @@ def test_a_seed_gives_the_same_case_again():
 
 @pytest.mark.parametrize(
     ("name", "form", "law"),
-    [(n, f, law) for n in FURTHER for f, one in FORMS[n].items() for law in one.laws],
+    [(n, f, law) for n in (*FURTHER, *CROSSED) for f, one in FORMS[n].items() for law in one.laws],
 )
 def test_a_further_effect_changes_a_bench_by_what_was_asked_for_or_by_its_most(name, form, law):
     case = make_case(11, name, form, 0.05, 0.01, "bench_10N", law, duration=6.0)
