@@ -1,8 +1,9 @@
 """Learn an unknown effect from a study's measurements, as a curve inside the model.
 
 A spline along displacement, speed, acceleration, the command, a memory of these or an extra channel
-acts as an added force, a factor of a part of the law, or a map of the command. In the isolation
-layer or a storey of a building it acts as an added force, friction or damping, or a factor of the
+acts as an added force, a factor of a part of the law, or a map of the command. Where no curve along
+one signal explains the error, surfaces over two signals are tried too. In the isolation layer or a
+storey of a building a curve acts as an added force, friction or damping, or a factor of the
 stiffness. The command keeps it if it lowers the error on held-out runs beyond chance.
 """
 
@@ -25,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--along", metavar="SIGNAL[,SIGNAL]", default="",
         help="signals that the curve may depend on, such as displacement,speed, or an extra "
-        "channel of the study; default all",
+        "channel of the study; of several, curves along each and surfaces over two; default all",
     )  # fmt: skip
     parser.add_argument(
         "--as", dest="parts", metavar="PART[,PART]", default="",

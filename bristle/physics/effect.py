@@ -30,6 +30,7 @@ from .law import LAWS, PARTS, Law, laws_of
 from .parameter import Parameter as Parameter  # effects, users' own as well, take these from here
 from .parameter import Table as Table
 from .parameter import all_parameters, check_numbers, fields_of, named
+from .parameter import bilinear as bilinear
 from .parameter import interpolate as interpolate
 
 SITES = ("damper", "structure", "sensor")

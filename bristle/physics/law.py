@@ -26,6 +26,7 @@ from .inputs import Inputs
 from .law_check import ALL_HOOKS, FIELDS, HOOKS, check_law
 from .law_check import PARTS as PARTS
 from .parameter import CHOICES, Parameter, Table, all_parameters, fields_of, named
+from .parameter import bilinear as bilinear
 from .parameter import interpolate as interpolate
 from .tuples import FACTORS, FORM_STEP, values_of_law
 

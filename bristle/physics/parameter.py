@@ -67,6 +67,27 @@ def interpolate(x: float, knots: tuple[float, ...], values: tuple[float, ...]) -
     return values[len(knots) - 1]
 
 
+def bilinear(
+    x: float, y: float, knots: tuple[float, ...], levels: tuple[float, ...],
+    rows: tuple[tuple[float, ...], ...],
+) -> float:  # fmt: skip
+    """Return the value at (x, y) of the surface with a row of values at the knots for each level.
+
+    It is linear in x and in y between them; beyond the first and the last it keeps the value there.
+    """
+    k = 1
+    while k < len(knots) - 1 and x >= knots[k]:
+        k += 1
+    n = 1
+    while n < len(levels) - 1 and y >= levels[n]:
+        n += 1
+    share = min(max((x - knots[k - 1]) / (knots[k] - knots[k - 1]), 0.0), 1.0)
+    high = min(max((y - levels[n - 1]) / (levels[n] - levels[n - 1]), 0.0), 1.0)
+    below = rows[n - 1][k - 1] + share * (rows[n - 1][k] - rows[n - 1][k - 1])
+    above = rows[n][k - 1] + share * (rows[n][k] - rows[n][k - 1])
+    return below + high * (above - below)
+
+
 def climb(x: float, knots: tuple[float, ...], rises: tuple[float, ...]) -> float:
     """Return the value at x of the broken line that begins at rises[0] and then gains each rise.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from itertools import product
 from math import copysign, inf, isfinite
@@ -20,6 +21,9 @@ RANGES = {
 
 FURTHER = (10.0, 0.1, 100.0, 0.01, 1e3)
 """Factors on the signals at which a parameter that moved nothing is looked at again."""
+
+BETWEEN = 33
+"""Values of one signal, the others kept, at which such a parameter is looked at as well."""
 
 SHARES = (0.0, 0.2, 0.5, 0.8, 1.0)
 """Shares of a parameter's range at which it is."""
@@ -159,9 +163,10 @@ def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> Non
             else:
                 jumped = refuse_jump(getattr(effect, hook), given, (0.0, 1.0), f"p.{name}", 24)
                 moved = jumped or moved
-        moved = moved or _moved_far_out(effect, name, (low, high), values)
         # Of a table some knots may lie where no signal of any rig comes.
-        moving[field_of[name]] = moving.get(field_of[name], False) or moved
+        moved = moved or moving.get(field_of[name], False)
+        moved = moved or _moved_far_out(effect, name, (low, high), values)
+        moving[field_of[name]] = moved or _moved_between(effect, name, (low, high), values)
     for field, moved in moving.items():
         if not moved:
             line = getattr(effect, next(iter(effect.hooks()))).__code__.co_firstlineno
@@ -185,6 +190,44 @@ def _moved_far_out(
         except FlawError:  # so far out it need not be right
             continue
     return False
+
+
+def _moved_between(
+    effect: type[Effect], name: str, bounds: tuple[float, float], values: dict[str, float]
+) -> bool:
+    """Return whether a parameter moves a hook anywhere on the way of one signal.
+
+    A row of a table counts near its own level alone, and so it does of a channel that it follows.
+    """
+    for factor, signal, hook in product((1.0, *FURTHER), _signals(effect)[1:7], effect.hooks()):
+        still = Q(*(factor * one for one in signal))._replace(dt=signal.dt, storey=signal.storey)
+        for q, others in _ways(effect, still, factor, values):
+            try:
+                z = _state(effect, q, others)
+                given = partial(_at_parameter, effect, hook, q, z, others, (name, *bounds))
+                if given(0.0) != given(1.0):
+                    return True
+            except FlawError:  # so far out it need not be right
+                continue
+    return False
+
+
+def _ways(
+    effect: type[Effect], still: Q, factor: float, values: dict[str, float]
+) -> Iterator[tuple[Q, dict[str, float]]]:
+    """Yield signals and parameters along the way of one signal, or of a channel's parameter."""
+    for signal in (one for one in effect.needs if one in RANGES):
+        reach = factor * RANGES[signal]
+        low = 0.0 if signal == "V" else -reach
+        for k in range(BETWEEN):
+            yield still._replace(**{signal: low + (reach - low) * k / (BETWEEN - 1)}), values
+    for name in effect.channels:
+        low, high = effect.parameters[name].bounds
+        default = effect.parameters[name].value
+        reach = min(high - low, 4.0 * abs(default) or 1.0)
+        for k in range(BETWEEN):
+            at = min(max(default + reach * (k / (BETWEEN - 1) - 0.5), low), high)
+            yield still, {**values, name: at}
 
 
 def _at_parameter(

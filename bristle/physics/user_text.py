@@ -46,12 +46,12 @@ class Dialect(NamedTuple):
 EFFECT = Dialect(
     "effect",
     "Effect",
-    {"bristle.physics.effect": ("Effect", "Parameter", "Table", "interpolate")},
+    {"bristle.physics.effect": ("Effect", "Parameter", "Table", "bilinear", "interpolate")},
     HOOKS,
     Q._fields,
     needs=True,
 )
-_OF_LAWS = ("Law", "Parameter", "Shape", "Table", "Variant", "interpolate")
+_OF_LAWS = ("Law", "Parameter", "Shape", "Table", "Variant", "bilinear", "interpolate")
 _FORMS = ("Constant", "Linear", "Monotone", "Quadratic", "Rising")
 LAW = Dialect(
     "law",
@@ -60,7 +60,7 @@ LAW = Dialect(
         "bristle.physics.law": (*_OF_LAWS, *_FORMS),
         # As the library's own files say it, and as a copy of one still does.
         "bristle.physics.command": _FORMS,
-        "bristle.physics.parameter": ("Parameter", "Table", "interpolate"),
+        "bristle.physics.parameter": ("Parameter", "Table", "bilinear", "interpolate"),
         "bristle.physics.falling": ("EXPONENT", "STANDARD", "falling"),
     },
     ALL_HOOKS,

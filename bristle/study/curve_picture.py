@@ -13,7 +13,8 @@ from ..diagnose.learned.closed import ClosedForm, in_words, name_of
 from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.fit import Closed, LearnedCurve
 from ..diagnose.learned.ring import RING, response
-from ..draw.style import BLUE, GREY, PALE, VERMILION, Page, look, png, short_z
+from ..diagnose.learned.surface import continues
+from ..draw.style import BLUE, GREY, PALE, VERMILION, Page, look, png, ramp, short_z
 from ..quantity import scale
 
 if TYPE_CHECKING:
@@ -52,13 +53,18 @@ def draw_curve(
             f"z on held-out runs {short_z(found.before.z)} before, {short_z(found.after.z)} with it"
         )
         said += f", {short_z(closed.trial.z)} with the formula." if closed is not None else "."
-        if curve.part != RING:
+        if curve.across:
+            said += " A hollow point continues those beside it: hardly a sample is near."
+        elif curve.part != RING:
             said += " The band is the 95 % interval of each value."
         page = Page(8.0, 3.6, heading, said)
-        grid = page.grid(1, 1, top=0.3, bottom=0.55, left=0.75, right=0.4)
+        right = 1.6 if curve.across else 0.4
+        grid = page.grid(1, 1, top=0.3, bottom=0.55, left=0.75, right=right)
         axes = page.figure.add_subplot(grid[0, 0])
         if curve.part == RING:
             _draw_mode(axes, curve)
+        elif curve.across:
+            _draw_surface(axes, found)
         else:
             _draw(axes, found, forms)
     return page
@@ -81,6 +87,39 @@ def _draw_mode(axes: Axes, curve: Curve) -> None:
     axes.set_title("amplitude of the force shown / of the damper's force")
 
 
+def _draw_surface(axes: Axes, found: LearnedCurve) -> None:
+    """Draw a surface as a family of curves, one for each level of its second signal."""
+    curve = found.curve
+    assert curve is not None
+    shape = len(curve.levels), len(curve.knots)
+    s = np.array(curve.knots)
+    y, half = np.array(curve.values).reshape(shape), 1.96 * np.array(found.std).reshape(shape)
+    told = np.ones(y.size, dtype=bool)
+    told[list(continues(curve))] = False
+    told = told.reshape(shape)
+    across, along = scale(curve.along_unit, float(np.max(np.abs(s))))
+    up, unit = scale(curve.unit, float(np.max(np.abs(y))))
+    over, level_unit = scale(curve.across_unit, float(np.max(np.abs(curve.levels))))
+    level_unit = "" if level_unit in ("", "1") else f" {level_unit}"
+    axes.axhline(0.0, color=PALE, lw=1.0)
+    for k, (colour, level) in enumerate(zip(ramp(len(y)), curve.levels, strict=True)):
+        known = told[k]
+        low, high = up * (y[k] - half[k]), up * (y[k] + half[k])
+        axes.fill_between(across * s, low, high, where=known, color=colour, alpha=0.12, lw=0.0)
+        name = f"{over * level:.3g}{level_unit}"
+        axes.plot(across * s, up * y[k], color=colour, lw=1.8, label=name)
+        axes.plot(across * s[known], up * y[k][known], color=colour, lw=0.0, marker="o", ms=3.5)
+        axes.plot(
+            across * s[~known], up * y[k][~known], color=colour, lw=0.0, marker="o", ms=3.5,
+            markerfacecolor="white",
+        )  # fmt: skip
+    _name_axes(axes, curve, along, unit)
+    axes.legend(
+        frameon=False, labelcolor=GREY, fontsize=9, title=curve.second.words, title_fontsize=9,
+        loc="center left", bbox_to_anchor=(1.0, 0.5),
+    )  # fmt: skip
+
+
 def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
     curve = found.curve
     assert curve is not None
@@ -98,10 +137,15 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
         axes.plot(across * fine, up * best.at(fine), color=VERMILION, lw=1.4, ls="--", label=name)
     for given in (value for name, value in curve.memory if name in GIVEN):
         axes.axvline(across * given, color=PALE, lw=1.0)
+    _name_axes(axes, curve, along, unit)
+    axes.legend(frameon=False, labelcolor=GREY, fontsize=9)
+
+
+def _name_axes(axes: Axes, curve: Curve, along: str, unit: str) -> None:
+    """Name the signal of a curve below its picture, and its part above."""
     words = curve.signal.formula or curve.signal.words
     axes.set_xlabel(f"{words} [{along}]" if along else words)
     quantity_name = curve.of.words.split(" ", 1)[1] if unit not in ("", "1") else "g"
     axes.set_title(
         f"{quantity_name} [{unit}]" if unit not in ("", "1") else f"g in {curve.of.formula}"
     )
-    axes.legend(frameon=False, labelcolor=GREY, fontsize=9)

@@ -21,7 +21,9 @@ from ..diagnose.learned.effect_file import effect_text
 from ..diagnose.learned.fit import Closed, LearnedCurve, close, learn
 from ..diagnose.learned.place import Place
 from ..diagnose.learned.ring import RING
+from ..diagnose.learned.rule import LEARN
 from ..diagnose.learned.slip import SLIP
+from ..diagnose.learned.surface import continues, separated
 from ..diagnose.opening import Insufficient, Opening
 from ..errors import StudyError
 from ..physics.effect import EFFECTS
@@ -33,7 +35,7 @@ from .curve_options import refuse_elsewhere
 from .curve_picture import curve_png
 from .identification import as_model
 from .rig import building_of
-from .set_aside import LEARNED
+from .set_aside import LEARNED as LEARNED_FROM
 from .study import Study
 
 Runs = BenchRuns | BuildingRuns
@@ -90,6 +92,8 @@ class LearnedEffect:
                     + ", ".join(self._values())
                     + "."
                 )
+        elif curve.across:
+            out += _of_surface(curve)
         elif curve.part == SLIP:
             pairs = zip(curve.knots, curve.values, strict=True)
             elements = [f"{quantity(f, 'N')} at {quantity(x, 'm')}" for x, f in pairs if f > 0.0]
@@ -152,6 +156,7 @@ class LearnedEffect:
                 "along": curve.along, "unit": curve.unit, "along_unit": curve.along_unit,
                 "knots": list(curve.knots), "values": list(curve.values), "std": list(found.std),
                 "memory": dict(curve.memory),
+                **_levels(curve),
                 "forms": [
                     {"name": one.name, "formula": one.form.text, "values": list(one.values),
                      "left": one.left}
@@ -159,8 +164,9 @@ class LearnedEffect:
                 ],
                 "nearest": self._nearest(curve),
                 "others": [
-                    {"part": one.curve.part, "along": one.curve.along, "z": one.trial.z,
-                     "z_train": one.trial.train}
+                    {"part": one.curve.part, "along": one.curve.along,
+                     **({"across": one.curve.across} if one.curve.across else {}),
+                     "z": one.trial.z, "z_train": one.trial.train}
                     for one in found.others
                 ],
             }  # fmt: skip
@@ -221,7 +227,7 @@ def learn_effect(
 def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffect:
     """Write a learned effect's file, its picture, and what the report says of it."""
     name, closed = learned.name, learned.closed
-    origin = f"{LEARNED} {study.name}, {date.today().year}"
+    origin = f"{LEARNED_FROM} {study.name}, {date.today().year}"
     if closed is not None:
         values = closed.trial.model.values  # of an effect that has no file yet
         memory = tuple((n, values[f"{name}.{n}"]) for n, _ in curve.memory)
@@ -284,6 +290,37 @@ def _free_name(study: Study) -> str:
     ).exists() or f"learned_{number}" in EFFECTS:
         number += 1
     return f"learned_{number}"
+
+
+def _levels(curve: Curve) -> dict[str, Any]:
+    """Return what a surface has more than a curve: `values` are then those of each level."""
+    if not curve.across:
+        return {}
+    return {
+        "across": curve.across, "across_unit": curve.across_unit, "levels": list(curve.levels),
+        "continued": [curve.entries[k] for k in continues(curve)],
+    }  # fmt: skip
+
+
+def _of_surface(curve: Curve) -> list[str]:
+    """Return what is said of a surface beside what it explains."""
+    one, other = (signal.words for signal in curve.signals)
+    kind, left = separated(curve)
+    out = (
+        f"The surface is nearly the {kind} of a curve along {one} and one along {other} "
+        f"({100.0 * left:.0f} % of its variation remains)."
+        if left <= LEARN.follows
+        else "The surface is neither the sum nor the product of two curves: the nearest "
+        f"{kind} leaves {100.0 * left:.0f} % of its variation."
+    )
+    few, count = len(continues(curve)), len(curve.values)
+    if not few:
+        return [out]
+    verb = "continues" if few == 1 else "continue"
+    return [
+        out,
+        f"{few} of its {count} values {verb} those beside them: these runs hardly reach there.",
+    ]
 
 
 def _excess(z: float) -> float:

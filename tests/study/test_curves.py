@@ -184,6 +184,26 @@ def test_elastic_slip_elements_are_told_one_by_one(study, learned, monkeypatch):
     assert second == "They give way with 0.4 N at 0.4 mm, 0.8 N at 9 mm of travel."
 
 
+def test_a_surface_is_told_with_what_its_data_do_not_reach(study, learned, monkeypatch):
+    learned()
+    knots, levels = (-0.01, 0.0, 0.01), (0.0, 2.0, 8.0)
+    values = tuple(2.0 * np.tanh(200.0 * x - V + 3.0) for V in levels for x in knots)
+    surface = Curve(
+        "force", "displacement", (), knots, values, (8,), across="voltage", levels=levels,
+    )  # fmt: skip
+    found = replace(found_of(), curve=surface, std=(0.05,) * 9)
+    monkeypatch.setattr(curves, "learn", lambda *_, **__: found)
+    told = learn_effect(study)
+    assert told.sentences()[0].startswith(
+        "learned_1 is an added force over displacement and the command."
+    )
+    assert "neither the sum nor the product of two curves" in told.sentences()[1]
+    assert told.sentences()[2].startswith("1 of its 9 values continues")
+    assert told.as_dict()["continued"] == ["row_3[3]"]
+    assert told.picture.stat().st_size > 10_000
+    assert 'assumed = ("row_3[3]",)' in told.file.read_text()
+
+
 def test_a_formula_over_a_memory_is_written_with_the_time_that_was_fitted(
     study, learned, monkeypatch
 ):

@@ -66,8 +66,8 @@ def closed_forms(curve: Curve, std: Sequence[float]) -> list[ClosedForm]:
     curve : as fitted
     std : (k,) of its values; a knot that was held at zero counts as the surest of the others
     """
-    if curve.of.alone or not curve.signal.named:
-        return []  # its values are no curve, or two of them
+    if curve.of.alone or curve.across or not curve.signal.named:
+        return []  # its values are no curve, or more than one
     s, y = np.array(curve.knots), np.array(curve.values)
     given = np.array(std)
     some = given[given > 0.0]

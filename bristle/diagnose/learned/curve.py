@@ -1,4 +1,7 @@
-"""A curve that is learned: on which part of the model it acts, along which signal, its values."""
+"""A curve that is learned: on which part of the model it acts, along which signal, its values.
+
+Over two signals it is a surface: a curve along the first one at each of some levels of the second.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,11 @@ from .slip import SLIP, force_source, signal_of
 
 _SLOPES = (("force", "displacement"), ("force", "velocity"), ("friction", "speed"))
 """Parts and signals along which a straight curve is the line of a layer or a storey itself."""
+
+_SURFACE = """bilinear(
+            {}, KNOTS, LEVELS,
+            ({}),
+        )"""
 
 BOUND = 30.0
 """Times the largest value of a learned curve: bounds of each of its values."""
@@ -164,6 +172,11 @@ class Curve:
     resonance has one value, its share, and frequency and damping ratio as memory. `at` is the site
     of the rig where it acts. `measured` is the unit of its signal where that is a channel beside
     those that bristle knows, else "".
+
+    Of a surface `across` is the second signal, `levels` are its values (SI), and `values` those at
+    the knots of the first level, then of the next ones. `held` are then also the knots that hardly
+    a sample is near to: their values continue those beside them; the first is the one that stays
+    zero, if one does. `measured` is the unit of its second signal.
     """
 
     part: str
@@ -177,6 +190,8 @@ class Curve:
     drive: str = VOLTAGE.name
     at: str = DAMPER
     measured: str = ""
+    across: str = ""
+    levels: tuple[float, ...] = ()
 
     @property
     def place(self) -> Place:
@@ -187,6 +202,11 @@ class Curve:
     def of(self) -> Part:
         """The part of the model that it changes."""
         return parts_at(self.place)[self.part]
+
+    @property
+    def kind(self) -> tuple[str, str, str]:
+        """Its part, its signal, and the second one of a surface."""
+        return self.part, self.along, self.across
 
     @property
     def of_line(self) -> bool:
@@ -200,20 +220,39 @@ class Curve:
 
     @property
     def signal(self) -> Along:
-        """The signal that it depends on."""
+        """The signal that it depends on, of a surface the first one."""
         if self.part == RING:
             return SIGNAL
-        if self.measured:
+        if self.measured and not self.across:
             return measured_signal(self.along, self.measured)
         along = ALONG[self.along] if self.along in ALONG else signal_of(self.knots)
         return signal_at(along, self.place)
+
+    @property
+    def second(self) -> Along:
+        """The second signal of a surface."""
+        if self.measured:
+            return measured_signal(self.across, self.measured)
+        return signal_at(ALONG[self.across], self.place)
+
+    @property
+    def signals(self) -> tuple[Along, ...]:
+        """All signals that it depends on."""
+        return (self.signal, self.second) if self.across else (self.signal,)
 
     @property
     def entries(self) -> tuple[str, ...]:
         """The names of the parameters that its values are."""
         if self.of.parameter:
             return (self.of.parameter,)
-        return tuple(f"curve[{k + 1}]" for k in range(len(self.knots)))
+        knots = range(1, len(self.knots) + 1)
+        return tuple(f"{row}[{k}]" for row in self.rows for k in knots)
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """The names of the tables that its values are in, of a surface one for each level."""
+        levels = range(1, len(self.levels) + 1)
+        return tuple(f"row_{k}" for k in levels) if self.across else ("curve",)
 
     @property
     def unit(self) -> str:
@@ -226,16 +265,25 @@ class Curve:
         return unit_for(self.signal.unit, drive_named(self.drive))
 
     @property
+    def across_unit(self) -> str:
+        """The unit of the levels of a surface."""
+        return unit_for(self.second.unit, drive_named(self.drive))
+
+    @property
     def source(self) -> str:
         """Its value as a hook computes it from the table."""
         if self.part == SLIP:
             return force_source(len(self.knots))
+        if self.across:
+            at, rows = f"{self.signal.source}, {self.second.source}", self.rows
+            listed = ", ".join(f"p.{row}" for row in rows)
+            return _SURFACE.format(at, listed)
         return self.signal.value or f"interpolate({self.signal.source}, KNOTS, p.curve)"
 
     @property
     def passive(self) -> bool:
         """Whether it gives no energy over a cycle, whatever its values."""
-        conserves = self.part == "force" and self.along == "displacement"
+        conserves = (self.part, self.along, self.across) == ("force", "displacement", "")
         active = ("force", "spring", "voltage", "channel")
         return self.part == SLIP or conserves or self.of.hook not in active
 
@@ -247,6 +295,8 @@ class Curve:
             return f"{self.of.words}, near {quantity(dict(self.memory)['frequency'], 'Hz')}"
         times = dict(self.memory)
         faded = f" (over {quantity(times['tau'], 's')})" if "tau" in times else ""
+        if self.across:
+            return f"{self.of.words} over {self.signal.words} and {self.second.words}{faded}"
         return f"{self.of.words} along {self.signal.words}{faded}"
 
 

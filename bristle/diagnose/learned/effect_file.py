@@ -53,12 +53,12 @@ def effect_text(name: str, curve: Curve, origin: str, formula: Formula | None = 
         f'    sites = ("{curve.of.site}",)',
         *_fields(curve),
         f'    source = "{origin}"',
-        f'    expect = "an error that depends on {curve.of.cause or curve.signal.words}"',
+        f'    expect = "an error that depends on {curve.of.cause or _signals(curve)}"',
         "    start_shares = ({},)  # the defaults are those of this rig: no search scales them",
     ]
     held = _assumed(curve, table)
     if held:
-        lines.append(f"    assumed = {held!r}  # no fit moves them".replace("'", '"'))
+        lines += _listed(held)
     if parameters or only:
         lines += [
             "    parameters = {",
@@ -75,8 +75,11 @@ def _followed(curve: Curve) -> list[Declared]:
     """Return the parameter that follows a measured channel; none where the curve follows none."""
     if not curve.measured:
         return []
-    middle = 0.5 * (curve.knots[0] + curve.knots[-1])
-    return [(FOLLOWING, middle, curve.along_unit, f"{curve.signal.words}, which runs tell")]
+    knots, unit = (
+        (curve.levels, curve.across_unit) if curve.across else (curve.knots, curve.along_unit)
+    )
+    words = curve.signals[-1].words
+    return [(FOLLOWING, 0.5 * (knots[0] + knots[-1]), unit, f"{words}, which runs tell")]
 
 
 def _assumed(curve: Curve, table: bool) -> tuple[str, ...]:
@@ -87,13 +90,23 @@ def _assumed(curve: Curve, table: bool) -> tuple[str, ...]:
     follows = (FOLLOWING,) if curve.measured else ()
     if not table:
         return follows
-    held = tuple(f"curve[{k + 1}]" for k in curve.held)
+    held = tuple(curve.entries[k] for k in curve.held)
     return (*held, *(name for name, _ in curve.memory if name in GIVEN), *follows)
+
+
+def _listed(held: Sequence[str]) -> list[str]:
+    """Return the lines that declare which parameters stay."""
+    names = [f'"{name}",' for name in held]
+    if len(names) < 6:
+        text = f"{tuple(held)!r}".replace("'", '"')
+        return [f"    assumed = {text}  # no fit moves them"]
+    rows = [" ".join(names[k : k + 6]) for k in range(0, len(names), 6)]
+    return ["    assumed = (  # no fit moves them", *(f"        {row}" for row in rows), "    )"]
 
 
 def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
     """Return the lines of the hooks."""
-    part, along = curve.of, curve.signal
+    part = curve.of
     elsewhere = ["        if p.which != 0.0 and p.which != q.storey:", "            return 0.0"]
     lines = [
         "    @staticmethod",
@@ -101,9 +114,9 @@ def _hooks(curve: Curve, formula: Formula | None) -> list[str]:
         *(elsewhere if curve.place.storey else []),
         f"        return {part.expression.format(g=_value(curve, formula))}",
     ]
-    if along.advance:
+    for advance in (along.advance for along in curve.signals if along.advance):
         lines += ["", "    @staticmethod", "    def advance(q, z, p):"]
-        lines += ["    " + line for line in along.advance.splitlines()]
+        lines += ["    " + line for line in advance.splitlines()]
     return lines
 
 
@@ -120,10 +133,10 @@ def _imports(
 ) -> list[str]:  # fmt: skip
     """Return the lines before the class: what the file is, its imports, its constants."""
     functions = [one for one in MATH if f"{one}(" in "\n".join(body)]
-    reads = "interpolate(" in "\n".join(body)
+    reads = [one for one in ("bilinear", "interpolate") if f"{one}(" in "\n".join(body)]
     kinds = [
         *(["Parameter"] if parameters else []), *(["Table"] if table else []),
-        *(["interpolate"] if reads else []),
+        *reads,
     ]  # fmt: skip
     lines = [
         f'"""{_title(name)}: {_subject(curve, "along")}, learned from measurements."""',
@@ -134,7 +147,11 @@ def _imports(
     if table:
         lines += ["", *_row("KNOTS = ", curve.knots)]
         unit = curve.along_unit
-        lines.append(f'"""Where the curve is given: {curve.signal.words} [{unit}]."""')
+        kind = "surface" if curve.across else "curve"
+        lines.append(f'"""Where the {kind} is given: {curve.signal.words} [{unit}]."""')
+    if curve.across:
+        lines += ["", *_row("LEVELS = ", curve.levels)]
+        lines.append(f'"""The same: {curve.second.words} [{curve.across_unit}]."""')
     unit = drive_named(curve.drive).unit
     return [
         *lines,
@@ -149,6 +166,8 @@ def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
     """Return the class's first lines and its docstring."""
     along = curve.signal.formula or curve.signal.words
     g = f"g = {formula.text if formula else 'curve(s)'},   s = {along}"
+    if curve.across:
+        g = f"g = surface(s, t),   s = {along}, t = {curve.second.words}"
     ends = formula is None or formula.ends
     end = ", for beyond its ends the curve keeps its value." if ends else "."
     if curve.of.law:
@@ -172,24 +191,33 @@ def _title(name: str) -> str:
 def _subject(curve: Curve, joined: str) -> str:
     """Return what a curve is: its part, and its signal after a word or two."""
     words = curve.of.words
-    return words if curve.of.alone else f"{words} {joined} {curve.signal.words}"
+    return words if curve.of.alone else f"{words} {joined} {_signals(curve)}"
+
+
+def _signals(curve: Curve) -> str:
+    """Return what a curve depends on: its signal, of a surface both."""
+    return " and ".join(one.words for one in curve.signals)
 
 
 def _table(curve: Curve) -> list[str]:
-    """Return the lines of the table's declaration."""
+    """Return the lines of the declaration of its table, of a surface one for each level."""
     low, high = bounds_of(curve)
-    meaning = "force at which the element slips" if curve.part == SLIP else "value of the curve"
-    return [
-        "    tables = {",
-        '        "curve": Table(',
-        "            KNOTS,",
-        *(f"            {line}" for line in _row("", curve.values, ",")),
-        f'            "{curve.unit}",',
-        f"            ({low:.4g}, {high:.4g}),",
-        f'            "{meaning}",',
-        "        )",
-        "    }",
-    ]
+    meanings = ["force at which the element slips" if curve.part == SLIP else "value of the curve"]
+    if curve.across:
+        unit = "" if curve.across_unit == "1" else f" {curve.across_unit}"
+        meanings = [f"value where {curve.second.words} is {at:.4g}{unit}" for at in curve.levels]
+    lines, each = ["    tables = {"], len(curve.knots)
+    for k, (row, meaning) in enumerate(zip(curve.rows, meanings, strict=True)):
+        lines += [
+            f'        "{row}": Table(',
+            "            KNOTS,",
+            *(f"            {line}" for line in _row("", curve.values[k * each :][:each], ",")),
+            f'            "{curve.unit}",',
+            f"            ({low:.4g}, {high:.4g}),",
+            f'            "{meaning}",',
+            "        ),",
+        ]
+    return [*lines, "    }"]
 
 
 def _constant(name: str, curve: Curve, value: float, text: str) -> list[str]:
@@ -200,12 +228,15 @@ def _constant(name: str, curve: Curve, value: float, text: str) -> list[str]:
 
 def _fields(curve: Curve) -> list[str]:
     """Return the lines of the class data that follow from part and signal."""
-    along, part, drive = curve.signal, curve.of, drive_named(curve.drive)
+    part, drive = curve.of, drive_named(curve.drive)
+    needs = [name for along in curve.signals for name in along.needs]
+    states = [state for along in curve.signals for state in along.states]
+    starts = [start for along in curve.signals for start in along.starts]
     given: dict[str, object] = {
-        "channels": {FOLLOWING: curve.along} if curve.measured else {},
-        "needs": tuple(dict.fromkeys((*along.needs, *part.needs, *_numbered(curve)))),
-        "states": {name: unit_for(unit, drive) for name, unit in along.states},
-        "starts": dict(along.starts),
+        "channels": {FOLLOWING: curve.across or curve.along} if curve.measured else {},
+        "needs": tuple(dict.fromkeys((*needs, *part.needs, *_numbered(curve)))),
+        "states": {name: unit_for(unit, drive) for name, unit in states},
+        "starts": dict(starts),
         "passive": curve.passive,
         "zero_at_rest": curve.rests or part.alone or part.expression != "{g}",
     }

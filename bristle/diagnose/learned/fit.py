@@ -23,9 +23,13 @@ from .promise import Promise, distinct
 from .residual import residual_of
 from .rule import LEARN, LearnRule
 from .screen import promises
+from .surface import continued, surfaces
 
 TRIED = 4
 """Curves that are fitted with everything else, of those that promise most."""
+
+SURFACES = 2
+"""Surfaces that are fitted so where no curve along one signal explains the error."""
 
 CLOSED = 2
 """Closed forms that are fitted in the place of a curve, until one does as well."""
@@ -91,7 +95,11 @@ def learn(
     before, train, held_out = opened.before, opened.searched, opened.held_out
     residual = residual_of(train, before.model)
     worth = (1.0 - rule.gain) ** 2 * Normal(residual).without_curve()
-    found = [one for one in promises(residual, parts, along, learning) if one.loss <= worth]
+    promised = promises(residual, parts, along, learning)
+    if len(along) > 1:
+        promised += surfaces(residual, parts, along, learning)
+        promised.sort(key=lambda one: learning.weighed(one.loss, one.curve))
+    found = [one for one in promised if one.loss <= worth]
     chosen = distinct(found, TRIED, learning.near)
     if not chosen:
         why = "No curve lowers the error on stretches of the training runs that it has not seen."
@@ -99,8 +107,11 @@ def learn(
     fitted = _best_first(_fitted(chosen, name, before.model, train, held_out), learning)
     if fitted[0].trial.train > rule.clean:
         model = with_law_of(before.model, fitted[0])
-        other = _others(promises(residual_of(train, model), parts, along, learning), fitted)
-        more = _fitted(distinct(other, TRIED, learning.near), name, model, train, held_out)
+        again = residual_of(train, model)
+        other = _others(promises(again, parts, along, learning), fitted)
+        two = _others(surfaces(again, parts, along, learning), fitted)
+        tried = [*distinct(other, TRIED, learning.near), *distinct(two, SURFACES, learning.near)]
+        more = _fitted(tried, name, model, train, held_out)
         fitted = _best_first([*fitted, *more], learning)
     refusals = [_refusal(before, one, rule, learning) for one in fitted]
     place = refusals.index("") if "" in refusals else 0
@@ -110,7 +121,7 @@ def learn(
 
 
 def _best_first(fitted: Sequence[Fitted], learning: LearnRule) -> list[Fitted]:
-    return sorted(fitted, key=lambda one: learning.weighed(one.loss, one.curve.memory))
+    return sorted(fitted, key=lambda one: learning.weighed(one.loss, one.curve))
 
 
 def with_law_of(base: Model, best: Fitted) -> Model:
@@ -126,8 +137,8 @@ def with_law_of(base: Model, best: Fitted) -> Model:
 
 def _others(found: Sequence[Promise], fitted: Sequence[Fitted]) -> list[Promise]:
     """Return promises of parts and signals that no curve was fitted to."""
-    done = {(one.curve.part, one.curve.along) for one in fitted}
-    return [one for one in found if (one.curve.part, one.curve.along) not in done]
+    done = {one.curve.kind for one in fitted}
+    return [one for one in found if one.curve.kind not in done]
 
 
 def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRule) -> str:
@@ -251,6 +262,11 @@ def _inside(curve: Curve, own: str, base: Model, train: Problem, held_out: Probl
         curve, values=tuple(model.value(entry) for entry in entries),
         memory=tuple((n, model.value(f"{own}.{n}")) for n, _ in curve.memory),
     )  # fmt: skip
+    if fitted.across:
+        fitted = continued(fitted)
+        model = replace(
+            model, values={**model.values, **dict(zip(entries, fitted.values, strict=True))}
+        )
     trial = judge(model, train, held_out)
     deviations = tuple(std.get(entry, 0.0) for entry in entries)
     return Fitted(fitted, deviations, trial, _left_out(train, model))

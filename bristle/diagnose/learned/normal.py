@@ -18,9 +18,9 @@ HELD = (0.0, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 
 class Hats(NamedTuple):
-    """Hat functions of `knots` at samples: knot `at` (n,) below each, `share` (n,) beyond it.
+    """Hat functions of `knots` at samples: the knots `at` (n, m) that each feels, with `share`.
 
-    They are constant beyond the ends.
+    They are constant beyond the ends. The shares of a sample add up to 1.
     """
 
     at: NDArray[np.int64]
@@ -32,7 +32,19 @@ def hats_at(values: Array, knots: Array) -> Hats:
     """Return the hat functions of knots (k,) at values (n,)."""
     at = np.clip(np.searchsorted(knots, values, side="right") - 1, 0, len(knots) - 2)
     share = np.clip((values - knots[at]) / (knots[at + 1] - knots[at]), 0.0, 1.0)
-    return Hats(at, share, len(knots))
+    return Hats(np.stack([at, at + 1], axis=1), np.stack([1.0 - share, share], axis=1), len(knots))
+
+
+def products(first: Hats, second: Hats) -> Hats:
+    """Return the hat functions of a grid: those along one signal times those along another one.
+
+    The knots of the first lie beside one another: knot k at level l is the one of number
+    l * first.knots + k.
+    """
+    n = len(first.at)
+    at = second.at[:, :, None] * first.knots + first.at[:, None, :]
+    share = second.share[:, :, None] * first.share[:, None, :]
+    return Hats(at.reshape(n, -1), share.reshape(n, -1), first.knots * second.knots)
 
 
 class Normal:
@@ -71,7 +83,7 @@ class Normal:
     def with_curve(self, column: Array, hats: Hats, free: list[int]) -> Normal:
         """Return the equations with a curve's values at its `free` knots.
 
-        Each sample feels two knots, so that sums over knots take the place of products of columns.
+        Each sample feels few knots, so that sums over knots take the place of products of columns.
 
         Parameters
         ----------
@@ -80,29 +92,25 @@ class Normal:
         free : knots (from 0) whose value is not held at zero
         """
         residual, folds, count = self.residual, len(self.powers), hats.knots
-        below, above = (1.0 - hats.share) * column, hats.share * column
-        index = residual.fold * count + hats.at
-
-        def summed(values: Array) -> Array:
-            total = np.bincount(index, values, folds * count)
-            return np.asarray(total, dtype=float).reshape(folds, count)
+        felt = [hats.share[:, m] * column for m in range(hats.at.shape[1])]
+        places = [residual.fold * count + hats.at[:, m] for m in range(hats.at.shape[1])]
 
         def both(values: Array) -> Array:
-            out = summed(values * below)
-            out[:, 1:] += summed(values * above)[:, :-1]
-            return out
+            total = np.zeros(folds * count)
+            for place, part in zip(places, felt, strict=True):
+                total += np.bincount(place, values * part, folds * count)
+            return total.reshape(folds, count)
 
         weight = residual.weight
-        own = np.zeros((folds, count, count))
-        knot = np.arange(count)
-        own[:, knot, knot] = summed(weight * below**2)
-        own[:, knot[1:], knot[1:]] += summed(weight * above**2)[:, :-1]
-        beside = summed(weight * below * above)[:, :-1]
-        own[:, knot[:-1], knot[1:]] = beside
-        own[:, knot[1:], knot[:-1]] = beside
+        own = np.zeros(folds * count * count)
+        for place, part in zip(places, felt, strict=True):
+            for m, other in enumerate(felt):
+                pair = place * count + hats.at[:, m]
+                own += np.bincount(pair, weight * part * other, len(own))
+        squares = own.reshape(folds, count, count)[:, free][:, :, free]
         mixed = np.array([both(column) for column in self._weighted.T]).transpose(1, 2, 0)
         sides = both(weight * residual.r)[:, free]
-        return self._with(mixed[:, free], own[:, free][:, :, free], sides)
+        return self._with(mixed[:, free], squares, sides)
 
     def with_columns(self, columns: Array) -> Normal:
         """Return the equations with more unknowns, of which each adds a column.

@@ -28,9 +28,9 @@ def distinct(found: Sequence[Promise], count: int, near: float = LEARN.near) -> 
     count : how many at most
     near : times the loss of the best one
     """
-    first: dict[tuple[str, str], Promise] = {}
+    first: dict[tuple[str, str, str], Promise] = {}
     for one in found:
-        special = (one.curve.part, one.curve.signal.contains)
+        special = (one.curve.part, one.curve.signal.contains, "")
         if one.loss <= near * found[0].loss and special not in first:
-            first.setdefault((one.curve.part, one.curve.along), one)
+            first.setdefault(one.curve.kind, one)
     return list(first.values())[:count]

@@ -90,7 +90,7 @@ def promises(
         if set(dict(one.curve.memory)).difference(GIVEN) and one.curve.part != RING
     ][:TUNED]
     kept += [_tuned(known, one) for one in remembering]
-    return sorted(kept, key=lambda one: rule.weighed(one.loss, one.curve.memory))
+    return sorted(kept, key=lambda one: rule.weighed(one.loss, one.curve))
 
 
 def _tuned(known: Normal, one: Promise) -> Promise:
@@ -209,7 +209,7 @@ def _promise(
     free = [k for k in range(len(knots)) if k not in held]
     normal = known.with_curve(residual.parts[part], hats, free)
     bend = np.diff(np.eye(len(knots)), 2, axis=0)[:, free]
-    smooth = _smoothest(normal, known.grams.shape[1], bend.T @ bend)
+    smooth = smoothest(normal, known.grams.shape[1], bend.T @ bend)
     if smooth is None:
         return None
     loss, found, freedom = smooth
@@ -228,7 +228,9 @@ def _promise(
     return Promise(curve, loss)
 
 
-def _smoothest(normal: Normal, p: int, shape: Array) -> tuple[float, Array, float] | None:
+def smoothest(
+    normal: Normal, p: int, shape: Array, weights: Sequence[float] = SMOOTH
+) -> tuple[float, Array, float] | None:
     """Return what the best smoothness leaves, with the curve's values and their freedom.
 
     None where the samples say nothing of the curve.
@@ -238,13 +240,14 @@ def _smoothest(normal: Normal, p: int, shape: Array) -> tuple[float, Array, floa
     normal : equations with a curve
     p : how many of their unknowns are the law's
     shape : (k, k) whose quadratic form is the penalty
+    weights : of the penalty that are tried, in terms of the curve's own information
     """
     gram = normal.grams.sum(axis=0)
     own = float(np.trace(gram[p:, p:])) / max(len(shape), 1)
     if not own > 0.0:
         return None
     best, penalty = np.inf, np.zeros_like(gram)
-    for weight in SMOOTH:
+    for weight in weights:
         tried = np.zeros_like(gram)
         tried[p:, p:] = weight * own * shape
         loss = normal.left_out(tried)
@@ -305,7 +308,7 @@ def _slipping(known: Normal) -> Promise | None:
     shown = _values(residual, signal_of(travels), {}) * residual.parts["force"][:, None]
     left = list(range(len(travels)))
     while len(left) > 1:  # a table has two knots at least
-        smooth = _smoothest(known.with_columns(shown[:, left]), p, np.eye(len(left)))
+        smooth = smoothest(known.with_columns(shown[:, left]), p, np.eye(len(left)))
         if smooth is None:
             return None
         loss, found, _ = smooth

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bingham_runs import NOISE, NOWHERE, STEP, VALUES, T, runs
 
 from bristle.data.extra import Extra
 from bristle.diagnose.learned.along import rebuilt
@@ -17,33 +18,10 @@ from bristle.diagnose.learned.rule import LEARN
 from bristle.diagnose.learned.screen import knots_of, promises
 from bristle.diagnose.learned.slip import SLIP, slips
 from bristle.errors import RecordError
-from bristle.identify.bench import Bench
 from bristle.identify.fit import Model, Problem, Run, fit
 from bristle.identify.run_labels import tracks_of
 from bristle.physics.effect import EFFECTS
 from bristle.physics.user import defined
-
-STEP = 0.002  # s
-T = STEP * np.arange(3000)
-VALUES = {"f_c": 1.3, "f_v": 0.83, "c_0": 100.0, "c_v": 20.0, "v_n": 0.02}
-NOISE = 0.05  # N
-NOWHERE = np.zeros((0, len(T), 4))
-
-
-def runs(hidden=lambda x, v, V, F: F):
-    """Return three runs of a Bingham damper with something hidden, the motion without noise."""
-    out = []
-    for seed in range(3):
-        random = np.random.default_rng(seed)
-        w = 2.0 * np.pi * random.uniform(0.4, 4.0, 8)
-        angle = w[:, None] * T + random.uniform(0.0, 6.0, 8)[:, None]
-        size = 0.05 / w
-        x, v, a = size @ np.sin(angle), (size * w) @ np.cos(angle), -(size * w**2) @ np.sin(angle)
-        V = np.repeat(random.choice([0.0, 3.0, 6.0], 12), len(T) // 12)
-        force = hidden(x, v, V, Bench("bingham", []).force(x, v, a, V, STEP, VALUES))
-        force = force + NOISE * random.standard_normal(len(T))
-        out.append(Run(f"run{seed}", STEP, x, v, a, V, force, NOISE, NOWHERE))
-    return Problem(out)
 
 
 def first_of(hidden):
@@ -175,8 +153,7 @@ def test_sums_over_knots_are_those_of_columns():
     knots = knots_of(x, 7)
     hats = hats_at(x, knots)
     dense = np.zeros((len(x), 7))
-    dense[np.arange(len(x)), hats.at] = 1.0 - hats.share
-    dense[np.arange(len(x)), hats.at + 1] += hats.share
+    np.add.at(dense, (np.arange(len(x))[:, None], hats.at), hats.share)
     columns = np.hstack([residual.known, dense * residual.parts["fluid"][:, None]])
     weighted = columns * residual.weight[:, None]
     normal = Normal(residual).with_curve(residual.parts["fluid"], hats, list(range(7)))
