@@ -106,17 +106,18 @@ def law_history(
     setup, motion, z, z1, out : as in `force_history`
     tracks, work : not needed here
     """
-    law, p = setup.law, setup.p
+    law, p, h = setup.law, setup.p, 0.0
     x, v, a, V, dt = motion.x, motion.v, motion.a, motion.V, motion.dt
     before = Inputs(x[0], v[0], a[0], V[0], 0.0, 0.0, 0.0, False)
-    out[0] = law_step(law, p, before, before, z, z1)[0]
-    for k in range(1, len(x)):
-        V1 = before_jump(V, k) if setup.lags else V[k]
-        now = Inputs(x[k], v[k], a[k], V1, dt, 0.0, 0.0, False)
+    for k in range(len(x)):  # the first sample too: a second call would be compiled once more
+        V1 = before_jump(V, k) if setup.lags and k > 0 else V[k]
+        now = Inputs(x[k], v[k], a[k], V1, h, 0.0, 0.0, False)
         out[k] = law_step(law, p, before, now, z, z1)[0]
-        before = Inputs(x[k], v[k], a[k], V[k], dt, 0.0, 0.0, False)
-        for i in range(setup.n_own):
-            z[i] = z1[i]
+        before = Inputs(x[k], v[k], a[k], V[k], h, 0.0, 0.0, False)
+        if k > 0:
+            for i in range(setup.n_own):
+                z[i] = z1[i]
+        h = dt
 
 
 def compiled_history(effects: bool = True) -> Callable[..., None]:
