@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ..data.command_limits import JUMP
 from ..physics import damper
+from ..physics.damper_setup import parameter_places, state_places
 from ..physics.inputs import Inputs, Setup
 from ..physics.laws import LAWS
 from .ahead import Ahead, begun
@@ -27,6 +28,7 @@ law_step = damper.step_law
 
 _ONE_AT_A_TIME = Lock()
 _ahead: Ahead | None = None
+_SIGNALS = ("x", "v", "a", "V")
 _NO_TRACKS: Mapping[str, Array] = MappingProxyType({})
 
 
@@ -104,17 +106,18 @@ def law_history(
     setup, motion, z, z1, out : as in `force_history`
     tracks, work : not needed here
     """
-    law, p = setup.law, setup.p
+    law, p, h = setup.law, setup.p, 0.0
     x, v, a, V, dt = motion.x, motion.v, motion.a, motion.V, motion.dt
     before = Inputs(x[0], v[0], a[0], V[0], 0.0, 0.0, 0.0, False)
-    out[0] = law_step(law, p, before, before, z, z1)[0]
-    for k in range(1, len(x)):
-        V1 = before_jump(V, k) if setup.lags else V[k]
-        now = Inputs(x[k], v[k], a[k], V1, dt, 0.0, 0.0, False)
+    for k in range(len(x)):  # the first sample too: a second call would be compiled once more
+        V1 = before_jump(V, k) if setup.lags and k > 0 else V[k]
+        now = Inputs(x[k], v[k], a[k], V1, h, 0.0, 0.0, False)
         out[k] = law_step(law, p, before, now, z, z1)[0]
-        before = Inputs(x[k], v[k], a[k], V[k], dt, 0.0, 0.0, False)
-        for i in range(setup.n_own):
-            z[i] = z1[i]
+        before = Inputs(x[k], v[k], a[k], V[k], h, 0.0, 0.0, False)
+        if k > 0:
+            for i in range(setup.n_own):
+                z[i] = z1[i]
+        h = dt
 
 
 def compiled_history(effects: bool = True) -> Callable[..., None]:
@@ -203,6 +206,15 @@ class Bench:
         self.effects = list(effects)
         self._setup = damper.setup_of(law, {}, self.effects, np.array, _slots)
         self._history = compiled_history(self._setup.active)
+        # Laid down once: fits ask for thousands of forces, and to find each place takes its time.
+        self._places = parameter_places(law, damper.SLOTS)
+        self._state_places = state_places(law, damper.SLOTS)
+        self._begins = [
+            (slot, signal)
+            for state, signal in _starts(law).items()
+            if (slot := self._state_places.get(f"{state}_0")) is not None
+        ]
+        self._states, self._work = damper.SLOTS.z_size, damper.work_size()
 
     def force(
         self, x: Array, v: Array, a: Array, V: Array, dt: float, values: dict[str, float],
@@ -219,29 +231,39 @@ class Bench:
             states end in `_0`; those that start with a signal take its first value
         tracks : (n,) in SI by name, of parameters of effects that change over the run
         """
-        setup = self._setup._replace(p=np.array(damper.pack(self.law, values)))
+        p, z = self._setup.p.copy(), np.zeros(self._states)
         first = {"x": x[0], "v": v[0], "a": a[0], "V": V[0]}
-        initial = {
-            f"{effect.name}.{state}_0": first[signal]
-            for effect in damper.SLOTS.effects
-            for state, signal in effect.starts.items()
-            if signal in first
-        }
-        for state, signal in LAWS[self.law].starts.items():
-            initial[f"{state}_0"] = first[signal]
-        z = np.array(damper.start_states(self.law, {**initial, **values}))
+        for slot, signal in self._begins:
+            z[slot] = first[signal]
+        for name, value in values.items():
+            for slot in self._places.get(name, ()):
+                p[slot] = value
+            if name in self._state_places:
+                z[self._state_places[name]] = value
+        setup = self._setup._replace(p=p)
         out = np.empty(len(x))
         # Each layout in memory would be compiled by itself.
         x, v, a, V = (np.ascontiguousarray(channel) for channel in (x, v, a, V))
         motion = Inputs(x, v, a, V, dt, 0.0, 0.0, False)
-        slots = [damper.SLOTS.parameters[name] for name in tracks]
+        slots = [self._places[name][0] for name in tracks]
         changing = Tracks(
             np.array(slots, dtype=np.int64),
             np.array(list(tracks.values()), dtype=float).reshape(len(slots), len(x)),
         )
-        work = np.zeros(damper.work_size())
+        work = np.zeros(self._work)
         self._history(setup, motion, changing, z, np.zeros_like(z), work, out)
         return out
+
+
+def _starts(law: str) -> dict[str, str]:
+    """Return the signal that each state begins with, of those that a motion has, by the state."""
+    begun = {
+        f"{effect.name}.{state}": signal
+        for effect in damper.SLOTS.effects
+        for state, signal in effect.starts.items()
+        if signal in _SIGNALS
+    }
+    return {**begun, **LAWS[law].starts}
 
 
 def _slots(numbers: list[Any]) -> NDArray[Any]:

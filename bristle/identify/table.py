@@ -1,7 +1,9 @@
 """Errors of the laws as Shirazi et al. (2012), section III-C, judge them.
 
 The quadratic error of the force, measured and predicted force low-passed alike, is minimised from
-several starting points; standard laws lack the exponential.
+several starting points; standard laws lack the exponential. The low-pass leaves little above its
+cut-off, so the searches from the starts take a part of the samples. What they end at is fitted
+once more to all samples.
 """
 
 from __future__ import annotations
@@ -37,7 +39,14 @@ ORDER = 4
 REST = 1e-3
 """Speed [m/s] below which a law with a sign is not valid: the damper may be stuck there."""
 
+THINNED = 8.0
+"""Samples per period of the cut-off that searches from the starts keep, at the least."""
+
+ENOUGH = 3000
+"""Samples of all runs together that they keep, at the least."""
+
 _ALIKE = 1e-3
+_FIRST, _LAST = 1e-3, 1e-4  # relative gain at which a search on a part of the samples, on all, ends
 _QUADRATIC = 1e3  # residuals divided by this stay where the search's loss is quadratic
 
 
@@ -48,7 +57,8 @@ class LawError:
     `train`, `holdout` the RMS error of the low-passed force [N], `nan` where there is no run;
     `moving` that of held-out samples (else of training samples) faster than `REST`; `share` the
     error on held-out (else training) runs over the RMS of the force; `starts`, `agreed` how many
-    starts were tried and how many came to the same end.
+    starts were tried and how many came to the same end, judged on the samples that the searches
+    from the starts take.
     """
 
     law: str
@@ -84,15 +94,23 @@ def low_pass(y: Array, dt: float, cutoff: float = CUTOFF) -> Array:
     RecordError
         If the cut-off is negative or not a number.
     """
-    from scipy.signal import sosfiltfilt
+    from scipy.signal import sosfilt
 
     if not cutoff >= 0.0:
         raise RecordError(f"cut-off {cutoff} Hz; 0 for none, or a positive number is right.")
     if cutoff == 0.0 or cutoff >= 0.5 / dt:
         return np.asarray(y, dtype=float)
-    sections = _sections(float(cutoff), float(dt))
-    pad = min(np.shape(y)[-1] - 1, max(30, int(1.0 / (cutoff * dt))))
-    return np.asarray(sosfiltfilt(sections, y, padlen=pad), dtype=float)
+    sections, settled = _sections(float(cutoff), float(dt))
+    y = np.asarray(y, dtype=float)
+    pad = min(y.shape[-1] - 1, max(30, int(1.0 / (cutoff * dt))))
+    settled = settled.reshape(len(sections), *(1,) * (y.ndim - 1), 2)
+    # What `scipy.signal.sosfiltfilt` does, which finds the settled state anew each time.
+    before, after = y[..., pad:0:-1], y[..., -2 : -pad - 2 : -1]
+    y = np.concatenate((2.0 * y[..., :1] - before, y, 2.0 * y[..., -1:] - after), axis=-1)
+    for _ in range(2):
+        y, _ = sosfilt(sections, y, zi=settled * y[..., :1])
+        y = y[..., ::-1]
+    return np.ascontiguousarray(y[..., pad : y.shape[-1] - pad])
 
 
 def low_passed(signals: Sequence[Array], steps: Sequence[float], cutoff: float) -> list[Array]:
@@ -115,10 +133,12 @@ def low_passed(signals: Sequence[Array], steps: Sequence[float], cutoff: float) 
 
 
 @cache
-def _sections(cutoff: float, dt: float) -> Array:
-    from scipy.signal import butter
+def _sections(cutoff: float, dt: float) -> tuple[Array, Array]:
+    """Return the sections of the filter, and their states where the signal has long been 1."""
+    from scipy.signal import butter, sosfilt_zi
 
-    return np.asarray(butter(ORDER, cutoff, fs=1.0 / dt, output="sos"))
+    sections = np.asarray(butter(ORDER, cutoff, fs=1.0 / dt, output="sos"))
+    return sections, np.asarray(sosfilt_zi(sections))
 
 
 def error_table(
@@ -162,8 +182,16 @@ def _law_error(
     model = Model(base.name, (), dict(variant.values))
     if steady(train):
         model = without(model, base.driven())
-    ends = [_fit_filtered(train, one, cutoff) for one in start_models(train, model, starts)]
-    best, cost = min(ends, key=lambda end: end[1])
+    few = _thinned(train, cutoff) if base.exact() else train
+    whole = None if few is train else train
+    ends = [_fit_filtered(few, one, cutoff, whole) for one in start_models(few, model, starts)]
+    ends = sorted(ends, key=lambda end: end[1])
+    tried, cost = len(ends), ends[0][1]
+    agreed = sum(end[1] <= cost * (1.0 + _ALIKE) for end in ends)
+    if few is not train:
+        # Of those that agree the first stands for all; the next one may still overtake it.
+        ends = [_fit_filtered(train, end[0], cutoff) for end in (ends[0], *ends[agreed:][:1])]
+    best, _ = min(ends, key=lambda end: end[1])
     deciding = holdout if holdout is not None and holdout.runs else train
     errors = filtered_errors(deciding, best, cutoff)
     moving = [
@@ -174,8 +202,21 @@ def _law_error(
     return LawError(
         law, best, _rms(filtered_errors(train, best, cutoff)),
         held_out if deciding is not train else float("nan"), _rms(moving), held_out / _rms(force),
-        len(ends), sum(end[1] <= cost * (1.0 + _ALIKE) for end in ends),
+        tried, agreed,
     )  # fmt: skip
+
+
+def _thinned(problem: Problem, cutoff: float) -> Problem:
+    """Return the runs with as few of their samples as tell a low-passed force."""
+    samples = sum(len(run.force) for run in problem.runs)
+    runs = []
+    for run in problem.runs:
+        every = int(1.0 / (THINNED * cutoff * run.dt)) if cutoff else 1
+        every = max(1, min(every, samples // ENOUGH))
+        part = run.of(slice(None, None, every))
+        runs.append(replace(part, dt=run.dt * every, skip=-(-run.skip // every)))
+    fewer = any(len(a.force) < len(b.force) for a, b in zip(runs, problem.runs, strict=True))
+    return problem.of(runs) if fewer else problem
 
 
 def filtered_errors(problem: Problem, model: Model, cutoff: float = CUTOFF) -> list[Array]:
@@ -200,8 +241,18 @@ def _rms(parts: list[Array]) -> float:
     return float(np.sqrt(np.mean(whole * whole))) if len(whole) else float("nan")
 
 
-def _fit_filtered(problem: Problem, model: Model, cutoff: float) -> tuple[Model, float]:
-    """Return the least-squares fit of the low-passed force from one start, and its RMS error."""
+def _fit_filtered(
+    problem: Problem, model: Model, cutoff: float, shown: Problem | None = None
+) -> tuple[Model, float]:
+    """Return the least-squares fit of the low-passed force from one start, and its RMS error.
+
+    Parameters
+    ----------
+    problem : the runs
+    model : where the search begins
+    cutoff : Hz
+    shown : what whoever watches is shown, where `problem` has a part of its samples alone
+    """
     from .fit import Scaled
 
     none = [(np.zeros(1), np.ones(1), np.zeros((1, 1))) for _ in problem.runs]
@@ -215,9 +266,11 @@ def _fit_filtered(problem: Problem, model: Model, cutoff: float) -> tuple[Model,
     def share(r: Array) -> float:
         return _QUADRATIC * _rms([r])
 
-    with watched(problem, scaled.at, share, over_noise=False) as accepted:
+    whole = shown is None
+    with watched(shown or problem, scaled.at, share, over_noise=False, last=whole) as accepted:
         found = descend(
-            residuals, scaled.start, scaled.low, scaled.high, 12, tolerance=1e-4, accepted=accepted
-        )
+            residuals, scaled.start, scaled.low, scaled.high, 12,
+            tolerance=_LAST if whole else _FIRST, accepted=accepted,
+        )  # fmt: skip
     best = scaled.at(found.theta)
     return replace(best, values=dict(best.values)), error_rms(problem, best, cutoff)

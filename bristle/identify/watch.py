@@ -77,6 +77,7 @@ def watched(
     at: Callable[[Array], Model],
     share: Callable[[Array], float],
     over_noise: bool = True,
+    last: bool = True,
 ) -> Iterator[Accepted | None]:
     """Give what `search.descend` tells its accepted steps to, None where nobody watches.
 
@@ -86,12 +87,14 @@ def watched(
     at : theta (p,) of the search to the model there
     share : its residuals (n,) to the RMS error over the RMS of the force
     over_noise : whether its residuals are over the noise, so that its cost tells z
+    last : whether its end may be what comes of the series; not that of a search on a part of the
+        samples, whose errors are not those of all
     """
     present = _series.get()
     if present is None:
         yield None
         return
-    search = _Search(present, problem, at, share, over_noise)
+    search = _Search(present, problem, at, share, over_noise, last)
     yield search
     search.end()
 
@@ -151,8 +154,8 @@ class _Series:
         """Whether it is time for another snapshot."""
         return time.monotonic() - self._last >= EVERY
 
-    def give(self, model: Model, problem: Problem, told: Mapping[str, Any]) -> None:
-        """Give a snapshot of a model that a search came to."""
+    def give(self, model: Model, problem: Problem, told: Mapping[str, Any], last: bool) -> None:
+        """Give a snapshot of a model that a search came to; `last` as in `watched`."""
         shown = _cycles_of(problem)
         runs = {one.run for one in shown}
         forces = {run: problem.predict(model, problem.runs[run]) for run in runs}
@@ -170,13 +173,14 @@ class _Series:
         )  # fmt: skip
         self._last = time.monotonic()
         self._told = _Told(model, problem, told)
-        if told["z"] is None and (self._best is None or told["share"] < self._best.told["share"]):
+        better = self._best is None or told["share"] < self._best.told["share"]
+        if last and told["z"] is None and better:
             self._best = self._told
 
     def end(self) -> None:
         """Give the best of searches for the least RMS error once more: it is what comes of them."""
         if self._best is not None and self._best is not self._told:
-            self.give(*self._best)
+            self.give(*self._best, last=True)
 
 
 class _Search:
@@ -184,10 +188,10 @@ class _Search:
 
     def __init__(
         self, series: _Series, problem: Problem, at: Callable[[Array], Model],
-        share: Callable[[Array], float], over_noise: bool,
+        share: Callable[[Array], float], over_noise: bool, last: bool,
     ) -> None:  # fmt: skip
         self._series, self._problem, self._at = series, problem, at
-        self._share, self._over_noise = share, over_noise
+        self._share, self._over_noise, self._is_last = share, over_noise, last
         self._number, self._errors = series.begin()
         self._left: tuple[Array, Array, float | None] | None = None  # what was not told yet
 
@@ -206,7 +210,7 @@ class _Search:
         told = {
             "search": self._number, "step": len(self._errors) - 1, "share": self._share(r), "z": z,
         }  # fmt: skip
-        self._series.give(self._at(theta), self._problem, told)
+        self._series.give(self._at(theta), self._problem, told, self._is_last)
 
 
 class _Cycle:

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ..data.model import StudyModel
-from ..diagnose.law_trials import LawTrial
-from ..diagnose.law_verdict import rows_of
 from ..errors import StudyError
 from ..identify.fit import Fit, Problem
 from ..identify.rig_fit import SiteModel
@@ -19,6 +17,8 @@ from .history import Step
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from ..diagnose.law_trials import LawTrial
 
 
 @dataclass(frozen=True)
@@ -121,6 +121,11 @@ class Identified:
     def as_dict(self) -> dict[str, Any]:
         """Return what json can hold."""
         rows = {row["name"]: row for row in self.parameters()}
+        laws: dict[str, Any] = {}
+        if self.laws:
+            from ..diagnose.law_verdict import rows_of
+
+            laws["laws"] = rows_of(self.laws)
         return {
             "schema": 1,
             "law": split_form(self.model.law)[0],
@@ -138,7 +143,7 @@ class Identified:
             "after": self.after,
             "table": [row.as_dict() for row in self.table],
             "forms": [row.as_dict() for row in self.forms],
-            **({"laws": rows_of(self.laws)} if self.laws else {}),
+            **laws,
             "notes": list(self.notes),
             "step": self.step.number if self.step else None,
         }

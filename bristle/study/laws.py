@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ..data.checks.levels import tells_a_bend
 from ..data.model import StudyModel, new_model
-from ..diagnose.law_text import left_out
-from ..diagnose.law_trials import LawTrial, not_finite, try_laws
 from ..errors import StudyError
 from ..findings import command
 from ..identify.model import Model
@@ -20,6 +19,9 @@ from ..progress import tell
 from .runs import Runs
 from .settings import ALL
 from .study import Study
+
+if TYPE_CHECKING:
+    from ..diagnose.law_trials import LawTrial
 
 
 def refuse_in_building(law: str | None, in_building: bool) -> None:
@@ -64,6 +66,8 @@ def all_laws(rig: Rig, runs: Runs, present: Model) -> tuple[LawTrial, ...]:
     StudyError
         If the rig is a building.
     """
+    from ..diagnose.law_trials import try_laws
+
     refuse_in_building(ALL, rig.building is not None)
     tell("trying every law")
     site = rig.sites(present)[DAMPER]
@@ -79,6 +83,9 @@ def left_out_notes(rig: Rig, present: Model) -> tuple[str, ...]:
     rig : the bench with its runs
     present : the model as it is
     """
+    from ..diagnose.law_text import left_out
+    from ..diagnose.law_trials import not_finite
+
     unfit = not_finite(rig.sites(present)[DAMPER].train, present)
     return (left_out(unfit),) if unfit else ()
 

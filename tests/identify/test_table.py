@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfiltfilt
 
 from bristle.errors import RecordError
+from bristle.identify import table
 from bristle.identify.bench import Bench
 from bristle.identify.fit import Problem, Run
 from bristle.identify.table import error_table, low_pass
@@ -38,6 +40,34 @@ def test_the_filter_has_no_phase_and_halves_the_power_twice_at_its_cut_off():
     assert np.array_equal(low_pass(fast, DT, 0.0), fast)
     with pytest.raises(RecordError, match="cut-off"):
         low_pass(fast, DT, -1.0)
+
+
+@pytest.mark.parametrize("shape", [(700,), (3, 700), (20,), (2, 5, 40)])
+def test_the_filter_is_that_of_scipy(shape):
+    y = np.random.default_rng(1).standard_normal(shape)
+    sections = butter(table.ORDER, 18.0, fs=1.0 / DT, output="sos")
+    expected = sosfiltfilt(sections, y, padlen=min(shape[-1] - 1, 30))
+    assert low_pass(y, DT) == pytest.approx(expected, rel=1e-12, abs=1e-14)
+
+
+@pytest.mark.parametrize("law", ["bingham", "lugre"])
+def test_searches_on_a_part_of_the_samples_end_where_those_on_all_do(law, monkeypatch):
+    train, held = problem(law, {}, 1), problem(law, {}, 2)
+    laws = (law, f"{law}_standard", "dahl")
+    asked = {"cutoff": 5.0, "laws": laws, "starts": 2}
+    whole = error_table(train, held, **asked)
+    monkeypatch.setattr(table, "ENOUGH", 500)  # of 3000, every sixth is kept
+    assert len(table._thinned(train, 5.0).runs[0].force) == N // 6
+    for one, other in zip(error_table(train, held, **asked), whole, strict=True):
+        assert one.train == pytest.approx(other.train, rel=1e-3)
+        assert one.holdout == pytest.approx(other.holdout, rel=5e-3)
+        assert one.starts == other.starts
+
+
+def test_few_samples_and_a_force_without_a_filter_are_kept_whole():
+    made = problem("bingham", {}, 1)
+    assert table._thinned(made, 18.0) is made
+    assert table._thinned(made, 0.0) is made
 
 
 def test_the_law_that_made_the_data_has_the_least_error():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from identify.test_fit import bench_run, truth_of
 
-from bristle.identify import watch
+from bristle.identify import table, watch
 from bristle.identify.fit import Fit, Model, Problem, fit, identify
 from bristle.identify.search import z_of
 from bristle.identify.table import error_table, force_rms
@@ -102,7 +102,11 @@ def test_a_fit_is_the_same_to_the_last_bit_whether_it_is_watched_or_not(problem:
 
 
 @pytest.mark.usefixtures("every_step")
-def test_laws_side_by_side_are_each_told_of_and_end_with_their_best(problem: Problem) -> None:
+@pytest.mark.parametrize("enough", [table.ENOUGH, 400])  # all samples, then a part of them first
+def test_laws_side_by_side_are_each_told_of_and_end_with_their_best(
+    problem: Problem, enough: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(table, "ENOUGH", enough)
     laws = ("bingham", "tanh", "bingham_standard")
     alone = error_table(problem, None, laws=laws, starts=2)
     seen: Seen = []
