@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from identify.test_fit import bench_run, truth_of
+from known_runs import bench_run, truth_of
 
 from bristle.identify import table, watch
 from bristle.identify.fit import Fit, Model, Problem, fit, identify
