@@ -17,7 +17,7 @@ UNSHOWN = 0.05
 NINE_OF_TEN = 1.282
 """Standard deviations above the mean that 9 of 10 stay below."""
 
-MARGIN = 1.2
+MARGIN = 1.08
 """Factor on the distance from which an effect is named: z is robust, so that large residuals count
 less than their squares, and other effects take up a part. `python -m benchmarks limits --named`
 counts what comes of it."""
