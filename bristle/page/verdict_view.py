@@ -53,7 +53,8 @@ def learned(study: Study) -> list[dict[str, Any]]:
     """Return the curves that were learned from a study's runs and whose effects it still has.
 
     Each with the half of its 95 % interval and the closed form nearest to it, as `bristle learn`
-    left them in reports/; without numbers where what was learned is no curve.
+    left them in reports/; of a surface the rows of its levels. Without numbers where what was
+    learned is neither.
     """
     found = []
     for file in sorted(study.reports_folder.glob("*.json")):
@@ -69,6 +70,13 @@ def learned(study: Study) -> list[dict[str, Any]]:
                 "unit": told["unit"], "along_unit": told["along_unit"],
                 "form": told["forms"][0]["formula"],
                 "nearest": {key: np.array(values) for key, values in nearest.items()},
+            }  # fmt: skip
+        elif told.get("levels"):  # a surface: a row of values for each level
+            rows = np.array(told["values"], dtype=float).reshape(len(told["levels"]), -1)
+            one |= {
+                "rows": [row.copy() for row in rows], "unit": told["unit"],
+                **{key: told[key] for key in ("along", "along_unit", "across", "across_unit")},
+                **{key: np.array(told[key], dtype=float) for key in ("knots", "levels")},
             }  # fmt: skip
         found.append(one)
     return found

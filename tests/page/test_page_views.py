@@ -172,6 +172,14 @@ def test_view_4_draws_what_was_learned_with_its_interval(home: Path, tmp_path: P
     (folder / "reports" / "learned_1.json").write_text(json.dumps({**told, "forms": []}))
     (one,) = verdict_view.answer(folder, {})["learned"]
     assert "knots" not in one  # a mode is no curve
+    surface = {
+        **told, "forms": [], "across": "voltage", "across_unit": "V", "levels": [0.0, 8.0],
+        "values": [-1.0, 0.0, 1.0, -2.0, 0.0, 2.0], "std": [0.1] * 6,
+    }  # fmt: skip
+    (folder / "reports" / "learned_1.json").write_text(json.dumps(surface))
+    (one,) = unpack(pack(verdict_view.answer(folder, {})))["learned"]
+    assert [row.tolist() for row in one["rows"]] == [[-1.0, 0.0, 1.0], [-2.0, 0.0, 2.0]]
+    assert one["levels"].tolist() == [0.0, 8.0]
 
 
 def test_view_5_has_the_steps_and_what_can_be_added(home: Path) -> None:

@@ -1,7 +1,7 @@
 // View 4, What is missing: verdict, evidence, limits of each effect, the next tests.
 
 import { packed } from "../api.mjs";
-import { bars, empty, h, key, shown, table, wrong, z } from "../dom.mjs";
+import { bars, empty, h, key, number, shown, table, wrong, z } from "../dom.mjs";
 import { Plot, extent } from "../plot.mjs";
 import { beforeAfter } from "../residual.mjs";
 
@@ -105,6 +105,7 @@ function tell(lines) {
 function learned(found) {
   if (!found.length) return null;
   return h("section", {}, h("h2", {}, "What was learned"), found.map((one) => {
+    if (one.rows) return surface(one);
     if (!one.knots) return h("div", {}, h("h3", {}, one.name), one.sentences.map((text) => h("p", {}, text)));
     const [[fx, ux], [fy, uy]] = [shown(one.along_unit), shown(one.unit)];
     const low = one.values.map((value, k) => value - one.half[k]);
@@ -120,6 +121,24 @@ function learned(found) {
       key(["blue", "learned"], ["floor", "95 % interval", true], ["red", `nearest form: ${one.form}`]),
       one.sentences.map((text) => h("p", {}, text)));
   }));
+}
+
+/** A surface over two signals: a curve along the first one for each level of the second. */
+function surface(one) {
+  const [[fx, ux], [fy, uy], [fz, uz]] = [shown(one.along_unit), shown(one.unit), shown(one.across_unit)];
+  const last = one.rows.length - 1;
+  const name = (k) => (k === 0 ? "blue" : k === last ? "red" : "pale");
+  const at = (k) => `${one.across} ${number(fz * one.levels[k], 3)}${uz ? ` ${uz}` : ""}`;
+  const picture = new Plot("", `${one.name}: the learned surface over ${one.along}, a curve for each level of ${one.across}`, (p) => {
+    p.axes(extent([one.knots], 0.02, fx), extent(one.rows, 0.06, fy), `${one.along}${ux ? ` [${ux}]` : ""}`, uy);
+    for (const k of [...one.rows.keys()].sort((a, b) => (name(b) === "pale") - (name(a) === "pale"))) {
+      p.line(one.knots, one.rows[k], name(k), { fx, fy, width: name(k) === "pale" ? 1.2 : 2 });
+      p.dots(one.knots, one.rows[k], name(k), { fx, fy, size: 3 });
+    }
+  });
+  return h("figure", {}, h("h3", {}, one.name), picture.canvas,
+    key(["blue", at(0)], ["pale", "levels between"], ["red", at(last)]),
+    one.sentences.map((text) => h("p", {}, text)));
 }
 
 function evidence(verdict) {
