@@ -36,11 +36,12 @@ class LearnRule:
     without a name stand for one that has a name. Found: blind seeds.
     """
 
-    surface: float = 1.05
-    """The same of a surface over two signals.
+    surface: float = 2.0
+    """What a surface must lower that part of the mean squared residual by which exceeds the noise.
 
+    As a factor: it has the values of several curves, and two curves in turn often explain as much.
     Trades: if higher, what depends on two signals at once is missed; if lower, a surface without a
-    name stands for a curve that has one. Found: blind seeds.
+    name stands for curves that have one. Found: blind seeds.
     """
 
     worth: float = 0.1
@@ -90,7 +91,9 @@ class LearnRule:
         """
         for name, _ in curve.memory:
             loss *= self.direction if name in GIVEN else self.memory
-        return loss * self.surface if curve.across else loss
+        if not curve.across:
+            return loss
+        return max(loss * self.direction, 1.0 + self.surface * (loss - 1.0))
 
 
 LEARN = LearnRule()
