@@ -109,8 +109,10 @@ def learn(
         model = with_law_of(before.model, fitted[0])
         again = residual_of(train, model)
         other = _others(promises(again, parts, along, learning), fitted)
-        two = _others(surfaces(again, parts, along, learning), fitted)
-        tried = [*distinct(other, TRIED, learning.near), *distinct(two, SURFACES, learning.near)]
+        tried = distinct(other, TRIED, learning.near)
+        if _explained(before, fitted[0], rule) < learning.enough:
+            two = _others(surfaces(again, parts, along, learning), fitted)
+            tried += distinct(two, SURFACES, learning.near)
         more = _fitted(tried, name, model, train, held_out)
         fitted = _best_first([*fitted, *more], learning)
     refusals = [_refusal(before, one, rule, learning) for one in fitted]
@@ -141,12 +143,17 @@ def _others(found: Sequence[Promise], fitted: Sequence[Fitted]) -> list[Promise]
     return [one for one in found if one.curve.kind not in done]
 
 
+def _explained(before: Trial, one: Fitted, rule: DecisionRule) -> float:
+    """Return the share of the excess z^2 - 1 on held-out runs that a curve explains."""
+    return 1.0 - rule.excess(one.trial.z) / max(rule.excess(before.z), 1e-300)
+
+
 def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRule) -> str:
     """Return why a curve is not kept; "" where it is."""
     why = ""
     if not missing(before, best.trial, rule):
         why = "does not lower the error on held-out runs beyond chance"
-    elif rule.excess(best.trial.z) > (1.0 - learning.worth) * rule.excess(before.z):
+    elif _explained(before, best, rule) < learning.worth:
         why = "explains too little of the error on held-out runs"
     told = f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
     return f"The best curve, {best.curve.words()}, {why} {told}." if why else ""

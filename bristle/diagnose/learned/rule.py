@@ -36,12 +36,19 @@ class LearnRule:
     without a name stand for one that has a name. Found: blind seeds.
     """
 
-    surface: float = 2.0
-    """What a surface must lower that part of the mean squared residual by which exceeds the noise.
+    surface: float = 1.25
+    """The same of a surface over two signals, which has the values of several curves.
 
-    As a factor: it has the values of several curves, and two curves in turn often explain as much.
     Trades: if higher, what depends on two signals at once is missed; if lower, a surface without a
-    name stands for curves that have one. Found: blind seeds.
+    name stands for a curve that has one. Found: blind seeds.
+    """
+
+    enough: float = 0.92
+    """Share of the excess z^2 - 1 from which on a curve is not compared with surfaces.
+
+    What it leaves a second curve explains as a rule. Trades: if higher, surfaces without a name
+    stand for two curves that have one; if lower, what depends on two signals at once is missed.
+    Found: blind seeds.
     """
 
     worth: float = 0.1
@@ -91,9 +98,7 @@ class LearnRule:
         """
         for name, _ in curve.memory:
             loss *= self.direction if name in GIVEN else self.memory
-        if not curve.across:
-            return loss
-        return max(loss * self.direction, 1.0 + self.surface * (loss - 1.0))
+        return loss * self.surface if curve.across else loss
 
 
 LEARN = LearnRule()
