@@ -71,9 +71,13 @@ def bilinear(
     x: float, y: float, knots: tuple[float, ...], levels: tuple[float, ...],
     rows: tuple[tuple[float, ...], ...],
 ) -> float:  # fmt: skip
-    """Return the value at (x, y) of the surface with a row of values at the knots for each level.
+    """Return the value at (x, y) of a surface: linear in x and in y, constant beyond its ends.
 
-    It is linear in x and in y between them; beyond the first and the last it keeps the value there.
+    Parameters
+    ----------
+    x, y : the two signals, in SI
+    knots, levels : where the surface is given along x and along y, ascending
+    rows : its values at the knots, a row for each level
     """
     k = 1
     while k < len(knots) - 1 and x >= knots[k]:
