@@ -94,23 +94,15 @@ def low_pass(y: Array, dt: float, cutoff: float = CUTOFF) -> Array:
     RecordError
         If the cut-off is negative or not a number.
     """
-    from scipy.signal import sosfilt
+    from scipy.signal import sosfiltfilt
 
     if not cutoff >= 0.0:
         raise RecordError(f"cut-off {cutoff} Hz; 0 for none, or a positive number is right.")
     if cutoff == 0.0 or cutoff >= 0.5 / dt:
         return np.asarray(y, dtype=float)
-    sections, settled = _sections(float(cutoff), float(dt))
-    y = np.asarray(y, dtype=float)
-    pad = min(y.shape[-1] - 1, max(30, int(1.0 / (cutoff * dt))))
-    settled = settled.reshape(len(sections), *(1,) * (y.ndim - 1), 2)
-    # What `scipy.signal.sosfiltfilt` does, which finds the settled state anew each time.
-    before, after = y[..., pad:0:-1], y[..., -2 : -pad - 2 : -1]
-    y = np.concatenate((2.0 * y[..., :1] - before, y, 2.0 * y[..., -1:] - after), axis=-1)
-    for _ in range(2):
-        y, _ = sosfilt(sections, y, zi=settled * y[..., :1])
-        y = y[..., ::-1]
-    return np.ascontiguousarray(y[..., pad : y.shape[-1] - pad])
+    sections = _sections(float(cutoff), float(dt))
+    pad = min(np.shape(y)[-1] - 1, max(30, int(1.0 / (cutoff * dt))))
+    return np.asarray(sosfiltfilt(sections, y, padlen=pad), dtype=float)
 
 
 def low_passed(signals: Sequence[Array], steps: Sequence[float], cutoff: float) -> list[Array]:
@@ -133,12 +125,10 @@ def low_passed(signals: Sequence[Array], steps: Sequence[float], cutoff: float) 
 
 
 @cache
-def _sections(cutoff: float, dt: float) -> tuple[Array, Array]:
-    """Return the sections of the filter, and their states where the signal has long been 1."""
-    from scipy.signal import butter, sosfilt_zi
+def _sections(cutoff: float, dt: float) -> Array:
+    from scipy.signal import butter
 
-    sections = np.asarray(butter(ORDER, cutoff, fs=1.0 / dt, output="sos"))
-    return sections, np.asarray(sosfilt_zi(sections))
+    return np.asarray(butter(ORDER, cutoff, fs=1.0 / dt, output="sos"))
 
 
 def error_table(
