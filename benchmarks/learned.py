@@ -30,9 +30,10 @@ import numpy as np
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.equilibrium import BuildingRuns
 from bristle.diagnose.learned.closed import closed_forms, name_of
+from bristle.diagnose.learned.closed_fit import close
 from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.effect_file import effect_text
-from bristle.diagnose.learned.fit import LearnedCurve, close, learn
+from bristle.diagnose.learned.fit import LearnedCurve, learn
 from bristle.diagnose.opening import Insufficient, Opening, opening, silent
 from bristle.identify.model import Model
 from bristle.identify.rig import DAMPER
@@ -40,7 +41,7 @@ from bristle.physics.user import defined
 
 from ._answers import Answer, Answers, ask
 from ._blind import cases
-from ._blind.plan import make_plan
+from ._blind.plan import MORE, make_plan
 from ._blind.subject import measurements
 from ._houses import LAW, ODDITIES, SHARES, house
 from ._rows import Row
@@ -139,9 +140,7 @@ def _answered(kind: str, number: int) -> Answer:
 
 def _of_bench(kind: str, number: int) -> tuple[Answer, Callable[[], Answer]]:
     """Return a case of a bench, and what gives the answer to it."""
-    many = (
-        number + 1 if kind in ("further", "crossed") else 3 * (number + 1) + 12
-    )  # of which some do not count
+    many = number + 1 if kind in MORE else 3 * (number + 1) + 12  # of which some do not count
     able = [
         task
         for task in make_plan(SEED, many, kind)

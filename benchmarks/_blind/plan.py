@@ -39,6 +39,9 @@ APART = ("structure", "shared", "further", "crossed")
 """Kinds whose cases have plans of their own: the building; an effect of `SITES` in a damper on a
 bench; effects outside the library beside those of the main plan, and such of two signals."""
 
+MORE = {"further": (28, FURTHER), "crossed": (29, CROSSED)}
+"""Kinds of further outside effects: the stream of random numbers of their plan, and their names."""
+
 KINDS = ("none", "effect", "outside", "fault", "pair", *APART)
 """What `--only` takes."""
 
@@ -99,7 +102,7 @@ def make_plan(seed: int, cases: int, only: str = "") -> list[Task]:
         return make_structure_plan(seed, cases)
     if only == "shared":
         return make_shared_plan(seed, cases)
-    if only in ("further", "crossed"):
+    if only in MORE:
         return make_further_plan(seed, cases, only)
     tasks: list[Task] = []
     for task in _endless(seed):
@@ -144,18 +147,18 @@ def make_shared_plan(seed: int, cases: int) -> list[Task]:
     return tasks
 
 
-def make_further_plan(seed: int, cases: int, kind: str = "further") -> list[Task]:
+def make_further_plan(seed: int, cases: int, kind: str) -> list[Task]:
     """Return the first `cases` tasks with a further outside effect at 15 and 40 % on a bench.
 
-    `kind` is "further", for one of `FURTHER`, or "crossed", for one of `CROSSED`.
-
     A longer plan begins with the shorter one; it draws nothing from the others.
+
+    Parameters
+    ----------
+    seed, cases : of the plan, and how many tasks
+    kind : a key of `MORE`
     """
-    rng, own = (
-        (np.random.default_rng([seed, 28]), FURTHER)
-        if kind == "further"
-        else (np.random.default_rng([seed, 29]), CROSSED)
-    )
+    stream, own = MORE[kind]
+    rng = np.random.default_rng([seed, stream])
     each = {name: _variants(name, rng, STRENGTHS[:2]) for name in own}
     names = _shuffled(list(own), rng)
     whats = (next(each[next(names)]) for _ in range(cases))
