@@ -55,7 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(arguments: argparse.Namespace) -> int:
     """Learn, write the effect's file, print what was found."""
     from ..diagnose.learned.along import ALONG
-    from ..diagnose.learned.curve import PARTS, PARTS_OF_LINE
+    from ..diagnose.learned.parts import PARTS, PARTS_OF_LINE
     from ..study.curves import learn_effect
     from ..study.study import Study
 

@@ -7,7 +7,7 @@ from itertools import product
 
 from ..compare.names import site_name
 from ..diagnose.learned.along import ALONG
-from ..diagnose.learned.curve import may_change, parts_at
+from ..diagnose.learned.parts import may_change, parts_at
 from ..diagnose.learned.place import Place
 from ..errors import StudyError
 

@@ -10,8 +10,9 @@ import numpy as np
 from ..compare.names import site_name
 from ..diagnose.learned.along import GIVEN
 from ..diagnose.learned.closed import ClosedForm, in_words, name_of
+from ..diagnose.learned.closed_fit import Closed
 from ..diagnose.learned.curve import Curve
-from ..diagnose.learned.fit import Closed, LearnedCurve
+from ..diagnose.learned.fit import LearnedCurve
 from ..diagnose.learned.ring import RING, response
 from ..diagnose.learned.surface import continues
 from ..draw.style import BLUE, GREY, PALE, VERMILION, Page, look, png, ramp, short_z
@@ -54,7 +55,10 @@ def draw_curve(
         )
         said += f", {short_z(closed.trial.z)} with the formula." if closed is not None else "."
         if curve.across:
-            said += " A hollow point continues those beside it: hardly a sample is near."
+            said += (
+                " The bands are 95 % intervals. A hollow point continues those beside it: hardly a "
+                "sample is near."
+            )
         elif curve.part != RING:
             said += " The band is the 95 % interval of each value."
         page = Page(8.0, 3.6, heading, said)

@@ -16,9 +16,10 @@ from ..compare.names import site_name
 from ..diagnose.bench import BenchRuns
 from ..diagnose.equilibrium import BuildingRuns
 from ..diagnose.learned.closed import ClosedForm, closed_forms, in_words, name_of
+from ..diagnose.learned.closed_fit import Closed, close
 from ..diagnose.learned.curve import Curve
 from ..diagnose.learned.effect_file import effect_text
-from ..diagnose.learned.fit import Closed, LearnedCurve, close, learn
+from ..diagnose.learned.fit import LearnedCurve, learn
 from ..diagnose.learned.place import Place
 from ..diagnose.learned.ring import RING
 from ..diagnose.learned.rule import LEARN
@@ -35,7 +36,7 @@ from .curve_options import refuse_elsewhere
 from .curve_picture import curve_png
 from .identification import as_model
 from .rig import building_of
-from .set_aside import LEARNED as LEARNED_FROM
+from .set_aside import LEARNED
 from .study import Study
 
 Runs = BenchRuns | BuildingRuns
@@ -227,7 +228,7 @@ def learn_effect(
 def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffect:
     """Write a learned effect's file, its picture, and what the report says of it."""
     name, closed = learned.name, learned.closed
-    origin = f"{LEARNED_FROM} {study.name}, {date.today().year}"
+    origin = f"{LEARNED} {study.name}, {date.today().year}"
     if closed is not None:
         values = closed.trial.model.values  # of an effect that has no file yet
         memory = tuple((n, values[f"{name}.{n}"]) for n, _ in curve.memory)

@@ -16,8 +16,9 @@ from bristle.bridge.export import export_study
 from bristle.cli import main
 from bristle.diagnose.learned.along import ALONG
 from bristle.diagnose.learned.closed import closed_forms, formula_of
-from bristle.diagnose.learned.curve import PARTS, Curve, may_change, parts_at
+from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.effect_file import effect_text
+from bristle.diagnose.learned.parts import PARTS, may_change, parts_at
 from bristle.diagnose.learned.place import AT_DAMPER, Place
 from bristle.diagnose.learned.ring import RING
 from bristle.diagnose.learned.slip import SLIP

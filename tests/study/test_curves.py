@@ -13,8 +13,9 @@ from bristle.cli import main
 from bristle.cli.learn import _of_command
 from bristle.diagnose.candidates import Trial
 from bristle.diagnose.learned.closed import formula_of
+from bristle.diagnose.learned.closed_fit import Closed
 from bristle.diagnose.learned.curve import Curve
-from bristle.diagnose.learned.fit import Closed, LearnedCurve
+from bristle.diagnose.learned.fit import LearnedCurve
 from bristle.diagnose.opening import Opening
 from bristle.diagnose.verdict_file import SCHEMA
 from bristle.errors import StudyError

@@ -15,8 +15,7 @@ from ..candidates import Trial, judge
 from ..decision import missing
 from ..opening import Opening
 from ..rule import DecisionRule
-from .closed import ClosedForm, formula_of
-from .curve import Curve, Formula
+from .curve import Curve
 from .effect_file import effect_text
 from .normal import Normal
 from .promise import Promise, distinct
@@ -29,10 +28,7 @@ TRIED = 4
 """Curves that are fitted with everything else, of those that promise most."""
 
 SURFACES = 2
-"""Surfaces that are fitted so where no curve along one signal explains the error."""
-
-CLOSED = 2
-"""Closed forms that are fitted in the place of a curve, until one does as well."""
+"""Surfaces that are fitted beside them where no curve along one signal explains the error."""
 
 AWAKE = 0.1
 """Smallest share of the command that a map leaves where its fit begins."""
@@ -108,11 +104,9 @@ def learn(
     if fitted[0].trial.train > rule.clean:
         model = with_law_of(before.model, fitted[0])
         again = residual_of(train, model)
-        other = _others(promises(again, parts, along, learning), fitted)
-        tried = distinct(other, TRIED, learning.near)
+        tried = _not_yet(promises(again, parts, along, learning), fitted, TRIED, learning)
         if _explained(before, fitted[0], rule) < learning.enough:
-            two = _others(surfaces(again, parts, along, learning), fitted)
-            tried += distinct(two, SURFACES, learning.near)
+            tried += _not_yet(surfaces(again, parts, along, learning), fitted, SURFACES, learning)
         more = _fitted(tried, name, model, train, held_out)
         fitted = _best_first([*fitted, *more], learning)
     refusals = [_refusal(before, one, rule, learning) for one in fitted]
@@ -137,10 +131,12 @@ def with_law_of(base: Model, best: Fitted) -> Model:
     return replace(base, values=values)
 
 
-def _others(found: Sequence[Promise], fitted: Sequence[Fitted]) -> list[Promise]:
-    """Return promises of parts and signals that no curve was fitted to."""
+def _not_yet(
+    found: Sequence[Promise], fitted: Sequence[Fitted], count: int, learning: LearnRule
+) -> list[Promise]:
+    """Return the best `count` promises of parts and signals that no curve was fitted to."""
     done = {one.curve.kind for one in fitted}
-    return [one for one in found if one.curve.kind not in done]
+    return distinct([one for one in found if one.curve.kind not in done], count, learning.near)
 
 
 def _explained(before: Trial, one: Fitted, rule: DecisionRule) -> float:
@@ -157,74 +153,6 @@ def _refusal(before: Trial, best: Fitted, rule: DecisionRule, learning: LearnRul
         why = "explains too little of the error on held-out runs"
     told = f"(z {before.z:.2f} before, {best.trial.z:.2f} with it)"
     return f"The best curve, {best.curve.words()}, {why} {told}." if why else ""
-
-
-@dataclass(frozen=True)
-class Closed:
-    """A closed form in the place of a learned curve: `formula` with its fitted values, `trial`."""
-
-    form: ClosedForm
-    formula: Formula
-    trial: Trial
-    std: dict[str, float]
-
-
-def close(
-    opened: Opening, found: LearnedCurve, forms: Sequence[ClosedForm], rule: LearnRule = LEARN
-) -> Closed | None:
-    """Fit the closed forms that may name a curve in its place; return the first that does as well.
-
-    Parameters
-    ----------
-    opened : runs and the fitted model, as a diagnosis begins with them
-    found : the curve, with the name of its effect
-    forms : fitted to the curve, the best first
-    rule : the numbers that decide between curves
-    """
-    able = [one for one in forms if one.left <= rule.resembles][:CLOSED]
-    return next(filter(None, (fit_closed(opened, found, one, rule) for one in able)), None)
-
-
-def fit_closed(
-    opened: Opening, found: LearnedCurve, form: ClosedForm, rule: LearnRule = LEARN
-) -> Closed | None:
-    """Fit a closed form in the place of a learned curve; None where it is clearly worse.
-
-    It has fewer numbers, and holds between and beyond the knots: as good is good enough, and better
-    where it follows the curve less closely.
-
-    Parameters
-    ----------
-    opened : runs and the fitted model, as a diagnosis begins with them
-    found : the curve, with the name of its effect
-    form : fitted to the curve
-    rule : the numbers that decide between curves
-    """
-    assert found.curve is not None
-    assert found.after is not None
-    formula = formula_of(form, found.curve)
-    if not formula.parameters:
-        return None
-    text = effect_text(found.name, found.curve, "a trial", formula)
-    base, values = found.after.model, dict(found.after.model.values)
-    values = {k: v for k, v in values.items() if not k.startswith(f"{found.name}.curve[")}
-    values |= {f"{found.name}.{n}": value for n, value, _ in formula.parameters}
-    with defined({found.name: text}):
-        train = opened.searched.of(opened.searched.runs)
-        held_out = opened.held_out.of(opened.held_out.runs)
-        model = refine(replace(base, values=values), train, SWEEPS)
-        trial = judge(model, train, held_out)
-        worst = (rule.as_good if form.left <= rule.follows else 1.0) * found.after.train
-        if trial.train > worst or not missing(found.before, trial, opened.rule):
-            return None
-        std = intervals_of(train, model).std
-        given = tuple(
-            (n, model.value(f"{found.name}.{n}"), unit) for n, _, unit in formula.parameters
-        )
-        memory = {f"{found.name}.{n}": n for n, _ in found.curve.memory}
-        own = {f"{found.name}.{n}": n for n, _, _ in formula.parameters} | memory
-        own_std = {n: std.get(key, 0.0) for key, n in own.items()}
-    return Closed(form, replace(formula, parameters=given), trial, own_std)
 
 
 def _fitted(

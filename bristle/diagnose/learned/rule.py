@@ -46,7 +46,7 @@ class LearnRule:
     enough: float = 0.92
     """Share of the excess z^2 - 1 from which on a curve is not compared with surfaces.
 
-    What it leaves a second curve explains as a rule. Trades: if higher, surfaces without a name
+    A second curve usually explains what it leaves. Trades: if higher, surfaces without a name
     stand for two curves that have one; if lower, what depends on two signals at once is missed.
     Found: blind seeds.
     """

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .along import ALONG, GIVEN, Along, measured_signals
-from .curve import Curve, may_change
+from .curve import Curve, inside
 from .modes import best_mode
 from .normal import Hats, Normal, hats_at
+from .parts import may_change
 from .promise import Promise, distinct
 from .residual import Residual
 from .ring import RING
@@ -219,10 +220,8 @@ def _promise(
     count = int(np.clip(round(freedom) + 2, FEWEST, most))
     if len(knots) > count:
         knots, fine, held = _fewer(kind, knots, fine, count, values)
-    low = kind.of.low
     curve = replace(
-        kind, knots=tuple(map(float, knots)),
-        values=tuple(float(max(value, 0.9 * low)) for value in fine), held=held,
+        kind, knots=tuple(map(float, knots)), values=inside(kind.of, fine), held=held,
         slow=residual.slow, top=residual.top, drive=residual.drive,
     )  # fmt: skip
     return Promise(curve, loss)

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .along import Along
-from .curve import Curve, may_change
+from .curve import Curve, inside
 from .normal import Hats, Normal, hats_at, products
+from .parts import may_change
 from .promise import Promise, distinct
 from .residual import Residual
 from .rule import LEARN, LearnRule
@@ -53,6 +54,12 @@ WEAK = 1e-3
 
 FLAT = 1e-2
 """Weight of first differences over that of second ones: beyond the data a surface levels off."""
+
+TURNS = 100
+"""Times that each curve of a product is sought while the other one stays."""
+
+TINY = 1e-300
+"""Least divisor."""
 
 _SAME = ({"velocity", "speed"}, {"acceleration", "slowing"})
 """Signals that say nearly the same."""
@@ -136,13 +143,7 @@ def _promise(
     knots, levels = knots_of(pair.x, size[0]), knots_of(pair.y, size[1])
     if min(len(knots), len(levels)) < FEWEST:
         return None
-    residual = known.residual
-    kind = Curve(
-        part, pair.first.name, tuple(pair.memory.items()), tuple(map(float, knots)), (),
-        slow=residual.slow, top=residual.top, drive=residual.drive, at=residual.at,
-        measured=pair.second.unit if pair.second.measured else "",
-        across=pair.second.name, levels=tuple(map(float, levels)),
-    )  # fmt: skip
+    residual, kind = known.residual, _empty(known.residual, part, pair, knots, levels)
     hats = products(hats_at(pair.x, knots), hats_at(pair.y, levels))
     column = residual.parts[part]
     told, own = _felt(hats, residual.weight, column)
@@ -160,8 +161,17 @@ def _promise(
     values = np.zeros(hats.knots)
     values[free] = found
     held = (*zero, *(int(k) for k in weak if k not in zero))
-    values = np.maximum(values, 0.9 * kind.of.low)
-    return Promise(replace(kind, values=tuple(map(float, values)), held=held), loss)
+    return Promise(replace(kind, values=inside(kind.of, values), held=held), loss)
+
+
+def _empty(residual: Residual, part: str, pair: _Pair, knots: Array, levels: Array) -> Curve:
+    """Return a surface without values."""
+    return Curve(
+        part, pair.first.name, tuple(pair.memory.items()), tuple(map(float, knots)), (),
+        slow=residual.slow, top=residual.top, drive=residual.drive, at=residual.at,
+        measured=pair.second.unit if pair.second.measured else "",
+        across=pair.second.name, levels=tuple(map(float, levels)),
+    )  # fmt: skip
 
 
 def _felt(hats: Hats, weight: Array, column: Array) -> tuple[Array, Array]:
@@ -217,8 +227,7 @@ def continued(surface: Curve) -> Curve:
     bend = _bending(len(surface.knots), len(surface.levels))
     pull = -bend[np.ix_(weak, free)] @ values[free]
     values[weak] = np.linalg.solve(bend[np.ix_(weak, weak)], pull)
-    values = np.maximum(values, 0.9 * surface.of.low)
-    return replace(surface, values=tuple(map(float, values)))
+    return replace(surface, values=inside(surface.of, values))
 
 
 def separated(surface: Curve) -> tuple[str, float]:
@@ -234,27 +243,27 @@ def separated(surface: Curve) -> tuple[str, float]:
     size = float(np.sqrt(np.sum(weight * (grid - np.average(grid, weights=weight)) ** 2)))
     if not size > 0.0:
         return "sum", 0.0
-    return min(
-        (("sum", _left(grid, weight, additive=True) / size),
-         ("product", _left(grid, weight, additive=False) / size)),
-        key=lambda one: one[1],
-    )  # fmt: skip
+    left = {"sum": _left_of_sum(grid, weight), "product": _left_of_product(grid, weight)}
+    nearest = min(left, key=lambda kind: left[kind])
+    return nearest, left[nearest] / size
 
 
-def _left(grid: Array, weight: Array, *, additive: bool) -> float:
-    """Return the root of the sum of squares that two curves leave of a grid (l, k)."""
-    rows, columns = np.zeros(len(grid)), np.zeros(grid.shape[1])
-    if not additive:
-        columns += 1.0
-    for _ in range(100):  # least squares in turn
-        if additive:
-            rows = np.sum(weight * (grid - columns), axis=1) / np.maximum(weight.sum(axis=1), 1e-12)
-            left = weight * (grid - rows[:, None])
-            columns = left.sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-12)
-        else:
-            size = np.maximum(weight @ columns**2, 1e-300)
-            rows = (weight * grid) @ columns / size
-            size = np.maximum(weight.T @ rows**2, 1e-300)
-            columns = (weight * grid).T @ rows / size
-    found = rows[:, None] + columns if additive else rows[:, None] * columns
-    return float(np.sqrt(np.sum(weight * (grid - found) ** 2)))
+def _left_of_sum(grid: Array, weight: Array) -> float:
+    """Return the root of the sum of squares that a sum of two curves leaves of a grid (l, k)."""
+    levels, knots = grid.shape
+    columns = np.hstack(
+        [np.repeat(np.eye(levels), knots, axis=0), np.tile(np.eye(knots), (levels, 1))]
+    )
+    root = np.sqrt(weight).ravel()
+    found = np.linalg.lstsq(columns * root[:, None], root * grid.ravel(), rcond=None)[0]
+    return float(np.linalg.norm(root * (grid.ravel() - columns @ found)))
+
+
+def _left_of_product(grid: Array, weight: Array) -> float:
+    """Return the same of a product of two curves, which are sought in turn by least squares."""
+    columns = np.linalg.svd(weight * grid)[2][0]  # not 1: the mean of an odd surface is zero
+    rows = np.zeros(len(grid))
+    for _ in range(TURNS):
+        rows = (weight * grid) @ columns / np.maximum(weight @ columns**2, TINY)
+        columns = (weight * grid).T @ rows / np.maximum(weight.T @ rows**2, TINY)
+    return float(np.sqrt(np.sum(weight * (grid - rows[:, None] * columns) ** 2)))

@@ -11,9 +11,10 @@ import pytest
 from bristle.check.conformance import examine
 from bristle.diagnose.learned.along import ALONG
 from bristle.diagnose.learned.closed import closed_forms, formula_of
-from bristle.diagnose.learned.curve import PARTS, Curve, may_change
+from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.effect_file import effect_text
 from bristle.diagnose.learned.fit import begun
+from bristle.diagnose.learned.parts import PARTS, may_change
 from bristle.diagnose.learned.slip import SLIP, slips
 from bristle.errors import PhysicsError
 from bristle.identify.fit import Problem, Run

@@ -10,9 +10,10 @@ import pytest
 from bristle.check.conformance import examine
 from bristle.diagnose.learned.along import ALONG
 from bristle.diagnose.learned.closed import closed_forms, formula_of, in_words
-from bristle.diagnose.learned.curve import Curve, may_change, parts_at
+from bristle.diagnose.learned.curve import Curve
 from bristle.diagnose.learned.effect_file import effect_text
 from bristle.diagnose.learned.normal import Normal
+from bristle.diagnose.learned.parts import may_change, parts_at
 from bristle.diagnose.learned.place import Place
 from bristle.diagnose.learned.residual import residual_of
 from bristle.diagnose.learned.screen import promises

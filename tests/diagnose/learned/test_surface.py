@@ -159,6 +159,11 @@ def test_a_sum_and_a_product_of_two_curves_are_told():
     assert (kind, round(left, 6)) == ("sum", 0.0)
     kind, left = separated(grid(lambda x, V: np.sin(200.0 * x) * (1.0 + V**2)))
     assert (kind, round(left, 6)) == ("product", 0.0)
+    # Of an odd one the mean over its knots is zero.
+    knots = (-2.0, -1.0, 0.0, 1.0, 2.0)
+    values = tuple(x * V for V in LEVELS for x in knots)
+    kind, left = separated(replace(grid(lambda x, V: 0.0), knots=knots, values=values))
+    assert (kind, round(left, 6)) == ("product", 0.0)
     edge = grid(lambda x, V: float(np.tanh((x - 0.002 * (V - 3.0)) / 0.002)))
     assert separated(edge)[1] > 0.2
     assert closed_forms(edge, [0.1] * 20) == []
