@@ -74,7 +74,7 @@ def learned(study: Study) -> list[dict[str, Any]]:
         elif told.get("levels"):  # a surface: a row of values for each level
             rows = np.array(told["values"], dtype=float).reshape(len(told["levels"]), -1)
             one |= {
-                "rows": [row.copy() for row in rows], "unit": told["unit"],
+                "rows": list(rows), "unit": told["unit"],
                 **{key: told[key] for key in ("along", "along_unit", "across", "across_unit")},
                 **{key: np.array(told[key], dtype=float) for key in ("knots", "levels")},
             }  # fmt: skip

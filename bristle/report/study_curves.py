@@ -39,20 +39,30 @@ def curves_section(study: Study, present: Collection[str]) -> str:
         parts.append(html.paragraphs(*texts, kind="lead"))
         picture = file.with_suffix(".png")
         if picture.is_file():
-            caption = (
-                "The curve with the 95 % interval of each of its values, and the closed form that "
-                "follows it best."
-                if rows
-                else "What was learned is no curve with a closed form."
-            )
+            caption = _caption(told)
             parts.append(html.figure(picture.read_bytes(), texts[0], caption))
-        if rows:  # a resonance and elastic-slip elements are no curve
+        if rows:  # a resonance, elastic-slip elements and a surface have none
             heads = ["form", "formula", "remains of the curve"]
             parts.append(html.table(heads, rows, numbers=(2,)))
         if name not in present:
             add = command("add", study.name, name)
             parts.append(html.paragraphs(f"The present model is without it:  {add}", kind="soft"))
     return html.section("What was learned from these runs", *parts) if parts else ""
+
+
+def _caption(told: dict[str, Any]) -> str:
+    """Return what the picture of a curve shows."""
+    if told.get("levels"):
+        return (
+            "The surface, a curve for each level of its second signal, with the 95 % interval of "
+            "each of its values. A hollow point continues those beside it."
+        )
+    if told["forms"]:
+        return (
+            "The curve with the 95 % interval of each of its values, and the closed form that "
+            "follows it best."
+        )
+    return "What was learned is no curve with a closed form."
 
 
 def _rows(told: dict[str, Any]) -> list[list[str]]:

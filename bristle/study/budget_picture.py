@@ -81,7 +81,9 @@ def draw_budget(problem: Problem, model: Model) -> Page | None:
     with look():
         bars = _BAR * len(parts) + 0.75
         above = _PANELS if cycles else 0.0
-        page = Page(_WIDTH, above + bars, "")
+        heading = f"{' + '.join([model.law, *model.effects])}: the parts of its force"
+        said = "Stacked over single cycles; the line is their sum, the model's force."
+        page = Page(_WIDTH, above + bars, heading, said if cycles else "")
         if cycles:
             grid = page.grid(1, len(cycles), top=0.4, bottom=bars + 0.5, column_gap=0.2)
             panels = [page.figure.add_subplot(grid[0, k]) for k in range(len(cycles))]

@@ -123,7 +123,7 @@ class Identified:
         rows = {row["name"]: row for row in self.parameters()}
         laws: dict[str, Any] = {}
         if self.laws:
-            from ..diagnose.law_verdict import rows_of
+            from ..diagnose.law_verdict import rows_of  # takes long: most identify one law
 
             laws["laws"] = rows_of(self.laws)
         return {

@@ -66,7 +66,7 @@ def all_laws(rig: Rig, runs: Runs, present: Model) -> tuple[LawTrial, ...]:
     StudyError
         If the rig is a building.
     """
-    from ..diagnose.law_trials import try_laws
+    from ..diagnose.law_trials import try_laws  # takes long: most identify one law
 
     refuse_in_building(ALL, rig.building is not None)
     tell("trying every law")

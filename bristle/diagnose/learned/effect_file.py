@@ -147,8 +147,7 @@ def _imports(
     if table:
         lines += ["", *_row("KNOTS = ", curve.knots)]
         unit = curve.along_unit
-        kind = "surface" if curve.across else "curve"
-        lines.append(f'"""Where the {kind} is given: {curve.signal.words} [{unit}]."""')
+        lines.append(f'"""Where the {_kind(curve)} is given: {curve.signal.words} [{unit}]."""')
     if curve.across:
         lines += ["", *_row("LEVELS = ", curve.levels)]
         lines.append(f'"""The same: {curve.second.words} [{curve.across_unit}]."""')
@@ -169,7 +168,8 @@ def _about(name: str, curve: Curve, formula: Formula | None) -> list[str]:
     if curve.across:
         g = f"g = surface(s, t),   s = {along}, t = {curve.second.words}"
     ends = formula is None or formula.ends
-    end = ", for beyond its ends the curve keeps its value." if ends else "."
+    kind = _kind(curve)
+    end = f", for beyond its ends the {kind} keeps its value." if ends else "."
     if curve.of.law:
         g, end = curve.of.law, "."
     return [
@@ -192,6 +192,10 @@ def _subject(curve: Curve, joined: str) -> str:
     """Return what a curve is: its part, and its signal after a word or two."""
     words = curve.of.words
     return words if curve.of.alone else f"{words} {joined} {_signals(curve)}"
+
+
+def _kind(curve: Curve) -> str:
+    return "surface" if curve.across else "curve"
 
 
 def _signals(curve: Curve) -> str:
