@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import exp, inf, pi, sin
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -497,6 +498,22 @@ def test_backlash_carries_nothing_over_the_width_of_its_gap() -> None:
     assert np.ptp(x[free]) == pytest.approx(2.0 * gap, rel=0.1)
     slides = (times > 0.6) & (times < 0.7)
     assert np.abs(forces[slides]).min() > 4.0
+
+
+def test_a_joint_with_damping_closes_without_a_jump_of_the_force() -> None:
+    values, gap, speed = {"gap": 1e-3, "k": 1e5, "c": 1e4, "mass": 0.004}, 1e-3, 0.1
+    own = EFFECTS["backlash"]
+    p = SimpleNamespace(**values)
+    q = SimpleNamespace(rod_x=0.0, rod_v=speed, force=0.0)
+    beyond = 1e-6 * np.arange(101)
+    force = [
+        own.reaction(q, SimpleNamespace(compression=gap + d, joint_velocity=0.0), p) for d in beyond
+    ]
+    assert force[0] == 0.0
+    assert (
+        max(np.abs(np.diff(force))) < 0.06 * values["c"] * speed
+    )  # 1 of 20 um over which it rises
+    assert force[50] == pytest.approx(values["k"] * beyond[50] + values["c"] * speed, rel=1e-9)
 
 
 # -- coil lag with two times and eddy currents

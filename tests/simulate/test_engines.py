@@ -175,3 +175,15 @@ def test_a_force_that_does_not_settle_names_the_damper_and_the_time() -> None:
         run("half_sine_pulse", steep, engine="compiled")
     assert len(caught.value.frame) >= 1
     assert np.isfinite(caught.value.frame.to_numpy()).all()
+
+
+@pytest.mark.parametrize("damper", ["LuGreDamper", "BinghamDamper"])
+@pytest.mark.parametrize(("gap", "k", "c"), [(2e-4, 1e5, 80.0), (3e-5, 3.2e6, 1e4)])
+def test_a_joint_with_play_and_damping_goes_beside_a_building(
+    damper: str, gap: float, k: float, c: float
+) -> None:
+    joint = {f"damper.backlash.{name}": v for name, v in (("gap", gap), ("k", k), ("c", c))}
+    chosen = {"damper.fmu": damper, "damper.backlash.on": True, **joint, "run.stop": 10.0}
+    frame = run("el_centro_0p6g_constant_voltage", chosen, engine="compiled")
+    assert frame.attrs["complete"] is True
+    assert 1.0 < frame["damper.force"].abs().max() < 20.0

@@ -2,16 +2,19 @@
 
 from ..effect import Effect, Parameter
 
+SOFT = 0.02  # of the gap: over which damping sets in
+LEAST = 1e-9  # m, the same where there is no gap
+
 
 class Backlash(Effect):
     """Backlash: the joint carries no force until its gap is closed.
 
-        force outside = k s' + c ds'/dt,   s' = s beyond +-gap,   s = x_rod - x_joint
+        force outside = k s' + c min(|s'|/d, 1) ds'/dt,   s' = s beyond +-gap,   s = x_rod - x_joint
 
-    A small joint mass lets the fluid spring back inside the gap. Leaves out the rattle of the
-    impacts: doubt it when the force rings after a gap has closed. With c above 0 the force jumps as
-    the gap closes: beside a building no force may agree with the motion then, however short the
-    step, and the run stops. With c = 0 it goes on.
+    Damping sets in over d, the first 2 % of the gap beyond it, as a contact does whose loss grows
+    with its indentation: a force that jumped would agree with no motion of a building at the moment
+    of closing. A small joint mass lets the fluid spring back inside the gap. Leaves out the rattle
+    of the impacts: doubt it when the force rings after a gap has closed.
     """
 
     name = "backlash"
@@ -22,7 +25,8 @@ class Backlash(Effect):
     zero_at_rest = True
     excludes = ("mount_compliance",)
     source = (
-        "Nordin & Gutman (2002), Automatica 38(10), 1633-1649 (physical model, Nordin et al. 1997)"
+        "Nordin & Gutman (2002), Automatica 38(10), 1633-1649 (physical model of Nordin et al. "
+        "1997); damping over indentation: Hunt & Crossley (1975), J. Appl. Mech. 42(2), 440-445"
     )
     expect = "after each reversal of the force no force at all over the width of the gap"
     states = {"compression": "m", "joint_velocity": "m/s"}
@@ -48,7 +52,8 @@ class Backlash(Effect):
         beyond = z.compression - min(max(z.compression, -p.gap), p.gap)
         if beyond == 0.0:
             return 0.0
-        force = p.k * beyond + p.c * (q.rod_v - z.joint_velocity)
+        c = p.c * min(abs(beyond) / (SOFT * p.gap + LEAST), 1.0)
+        force = p.k * beyond + c * (q.rod_v - z.joint_velocity)
         # A joint pushes and never pulls: damping may unload it, not turn the contact round.
         return max(force, 0.0) if beyond > 0.0 else min(force, 0.0)
 
@@ -56,11 +61,11 @@ class Backlash(Effect):
     def rate(q, z, p):
         slip = q.rod_v - z.joint_velocity
         beyond = z.compression - min(max(z.compression, -p.gap), p.gap)
-        force = 0.0
+        c, force = p.c * min(abs(beyond) / (SOFT * p.gap + LEAST), 1.0), 0.0
         if beyond > 0.0:
-            force = max(p.k * beyond + p.c * slip, 0.0)
+            force = max(p.k * beyond + c * slip, 0.0)
         elif beyond < 0.0:
-            force = min(p.k * beyond + p.c * slip, 0.0)
+            force = min(p.k * beyond + c * slip, 0.0)
         return slip, (force - q.force) / p.mass
 
     @staticmethod
