@@ -103,9 +103,10 @@ def best_of(trials: Sequence[Trial], rule: DecisionRule = BENCH) -> Trial:
 def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawTrial]:
     """Return the laws that go on through the search for effects, `most_laws` at most.
 
-    The best on held-out runs, and the simplest that is not clearly worse; the best of those that
-    contain no effect, the one with a parabola only where a straight line is clearly worse. Then
-    those of them that no simpler one surpasses, the smallest error first.
+    The best on held-out runs, that with the smallest z even where its plain error puts it out, and
+    the simplest that is not clearly worse; the best of those that contain no effect, the one with a
+    parabola only where a straight line is clearly worse. Then those of them that no simpler one
+    surpasses, the smallest error first.
     """
     ranked = sorted(rows, key=lambda row: row.trial.z)
     first = best_of([row.trial for row in rows], rule)
@@ -115,7 +116,10 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     straight = [row for row in plain if CURVED not in row.contains]
     others = [row for row in ranked if row is best or row is not by_z]
     level = [row for row in others if not clearly_worse(row.trial, best.trial, rule)]
-    picked = [best, *straight[:1], min(level, key=lambda row: (row.fitted, row.trial.z))]
+    # What a law lacks may be why it fits the many samples near rest alone.
+    near_rest = _formed(ranked[0], rows, rule)
+    fewest = min(level, key=lambda row: (row.fitted, row.trial.z))
+    picked = [best, *straight[:1], near_rest, fewest]
     if straight and clearly_worse(straight[0].trial, plain[0].trial, rule):
         picked.insert(1, plain[0])
     front = [

@@ -120,6 +120,13 @@ def test_the_straight_form_does_not_go_on_beside_the_parabola_that_it_gave_way_t
     assert [one.law for one in survivors(rows)] == ["modified_bouc_wen[quadratic]", "bingham"]
 
 
+def test_the_smallest_z_goes_on_where_a_missing_effect_makes_its_plain_error_large():
+    # Of a damper whose mount gives: its law alone fits the samples near rest, and no others.
+    near_rest = row("tanh", 6.6)
+    rows = [replace(near_rest, trial=replace(near_rest.trial, rms=13.2)), row("lugre", 7.9)]
+    assert {one.law for one in survivors(rows)} == {"lugre", "tanh"}
+
+
 def test_near_the_noise_z_judges_the_form_of_a_command():
     near = [row("modified_bouc_wen", 1.5), row("bingham", 4.0), bent(1.55, 1.4)]
     assert survivors(near)[0].law == "modified_bouc_wen"
