@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from os import cpu_count
 
 from ...identify.fit import Model, Problem, intervals_of
 from ...identify.residuals import residuals
@@ -163,14 +165,17 @@ def _fitted(
         f"{name}_{k}": effect_text(f"{name}_{k}", one.curve, "a trial")
         for k, one in enumerate(chosen)
     }
-    count, out = Count("fitting a curve", len(chosen)), []
-    with defined(texts):
+    count = Count("fitting a curve", len(chosen))
+    with defined(texts), ThreadPoolExecutor(cpu_count()) as pool:
         train, held_out = train.of(train.runs), held_out.of(held_out.runs)
-        for own, one in zip(texts, chosen, strict=True):
+        train.bench(base)  # compiled before threads ask for it
+
+        def fitted(own: str, one: Promise) -> Fitted:
             found = _inside(one.curve, own, base, train, held_out)
-            out.append(replace(found, trial=_renamed(found.trial, own, name)))
             count.done(one.curve.words())
-    return out
+            return replace(found, trial=_renamed(found.trial, own, name))
+
+        return list(pool.map(fitted, texts, chosen))
 
 
 def _inside(curve: Curve, own: str, base: Model, train: Problem, held_out: Problem) -> Fitted:
