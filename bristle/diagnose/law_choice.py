@@ -104,22 +104,24 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     """Return the laws that go on through the search for effects, `most_laws` at most.
 
     The best on held-out runs, that with the smallest z even where its plain error puts it out, and
-    the simplest that is not clearly worse; the best of those that contain no effect, the one with a
-    parabola only where a straight line is clearly worse. Then those of them that no simpler one
-    surpasses, the smallest error first.
+    the simplest that is not clearly worse, also of those that contain an effect; the best of those
+    that contain none, the one with a parabola only where a straight line is clearly worse. Then
+    those of them that no simpler one surpasses, the smallest error first.
     """
     ranked = sorted(rows, key=lambda row: row.trial.z)
     first = best_of([row.trial for row in rows], rule)
     by_z = next(row for row in rows if row.trial is first)
     best = _formed(by_z, rows, rule)
-    plain = [row for row in ranked if not set(row.contains) - {CURVED}]
+    plain = [row for row in ranked if not _holds(row)]
     straight = [row for row in plain if CURVED not in row.contains]
     others = [row for row in ranked if row is best or row is not by_z]
     level = [row for row in others if not clearly_worse(row.trial, best.trial, rule)]
     # What a law lacks may be why it fits the many samples near rest alone.
     near_rest = _formed(ranked[0], rows, rule)
     fewest = min(level, key=lambda row: (row.fitted, row.trial.z))
-    picked = [best, *straight[:1], near_rest, fewest]
+    # Without what is missing, a law that contains an effect may do no better than one without.
+    holding = sorted(filter(_holds, level), key=lambda row: row.fitted)
+    picked = [best, *straight[:1], near_rest, fewest, *holding[:1]]
     if straight and clearly_worse(straight[0].trial, plain[0].trial, rule):
         picked.insert(1, plain[0])
     front = [
@@ -129,6 +131,11 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     ]
     picked += front
     return list({row.law: row for row in picked}.values())[: rule.most_laws]
+
+
+def _holds(row: LawTrial) -> bool:
+    """Return whether a law contains an effect; a parabola of the command is none."""
+    return bool(set(row.contains) - {CURVED})
 
 
 def _formed(best: LawTrial, rows: Sequence[LawTrial], rule: DecisionRule) -> LawTrial:

@@ -127,6 +127,15 @@ def test_the_smallest_z_goes_on_where_a_missing_effect_makes_its_plain_error_lar
     assert {one.law for one in survivors(rows)} == {"lugre", "tanh"}
 
 
+def test_a_law_that_contains_an_effect_goes_on_where_it_does_no_better_than_one_without():
+    # A Bouc-Wen damper with Stribeck friction: its spring shows once the friction is there.
+    rows = [
+        row("lugre[quadratic]", 8.93), row("bouc_wen", 8.94), row("modified_bouc_wen", 8.95),
+        row("lugre", 8.95), row("lugre_standard", 9.4), row("dahl", 9.47), row("bingham", 14.6),
+    ]  # fmt: skip
+    assert "bouc_wen" in [one.law for one in survivors(rows)]
+
+
 def test_near_the_noise_z_judges_the_form_of_a_command():
     near = [row("modified_bouc_wen", 1.5), row("bingham", 4.0), bent(1.55, 1.4)]
     assert survivors(near)[0].law == "modified_bouc_wen"
