@@ -101,12 +101,13 @@ def best_of(trials: Sequence[Trial], rule: DecisionRule = BENCH) -> Trial:
 
 
 def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawTrial]:
-    """Return the laws that go on through the search for effects, `most_laws` at most.
+    """Return the laws that go on through the search for effects.
 
-    The best on held-out runs, that with the smallest z even where its plain error puts it out, and
-    the simplest that is not clearly worse, also of those that contain an effect; the best of those
-    that contain none, the one with a parabola only where a straight line is clearly worse. Then
-    those of them that no simpler one surpasses, the smallest error first.
+    The best on held-out runs, and the simplest that is not clearly worse; the best of those that
+    contain no effect, the one with a parabola only where a straight line is clearly worse. Then
+    those of them that no simpler one surpasses, the smallest error first, up to `most_laws` of all
+    these. Last, where they are not among them, the law with the smallest z even if its plain error
+    puts it out, and the simplest of those that contain an effect and are not clearly worse.
     """
     ranked = sorted(rows, key=lambda row: row.trial.z)
     first = best_of([row.trial for row in rows], rule)
@@ -116,12 +117,7 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
     straight = [row for row in plain if CURVED not in row.contains]
     others = [row for row in ranked if row is best or row is not by_z]
     level = [row for row in others if not clearly_worse(row.trial, best.trial, rule)]
-    # What a law lacks may be why it fits the many samples near rest alone.
-    near_rest = _formed(ranked[0], rows, rule)
-    fewest = min(level, key=lambda row: (row.fitted, row.trial.z))
-    # Without what is missing, a law that contains an effect may do no better than one without.
-    holding = sorted(filter(_holds, level), key=lambda row: row.fitted)
-    picked = [best, *straight[:1], near_rest, fewest, *holding[:1]]
+    picked = [best, *straight[:1], min(level, key=lambda row: (row.fitted, row.trial.z))]
     if straight and clearly_worse(straight[0].trial, plain[0].trial, rule):
         picked.insert(1, plain[0])
     front = [
@@ -129,8 +125,12 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
         for row in straight
         if not any(o.fitted <= row.fitted and o.trial.z < row.trial.z for o in straight)
     ]
-    picked += front
-    return list({row.law: row for row in picked}.values())[: rule.most_laws]
+    first_ones = list({row.law: row for row in [*picked, *front]}.values())[: rule.most_laws]
+    # What a law lacks may be why it fits the many samples near rest alone, or why one that contains
+    # an effect does no better than one without.
+    holding = sorted(filter(_holds, level), key=lambda row: row.fitted)
+    hidden = [_formed(ranked[0], rows, rule), *holding[:1]]
+    return list({row.law: row for row in [*first_ones, *hidden]}.values())
 
 
 def _holds(row: LawTrial) -> bool:

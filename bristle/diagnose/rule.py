@@ -135,7 +135,11 @@ class DecisionRule:
     """
 
     most_laws: int = 4
-    """Largest number of laws whose effects are searched. Trades: computing time. Found: stated."""
+    """Largest number of laws whose effects are searched.
+
+    Up to two come on top whose error may be large because of what is missing. Trades: computing
+    time. Found: stated.
+    """
 
     # --- two effects
 
