@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 from bristle.data.checks.levels import tells_a_bend
 from bristle.data.measurement import Measurement
+from bristle.diagnose.candidates import judge
 from bristle.diagnose.corrected import corrected
 from bristle.diagnose.damper import look_at_damper
-from bristle.diagnose.decision import missing
 from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.finding import Finding
 from bristle.diagnose.law_choice import choose, search
@@ -36,16 +36,15 @@ from bristle.diagnose.opening import (
 from bristle.identify.model import Model, Problem
 from bristle.identify.prepare import prepare
 from bristle.identify.residuals import has_offset, zero_of
-from bristle.identify.search_context import refine
+from bristle.identify.rig import DAMPER, Site
+from bristle.identify.site_fit import fit_site
 from bristle.physics.laws import DEFAULT
 from bristle.physics.user import defined
+from bristle.study.completion import MOST_EFFECTS, gaining
 from bristle.study.inputs import runs_of
 from bristle.study.runs import Runs
 
 from ._floor import share_of
-
-MOST = 4
-"""Effects and curves that are added at the most, as in `study auto`."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +66,9 @@ class Found:
         effects = [one for one in self.model.effects if not one.startswith(NAME)]
         return " + ".join([self.model.law, *effects, *(one.words() for one in self.curves)])
 
+
+STARTS = 4
+"""Starting points of a law, as commands take them."""
 
 NAME = "learned_"
 """Begin of the names of curves."""
@@ -121,20 +123,24 @@ def _laws(
 
 def _with_effects(split: Runs, finding: Finding, opened: Opening, say: Progress) -> Opening:
     """Add effects as long as one is named, or lowers the error beyond chance; see `study auto`."""
-    while len(opened.before.model.effects) < MOST:
-        gaining = [one for one in finding.trials if missing(opened.before, one)]
+    while len(opened.before.model.effects) < MOST_EFFECTS:
         if finding.kind == "effect" and finding.model is not None:
-            model = finding.model
-        elif finding.kind == "unknown" and gaining:
-            model = gaining[0].model
+            models = [finding.model]
+        elif finding.kind == "unknown":
+            models = [one.model for one in gaining(opened.before, finding.trials)]
         else:
             break
-        say(f"{model.law} + {' + '.join(model.effects)}")
+        if not models:
+            break
+        say(" or ".join(f"{one.law} + {' + '.join(one.effects)}" for one in models))
+        fitted = (_identified(one, opened.problem) for one in models)
+        judged = [judge(one, opened.problem, opened.held_out) for one in fitted]
+        model = min(judged, key=lambda one: one.z).model
         again = opening(split.train, split.holdout, model, identified=True)
         if isinstance(again, Insufficient):
             break
         opened = again
-        if len(model.effects) < MOST:
+        if len(model.effects) < MOST_EFFECTS:
             finding, opened = look_at_damper(opened)
     return opened
 
@@ -143,7 +149,7 @@ def _with_curves(opened: Opening, say: Progress) -> Found:
     """Learn curves as long as one lowers the error beyond chance and the model is not full."""
     curves: tuple[Curve, ...] = ()
     with ExitStack() as stack:
-        while len(opened.before.model.effects) < MOST:
+        while len(opened.before.model.effects) < MOST_EFFECTS:
             name = f"{NAME}{len(curves) + 1}"
             say(f"{name} (z {opened.before.z:.2f})")
             learned = learn(opened, name)
@@ -177,12 +183,22 @@ def opened_once(found: Found, train: Sequence[Measurement], held: Sequence[Measu
     }
     with defined(texts):
         problem, judging = corrected_runs(found, train, held)
-        model = refine(found.model, problem)
+        model = _identified(found.model, problem)
         zero = zero_of(problem, model)[0] if found.free_zero and not has_offset(model) else 0.0
         errors = [
             (run.force - judging.predict(model, run) - zero)[run.skip :] for run in judging.runs
         ]
         return share_of(errors, judging.runs)
+
+
+def _identified(model: Model, problem: Problem) -> Model:
+    """Return a model fitted as `bristle identify` and `bristle add` do.
+
+    From several starts and from the model's own values, which the search for effects came to and
+    which may be a local minimum: the least cost on these runs counts.
+    """
+    site = Site(DAMPER, lambda _: problem)
+    return fit_site(model, site, {DAMPER: site}, STARTS, model.values).model
 
 
 def corrected_runs(

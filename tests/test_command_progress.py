@@ -186,7 +186,7 @@ def test_ctrl_c_tells_what_is_kept(
     assert main(["diagnose", str(rig)]) == 130
     (line,) = capsys.readouterr().err.splitlines()
     assert line == f"interrupted. {KEPT['diagnose']}"
-    monkeypatch.setattr("bristle.study.learning.complete", interrupted)
+    monkeypatch.setattr("bristle.study.completion.complete", interrupted)
     assert main(["study", "auto", str(rig)]) == 130
     assert KEPT["study auto"] in capsys.readouterr().err
     monkeypatch.setattr(Study, "undo", interrupted)

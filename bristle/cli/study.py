@@ -267,7 +267,8 @@ def _print_corrections(found: DataCheck) -> None:
 
 
 def _auto(arguments: argparse.Namespace) -> int:
-    from ..study.learning import complete, verdict_of
+    from ..study.completion import complete
+    from ..study.learning import verdict_of
     from ..study.staircase import staircase
     from ..study.study import Study
     from .diagnose import text

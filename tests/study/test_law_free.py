@@ -15,10 +15,11 @@ from bristle.diagnose.candidates import Trial
 from bristle.errors import StudyError
 from bristle.identify.fit import Model
 from bristle.physics.building import paper_building
-from bristle.study import learning
+from bristle.study import completion
+from bristle.study.completion import MOST_EFFECTS, complete
 from bristle.study.create import create_study
 from bristle.study.laws import law_command, law_or_all, with_law
-from bristle.study.learning import MOST_EFFECTS, complete, diagnose_study
+from bristle.study.learning import Joined, diagnose_study
 from bristle.study.public import diagnose, identify
 from bristle.study.study import Study
 from tests.independent.generate import make_case
@@ -64,14 +65,14 @@ def folder(monkeypatch):
         study.names += names
         return SimpleNamespace(step=f"add {names[0]}")
 
-    monkeypatch.setattr(learning, "add_effects", add)
+    monkeypatch.setattr(completion, "add_effects", add)
     return made
 
 
 def told(monkeypatch, answers):
     """Let the diagnoses be these, one after the other."""
     found = iter(answers)
-    monkeypatch.setattr(learning, "diagnose_study", lambda _study, **_given: next(found))
+    monkeypatch.setattr(completion, "diagnose_study", lambda _study, **_given: next(found))
 
 
 def test_greedy_adds_what_gains_most_until_nothing_gains(folder, monkeypatch):
@@ -85,6 +86,29 @@ def test_greedy_adds_what_gains_most_until_nothing_gains(folder, monkeypatch):
     assert folder.names == ["stribeck", "coil_lag"]
     assert done.verdict is answers[-1]
     assert len(done.steps) == 2
+
+
+def test_of_effects_that_gain_about_alike_the_one_that_is_better_identified_is_added(
+    folder, monkeypatch
+):
+    answers = [
+        verdict("unknown", 6.0, ("stribeck", 4.0), ("drift", 4.3), ("coil_lag", 4.5)),
+        verdict("unknown", 3.8),
+    ]
+    told(monkeypatch, answers)
+    after = {"stribeck": 4.0, "drift": 3.8}
+
+    def joined(_study, names, _begin):
+        return Joined(names, SimpleNamespace(after={"z_holdout": after[names[0]]}))
+
+    def added(study, fitted, _why):
+        study.names += fitted.names
+        return SimpleNamespace(step=f"add {fitted.names[0]}")
+
+    monkeypatch.setattr(completion, "joined_with", joined)
+    monkeypatch.setattr(completion, "added", added)
+    complete(folder, greedy=True, say=print)
+    assert folder.names == ["drift"]
 
 
 def test_without_greedy_an_unknown_error_ends_it(folder, monkeypatch):

@@ -14,9 +14,10 @@ from bristle.errors import RecordError, StudyError
 from bristle.study import learning
 from bristle.study.before_after import before_after, predictions
 from bristle.study.comparison import compare_study
+from bristle.study.completion import complete
 from bristle.study.create import create_study
 from bristle.study.identification import identify_study
-from bristle.study.learning import add_effects, complete, diagnose_study
+from bristle.study.learning import add_effects, diagnose_study
 from bristle.study.public import diagnose
 from bristle.study.study import Study
 from tests.independent.generate import make_case

@@ -1,0 +1,171 @@
+"""Identify, diagnose and add until a study's model is enough, by one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..diagnose import Diagnosis
+from ..diagnose.candidates import Trial
+from ..diagnose.decision import missing
+from ..progress import tell
+from .added_runs import other_data
+from .curves import LearnedEffect, learn_effect
+from .history import Step
+from .identification import identify_study
+from .laws import law_or_all
+from .learning import (
+    Joined,
+    Say,
+    add_effects,
+    added,
+    diagnose_study,
+    is_identified,
+    joined_with,
+    take_law,
+    verdict_of,
+)
+from .settings import ALL
+from .study import Study
+
+MOST_EFFECTS = 4
+"""Effects that `complete` adds at the most: a model that asks for more is the wrong model."""
+
+ABREAST = 1.1
+"""Effects that leave up to this times the best one's z are fitted from several starts, then chosen.
+
+The search for effects starts each from the law as it was fitted without: of a law that is far from
+the rig, such a fit may end in a local minimum.
+"""
+
+MOST_ABREAST = 3
+"""Effects that are fitted so at the most."""
+
+
+@dataclass(frozen=True)
+class Completed:
+    """What `complete` came to: the last diagnosis, and the steps that it made.
+
+    `curves` are those learned where no effect of the library explained the error.
+    """
+
+    verdict: Diagnosis
+    steps: tuple[Step, ...]
+    curves: tuple[LearnedEffect, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what json can hold."""
+        return {
+            "verdict": self.verdict.as_dict(),
+            **({"learned": [one.as_dict() for one in self.curves]} if self.curves else {}),
+            "steps": [
+                {
+                    "number": step.number, "what": step.what, "why": step.why,
+                    "before": step.before, "after": step.after,
+                }
+                for step in self.steps
+            ],
+        }  # fmt: skip
+
+
+def complete(
+    study: Study,
+    *,
+    law: str | None = None,
+    greedy: bool = False,
+    curves: bool = False,
+    say: Say = tell,
+    on_step: Callable[[], None] | None = None,
+) -> Completed:
+    """Identify, diagnose and add until the verdict is none, ambiguous, unknown or insufficient.
+
+    What was done is in the history already when this is interrupted: calling it again goes on.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    law : "all" first seeks the law together with its effects; another name is taken first; None
+        seeks it where nobody chose one (`laws.law_or_all`)
+    greedy : whether to go on where the verdict is unknown, by the effect that lowers the held-out
+        error most, as long as one does so by enough and beyond chance
+    curves : whether to go on where the verdict is unknown, by learning a curve
+    say : called with a few words at each stage
+    on_step : called after each new step of the history
+    """
+    steps: list[Step] = []
+    learned: list[LearnedEffect] = []
+
+    def stepped(step: Step | None) -> None:
+        if step is not None:
+            steps.append(step)
+            if on_step is not None:
+                on_step()
+
+    law = law_or_all(study, law)
+    free = law == ALL
+    other = None if law in (ALL, study.model().law) else law
+    stale = bool(other_data(study)) or not is_identified(study.model())
+    if not free and (other or stale):
+        say("identifying the model")
+        stepped(identify_study(study, law=other, table=False).step)
+    while True:
+        found = diagnose_study(study, law=ALL if free else study.model().law, say=say)
+        if free:
+            found = _with_law_taken(study, found, stepped)
+        free = False
+        names, abreast = _named(found), list[Trial]()
+        if greedy and found.kind == "unknown" and found.before is not None:
+            abreast = gaining(found.before, found.trials)
+        if found.kind == "unknown" and curves and not abreast:
+            say("learning a curve")
+            learned.append(learn_effect(study))
+            names = (learned[-1].name,) if learned[-1].file is not None else ()
+        names = names or tuple(trial.effects[-1] for trial in abreast[:1])
+        if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
+            return Completed(found, tuple(steps), tuple(learned))
+        why = f"verdict: {found.kind}"
+        if len(abreast) > 1:
+            best = _best_fitted(study, abreast, say)
+            say("adding " + best.names[0])
+            stepped(added(study, best, why).step)
+        else:
+            say("adding " + " and ".join(names))
+            stepped(add_effects(study, names, why=why, found=found).step)
+
+
+def _named(found: Diagnosis) -> tuple[str, ...]:
+    return found.effects if found.kind == "effect" else ()
+
+
+def gaining(before: Trial, trials: Sequence[Trial]) -> list[Trial]:
+    """Return the effects, each alone, that lower an error about as much as the best one.
+
+    The best first; none where no effect does so by enough and beyond chance.
+    """
+    able = [trial for trial in trials if missing(before, trial)]
+    return [trial for trial in able if trial.z <= ABREAST * able[0].z][:MOST_ABREAST]
+
+
+def _best_fitted(study: Study, abreast: Sequence[Trial], say: Say) -> Joined:
+    """Return the effect that, identified with the model, leaves the least z on held-out runs."""
+    names = [trial.effects[-1] for trial in abreast]
+    say("these gain about alike and are identified: " + ", ".join(names))
+    fits = [
+        joined_with(study, (name,), trial.model.values)
+        for name, trial in zip(names, abreast, strict=True)
+    ]
+    return min(fits, key=lambda one: one.z)
+
+
+def _with_law_taken(
+    study: Study, found: Diagnosis, stepped: Callable[[Step | None], None]
+) -> Diagnosis:
+    """Take the law of a verdict; return the verdict as one on the model that the study then has."""
+    taken = take_law(study, found)
+    if taken is None or found.laws is None:
+        return found
+    stepped(taken.step)
+    found = replace(found, laws=replace(found.laws, before=found.law))
+    study.write_verdict(verdict_of(study, found))
+    return found
