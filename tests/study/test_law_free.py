@@ -99,7 +99,7 @@ def test_of_effects_that_gain_about_alike_the_one_that_is_better_identified_is_a
     after = {"stribeck": 4.0, "drift": 3.8}
 
     def joined(_study, names, _begin):
-        return Joined(names, SimpleNamespace(after={"z_holdout": after[names[0]]}))
+        return Joined(names, SimpleNamespace(after={"z_train": 1.0, "z_holdout": after[names[0]]}))
 
     def added(study, fitted, _why):
         study.names += fitted.names
