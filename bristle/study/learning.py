@@ -82,6 +82,7 @@ def diagnose_study(
 
 
 def is_identified(model: StudyModel) -> bool:
+    """Return whether a value of a model comes from an identification."""
     return any(value.origin == "identified" for value in model.flat().values())
 
 
