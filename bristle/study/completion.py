@@ -14,15 +14,14 @@ from .added_runs import other_data
 from .curves import LearnedEffect, learn_effect
 from .history import Step
 from .identification import identify_study
+from .identified import Identified
 from .laws import law_or_all
 from .learning import (
-    Joined,
     Say,
     add_effects,
-    added,
     diagnose_study,
+    identify_with,
     is_identified,
-    joined_with,
     take_law,
     verdict_of,
 )
@@ -33,14 +32,14 @@ MOST_EFFECTS = 4
 """Effects that `complete` adds at the most: a model that asks for more is the wrong model."""
 
 ABREAST = 1.1
-"""Effects that leave up to this times the best one's z are fitted from several starts, then chosen.
+"""Effects whose z is up to this times the smallest are identified before one of them is added.
 
-The search for effects starts each from the law as it was fitted without: of a law that is far from
-the rig, such a fit may end in a local minimum.
+The search fits each effect from the law's values without it. Where the law is far from the rig,
+that fit may end in a local minimum.
 """
 
 MOST_ABREAST = 3
-"""Effects that are fitted so at the most."""
+"""Largest number of effects that are identified before one of them is added."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +87,7 @@ def complete(
     law : "all" first seeks the law together with its effects; another name is taken first; None
         seeks it where nobody chose one (`laws.law_or_all`)
     greedy : whether to go on where the verdict is unknown, by the effect that lowers the held-out
-        error most, as long as one does so by enough and beyond chance
+        error most, as long as one does so by enough and beyond chance; see `gaining`
     curves : whether to go on where the verdict is unknown, by learning a curve
     say : called with a few words at each stage
     on_step : called after each new step of the history
@@ -124,14 +123,13 @@ def complete(
         names = names or tuple(trial.effects[-1] for trial in abreast[:1])
         if not names or len(study.model().effects) + len(names) > MOST_EFFECTS:
             return Completed(found, tuple(steps), tuple(learned))
-        why = f"verdict: {found.kind}"
+        identified = None
         if len(abreast) > 1:
-            best = _best_fitted(study, abreast, say)
-            say("adding " + best.names[0])
-            stepped(added(study, best, why).step)
-        else:
-            say("adding " + " and ".join(names))
-            stepped(add_effects(study, names, why=why, found=found).step)
+            names, identified = _best_identified(study, abreast, say)
+        say("adding " + " and ".join(names))
+        why = f"verdict: {found.kind}"
+        added = add_effects(study, names, why=why, found=found, identified=identified)
+        stepped(added.step)
 
 
 def _named(found: Diagnosis) -> tuple[str, ...]:
@@ -141,21 +139,32 @@ def _named(found: Diagnosis) -> tuple[str, ...]:
 def gaining(before: Trial, trials: Sequence[Trial]) -> list[Trial]:
     """Return the effects, each alone, that lower an error about as much as the best one.
 
-    The best first; none where no effect does so by enough and beyond chance.
+    Parameters
+    ----------
+    before : the trial of the model without them
+    trials : with one effect more each, the smallest z first
+
+    Returns
+    -------
+    list of Trial
+        The best first, `MOST_ABREAST` at most; none where no effect lowers the error by enough and
+        beyond chance.
     """
     able = [trial for trial in trials if missing(before, trial)]
     return [trial for trial in able if trial.z <= ABREAST * able[0].z][:MOST_ABREAST]
 
 
-def _best_fitted(study: Study, abreast: Sequence[Trial], say: Say) -> Joined:
-    """Return the effect that, identified with the model, leaves the least z on held-out runs."""
-    names = [trial.effects[-1] for trial in abreast]
-    say("these gain about alike and are identified: " + ", ".join(names))
-    fits = [
-        joined_with(study, (name,), trial.model.values)
+def _best_identified(
+    study: Study, abreast: Sequence[Trial], say: Say
+) -> tuple[tuple[str, ...], Identified]:
+    """Return the effect that leaves the least z once identified, and that identification."""
+    names = [trial.effects[-1:] for trial in abreast]
+    say("these gain about alike and are identified: " + ", ".join(name for (name,) in names))
+    found = [
+        identify_with(study, name, trial.model.values)
         for name, trial in zip(names, abreast, strict=True)
     ]
-    return min(fits, key=lambda one: one.z)
+    return min(zip(names, found, strict=True), key=lambda one: one[1].z)
 
 
 def _with_law_taken(

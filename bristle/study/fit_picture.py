@@ -51,7 +51,6 @@ def draw_identified(found: Identified) -> Page:
 
 
 def _headings(found: Identified, role: str) -> tuple[str, str]:
-    z = found.after.get("z_holdout", found.after["z_train"])
     share = found.after.get("share_holdout", found.after["share_train"])
     low = f" below {found.cutoff:g} Hz" if found.cutoff else ""
     law = " + ".join([found.model.law, *found.model.effects])
@@ -60,6 +59,6 @@ def _headings(found: Identified, role: str) -> tuple[str, str]:
     worst = " at the worst site" if site.shown else ""
     runs = "runs held out" if role == "held out" else "training runs"
     return (
-        f"{law}: error {percent(share)} of the force{low}, z = {short_z(z)}{worst}",
+        f"{law}: error {percent(share)} of the force{low}, z = {short_z(found.z)}{worst}",
         f"{what} in {runs}, measured and predicted. z is error / noise; a true model has 1.",
     )

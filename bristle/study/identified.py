@@ -84,6 +84,11 @@ class Identified:
         return self.at.site.holdout
 
     @property
+    def z(self) -> float:
+        """z on held-out runs; on training runs where none is held out."""
+        return self.after.get("z_holdout", self.after["z_train"])
+
+    @property
     def unidentified(self) -> tuple[str, ...]:
         """Names of the parameters that the data do not identify."""
         return self.fit.unidentified

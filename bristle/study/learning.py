@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from ..data.model import StudyModel
 from ..diagnose import Diagnosis, diagnose_rig
@@ -135,7 +135,12 @@ class Added:
 
 
 def add_effects(
-    study: Study, names: Sequence[str], *, why: str = "", found: Diagnosis | None = None
+    study: Study,
+    names: Sequence[str],
+    *,
+    why: str = "",
+    found: Diagnosis | None = None,
+    identified: Identified | None = None,
 ) -> Added:
     """Add effects to a study's model, refit it, and write the step.
 
@@ -145,58 +150,16 @@ def add_effects(
     names : of the effects
     why : the reason for the history; else the verdict at hand, or "by hand"
     found : the diagnosis that named them: the fit then begins from its values
+    identified : what `identify_with` found for these effects, where it was asked before
 
     Raises
     ------
     StudyError
         If an effect is not known, is there already, or cannot join the model.
     """
-    fitted = joined_with(study, names, found.values if found is not None else {})
-    return added(study, fitted, why)
-
-
-class Joined(NamedTuple):
-    """Effects, as a study's model names them, and the model identified with them."""
-
-    names: tuple[str, ...]
-    identified: Identified
-
-    @property
-    def z(self) -> float:
-        """z on held-out runs; on training runs where none is held out."""
-        after = self.identified.after
-        return after.get("z_holdout", after["z_train"])
-
-
-def joined_with(study: Study, names: Sequence[str], begin: Mapping[str, float]) -> Joined:
-    """Identify a study's model with effects added; the study stays as it is.
-
-    Parameters
-    ----------
-    study : the folder, opened
-    names : of the effects
-    begin : values in SI by name from which one more fit begins
-    """
-    study.usable_effects()
-    for name in names:
-        refuse_left_out(study.effects_folder / f"{name}.py")
-    tell("reading the runs")
-    model = present = study.model()
-    bench = not study.settings.has_building
-    names = tuple(as_named_here(name, bench) for name in names)
-    for name in names:
-        refuse_effect(model, name, bench)
-        model = model.with_effect(name)
-    known = set(model.flat())
-    start = {k: v for k, v in begin.items() if k in known}
-    # With the new effects at their defaults it would be nobody's model: before is the one without.
-    task = FitTask(study.settings.cut_off, table=False, present=present, begin=start)
-    return Joined(names, identify_model(study, model, task))
-
-
-def added(study: Study, fitted: Joined, why: str) -> Added:
-    """Write the step that adds effects."""
-    names, identified = fitted
+    if identified is None:
+        identified = identify_with(study, names, found.values if found is not None else {})
+    names = _named_here(study, names)
     verdict = study.verdict()
     if not why:
         agreed = verdict is not None and set(names) <= set(verdict.get("effects", []))
@@ -205,3 +168,37 @@ def added(study: Study, fitted: Joined, why: str) -> Added:
         "add " + ", ".join(names), why, identified.model, identified.before, identified.after
     )
     return Added(names, replace(identified, step=step), step)
+
+
+def identify_with(study: Study, names: Sequence[str], begin: Mapping[str, float]) -> Identified:
+    """Identify a study's model with effects added; the study stays as it is.
+
+    Parameters
+    ----------
+    study : the folder, opened
+    names : of the effects
+    begin : values in SI by name from which one more fit begins
+
+    Raises
+    ------
+    StudyError
+        If an effect is not known, is there already, or cannot join the model.
+    """
+    study.usable_effects()
+    for name in names:
+        refuse_left_out(study.effects_folder / f"{name}.py")
+    tell("reading the runs")
+    model = present = study.model()
+    for name in _named_here(study, names):
+        refuse_effect(model, name, not study.settings.has_building)
+        model = model.with_effect(name)
+    known = set(model.flat())
+    start = {k: v for k, v in begin.items() if k in known}
+    # With the new effects at their defaults it would be nobody's model: before is the one without.
+    task = FitTask(study.settings.cut_off, table=False, present=present, begin=start)
+    return identify_model(study, model, task)
+
+
+def _named_here(study: Study, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names that a study's model gives effects."""
+    return tuple(as_named_here(name, not study.settings.has_building) for name in names)

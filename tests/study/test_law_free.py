@@ -19,7 +19,7 @@ from bristle.study import completion
 from bristle.study.completion import MOST_EFFECTS, complete
 from bristle.study.create import create_study
 from bristle.study.laws import law_command, law_or_all, with_law
-from bristle.study.learning import Joined, diagnose_study
+from bristle.study.learning import diagnose_study
 from bristle.study.public import diagnose, identify
 from bristle.study.study import Study
 from tests.independent.generate import make_case
@@ -97,16 +97,11 @@ def test_of_effects_that_gain_about_alike_the_one_that_is_better_identified_is_a
     ]
     told(monkeypatch, answers)
     after = {"stribeck": 4.0, "drift": 3.8}
-
-    def joined(_study, names, _begin):
-        return Joined(names, SimpleNamespace(after={"z_train": 1.0, "z_holdout": after[names[0]]}))
-
-    def added(study, fitted, _why):
-        study.names += fitted.names
-        return SimpleNamespace(step=f"add {fitted.names[0]}")
-
-    monkeypatch.setattr(completion, "joined_with", joined)
-    monkeypatch.setattr(completion, "added", added)
+    monkeypatch.setattr(
+        completion,
+        "identify_with",
+        lambda _study, names, _begin: SimpleNamespace(z=after[names[0]]),
+    )
     complete(folder, greedy=True, say=print)
     assert folder.names == ["drift"]
 
