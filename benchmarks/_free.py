@@ -41,6 +41,7 @@ from bristle.identify.site_fit import fit_site
 from bristle.physics.laws import DEFAULT
 from bristle.physics.user import defined
 from bristle.study.completion import MOST_EFFECTS, gaining
+from bristle.study.identification import FitTask
 from bristle.study.inputs import runs_of
 from bristle.study.runs import Runs
 
@@ -66,9 +67,6 @@ class Found:
         effects = [one for one in self.model.effects if not one.startswith(NAME)]
         return " + ".join([self.model.law, *effects, *(one.words() for one in self.curves)])
 
-
-STARTS = 4
-"""Starting points of a law, as commands take them."""
 
 NAME = "learned_"
 """Begin of the names of curves."""
@@ -198,7 +196,7 @@ def _identified(model: Model, problem: Problem) -> Model:
     which may be a local minimum: the least cost on these runs counts.
     """
     site = Site(DAMPER, lambda _: problem)
-    return fit_site(model, site, {DAMPER: site}, STARTS, model.values).model
+    return fit_site(model, site, {DAMPER: site}, FitTask.starts, model.values).model
 
 
 def corrected_runs(

@@ -125,12 +125,12 @@ def survivors(rows: Sequence[LawTrial], rule: DecisionRule = BENCH) -> list[LawT
         for row in straight
         if not any(o.fitted <= row.fitted and o.trial.z < row.trial.z for o in straight)
     ]
-    first_ones = list({row.law: row for row in [*picked, *front]}.values())[: rule.most_laws]
+    usual = list({row.law: row for row in [*picked, *front]}.values())[: rule.most_laws]
     # What a law lacks may be why it fits the many samples near rest alone, or why one that contains
     # an effect does no better than one without.
     holding = sorted(filter(_holds, level), key=lambda row: row.fitted)
     hidden = [_formed(ranked[0], rows, rule), *holding[:1]]
-    return list({row.law: row for row in [*first_ones, *hidden]}.values())
+    return list({row.law: row for row in [*usual, *hidden]}.values())
 
 
 def _holds(row: LawTrial) -> bool:

@@ -168,7 +168,6 @@ def _fitted(
     count = Count("fitting a curve", len(chosen))
     with defined(texts), ThreadPoolExecutor(cpu_count()) as pool:
         train, held_out = train.of(train.runs), held_out.of(held_out.runs)
-        train.bench(base)  # compiled before threads ask for it
 
         def fitted(own: str, one: Promise) -> Fitted:
             found = _inside(one.curve, own, base, train, held_out)

@@ -2,7 +2,7 @@
 
 from ..effect import Effect, Parameter
 
-SOFT = 0.02  # of the gap: over which damping sets in
+RISE = 0.02  # of the gap: indentation over which the damping sets in
 LEAST = 1e-9  # m, the same where there is no gap
 
 
@@ -11,10 +11,10 @@ class Backlash(Effect):
 
         force outside = k s' + c min(|s'|/d, 1) ds'/dt,   s' = s beyond +-gap,   s = x_rod - x_joint
 
-    Damping sets in over d, the first 2 % of the gap beyond it, as a contact does whose loss grows
-    with its indentation: a force that jumped would agree with no motion of a building at the moment
-    of closing. A small joint mass lets the fluid spring back inside the gap. Leaves out the rattle
-    of the impacts: doubt it when the force rings after a gap has closed.
+    The damping sets in over an indentation d of 2 % of the gap, as in a contact whose loss grows
+    with its indentation. With a jump of the force as the gap closes, no force would agree with the
+    motion of a building at that moment. A small joint mass lets the fluid spring back inside the
+    gap. Leaves out the rattle of the impacts: doubt it when the force rings after a gap has closed.
     """
 
     name = "backlash"
@@ -52,7 +52,7 @@ class Backlash(Effect):
         beyond = z.compression - min(max(z.compression, -p.gap), p.gap)
         if beyond == 0.0:
             return 0.0
-        c = p.c * min(abs(beyond) / (SOFT * p.gap + LEAST), 1.0)
+        c = p.c * min(abs(beyond) / (RISE * p.gap + LEAST), 1.0)
         force = p.k * beyond + c * (q.rod_v - z.joint_velocity)
         # A joint pushes and never pulls: damping may unload it, not turn the contact round.
         return max(force, 0.0) if beyond > 0.0 else min(force, 0.0)
@@ -61,7 +61,8 @@ class Backlash(Effect):
     def rate(q, z, p):
         slip = q.rod_v - z.joint_velocity
         beyond = z.compression - min(max(z.compression, -p.gap), p.gap)
-        c, force = p.c * min(abs(beyond) / (SOFT * p.gap + LEAST), 1.0), 0.0
+        c = p.c * min(abs(beyond) / (RISE * p.gap + LEAST), 1.0)
+        force = 0.0
         if beyond > 0.0:
             force = max(p.k * beyond + c * slip, 0.0)
         elif beyond < 0.0:
