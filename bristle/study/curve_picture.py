@@ -63,7 +63,8 @@ def draw_curve(
             said += " The band is the 95 % interval of each value."
         page = Page(8.0, 3.6, heading, said)
         right = 1.6 if curve.across else 0.4
-        grid = page.grid(1, 1, top=0.3, bottom=0.55, left=0.75, right=right)
+        top = 0.3 if curve.across or curve.part == RING else 0.6  # a legend stands there
+        grid = page.grid(1, 1, top=top, bottom=0.55, left=0.75, right=right)
         axes = page.figure.add_subplot(grid[0, 0])
         if curve.part == RING:
             _draw_mode(axes, curve)
@@ -142,7 +143,11 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
     for given in (value for name, value in curve.memory if name in GIVEN):
         axes.axvline(across * given, color=PALE, lw=1.0)
     _name_axes(axes, curve, along, unit)
-    axes.legend(frameon=False, labelcolor=GREY, fontsize=9)
+    # Above the title: a curve with many waves leaves no room beside it.
+    axes.legend(
+        frameon=False, labelcolor=GREY, fontsize=9, loc="lower left", bbox_to_anchor=(0.0, 1.08),
+        ncols=2, borderpad=0.0, borderaxespad=0.0, columnspacing=1.2,
+    )  # fmt: skip
 
 
 def _name_axes(axes: Axes, curve: Curve, along: str, unit: str) -> None:
