@@ -145,7 +145,7 @@ def _draw(axes: Axes, found: LearnedCurve, forms: Sequence[ClosedForm]) -> None:
     _name_axes(axes, curve, along, unit)
     # Above the title: a curve with many waves leaves no room beside it.
     axes.legend(
-        frameon=False, labelcolor=GREY, fontsize=9, loc="lower left", bbox_to_anchor=(0.0, 1.08),
+        frameon=False, labelcolor=GREY, fontsize=9, loc="lower left", bbox_to_anchor=(0.0, 1.13),
         ncols=2, borderpad=0.0, borderaxespad=0.0, columnspacing=1.2,
     )  # fmt: skip
 
