@@ -26,7 +26,7 @@ LAWS = ("bouc_wen", "tanh", "dahl", "modified_bouc_wen")
 RUNS = ("train_1", "train_2", "train_3", "train_4", "holdout_1", "holdout_2")
 
 LEAST, MOST = 0.1, 0.6
-"""Share of the force that an effect must change, beyond what the law takes up."""
+"""Share of the force that an effect must change, beyond what the law absorbs."""
 
 SEED = 4100
 

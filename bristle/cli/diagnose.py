@@ -179,7 +179,7 @@ def _then(verdict: Verdict, folder: Path) -> str:
 def _not_excited(verdict: Verdict) -> list[str]:
     """Return the effects that these runs cannot show, and others may.
 
-    What a parameter of another effect takes up is that effect.
+    What a parameter of another effect absorbs is that effect.
     """
     rows = [row for found in verdict["findings"] for row in found.get("limits", ())]
     hidden = [row for row in rows if row.get("why") and "." not in row["why"].partition(" ")[0]]

@@ -177,7 +177,7 @@ def open_effects(verdict: Mapping[str, Any], model: StudyModel) -> LeftOpen:
             if name not in EFFECTS or any(_clash(name, other) for other in model.effects):
                 continue
             if one.get("why"):
-                # What a parameter of a known effect takes up is in the band of that parameter.
+                # What a parameter of a known effect absorbs is in the band of that parameter.
                 if str(one["why"]).partition(".")[0] not in model.effects:
                     unlimited.append(name)
                 continue

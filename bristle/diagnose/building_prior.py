@@ -3,7 +3,7 @@
 Without a load cell the force is what equilibrium leaves: inertia, less the springs. A stiffness
 that is 2 % off in the building's file then acts like a linear spring beside the damper, a mass like
 a fluid's. So the file's numbers are taken as a laboratory knows them, and move within that together
-with the law; what they cannot take up is left for the effects.
+with the law; what they cannot absorb is left for the effects.
 
 The first level's mass stays: the scale of all forces is not told by motion, and a residual shrinks
 with it.

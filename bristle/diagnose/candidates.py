@@ -137,7 +137,7 @@ def short_search(
 
     Its loss is that on the training runs.
 
-    All parameters move at once: with the law's held, an effect that the law has taken up vanishes.
+    All parameters move at once: with the law's held, an effect that the law has absorbed vanishes.
     Where impacts make the way rough the first step says little of a start: all go a short way, and
     those that came farthest go on.
 

@@ -122,7 +122,7 @@ def _untestable(
 ) -> tuple[str, ...]:
     """Return the effects, not those named, that some site's runs do not show.
 
-    Without a load cell the damper's law takes up others whole.
+    Without a load cell the damper's law absorbs others entirely.
     """
     names = {name for found in findings.values() for name in found.untestable}
     if reconstructed:

@@ -1,6 +1,6 @@
 """How large each effect may still be, on runs that do not show it, and from what size it is named.
 
-Law and known effects are refitted: what their sensitivities can take up does not count.
+Law and known effects are refitted: what their sensitivities can absorb does not count.
 """
 
 from __future__ import annotations
@@ -115,12 +115,12 @@ def limit_of(sized: Sized) -> EffectLimit:
 
 
 def _why_hidden(sized: Sized) -> str:
-    """Return why the runs cannot show an effect: what does not move, or what takes it up."""
+    """Return why the runs cannot show an effect: what does not move, or what absorbs it."""
     known = sized.known
     change = sized.change(1.0)
     if np.linalg.norm(change) > known.rule.silent * known.size and known.search.names:
         alike = np.abs(known.own.T @ change)
-        return f"{known.search.names[int(np.argmax(alike))]} of the model takes it up"
+        return f"{known.search.names[int(np.argmax(alike))]} of the model absorbs it"
     problem = known.problem
     held = all(steady(problem.of([run])) for run in problem.runs)
     still = held and "V" in EFFECTS[sized.name].needs

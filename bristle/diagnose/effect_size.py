@@ -1,6 +1,6 @@
 """An effect beside a fitted model with one number for its size, and what it changes on some runs.
 
-What the model's own parameters can take up of a change is left out by their sensitivities.
+What the model's own parameters can absorb of a change is left out by their sensitivities.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Known:
 
     @cached_property
     def taken(self) -> Array:
-        """What of a change (n,) the model's own parameters take up (p, n), by least squares."""
+        """What of a change (n,) the model's own parameters absorb (p, n), by least squares."""
         return np.asarray(np.linalg.pinv(self.own, rcond=TOLD), dtype=float)
 
     @cached_property
@@ -127,7 +127,7 @@ class Known:
         return float(np.linalg.norm(np.concatenate(parts)))
 
     def beyond(self, change: Array) -> Array:
-        """Return what of a change (n,) the model's own parameters do not take up."""
+        """Return what of a change (n,) the model's own parameters do not absorb."""
         kept: Array = change - self.basis @ (self.basis.T @ change)
         return kept
 
@@ -152,10 +152,10 @@ class Known:
         return float(np.sum(losses(self.refitted(self.plain))))
 
     def moved(self, change: Array) -> tuple[tuple[str, float], ...]:
-        """Return by how much [SI] a fit moves the model's own parameters to take up a change (n,).
+        """Return by how much [SI] a fit moves the model's own parameters to absorb a change (n,).
 
         A parameter that the runs hardly tell would have to move beyond what its sensitivity says:
-        it stays, and the others take up what they can.
+        it stays, and the others absorb what they can.
 
         Parameters
         ----------
@@ -229,7 +229,7 @@ class Sized:
     def change_there(self, size: float) -> Array:
         """Return what is left (n,) of the effect on the runs that decide, the model refitted.
 
-        Of the normalised residuals there; the model's parameters take up of the effect what they
+        Of the normalised residuals there; the model's parameters absorb of the effect what they
         can on the runs that are fitted to. Where that is far, it is what a small part of the way
         changes, in proportion: sensitivities said how far, so that they say what it does.
         """

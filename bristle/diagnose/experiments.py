@@ -148,7 +148,7 @@ def _contrast(rivals: Sequence[_Rival], run: Run) -> float:
     """Return the smallest difference that any rival leaves to any other's force, in noises.
 
     The rival may move its parameters as far as the runs at hand allow: a difference that a refit
-    takes up separates nothing.
+    absorbs separates nothing.
     """
     seen = [rival.on(run) for rival in rivals]
     least = np.inf

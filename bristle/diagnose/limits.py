@@ -59,10 +59,10 @@ def untestable(
 ) -> list[str]:
     """Return the effects that these runs do not excite, or that refitting the model absorbs.
 
-    Those that a part of the law takes up whole, on whatever runs, are among them.
+    Those that a part of the law absorbs entirely, on whatever runs, are among them.
 
     Each effect is added at default size and scaled to `rule.typical`; what the sensitivities to the
-    model's own parameters cannot take up must reach `visible`.
+    model's own parameters cannot absorb must reach `visible`.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 The shear of a storey is the inertia above it, and must go with one line through drift and drift
 rate at each storey; at the isolation layer it must go with the measured force besides. Masses that
-are off leave what no line takes up, and a load cell of another scale is, for equilibrium, nothing
+are off leave what no line absorbs, and a load cell of another scale is, for equilibrium, nothing
 but masses that are all off alike. So masses are moved first, as far as a file may be wrong. Without
 a measured force only their ratios can be told.
 """
@@ -138,7 +138,7 @@ def _shift(
         here = _target(train)
 
         def left(values: Array, Q: Array = Q, weight: Array = weight) -> Array:
-            """Return what no line takes up of forces (m,), over the noise."""
+            """Return what no line absorbs of forces (m,), over the noise."""
             scaled = values * weight
             return np.asarray(scaled - Q @ (Q.T @ scaled))
 

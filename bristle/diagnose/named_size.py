@@ -19,7 +19,7 @@ NINE_OF_TEN = 1.282
 
 MARGIN = 1.08
 """Factor on the distance from which an effect is named: z is robust, so that large residuals count
-less than their squares, and other effects take up a part. `python -m benchmarks limits --named`
+less than their squares, and other effects absorb a part. `python -m benchmarks limits --named`
 counts what comes of it."""
 
 STRAIGHT = 2

@@ -50,7 +50,7 @@ class Diagnosis:
     sensors : tuple of SensorFault
         Faults that the channels show of each other.
     untestable : tuple of str
-        Effects that the runs do not excite, or that the model takes up.
+        Effects that the runs do not excite, or that the model absorbs.
     coordinate : str
         What an unknown residual depends on.
     sites : mapping of str

@@ -148,7 +148,7 @@ def about(effect: str, drive: Drive = VOLTAGE) -> str:
 def untestable(verdict: Verdict) -> list[str]:
     """Return the effects that the data could not show, with their sites where there are several.
 
-    Where no run would show one, for a part of the damper's law takes it up, that is said with it.
+    Where no run would show one, for a part of the damper's law absorbs it, that is said with it.
     """
     findings = verdict.get("findings") or []
     out = []
@@ -161,7 +161,7 @@ def untestable(verdict: Verdict) -> list[str]:
 
 
 def _absorbing(name: str, sites: Sequence[str], verdict: Verdict) -> list[str]:
-    """Return what part of the damper's law takes an effect up, in a list; none where none does."""
+    """Return what part of the damper's law absorbs an effect, in a list; none where none does."""
     part = EFFECTS[name].absorbed_by if name in EFFECTS else ""
     ranking = verdict.get("ranking") or []
     # A law without that part is offered the effect; in a reconstructed force it is the layer's.
@@ -169,7 +169,7 @@ def _absorbing(name: str, sites: Sequence[str], verdict: Verdict) -> list[str]:
         (row["effect"], row.get("site")) == (name, DAMPER) for row in ranking
     )
     return (
-        [f"the law's {part} force takes it up"] if part and DAMPER in sites and not offered else []
+        [f"the law's {part} force absorbs it"] if part and DAMPER in sites and not offered else []
     )
 
 

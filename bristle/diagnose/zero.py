@@ -1,9 +1,9 @@
 """The zero of a load cell beside an effect: both are fitted together.
 
 A constant force is no effect by itself: the load cell's zero explains it as well as a preload, and
-needs nothing of the damper. Fitted alone, though, it takes up part of what an effect does, and an
+needs nothing of the damper. Fitted alone, though, it absorbs part of what an effect does, and an
 effect fitted without it asks for a second one that has a constant force. So where a constant is
-left beside what was found, or was taken up by a second effect, everything is tried once more with
+left beside what was found, or was absorbed by a second effect, everything is tried once more with
 the zero free.
 """
 

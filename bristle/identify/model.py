@@ -175,7 +175,7 @@ class Problem:
     def damper_effects(self, law: str) -> list[str]:
         """Return the effects of the damper, by a model's names, that these runs may tell.
 
-        Not those that a part of the law takes up whole.
+        Not those that a part of the law absorbs entirely.
         """
         return [
             effect.name
@@ -324,7 +324,7 @@ def _spread(parts: list[Array]) -> float:
 
 
 def absorbed(effect: type[Effect], law: str) -> bool:
-    """Return whether a part of a damper's law takes up whole what an effect does beside it."""
+    """Return whether a part of a damper's law absorbs entirely what an effect does beside it."""
     return bool(effect.absorbed_by) and LAWS[law].has(effect.absorbed_by)
 
 

@@ -35,7 +35,7 @@ STEPS = (1.0, 0.3)
 def initial_guesses(effect: str, base: Model, problem: Problem) -> list[Model]:
     """Return the models from which the search for an effect's parameters begins.
 
-    An effect of speed alone competes with the law's own fall with speed, which has taken up what it
+    An effect of speed alone competes with the law's own fall with speed, which has absorbed what it
     could: so some of its starts have that part small and wide.
     """
     bases = [dict(base.values)]

@@ -185,7 +185,7 @@ class Effect:
         values, in this order, as a tuple; `sizes` are the rig's (`Sizes`).
     A static method `in_words(p)` says what its values mean, in a sentence for the verdict.
     A static method `yield_share(p)` says by what the law's own yield force is divided at a start,
-    for an effect that the law has taken up in part.
+    for an effect that the law has absorbed in part.
 
     Class data of the verdict
     -------------------------
@@ -195,7 +195,7 @@ class Effect:
         What else does the same to a building's damper whose force no load cell shows, and in a
         sentence why: {name of an effect, or what it is in words: sentence}.
     absorbed_by
-        The part of the damper's law (`law.PARTS`) that then takes the effect up whole.
+        The part of the damper's law (`law.PARTS`) that then absorbs the effect entirely.
     mimics
         Faults of sensors that its absence may look like (`MIMICKED`): they are weighed against it.
     faults

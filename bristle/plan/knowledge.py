@@ -1,7 +1,7 @@
 """What runs say of a model: normal equations of its parameters and of what might be beside them.
 
 Those of several runs add up, measured ones and planned ones alike; so a plan is judged without a
-fit. What a refit of the model's parameters would take up of a change is left out by them.
+fit. What a refit of the model's parameters would absorb of a change is left out by them.
 """
 
 from __future__ import annotations
@@ -252,9 +252,9 @@ class Known:
         }
 
     def kept(self) -> dict[str, float]:
-        """Return the share of each rival's change that no parameter takes up, by the runs alone.
+        """Return the share of each rival's change that no parameter absorbs, by the runs alone.
 
-        What is known of a parameter beforehand would tell of an effect that it takes up entirely.
+        What is known of a parameter beforehand would tell of an effect that it absorbs entirely.
         """
         p = self._own
         size = np.sqrt(np.maximum(np.diag(self.told.normal), 1e-300))

@@ -135,10 +135,10 @@ class Plan:
         )
 
     def _why_hidden(self, one: Outcome) -> str:
-        """Return why no test shows an effect: the model takes it up, or nothing moves it."""
+        """Return why no test shows an effect: the model absorbs it, or nothing moves it."""
         none = "no test within these limits shows it"
         if one.excited:
-            return f"{none}; the model takes it up."
+            return f"{none}; the model absorbs it."
         held = self.limits.command[0] == self.limits.command[1] or {*self.limits.commands} == {
             "held"
         }

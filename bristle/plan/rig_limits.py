@@ -52,7 +52,7 @@ class RigLimits:
     runs : int
         How many tests.
     heat : float
-        Energy that the damper may take up in a test [J].
+        Energy that the damper may absorb in a test [J].
     rate : float
         Samples per second of the controller.
     motions, commands : tuple of str

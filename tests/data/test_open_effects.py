@@ -131,8 +131,8 @@ def test_the_widest_effect_is_worth_a_test_from_a_tenth_of_the_variance_on() -> 
 
 
 def test_what_a_known_effect_takes_up_is_in_the_band_of_its_parameters() -> None:
-    taken = {"effect": "duffing", "why": "gas_spring.k_3 of the model takes it up"}
-    by_law = {"effect": "saturation", "why": "f_v of the model takes it up"}
+    taken = {"effect": "duffing", "why": "gas_spring.k_3 of the model absorbs it"}
+    by_law = {"effect": "saturation", "why": "f_v of the model absorbs it"}
     assert open_effects(
         verdict(taken, by_law), new_model("bingham", ("gas_spring",))
     ).unlimited == ["saturation"]

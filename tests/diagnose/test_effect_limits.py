@@ -74,7 +74,7 @@ def test_what_is_named_is_what_the_runs_that_decide_show(known):
     assert limit_of(Sized(SPRING, replace(known, judging=known.problem))).named == pytest.approx(
         alone, rel=0.1
     )
-    # A spring of half the stroke has half the force; the law takes up none of it.
+    # A spring of half the stroke has half the force; the law absorbs none of it.
     half = known.problem.of([replace(run, x=0.5 * run.x) for run in known.problem.runs])
     halved = limit_of(Sized(SPRING, replace(known, judging=half)))
     assert halved.named == pytest.approx(2.0 * alone, rel=0.15)
@@ -86,7 +86,7 @@ def test_a_parameter_that_the_runs_hardly_tell_is_not_moved_beyond_its_sensitivi
     problem = problem_of(steps, values=straight)
     model = replace(refine(Model("bingham", (), straight, ("v_n",)), problem), fixed=())
     known = Known(problem, model, problem.expectation(model), 6000)
-    sized = Sized("quadratic_damping", known)  # what v_n would take up, moved by many powers of ten
+    sized = Sized("quadratic_damping", known)  # what v_n would absorb, moved by many powers of ten
     alone = limit_of(sized)
     change = sized.change(alone.named / sized.one)
     assert abs(known.steps(change)[known.search.names.index("v_n")]) > 2.0
@@ -163,7 +163,7 @@ def test_what_hides_an_effect_is_told():
     sprung = {**VALUES, "gas_spring.k": 50.0, "gas_spring.k_3": 1e4}
     both = Model("bingham", (SPRING,), sprung, ("f_v", "c_v", "gas_spring.k_2"))
     taken = Known(problem, both, problem.expectation(both), 6000)
-    assert limit_of(Sized("duffing", taken)).why == "gas_spring.k_3 of the model takes it up"
+    assert limit_of(Sized("duffing", taken)).why == "gas_spring.k_3 of the model absorbs it"
 
 
 def test_every_effect_says_how_much_there_is_of_it():
@@ -176,13 +176,13 @@ def test_the_table_has_units_as_people_write_them():
     limits = [
         EffectLimit("coil_lag", "tau", "s", False, 1.4e-3, 2e-4, 0.011, 2e-3),
         EffectLimit("mount_compliance", "k", "N/m", True, 2.1e7, None, None, None, True),
-        EffectLimit("base_friction", why="f_c of the model takes it up"),
+        EffectLimit("base_friction", why="f_c of the model absorbs it"),
     ]
     verdict = {"findings": [{"site": "damper", "limits": [one.as_dict() for one in limits]}]}
     assert limit_rows(verdict) == [
         ["coil_lag", "tau below 1.4 ms", "0.02 %", "11 ms"],
         ["mount_compliance", "k above 21 MN/m", "-", "-"],
-        ["base_friction", "f_c of the model takes it up", "-", "-"],
+        ["base_friction", "f_c of the model absorbs it", "-", "-"],
     ]
     table = _limits(verdict)
     assert table[1].split() == [

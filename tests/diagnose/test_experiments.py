@@ -1,4 +1,4 @@
-"""Which run separates rivals: what a refit takes up is no difference."""
+"""Which run separates rivals: what a refit absorbs is no difference."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ def test_masses_that_are_off_are_found_and_no_fault_is_told(clean, doubt):
     before = [look_at(site, *pair).kind for site, pair in runs.lines(told).items()]
     assert "unknown" in before
     found = suited_masses(runs, told)
-    # The base's mass stands for a part of its force that the layer's line takes up by itself.
+    # The base's mass stands for a part of its force that the layer's line absorbs by itself.
     assert np.diag(found.M)[1:] == pytest.approx(np.diag(b.M)[1:], rel=3e-3)
     after = {site: look_at(site, *pair) for site, pair in runs.lines(found).items()}
     assert {one.kind for one in after.values()} == {"none"}

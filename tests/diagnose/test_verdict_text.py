@@ -86,7 +86,7 @@ def test_effects_that_no_run_showed_are_told_with_their_sites():
 
 def test_what_the_law_takes_up_is_told_with_the_part_that_does():
     hidden = at("damper", untestable=("base_friction",))
-    told = "the law's yield force takes it up"
+    told = "the law's yield force absorbs it"
     assert untestable(said(damper=hidden)) == [f"base_friction ({told})"]
     building = said(layer=at("layer"), damper=hidden)
     assert untestable(building) == [f"base_friction (damper: {told})"]

@@ -186,7 +186,7 @@ def test_a_stop_is_fitted_from_where_the_runs_come() -> None:
 def test_what_each_rig_is_offered() -> None:
     names = joinable(Model("lugre"))
     assert {"end_stop", "duffing", "gas_spring"} <= set(names)
-    # What the law's own yield force takes up whole is not offered: it is told as untestable.
+    # What the law's own yield force absorbs entirely is not offered: it is told as untestable.
     assert "base_friction" not in names
     inside = joinable(Model("lugre"), problem=layer_and_damper())
     assert {"end_stop@damper", "duffing@damper", "gas_spring"} <= set(inside)

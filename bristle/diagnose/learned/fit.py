@@ -125,7 +125,7 @@ def _best_first(fitted: Sequence[Fitted], learning: LearnRule) -> list[Fitted]:
 def with_law_of(base: Model, best: Fitted) -> Model:
     """Return a model with the law's values that were fitted together with a curve.
 
-    Alone, the law has taken up what it can of a large curve. A scan linear in a law so far off
+    Alone, the law has absorbed what it can of a large curve. A scan linear in a law so far off
     mistakes a factor of the whole force for one of a part of it; beside a curve that explains most
     of the error the law is nearer to the rig's.
     """

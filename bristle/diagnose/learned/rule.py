@@ -69,7 +69,7 @@ class LearnRule:
     """Times its mean squared residual that a model may have on a stretch which a fit left out.
 
     Beyond it the model's parameters are held for the scan. Trades: if higher, a scan says nothing
-    where the runs hardly tell parameters apart; if lower, a curve that the parameters have taken up
+    where the runs hardly tell parameters apart; if lower, a curve that the parameters have absorbed
     in part is missed. Found: stated, and seen on published measurements.
     """
 
