@@ -265,7 +265,8 @@ def test_what_is_at_the_resolution_of_the_integration_gains_nothing() -> None:
 
 
 def test_rivals_that_no_test_tells_apart_are_said_to_be_so(rig: bristle.Study) -> None:
-    found = bristle.plan(rig, separate=["gas_spring", "duffing"], runs=1, duration="3 s")
+    few = {"runs": 1, "duration": "3 s", "motions": ["sine"], "commands": ["held"]}
+    found = bristle.plan(rig, separate=["gas_spring", "duffing"], **few)
     assert not found.worth  # on this rig neither has a size
     assert "no test within these limits tells them apart" in found.sentences()[0]
     assert "Nothing is left to gain" in found.sentences()[-1]
@@ -276,7 +277,8 @@ def test_a_command_that_does_not_move_shows_no_lag_and_is_said_to(sheet: Path) -
     found = bristle.plan(sheet, see="coil_lag", command=held)
     why = "coil_lag: no test within these limits shows it: the command does not move."
     assert found.sentences()[0] == why
-    apart = bristle.plan(sheet, separate=["coil_lag", "none"], command=held, duration="4 s")
+    few = {"command": held, "runs": 1, "duration": "4 s", "motions": ["sine"]}
+    apart = bristle.plan(sheet, separate=["coil_lag", "none"], **few)
     assert "differ by 0 standard deviations" in apart.sentences()[0]
     assert apart.outcomes[0].cells()[-1] == "0 std"
 
