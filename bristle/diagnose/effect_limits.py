@@ -6,14 +6,13 @@ Law and known effects are refitted: what their sensitivities can absorb does not
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from os import cpu_count
 from typing import Any
 
 import numpy as np
 
 from ..identify.model import steady
+from ..identify.threads import in_threads
 from ..physics.effect import EFFECTS
 from .allowed_size import largest_allowed
 from .effect_size import Known, Sized
@@ -85,8 +84,7 @@ def effect_limits(
         one = Sized(name, known)
         return EffectLimit(name, why=_why_hidden(one)) if name in hidden else limit_of(one)
 
-    with ThreadPoolExecutor(cpu_count()) as pool:
-        return tuple(pool.map(found, (name for name in sorted(names) if EFFECTS[name].amount)))
+    return tuple(in_threads(found, [name for name in sorted(names) if EFFECTS[name].amount]))
 
 
 def limit_of(sized: Sized) -> EffectLimit:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from os import cpu_count
 from typing import Any
 
 import numpy as np
@@ -17,13 +15,13 @@ from ..identify.residuals import errors
 from ..identify.search import z_scale
 from ..identify.search_context import Search, refine
 from ..identify.starts import start_models
+from ..identify.threads import in_threads
 from ..identify.watch import LAW, series
 from ..physics.effect import EFFECTS
 from ..physics.forms import LINEAR_FORM, QUADRATIC_FORM, choosable, joined_form, split_form
 from ..physics.laws import base_and_variant, law_names
 from ..progress import Count
 from ..quantity import short_z
-from ..snapshots import watcher
 from .candidates import Trial, judge
 from .decision import Z
 from .rule import BENCH, DecisionRule
@@ -101,16 +99,15 @@ def try_laws(
     """
     unfit = not_finite(train, present)  # which compiles all before threads ask for it
     names = [name for name in law_names() if name not in unfit]
-    count, take = Count("law", len(names)), watcher()
-    with ThreadPoolExecutor(cpu_count()) as pool:
+    count = Count("law", len(names))
 
-        def tried(name: str) -> list[LawTrial]:
-            with series(LAW, name, take):
-                found = _tried(name, train, held_out, present, bends)
-            count.done(name)
-            return found
+    def tried(name: str) -> list[LawTrial]:
+        with series(LAW, name):
+            found = _tried(name, train, held_out, present, bends)
+        count.done(name)
+        return found
 
-        rows = [row for rows in pool.map(tried, names) for row in rows]
+    rows = [row for rows in in_threads(tried, names) for row in rows]
     return tuple(sorted(rows, key=lambda row: row.trial.z))
 
 

@@ -8,9 +8,7 @@ force that follows the voltage before the voltage was recorded has no cause: the
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +18,7 @@ from ..identify.model import steady
 from ..identify.search import HUBER_AT_ONE, losses
 from ..identify.search_context import refine, residuals
 from ..identify.start_grid import SearchContext, ranked_guesses
+from ..identify.threads import in_threads
 from ..physics.effect import EFFECTS, Effect, effects_of
 from ..quantity import quantity
 from .candidates import Trial, joinable, judge, short_search
@@ -103,11 +102,10 @@ def has_rival(
     cost = _loss(own, found.train)
     context = SearchContext(model, train)
     rivals = [name for name in joinable(model) if fault in EFFECTS[name].mimics]
-    with ThreadPoolExecutor(cpu_count()) as pool:
-        found_there = pool.map(
-            lambda name: short_search(name, context, ranked_guesses(name, context)), rivals
-        )
-        return any(_loss(one.model, train) < cost * (1.0 - rule.margin) for one in found_there)
+    found_there = in_threads(
+        lambda name: short_search(name, context, ranked_guesses(name, context)), rivals
+    )
+    return any(_loss(one.model, train) < cost * (1.0 - rule.margin) for one in found_there)
 
 
 def promise(cost: float, before: float) -> float:

@@ -8,10 +8,8 @@ the limit moved until the likelihood has fallen as far as 95 % ask.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from math import sqrt
-from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +18,7 @@ from ..identify.model import Model
 from ..identify.residuals import residuals
 from ..identify.search import loss
 from ..identify.search_context import refine
+from ..identify.threads import in_threads
 from ..progress import Count
 from .allowed_size import ONE_SIDED, TWO_SIDED
 from .effect_limits import EffectLimit
@@ -56,8 +55,7 @@ def profiled(known: Known, limits: Sequence[EffectLimit]) -> tuple[EffectLimit, 
         count.done(limit.effect)
         return found
 
-    with ThreadPoolExecutor(cpu_count()) as pool:
-        return tuple(pool.map(checked, limits))
+    return tuple(in_threads(checked, limits))
 
 
 def _checked(known: Known, limit: EffectLimit) -> EffectLimit:

@@ -7,7 +7,7 @@ that correlation in time counts in the intervals as well.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..physics.effect import EFFECTS
 from ..physics.laws import LAWS
-from ..progress import counted, tell
+from ..progress import Count, tell
 from .intervals import covariance_of
 from .model import (
     Model,
@@ -32,6 +32,7 @@ from .residuals import Expected
 from .scaled import Scaled
 from .search import descend, loss
 from .starts import start_model, start_models
+from .threads import in_threads
 from .watch import share_of, watched
 
 __all__ = [
@@ -147,17 +148,9 @@ def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) 
     if not joints:
         return found
     generator = np.random.default_rng(len(found.std))  # fixed: a model has the same ends again
-    ends = [found]
-    for _ in range(_ENDS):
-        values = dict(found.model.values)
-        for name in found.model.free():
-            own = any(name.startswith(joint + ".") for joint in joints)
-            aside = _ASIDE.get(parameter(model.law, name).unit, _BESIDE) if own else _BESIDE
-            low, high = found.model.bounds(name)
-            moved = found.model.value(name) * np.exp(aside * generator.standard_normal())
-            values[name] = float(np.clip(moved, low, high))
-        start = replace(found.model, values=values)
-        ends.append(fit(problem, start, expectation=expected, with_std=False))
+    starts = [_beside(found.model, joints, generator) for _ in range(_ENDS)]
+    search = partial(fit, problem, expectation=expected, with_std=False)
+    ends = [found, *in_threads(search, starts)]
     best = min(ends, key=lambda one: one.cost)
     if best is not found:
         best = fit(problem, best.model, expectation=expected, max_evaluations=4)
@@ -169,6 +162,17 @@ def multistart_refit(problem: Problem, model: Model, max_evaluations: int = 25) 
     assert best.covariance is not None
     more = np.diag(np.array([spread[name] for name in best.std]) ** 2)
     return replace(best, std=std, covariance=best.covariance + more)
+
+
+def _beside(model: Model, joints: Sequence[str], generator: np.random.Generator) -> Model:
+    """Return a model with its free parameters moved at random, those of a joint the most."""
+    values = dict(model.values)
+    for name in model.free():
+        own = any(name.startswith(joint + ".") for joint in joints)
+        aside = _ASIDE.get(parameter(model.law, name).unit, _BESIDE) if own else _BESIDE
+        moved = model.value(name) * np.exp(aside * generator.standard_normal())
+        values[name] = float(np.clip(moved, *model.bounds(name)))
+    return replace(model, values=values)
 
 
 def intervals_of(problem: Problem, model: Model) -> Fit:
@@ -227,10 +231,14 @@ def identify(
     model = without(model, silent)
     trials = start_models(problem, model, starts)
     expected = problem.expectation(trials[0])
-    fits = [
-        fit(problem, one, expectation=expected, max_evaluations=12, with_std=False)
-        for one in counted(trials, f"fitting {law}: start")
-    ]
+    count = Count(f"fitting {law}: start", len(trials))
+
+    def searched(start: Model) -> Fit:
+        found = fit(problem, start, expectation=expected, max_evaluations=12, with_std=False)
+        count.done()
+        return found
+
+    fits = in_threads(searched, trials)
     best = min(fits, key=lambda one: one.cost)
     agreed = sum(one.cost <= best.cost * (1.0 + _ALIKE) for one in fits)
     tell(f"fitting {law}: intervals")

@@ -10,10 +10,8 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
-from os import cpu_count
 from typing import Any
 
 import numpy as np
@@ -22,10 +20,10 @@ from numpy.typing import NDArray
 from ..errors import RecordError
 from ..physics.laws import base_and_variant, law_names
 from ..progress import Count
-from ..snapshots import watcher
 from .model import Model, Problem, Run, steady, without
 from .search import descend
 from .starts import start_models
+from .threads import in_threads
 from .watch import LAW, series, watched
 
 Array = NDArray[np.float64]
@@ -152,16 +150,15 @@ def error_table(
     # The law with the most parameters takes longest: begun last, it would keep one core waiting.
     order = sorted(laws, key=lambda law: -len(base_and_variant(law)[0].parameters))
     train.bench(Model(base_and_variant(laws[0])[0].name))  # compiled before threads ask for it
-    with ThreadPoolExecutor(cpu_count()) as pool:
-        count, take = Count("law of the table", len(laws)), watcher()
+    count = Count("law of the table", len(laws))
 
-        def error(law: str) -> LawError:
-            with series(LAW, law, take):
-                found = _law_error(train, holdout, cutoff, law, starts)
-            count.done(law)
-            return found
+    def error(law: str) -> LawError:
+        with series(LAW, law):
+            found = _law_error(train, holdout, cutoff, law, starts)
+        count.done(law)
+        return found
 
-        found = dict(zip(order, pool.map(error, order), strict=True))
+    found = dict(zip(order, in_threads(error, order), strict=True))
     return [found[law] for law in laws]
 
 

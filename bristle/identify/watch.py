@@ -50,17 +50,15 @@ _series: ContextVar[_Series | None] = ContextVar("series", default=None)
 
 
 @contextmanager
-def series(kind: str, name: str = "", take: Watcher | None = None) -> Iterator[None]:
+def series(kind: str, name: str = "") -> Iterator[None]:
     """Let the searches of this context be watched, as one series.
 
     Parameters
     ----------
     kind : `MODEL` or `LAW`
     name : of the site of a building, or of the law
-    take : gets the snapshots; None asks for the context's `snapshots.watcher`. A thread has none
-        of its own: it is given that of the one that started it
     """
-    take = take or watcher()
+    take = watcher()
     present = None if take is None else _Series(take, kind, name)
     before = _series.set(present)
     try:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from os import cpu_count
 from typing import ClassVar
 
 import numpy as np
@@ -17,6 +15,7 @@ from scipy.stats import qmc
 from ..data.noise import white_noise
 from ..errors import StudyError
 from ..identify.model import Run
+from ..identify.threads import in_threads
 from ..progress import Count, tell
 from ..quantity import quantity
 from .knowledge import Asked
@@ -108,8 +107,7 @@ class Planner:
             count.done(test.motion.kind)
             return found
 
-        with ThreadPoolExecutor(cpu_count()) as pool:
-            found = [one for one in pool.map(look, tests) if one is not None]
+        found = [one for one in in_threads(look, tests) if one is not None]
         if not found:
             raise StudyError(self._why_nothing(tests))
         roles = roles_of(self.limits.runs, self.goal.judged)
