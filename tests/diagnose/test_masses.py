@@ -12,7 +12,10 @@ from bristle.diagnose.rule import SITE
 from bristle.diagnose.sites import look_at
 from bristle.identify.response import responses
 
-DOUBTS = ([0.02, -0.03, 0.025], [-0.04, 0.01, 0.03], [0.0, 0.05, -0.02])
+DOUBTS = (
+    [0.02, -0.03, 0.025],
+    *(pytest.param(d, marks=pytest.mark.slow) for d in ([-0.04, 0.01, 0.03], [0.0, 0.05, -0.02])),
+)
 
 
 def shaken(gain=1.0, hidden=None, without=()):
