@@ -170,8 +170,9 @@ def search(
     Where noise is all that the best law leaves, the simplest that it does not surpass comes first:
     if that lacks nothing and contains no effect, no other is searched. Then come the simpler ones
     first: a law is left out where the runs are explained already by no more parameters than it
-    would have with the smallest effect that can join it. Two effects of a law are tried only where
-    no law with a single one explains the runs so well that none could be clearly better.
+    would have with the smallest effect that can join it. Where no law with a single effect explains
+    the runs so well that none could be clearly better, the best law that was left out is looked at
+    as well, and after it two effects of each law.
 
     Parameters
     ----------
@@ -191,9 +192,26 @@ def search(
         for row in sorted(others, key=lambda row: (row.fitted, row.trial.z)):
             if _worth_a_look(row, found, rule):
                 found.append(look(row, pairs))
-        if any(pair.explains and pair.after.z <= 1.0 + rule.law_gain for pair in found):
+        if not pairs and not _explained(found, rule):
+            # One law's missing effect may be what another law has: it then fits better alone.
+            passed = _best_passed_over(rows, found)
+            found += [look(row, pairs) for row in passed]
+            others += passed
+        if _explained(found, rule):
             break
     return found
+
+
+def _explained(found: Sequence[Pair], rule: DecisionRule) -> bool:
+    """Return whether a pair explains the runs so well that none could be clearly better."""
+    return any(pair.explains and pair.after.z <= 1.0 + rule.law_gain for pair in found)
+
+
+def _best_passed_over(rows: Sequence[LawTrial], found: Sequence[Pair]) -> list[LawTrial]:
+    """Return the law with the smallest z of which no variant and no form was searched, if any."""
+    searched = {_base(pair.row) for pair in found}
+    left = [row for row in rows if _base(row) not in searched]
+    return sorted(left, key=lambda row: row.trial.z)[:1]
 
 
 def _worth_a_look(row: LawTrial, found: Sequence[Pair], rule: DecisionRule) -> bool:

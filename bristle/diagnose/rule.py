@@ -137,8 +137,8 @@ class DecisionRule:
     most_laws: int = 4
     """Largest number of laws whose effects are searched.
 
-    Up to two come on top whose error may be large because of what is missing. Trades: computing
-    time. Found: stated.
+    Up to two come on top whose error may be large because of what is missing, and the best law that
+    was left out where none of these explains the runs. Trades: computing time. Found: stated.
     """
 
     # --- two effects

@@ -173,6 +173,17 @@ def test_laws_are_searched_on_where_a_simple_one_explains_nothing():
     assert asked == ["bingham", "bouc_wen"]
 
 
+def test_where_nothing_explains_the_runs_the_best_law_that_was_left_out_is_looked_at():
+    z = {"lugre": 5.0, "dahl": 5.05, "bouc_wen": 7.0, "modified_bouc_wen": 6.5, "bingham": 9.0}
+    true = pair("modified_bouc_wen", 6.5, "effect", ("flattening",), 1.0)
+    others = [pair(law, z[law], "unknown", z=4.0) for law in z if law != true.row.law]
+    look, asked = looker(true, *others)
+    found = search([row(law, z[law]) for law in z], look)
+    assert choose(found) is true
+    assert asked[-1] == "modified_bouc_wen"
+    assert "bouc_wen" not in asked
+
+
 def test_the_simpler_of_two_that_explain_the_runs_is_named_and_the_other_told():
     simple, rich = pair("dahl", 1.001), pair("lugre", 1.0)
     assert choose([rich, simple]) is simple
