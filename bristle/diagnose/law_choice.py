@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from ..physics.forms import CURVED, split_form
 from .candidates import Trial, joinable
+from .decision import missing
 from .evidence import Difference, paired
 from .finding import Finding
 from .law_trials import LawTrial
@@ -45,6 +46,13 @@ class Pair:
     def explains(self) -> bool:
         """Whether the law with its effects leaves nothing unexplained."""
         return self.finding.kind in EXPLAINING
+
+    def reach(self, rule: DecisionRule = BENCH) -> Trial:
+        """Return the trial of the law with what lowers its error most, beyond chance, or alone."""
+        found = self.finding
+        tried = (*found.trials, found.together) if found.together else found.trials
+        gaining = [trial for trial in tried if missing(self.after, trial, rule)]
+        return min((self.after, *gaining), key=lambda trial: trial.z)
 
     @property
     def order(self) -> tuple[int, int, float]:
@@ -231,13 +239,15 @@ def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
     """Return the pair of law and effects that the runs ask for.
 
     Of those that explain the runs and that the best one on held-out runs does not surpass, the
-    simplest; where none explains them, the best one.
+    simplest; where none explains them, the one that comes nearest with effects of the library.
     """
     best = best_of([pair.after for pair in pairs], rule)
     level = [pair for pair in pairs if pair.explains and as_good(pair.after, best, rule)]
     if level:
         return min(level, key=lambda pair: pair.order)
-    return next(pair for pair in pairs if pair.after is best)
+    reached = [pair.reach(rule) for pair in pairs]
+    nearest = best_of(reached, rule)
+    return next(pair for pair, one in zip(pairs, reached, strict=True) if one is nearest)
 
 
 def equivalents(

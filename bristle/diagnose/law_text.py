@@ -45,7 +45,10 @@ def law_sentences(verdict: Row) -> list[str]:
     with_what = f" with {joined(mine['effects'])}" if mine.get("kind") == "effect" else ""
     count = len({row["law"] for row in rows})
     if verdict.get("kind") == "unknown":
-        out = [f"None of {count} laws explains the runs; {law_name(mine)} leaves least, {Z} = {z}."]
+        out = [
+            f"None of {count} laws explains the runs, with an effect or without; {law_name(mine)} "
+            f"comes nearest, {Z} = {z} without."
+        ]
     else:
         out = [
             f"Of {count} laws it is the simplest that explains the runs: "

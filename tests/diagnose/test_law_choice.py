@@ -212,6 +212,16 @@ def test_where_none_explains_the_runs_the_best_is_unknown():
     assert equivalents(best, [best, other], [best.row, other.row]) == []
 
 
+def test_where_none_explains_the_runs_the_law_that_comes_nearest_with_an_effect_is_the_best():
+    alone, other = pair("tanh", 3.0, "unknown"), pair("dahl", 5.0, "unknown")
+    gas = trial(2.0, "dahl", ("gas_spring",))
+    other = replace(other, finding=replace(other.finding, trials=(gas,)))
+    assert other.reach() is gas
+    assert choose([alone, other]) is other
+    far = replace(other, finding=replace(other.finding, trials=(trial(4.0, "dahl", ("delay",)),)))
+    assert choose([alone, far]) is alone
+
+
 def test_of_wrong_laws_one_that_serves_rest_alone_is_not_the_best():
     near_rest, all_over = trial(5.8, "tanh"), trial(6.1, "modified_bouc_wen")
     near_rest, all_over = replace(near_rest, rms=13.2), replace(all_over, rms=9.1)
