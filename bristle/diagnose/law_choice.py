@@ -239,15 +239,25 @@ def choose(pairs: Sequence[Pair], rule: DecisionRule = BENCH) -> Pair:
     """Return the pair of law and effects that the runs ask for.
 
     Of those that explain the runs and that the best one on held-out runs does not surpass, the
-    simplest; where none explains them, the one that comes nearest with effects of the library.
+    simplest; where none explains them, the one that comes nearest with an effect or without.
     """
     best = best_of([pair.after for pair in pairs], rule)
     level = [pair for pair in pairs if pair.explains and as_good(pair.after, best, rule)]
     if level:
         return min(level, key=lambda pair: pair.order)
+    return _nearest(pairs, rule)
+
+
+def _nearest(pairs: Sequence[Pair], rule: DecisionRule) -> Pair:
+    """Return the pair that comes nearest to the runs, the simplest of those that hardly differ."""
     reached = [pair.reach(rule) for pair in pairs]
-    nearest = best_of(reached, rule)
-    return next(pair for pair, one in zip(pairs, reached, strict=True) if one is nearest)
+    least = best_of(reached, rule)
+    alike = [
+        (len(one.model.free()), one.z, k)
+        for k, one in enumerate(reached)
+        if one.z <= (1.0 + rule.law_gain) * least.z and not serves_rest(one, least, rule)
+    ]
+    return pairs[min(alike)[2]]
 
 
 def equivalents(

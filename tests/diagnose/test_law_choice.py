@@ -220,6 +220,8 @@ def test_where_none_explains_the_runs_the_law_that_comes_nearest_with_an_effect_
     assert choose([alone, other]) is other
     far = replace(other, finding=replace(other.finding, trials=(trial(4.0, "dahl", ("delay",)),)))
     assert choose([alone, far]) is alone
+    rich = pair("modified_bouc_wen", 2.99, "unknown")
+    assert choose([rich, alone]) is alone  # that hardly differs, with fewer parameters
 
 
 def test_of_wrong_laws_one_that_serves_rest_alone_is_not_the_best():
