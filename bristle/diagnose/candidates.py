@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from os import cpu_count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +13,7 @@ from ..identify.residuals import Expected, errors, residuals
 from ..identify.search import loss, losses, z_of, z_scale
 from ..identify.search_context import Search, is_rough, refine
 from ..identify.start_grid import Candidate, SearchContext, ranked_guesses
+from ..identify.threads import in_threads
 from ..physics.effect import EFFECTS, effects_of, exclude
 from ..progress import Count
 
@@ -188,41 +187,39 @@ def try_all(
     context = SearchContext(base, train)
     there = held_out.expectation(base)
     names = joinable(base, shown, train)
-    with ThreadPoolExecutor(cpu_count()) as pool:
-        guesses = dict(
-            zip(names, pool.map(lambda name: ranked_guesses(name, context), names), strict=True)
-        )
-        if most is not None:
-            looked = pool.map(lambda name: screened(name, context, guesses[name]), names)
-            guesses = dict(zip(names, looked, strict=True))
-            best = sorted(names, key=lambda name: guesses[name][0].cost)[:most]
-            names = [name for name in names if name in best]
-        fewer = most is not None
-        ends: dict[str, float] = {}
-        count = Count("effect", len(names))
+    looked = in_threads(lambda name: ranked_guesses(name, context), names)
+    guesses = dict(zip(names, looked, strict=True))
+    if most is not None:
+        looked = in_threads(lambda name: screened(name, context, guesses[name]), names)
+        guesses = dict(zip(names, looked, strict=True))
+        best = sorted(names, key=lambda name: guesses[name][0].cost)[:most]
+        names = [name for name in names if name in best]
+    fewer = most is not None
+    ends: dict[str, float] = {}
+    count = Count("effect", len(names))
 
-        def look(name: str) -> Candidate:
-            end = short_search(name, context, guesses[name], fewer)
-            ends[name] = end.cost
-            share = 100.0 * end.cost / context.cost if context.cost > 0.0 else 100.0
-            best = min(dict(ends), key=lambda one: ends[one])
-            count.done(name, f"{share:.3g} % of the cost remains; best so far {best}")
-            return end
+    def look(name: str) -> Candidate:
+        end = short_search(name, context, guesses[name], fewer)
+        ends[name] = end.cost
+        share = 100.0 * end.cost / context.cost if context.cost > 0.0 else 100.0
+        best = min(dict(ends), key=lambda one: ends[one])
+        count.done(name, f"{share:.3g} % of the cost remains; best so far {best}")
+        return end
 
-        found = list(pool.map(look, names))
-        gained = max(context.cost - one.cost for one in found)
-        least = max(PROMISING * gained, WORTH * context.cost)
+    found = in_threads(look, names)
+    gained = max(context.cost - one.cost for one in found)
+    least = max(PROMISING * gained, WORTH * context.cost)
 
-        refined = Count("refining effect", sum(context.cost - one.cost >= least for one in found))
+    refined = Count("refining effect", sum(context.cost - one.cost >= least for one in found))
 
-        def finish(one: Candidate) -> Trial:
-            if context.cost - one.cost >= least:
-                trial = judge(refine(one.model, train, LONG), train, held_out)
-                refined.done(one.model.effects[-1], f"z {trial.z:.3g} on held-out runs")
-                return trial
-            return judge(one.model, train, held_out, (context.expected, there))
+    def finish(one: Candidate) -> Trial:
+        if context.cost - one.cost >= least:
+            trial = judge(refine(one.model, train, LONG), train, held_out)
+            refined.done(one.model.effects[-1], f"z {trial.z:.3g} on held-out runs")
+            return trial
+        return judge(one.model, train, held_out, (context.expected, there))
 
-        trials = list(pool.map(finish, found))
+    trials = in_threads(finish, found)
     return sorted(trials, key=lambda trial: trial.z)
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from os import cpu_count
 
 from ...identify.fit import Model, Problem, intervals_of
 from ...identify.residuals import residuals
 from ...identify.search import z_scale
 from ...identify.search_context import refine
+from ...identify.threads import in_threads
 from ...physics.user import defined
 from ...progress import Count
 from ..candidates import Trial, judge
@@ -166,15 +165,16 @@ def _fitted(
         for k, one in enumerate(chosen)
     }
     count = Count("fitting a curve", len(chosen))
-    with defined(texts), ThreadPoolExecutor(cpu_count()) as pool:
+    with defined(texts):
         train, held_out = train.of(train.runs), held_out.of(held_out.runs)
 
-        def fitted(own: str, one: Promise) -> Fitted:
-            found = _inside(one.curve, own, base, train, held_out)
-            count.done(one.curve.words())
+        def fitted(one: tuple[str, Promise]) -> Fitted:
+            own, promise = one
+            found = _inside(promise.curve, own, base, train, held_out)
+            count.done(promise.curve.words())
             return replace(found, trial=_renamed(found.trial, own, name))
 
-        return list(pool.map(fitted, texts, chosen))
+        return in_threads(fitted, list(zip(texts, chosen, strict=True)))
 
 
 def _inside(curve: Curve, own: str, base: Model, train: Problem, held_out: Problem) -> Fitted:
