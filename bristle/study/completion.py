@@ -101,13 +101,7 @@ def complete(
             if on_step is not None:
                 on_step()
 
-    law = law_or_all(study, law)
-    free = law == ALL
-    other = None if law in (ALL, study.model().law) else law
-    stale = bool(other_data(study)) or not is_identified(study.model())
-    if not free and (other or stale):
-        say("identifying the model")
-        stepped(identify_study(study, law=other, table=False).step)
+    free = _begun_free(study, law_or_all(study, law), say, stepped)
     while True:
         found = diagnose_study(study, law=ALL if free else study.model().law, say=say)
         if free:
@@ -130,6 +124,18 @@ def complete(
         why = f"verdict: {found.kind}"
         added = add_effects(study, names, why=why, found=found, identified=identified)
         stepped(added.step)
+
+
+def _begun_free(
+    study: Study, law: str | None, say: Say, stepped: Callable[[Step | None], None]
+) -> bool:
+    """Return whether the law is to be sought; identify a model that is to keep it, where needed."""
+    other = None if law in (ALL, study.model().law) else law
+    stale = bool(other_data(study)) or not is_identified(study.model())
+    if law != ALL and (other or stale):
+        say("identifying the model")
+        stepped(identify_study(study, law=other, table=False).step)
+    return law == ALL
 
 
 def _named(found: Diagnosis) -> tuple[str, ...]:
