@@ -15,13 +15,8 @@ from ..findings import unknown, written
 from ..physics.drive import DRIVES, VOLTAGE
 from ..units import convert
 from .motions import COMMANDS, MOTIONS
-from .rig_limits import RigLimits
+from .rig_limits import SIZES, RigLimits
 
-SIZES = {
-    "stroke": "m", "speed": "m/s", "acceleration": "m/s2", "force": "N", "heat": "J",
-    "duration": "s", "pause": "s", "rate": "Hz", "damper_stroke": "m", "drift": "m",
-}  # fmt: skip
-"""Units of the quantities of rig.toml, and what they are called there."""
 _NAMES = tuple(one.name for one in fields(RigLimits))
 
 

@@ -28,6 +28,12 @@ SPAN = 40.0
 ZERO = 0.02
 """Share of the largest command below which the smallest is zero, but for its noise."""
 
+SIZES = {
+    "stroke": "m", "speed": "m/s", "acceleration": "m/s2", "force": "N", "heat": "J",
+    "duration": "s", "pause": "s", "rate": "Hz", "damper_stroke": "m", "drift": "m",
+}  # fmt: skip
+"""Units of the limits that are quantities, by the names that rig.toml gives them."""
+
 
 @dataclass(frozen=True)
 class RigLimits:
@@ -87,14 +93,11 @@ class RigLimits:
         StudyError
             Saying which limit, and what would be right.
         """
-        for name in (
-            "stroke", "speed", "acceleration", "force", "duration", "heat", "rate",
-            "damper_stroke", "drift",
-        ):  # fmt: skip
-            if not getattr(self, name) > 0.0:
+        for name, unit in SIZES.items():
+            if name != "pause" and not getattr(self, name) > 0.0:
                 raise StudyError(
-                    f"{name} = {getattr(self, name):g}: these limits allow no motion; more than 0 "
-                    "is right."
+                    f"{name} = {getattr(self, name):g} {unit}: these limits allow no motion; more "
+                    "than 0 is right."
                 )
         if not 0.0 <= self.band[0] < self.band[1]:
             raise StudyError(

@@ -203,7 +203,7 @@ def test_limits_of_a_building_are_read_with_their_units(tmp_path: Path) -> None:
     file = tmp_path / "rig.toml"
     file.write_text('schema = 1\n[limits]\ndamper_stroke = "12 mm"\ndrift = "4 mm"\n')
     assert read_rig(file) == pytest.approx({"damper_stroke": 0.012, "drift": 0.004})
-    with pytest.raises(StudyError, match="drift = 0: these limits allow no motion"):
+    with pytest.raises(StudyError, match="drift = 0 m: these limits allow no motion"):
         replace(LIMITS, drift=0.0).check()
 
 
