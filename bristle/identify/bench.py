@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import cache
 from threading import Lock
 from types import MappingProxyType
@@ -26,8 +26,14 @@ damper_evaluate = damper.evaluate
 law_step = damper.step_law
 
 
+_INLINE = (
+    "damper.step", "series.advance_series", "series.balanced_speed", "series.by_secants",
+    "series.speed_excess",
+)  # fmt: skip
+"""Callees of `force_history` that cost more to call than to hold in it."""
+
 _ONE_AT_A_TIME = Lock()
-_ahead: Ahead | None = None
+_ahead: dict[str, Ahead] = {}
 _SIGNALS = ("x", "v", "a", "V")
 _NO_TRACKS: Mapping[str, Array] = MappingProxyType({})
 
@@ -126,42 +132,46 @@ def compiled_history(effects: bool = True) -> Callable[..., None]:
     The first call on a machine takes seconds, that without effects one or two.
     """
     with _ONE_AT_A_TIME:  # threads that try effects ask for it at once
-        if _ahead is not None:
-            _ahead.wait((force_history if effects else law_history).__name__)
+        begun_before = _ahead.get((force_history if effects else law_history).__name__)
+        if begun_before is not None:
+            begun_before.wait()
         return _compiled(damper.evaluate) if effects else _compiled_law(damper.step_law)
 
 
 def compile_ahead(effects: bool = True) -> None:
-    """Begin to compile what predicts forces in another process, where no machine code is kept yet.
+    """Begin to compile what predicts forces in other processes, where no machine code is kept yet.
 
     Parameters
     ----------
     effects : whether effects will be asked for too, not a law alone
     """
-    global _ahead
     from ..jit import digest, kept
 
     _hold_generated()
-    wanted = (law_history, force_history) if effects else (law_history,)
-    missing = [one for one in wanted if not kept(one)]
-    if missing and (_ahead is None or not _ahead.at_work):
-        _ahead = begun({one.__name__: digest(one) for one in missing})
+    for one in (force_history, law_history) if effects else (law_history,):
+        before = _ahead.get(one.__name__)
+        if (before is None or not before.at_work) and not kept(one):
+            process = begun(one.__name__, digest(one))
+            if process is not None:
+                _ahead[one.__name__] = process
 
 
-def keep(asked: Sequence[str]) -> None:
-    """Compile functions, each given as NAME=DIGEST, and print the name of each that is kept.
+def keep(name: str, wanted: str) -> None:
+    """Compile a function by its name and print that it is kept, unless its digest is another here.
 
-    It ends at the first digest that is another one here.
+    Parameters
+    ----------
+    name : law_history or force_history
+    wanted : the digest that it must have
     """
     from ..jit import digest
 
-    for name, _, wanted in (one.partition("=") for one in asked):
-        if digest({one.__name__: one for one in (law_history, force_history)}[name]) != wanted:
-            return
-        still = np.zeros(2)
-        effects = [] if name == law_history.__name__ else [damper.SLOTS.effects[0].name]
-        Bench(next(iter(LAWS)), effects).force(still, still, still, still, 1e-3, {})
-        print(name, flush=True)
+    if digest({one.__name__: one for one in (law_history, force_history)}[name]) != wanted:
+        return
+    still = np.zeros(2)
+    effects = [] if name == law_history.__name__ else [damper.SLOTS.effects[0].name]
+    Bench(next(iter(LAWS)), effects).force(still, still, still, still, 1e-3, {})
+    print(name, flush=True)
 
 
 def _hold_generated() -> None:
@@ -176,7 +186,7 @@ def _compiled(evaluate: Any) -> Callable[..., None]:
     from ..jit import compiled
 
     _hold_generated()
-    function: Callable[..., None] = compiled(force_history)
+    function: Callable[..., None] = compiled(force_history, _INLINE)
     return function
 
 

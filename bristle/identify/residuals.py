@@ -29,7 +29,10 @@ FINITE = 1e6
 
 def over_noise(error: Array, sigma: Array) -> Array:
     """Return an error (n,) over the noise expected of a true model (n,), always finite."""
-    return np.asarray(np.nan_to_num(error / sigma, nan=FINITE, posinf=FINITE, neginf=-FINITE))
+    z: Array = error / sigma
+    if np.isfinite(z).all():  # the rule, and the rest takes five times as long
+        return z
+    return np.asarray(np.nan_to_num(z, nan=FINITE, posinf=FINITE, neginf=-FINITE))
 
 
 def errors(problem: Problem, model: Model, expected: Expected) -> list[Array]:

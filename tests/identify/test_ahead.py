@@ -15,20 +15,20 @@ from bristle.physics.inputs import Inputs
 
 
 def test_a_process_that_knows_other_functions_ends_without_compiling() -> None:
-    found = Ahead({"law_history": "that of a user's own law"})
-    found.wait("law_history")
+    found = Ahead("law_history", "that of a user's own law")
+    found.wait()
     assert not found.at_work
-    found.wait("law_history")  # whoever asks again compiles it
+    found.wait()  # whoever asks again compiles it
 
 
 def test_where_no_process_can_be_begun_nothing_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", str(Path("there") / "is" / "none"))
-    assert begun({"law_history": "0"}) is None
+    assert begun("law_history", "0") is None
 
 
 def test_what_is_kept_is_not_compiled_again(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(jit, "kept", lambda _: True)
-    monkeypatch.setattr(bench, "begun", lambda _: pytest.fail("it begins a process"))
+    monkeypatch.setattr(bench, "begun", lambda *_: pytest.fail("it begins a process"))
     bench.compile_ahead()
 
 
@@ -48,9 +48,8 @@ def test_another_process_keeps_what_fits_need(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("BRISTLE_CACHE", str(tmp_path))
-    monkeypatch.setattr(bench, "_ahead", None)
+    monkeypatch.setattr(bench, "_ahead", {})
     bench.compile_ahead(effects=False)
-    assert isinstance(bench._ahead, Ahead)
-    bench._ahead.wait("law_history")
+    bench._ahead["law_history"].wait()
     assert jit.kept(bench.law_history)
     assert not jit.kept(bench.force_history)
