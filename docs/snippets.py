@@ -4,8 +4,8 @@ A block is one of
 
     ```console                      lines that begin with "$ " are run, the others are output
     ```python                       run after these; a page's blocks share one interpreter
-    ```LANGUAGE title="PATH"        written to PATH first; a PATH below bristle/ in a copy of the
-                                    sources
+    ```LANGUAGE title="PATH"        written to PATH before the console blocks below it and before
+                                    python; a PATH below bristle/ in a copy of the sources
     ```text                         right after a python block: what that block prints
 
 A comment `<!-- needs: MODULE -->` before a block leaves it out where the module is missing,
@@ -100,7 +100,7 @@ def run_page(page: Path, update: bool = False) -> int:
     found = blocks(text)
     with tempfile.TemporaryDirectory(prefix="bristle_docs_") as name:
         folder = Path(name)
-        environment = _prepare(folder, found)
+        environment = _prepare(folder)
         sandbox = (page, found, folder, environment)
         pairs = [*_console(*sandbox), *_python(*sandbox)]
     wrong = [pair for pair in pairs if not same(pair[0].body, pair[1])]
@@ -131,31 +131,32 @@ def same(said: str, got: str) -> bool:
     return True
 
 
-def _prepare(folder: Path, found: list[Block]) -> dict[str, str]:
-    """Lay out files and a `bristle` command; return the environment of the page's commands."""
-    sources = ROOT
-    if any(block.title and block.title.startswith("bristle/") for block in found):
-        sources = folder
-        for name in ("bristle", "components", "scenarios"):
-            shutil.copytree(
-                ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__")
-            )
-        shutil.copyfile(ROOT / "build_fmus.py", folder / "build_fmus.py")
-    else:
-        shutil.copytree(ROOT / "scenarios", folder / "scenarios")
-    for block in found:
-        if block.title:
-            target = folder / block.title
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_text(block.body, encoding="utf-8")
+def _prepare(folder: Path) -> dict[str, str]:
+    """Lay out scenarios and a `bristle` command; return the environment of the page's commands."""
+    shutil.copytree(ROOT / "scenarios", folder / "scenarios")
     command = folder / ".bin" / "bristle"
     command.parent.mkdir()
     command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m bristle.cli "$@"\n')
     command.chmod(0o755)
-    environment = {**os.environ, "PYTHONPATH": str(sources), "COLUMNS": "100", "NO_COLOR": "1"}
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "100", "NO_COLOR": "1"}
     environment["BRISTLE_STATE"] = str(folder / ".state")
     environment["PATH"] = f"{command.parent}{os.pathsep}{os.environ['PATH']}"
     return environment
+
+
+def _write(block: Block, folder: Path, environment: dict[str, str]) -> None:
+    """Write a block to the path that its title names, in a copy of the sources if it is there."""
+    assert block.title is not None
+    if block.title.startswith("bristle/") and environment["PYTHONPATH"] != str(folder):
+        for name in ("bristle", "components"):
+            shutil.copytree(
+                ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__")
+            )
+        shutil.copyfile(ROOT / "build_fmus.py", folder / "build_fmus.py")
+        environment["PYTHONPATH"] = str(folder)
+    target = folder / block.title
+    target.parent.mkdir(parents=True, exist_ok=True)
+    target.write_text(block.body, encoding="utf-8")
 
 
 def _python(
@@ -191,8 +192,13 @@ def _installed(modules: str) -> bool:
 def _console(
     page: Path, found: list[Block], folder: Path, environment: dict[str, str]
 ) -> Iterator[tuple[Block, str]]:
-    """Run the commands of the console blocks; yield each block and what it should hold."""
+    """Write files and run the commands of console blocks, from the top of the page to its end.
+
+    Yields each console block and what it should hold.
+    """
     for block in found:
+        if block.title:
+            _write(block, folder, environment)
         if block.language != "console" or block.skipped:
             continue
         lines = []

@@ -21,7 +21,7 @@ from bristle.fmu.description import Description, extract, read_description
 
 SOURCE = Path(__file__).with_name("host.c")
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-RUNS, STEPS, STEP = 20, 40, 0.002
+RUNS, STEPS, STEP = 8, 40, 0.002
 MOTION = {"V": (4.0, 3.0), "m": (0.0, 5e-3), "m/s": (0.0, 0.1), "m/s2": (0.0, 2.0), "N": (0.0, 1.0)}
 
 
