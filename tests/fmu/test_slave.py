@@ -12,6 +12,7 @@ from built import COMPONENTS, DAMPERS, SITES, built, lively
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 from fresh import fresh
+from kinds import ONE_OF_EACH
 
 from bristle import units
 from bristle.fmu import build, catalogue
@@ -22,13 +23,9 @@ CONTROLLERS = ["ClippedOptimal", "HinfInverse", "Lpv", "LqgClipped", "Skyhook", 
 each_component = pytest.mark.parametrize("component", COMPONENTS)
 each_damper = pytest.mark.parametrize("component", DAMPERS)
 
-# One of each slave class; of dampers a law without states and one with. What a host can do wrong is
-# tried on all components by `bristle conform` (tests/conformance); here with every effect on.
-KINDS = [
-    "Structure", "BinghamDamper", "LuGreDamper", "GroundMotion", "ConstantVoltage", "SignalSource",
-    "PrescribedMotion", "Sensors", "ClippedOptimal", "Skyhook",
-]  # fmt: skip
-each_kind = pytest.mark.parametrize("component", KINDS)
+# What a host can do wrong is tried on all components by `bristle conform` (tests/conformance); here
+# on one of each slave class, with every effect on.
+each_kind = pytest.mark.parametrize("component", ONE_OF_EACH)
 
 # Names, units and order of the ports: other tools hold on to them.
 DAMPER_INPUTS = {
@@ -409,7 +406,7 @@ def replay(path: str, values: dict[str, Any]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("component", "effects"), [(c, False) for c in KINDS] + [(c, True) for c in SITES]
+    ("component", "effects"), [(c, False) for c in ONE_OF_EACH] + [(c, True) for c in SITES]
 )
 def test_the_whole_state_can_be_kept_and_set(component: str, effects: bool) -> None:
     values = {k: v for k, v in lively(component).items() if effects or not k.endswith(".on")}
@@ -585,7 +582,7 @@ def provoked(component: str) -> list[tuple[str, Any, dict[str, Any]]]:
     return [(*pair, answer) for pair, answer in zip(bad, answers, strict=True)]
 
 
-@pytest.mark.parametrize("component", [c for c in KINDS if INPUTS[c]])
+@pytest.mark.parametrize("component", [c for c in ONE_OF_EACH if INPUTS[c]])
 def test_fault_1_an_input_that_is_not_finite(component: str) -> None:
     found = [(thing, answer) for kind, thing, answer in provoked(component) if kind == "input"]
     assert len(found) == 3 * len(INPUTS[component])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bristle.component.structure import StructureModel
+from bristle.identify.bench import Tracks, compiled_history, force_history
 from bristle.jit import compiled
 from bristle.physics import damper, structure
 from bristle.physics.building import paper_building
@@ -35,17 +36,12 @@ STRUCTURE_CASES: list[list[str]] = [
 ]
 
 
-@pytest.fixture(scope="module", autouse=True)
+@pytest.fixture(scope="module")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Any:
     """Keep machine code out of the user's cache."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("BRISTLE_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
-
-
-@pytest.fixture(scope="module")
-def fast_damper(cache: Any) -> Any:
-    return compiled(damper.step)
 
 
 @pytest.fixture(scope="module")
@@ -60,42 +56,33 @@ def test_every_effect_takes_part() -> None:
 
 
 def damper_run(
-    step: Any, law: str, effects: list[str], exponent: float, to: Any, halts: bool
-) -> np.ndarray:
-    """Return force, friction and states of 150 steps; `to` makes the sequences."""
+    history: Any, law: str, effects: list[str], exponent: float, dt: float, to: Any
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the force at 150 samples and the states at the end; `to` makes the sequences."""
     model = damper.DamperModel(law, {"exponent": exponent}, effects)
     setup = damper.setup_of(law, {"exponent": exponent}, effects, to, to)
-    z, work = to(model.z), to([0.0] * damper.work_size())
-    found = []
-    last = (0.0, 0.0, 0.0, 4.0)
-    for k in range(1, 151):
-        dt = (0.002, 0.01, 0.0005)[k % 3]
-        t = 0.002 * k
-        now = (
-            float(0.012 * np.sin(15.0 * t)),
-            float(0.18 * np.cos(15.0 * t)),
-            float(-2.7 * np.sin(15.0 * t)),
-            float(4.0 + 3.9 * np.sin(7.0 * t)),
-        )
-        z1 = to([0.0] * len(model.z))
-        halt = 6.0 * now[1] if halts else 0.0
-        begin, end = (Inputs(*at, dt, 0.0, halt, halts) for at in (last, now))
-        pair = step(setup._replace(active=True), begin, end, z, z1, work)
-        z, last = z1, now
-        found.append([*pair, *z])
-    return np.array(found)
+    t = dt * np.arange(150)
+    voltage = 4.0 + 3.9 * np.sin(7.0 * t)
+    voltage[60:] -= 2.0  # a jump has a step of its own
+    motion = (0.012 * np.sin(15.0 * t), 0.18 * np.cos(15.0 * t), -2.7 * np.sin(15.0 * t), voltage)
+    given = Inputs(*(to(channel.tolist()) for channel in motion), dt, 0.0, 0.0, False)
+    none = Tracks(np.zeros(0, dtype=np.int64), np.zeros((0, len(t))))
+    z, z1, out = to(model.z), to([0.0] * len(model.z)), to([0.0] * len(t))
+    history(setup._replace(active=True), given, none, z, z1, to([0.0] * damper.work_size()), out)
+    return np.array(out), np.array(z)
 
 
 @pytest.mark.parametrize(
     ("law", "effects"), DAMPER_CASES, ids=lambda v: v if isinstance(v, str) else "+".join(v)
 )
-def test_dampers(fast_damper: Any, law: str, effects: list[str]) -> None:
-    for exponent, halts in ((0.0, False), (1.0, True), (2.0, False)):
-        plain = damper_run(damper.step, law, effects, exponent, list, halts)
-        fast = damper_run(fast_damper, law, effects, exponent, np.array, halts)
-        scale = np.abs(plain).max(axis=0)
-        assert (np.abs(fast - plain).max(axis=0) <= 1e-12 * np.maximum(scale, 1e-9)).all()
-        assert np.abs(plain[:, 0]).max() > 1.0
+def test_dampers(law: str, effects: list[str]) -> None:
+    for exponent, dt in ((0.0, 0.002), (1.0, 0.01), (2.0, 0.0005)):
+        plain = damper_run(force_history, law, effects, exponent, dt, list)
+        fast = damper_run(compiled_history(), law, effects, exponent, dt, np.array)
+        assert np.abs(plain[0]).max() > 1.0
+        for one, other in zip(plain, fast, strict=True):
+            scale = np.maximum(np.abs(one), 1e-3 * np.abs(one).max())
+            assert (np.abs(other - one) <= 1e-12 * np.maximum(scale, 1e-9)).all()
 
 
 VALUES = {
@@ -134,6 +121,7 @@ def test_structures(fast_structure: Any, effects: list[str]) -> None:
     assert (np.abs(fast - plain).max(axis=0) <= 1e-12 * scale).all()
 
 
+@pytest.mark.usefixtures("cache")
 @pytest.mark.parametrize("kind", KINDS)
 def test_signals(kind: str) -> None:
     p = np.array([parameter.value for parameter in PARAMETERS.values()])
