@@ -120,7 +120,7 @@ def _first_samples(run: Run, samples: int) -> StructureRun:
     assert isinstance(run, StructureRun)
     keep = run.keep[run.keep < samples]
     whole = _whole(run).of(slice(samples))
-    return replace(run.of(slice(len(keep))), whole=whole, keep=keep)
+    return replace(run.of(slice(len(keep))), whole=whole)
 
 
 def decide_site(before: Trial, trials: Sequence[Trial], rule: DecisionRule = SITE) -> Decision:

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,10 @@ class StructureRun(Run):
 
     whole: Run | None = field(default=None, repr=False)
     keep: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    def of(self, part: slice) -> Self:
+        """Return the run with these of the samples that count; `whole` stays, for its history."""
+        return replace(super().of(part), keep=self.keep[part])
 
 
 class StructureProblem(Problem):
@@ -147,7 +151,7 @@ class StructureProblem(Problem):
         if structure:
             own = of_one_site(model, structure)
             along = self.along(own.effects)
-            force = force + along.force(x, v, run.dt, stiffness, own.values)
+            force = force + along.force(x, v, seen.dt, stiffness, own.values)
         return force if seen is run else force[run.keep]
 
 
@@ -194,7 +198,7 @@ def thinned(problem: StructureProblem, stride: int = 5) -> StructureProblem:
     for run in problem.runs:
         assert isinstance(run, StructureRun)
         part = slice(run.skip, None, stride)
-        runs.append(replace(run.of(part), skip=0, keep=run.keep[part]))
+        runs.append(replace(run.of(part), skip=0))
     return problem.of([*runs])
 
 

@@ -17,7 +17,7 @@ from ..identify.fit import Fit, Model
 from ..identify.residuals import robust_z
 from ..identify.rig import DAMPER, Rig
 from ..identify.rig_fit import SiteModel, SiteModels, errors_of, fit_rig, site_models
-from ..identify.table import LawError, error_table
+from ..identify.table import LawError, error_rms, error_table
 from ..physics.effect import EFFECTS
 from ..physics.forms import shown_law
 from ..physics.laws import base_and_variant, law_names
@@ -204,7 +204,8 @@ def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Iden
     at = models.get(DAMPER) or _worst(models)
     rows = _table(at, task) if task.table else []
     task.show(4)
-    notes += [*fits.notes(), *_by_site(models), *_weighing(rows, model, after), *rig.notes]
+    own = error_rms(at.site.train, at.model, task.cutoff)
+    notes += [*fits.notes(), *_by_site(models), *_weighing(rows, model, own, after), *rig.notes]
     notes += _under_load(at)
     return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
 
@@ -307,8 +308,18 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
     return replace(other, effects=dict(model.effects))
 
 
-def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float]) -> list[str]:
-    """Say what a model that errs by more than noise does to intervals and to the fit."""
+def _weighing(
+    rows: list[LawError], model: StudyModel, own: float, after: Mapping[str, float]
+) -> list[str]:
+    """Say what a model that errs by more than noise does to intervals and to the fit.
+
+    Parameters
+    ----------
+    rows : the table of laws at a site
+    model : the study's model
+    own : its RMS error at that site [N], low-passed as in the table
+    after : errors of the whole rig
+    """
     if after["z_train"] <= _MISFIT:
         return []
     notes = [
@@ -316,11 +327,11 @@ def _weighing(rows: list[LawError], model: StudyModel, after: Mapping[str, float
         "the best values of this model, not the constants of a damper."
     ]
     same = [row for row in rows if row.law == model.law and not model.effects]
-    if same and same[0].train < 0.95 * after["rms_train"]:
+    if same and same[0].train < 0.95 * own:
         notes.append(
             f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
             f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N instead "
-            f"of {plain(after['rms_train'], 4)} N."
+            f"of {plain(own, 4)} N."
         )
     return notes
 

@@ -64,6 +64,15 @@ def test_an_extra_channel_is_a_coordinate_at_every_site(truth):
         np.testing.assert_array_equal(thin.extra["tilt"].values, tilt[thin.keep])
 
 
+@pytest.mark.parametrize("law", ["bingham", "lugre"])
+def test_a_part_of_a_run_is_predicted_as_in_the_whole(truth, law):
+    b, _, response = truth
+    run = damper_run(response, b, law)
+    problem, model, part = StructureProblem([run]), Model(law), slice(40, 6000, 3)
+    whole = problem.predict(model, run)
+    np.testing.assert_array_equal(problem.predict(model, run.of(part)), whole[part])
+
+
 def test_a_jump_of_the_acceleration_is_no_noise():
     smooth = np.sin(np.arange(400) * 0.01)
     assert not np.any(jumps(smooth + np.random.default_rng(0).normal(size=400), 0.002))

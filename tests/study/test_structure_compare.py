@@ -56,6 +56,15 @@ def test_the_layer_whose_spring_stiffens_is_the_worst_site_along_displacement(st
     assert "it pushes back" in where
 
 
+def test_the_table_of_laws_is_that_of_the_damper(stiff):
+    found = identify_study(stiff, law="lugre", starts=2, write=False)
+    own = {row.law: row for row in found.table}
+    assert {"bingham", "lugre", "dahl"} <= set(own)
+    assert own["lugre"].share < 0.02  # the layer's error is none of the damper's
+    assert own["lugre"].train < 0.5 * found.after["rms_train"]
+    assert not any("Least squares of the force alone" in note for note in found.notes)
+
+
 def test_no_site_of_a_clean_building_fails(clean):
     for role in ("holdout", "train"):
         found = compare_study(clean, role=role)
