@@ -181,9 +181,11 @@ def _not_excited(verdict: Verdict) -> list[str]:
 
     What a parameter of another effect absorbs is that effect.
     """
+    from ..diagnose.effect_limits import NO_AMOUNT
+
     rows = [row for found in verdict["findings"] for row in found.get("limits", ())]
     hidden = [row for row in rows if row.get("why") and "." not in row["why"].partition(" ")[0]]
-    return sorted({row["effect"] for row in hidden})
+    return sorted({row["effect"] for row in hidden if row["why"] != NO_AMOUNT})
 
 
 def _other_laws(verdict: Verdict, folder: Path) -> str:

@@ -22,6 +22,9 @@ from .resolved_size import resolved
 ABSORBED = 1e-3
 """Share of a change that must be left; below that it is the error of the sensitivities."""
 
+NO_AMOUNT = "its class names no amount: no parameter is its size"
+"""Why an effect has no limit."""
+
 LOOK = 0.1
 """How many standard deviations a change has at which an effect is looked at first."""
 
@@ -70,7 +73,7 @@ class EffectLimit:
 def effect_limits(
     known: Known, names: Sequence[str], hidden: Sequence[str] = ()
 ) -> tuple[EffectLimit, ...]:
-    """Return what runs allow of each effect, by name; those without an `amount` are left out.
+    """Return what runs allow of each effect, by name; of those without an `amount` that it lacks.
 
     Parameters
     ----------
@@ -81,10 +84,12 @@ def effect_limits(
     known.basis, known.noise, known.size, known.taken, known.lowest  # noqa: B018  # before threads ask for them
 
     def found(name: str) -> EffectLimit:
+        if not EFFECTS[name].amount:
+            return EffectLimit(name, why=NO_AMOUNT)
         one = Sized(name, known)
         return EffectLimit(name, why=_why_hidden(one)) if name in hidden else limit_of(one)
 
-    return tuple(in_threads(found, [name for name in sorted(names) if EFFECTS[name].amount]))
+    return tuple(in_threads(found, sorted(names)))
 
 
 def limit_of(sized: Sized) -> EffectLimit:

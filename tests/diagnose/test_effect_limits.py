@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.cli.diagnose import _limits
-from bristle.diagnose.effect_limits import EffectLimit, effect_limits, limit_of
+from bristle.cli.diagnose import _limits, _not_excited
+from bristle.diagnose.effect_limits import NO_AMOUNT, EffectLimit, effect_limits, limit_of
 from bristle.diagnose.effect_size import Known, Sized
 from bristle.diagnose.resolved_size import STANDS_OUT, resolved
 from bristle.diagnose.verdict_text import limit_rows
@@ -170,6 +170,16 @@ def test_every_effect_says_how_much_there_is_of_it():
     for name, effect in EFFECTS.items():
         if not effect.own:
             assert effect.amount.removeprefix("1/") in effect.parameters, name
+
+
+def test_an_effect_without_an_amount_has_no_limit_and_says_why(known, monkeypatch):
+    monkeypatch.setattr(EFFECTS["stribeck"], "amount", "")
+    one, other = effect_limits(known, ("stribeck", SPRING))
+    assert (one.effect, one.why) == (SPRING, "")
+    assert (other.effect, other.why) == ("stribeck", NO_AMOUNT)
+    rows = [limit.as_dict() for limit in (one, other)]
+    assert limit_rows({"findings": [{"limits": rows}]})[1] == ["stribeck", NO_AMOUNT, "-", "-"]
+    assert _not_excited({"findings": [{"limits": rows}]}) == []
 
 
 def test_the_table_has_units_as_people_write_them():
