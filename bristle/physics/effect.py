@@ -283,6 +283,7 @@ class Effect:
             _take_sites(cls)
             cls.parameters = all_parameters(cls.parameters, cls.tables)
             cls.State = named("State", tuple(cls.states))
+            cls._fields = fields_of(cls.parameters, cls.tables)
             cls.Values = named("Values", tuple(cls.fields()))
             _check(cls)
             _refuse_twin(cls)
@@ -296,7 +297,8 @@ class Effect:
     @classmethod
     def fields(cls) -> dict[str, tuple[str, ...]]:
         """Return what `p` holds: field to the parameters in it, several for a table."""
-        return fields_of(cls.parameters, cls.tables)
+        laid_down = cls.__dict__.get("_fields")  # hooks are called some hundred thousand times
+        return fields_of(cls.parameters, cls.tables) if laid_down is None else laid_down
 
     @classmethod
     def values_of(cls, values: Mapping[str, float]) -> Any:

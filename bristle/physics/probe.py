@@ -25,6 +25,9 @@ FURTHER = (10.0, 0.1, 100.0, 0.01, 1e3)
 BETWEEN = 33
 """Values of one signal, the others kept, at which such a parameter is looked at as well."""
 
+Within = tuple[str, float, float]
+"""A parameter and between which values it is moved."""
+
 SHARES = (0.0, 0.2, 0.5, 0.8, 1.0)
 """Shares of a parameter's range at which it is."""
 
@@ -148,6 +151,7 @@ def _at_signal(
 
 def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> None:
     moving: dict[str, bool] = {}
+    within: dict[str, list[Within]] = {}
     field_of = {name: field for field, names in effect.fields().items() for name in names}
     for name, parameter in effect.parameters.items():
         low, high = parameter.bounds
@@ -157,26 +161,28 @@ def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> Non
         moved = False
         for q, hook in product(_signals(effect), effect.hooks()):
             z = _state(effect, q, values)
-            given = partial(_at_parameter, effect, hook, q, z, values, (name, low, high))
+            given = partial(_at_parameters, effect, hook, q, z, values, [(name, low, high)])
             if name in CHOICES:
                 moved = moved or given(0.0) != given(1.0)
             else:
                 jumped = refuse_jump(getattr(effect, hook), given, (0.0, 1.0), f"p.{name}", 24)
                 moved = jumped or moved
-        # Of a table some knots may lie where no signal of any rig comes.
-        moved = moved or moving.get(field_of[name], False)
-        moved = moved or _moved_far_out(effect, name, (low, high), values)
-        moving[field_of[name]] = moved or _moved_between(effect, name, (low, high), values)
+        moving[field_of[name]] = moved or moving.get(field_of[name], False)
+        within.setdefault(field_of[name], []).append((name, low, high))
+    for field in [field for field, moved in moving.items() if not moved]:
+        # Of a table some knots may lie where no signal of any rig comes: all at once, then each.
+        moving[field] = any(
+            _moved_far_out(effect, some, values) or _moved_between(effect, some, values)
+            for some in (within[field], *([one] for one in within[field]))
+        )
     for field, moved in moving.items():
         if not moved:
             line = getattr(effect, next(iter(effect.hooks()))).__code__.co_firstlineno
             raise FlawError(f"p.{field} moves nothing: no measurement could tell it.", line)
 
 
-def _moved_far_out(
-    effect: type[Effect], name: str, bounds: tuple[float, float], values: dict[str, float]
-) -> bool:
-    """Return whether a parameter moves a hook in larger or smaller motion than that of the rig.
+def _moved_far_out(effect: type[Effect], within: list[Within], values: dict[str, float]) -> bool:
+    """Return whether parameters move a hook in larger or smaller motion than that of the rig.
 
     What begins beyond a knot, such as a stop behind a gap, does nothing before it.
     """
@@ -184,7 +190,7 @@ def _moved_far_out(
         q = Q(*(factor * one for one in signal))._replace(dt=signal.dt, storey=signal.storey)
         try:
             z = _state(effect, q, values)
-            given = partial(_at_parameter, effect, hook, q, z, values, (name, *bounds))
+            given = partial(_at_parameters, effect, hook, q, z, values, within)
             if len({given(share) for share in SHARES}) > 1:
                 return True
         except FlawError:  # so far out it need not be right
@@ -192,10 +198,8 @@ def _moved_far_out(
     return False
 
 
-def _moved_between(
-    effect: type[Effect], name: str, bounds: tuple[float, float], values: dict[str, float]
-) -> bool:
-    """Return whether a parameter moves a hook anywhere on the way of one signal.
+def _moved_between(effect: type[Effect], within: list[Within], values: dict[str, float]) -> bool:
+    """Return whether parameters move a hook anywhere on the way of one signal.
 
     A row of a table counts near its own level alone, and so it does of a channel that it follows.
     """
@@ -204,7 +208,7 @@ def _moved_between(
         for q, others in _ways(effect, still, factor, values):
             try:
                 z = _state(effect, q, others)
-                given = partial(_at_parameter, effect, hook, q, z, others, (name, *bounds))
+                given = partial(_at_parameters, effect, hook, q, z, others, within)
                 if given(0.0) != given(1.0):
                     return True
             except FlawError:  # so far out it need not be right
@@ -230,12 +234,13 @@ def _ways(
             yield still, {**values, name: at}
 
 
-def _at_parameter(
+def _at_parameters(
     effect: type[Effect], hook: str, q: Q, z: Any, values: dict[str, float],
-    within: tuple[str, float, float], share: float,
+    within: list[Within], share: float,
 ) -> tuple[float, ...]:  # fmt: skip
-    """Call a hook with a parameter between low and high, by decades where they span many."""
-    name, low, high = within
-    by_decades = low > 0.0 and high > 100.0 * low
-    value = low * (high / low) ** share if by_decades else low + (high - low) * share
-    return _call(effect, hook, q, z, {**values, name: value})
+    """Call a hook with parameters between low and high, by decades where they span many."""
+    given = dict(values)
+    for name, low, high in within:
+        by_decades = low > 0.0 and high > 100.0 * low
+        given[name] = low * (high / low) ** share if by_decades else low + (high - low) * share
+    return _call(effect, hook, q, z, given)
