@@ -275,6 +275,7 @@ class Effect:
     _elsewhere: ClassVar[dict[str, type[Effect]]]
     State: ClassVar[Any]
     Values: ClassVar[Any]
+    _laid_down: ClassVar[dict[str, tuple[str, ...]]]
 
     def __init_subclass__(cls, register: bool = True, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
@@ -283,7 +284,7 @@ class Effect:
             _take_sites(cls)
             cls.parameters = all_parameters(cls.parameters, cls.tables)
             cls.State = named("State", tuple(cls.states))
-            cls._fields = fields_of(cls.parameters, cls.tables)
+            cls._laid_down = fields_of(cls.parameters, cls.tables)
             cls.Values = named("Values", tuple(cls.fields()))
             _check(cls)
             _refuse_twin(cls)
@@ -297,7 +298,7 @@ class Effect:
     @classmethod
     def fields(cls) -> dict[str, tuple[str, ...]]:
         """Return what `p` holds: field to the parameters in it, several for a table."""
-        laid_down = cls.__dict__.get("_fields")  # hooks are called some hundred thousand times
+        laid_down = cls.__dict__.get("_laid_down")  # hooks are called some hundred thousand times
         return fields_of(cls.parameters, cls.tables) if laid_down is None else laid_down
 
     @classmethod
