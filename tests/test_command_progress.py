@@ -90,7 +90,7 @@ FAST = {
 }  # fmt: skip
 SLOW = {
     "example": (["example", "bench", "{out}"], "run 2 of 5"),
-    "identify": (["identify", "{rig}"], r"start 2 of 4|intervals"),
+    "identify": (["identify", "{rig}"], r"start \d of 4"),
     "diagnose": (["diagnose", "{rig}", "--law", "lugre"], r"effect \d+ of \d+"),
     "compare": (["compare", "{rig}"], "holding the model against the runs"),
     "report": (["report", "{rig}"], "drawing"),

@@ -131,7 +131,7 @@ def test_a_zero_that_was_found_first_is_renewed_beside_an_effect():
 
 @pytest.mark.slow
 def test_an_effect_is_named_alone_and_the_zero_told():
-    found = of_damper.look_at_damper(opened(**HIDDEN))
+    found, _ = of_damper.look_at_damper(opened(**HIDDEN))
     assert (found.kind, found.effects) == ("effect", ("stribeck",))
     (fault,) = found.sensors
     assert fault.value == pytest.approx(OFFSET, abs=0.02)
