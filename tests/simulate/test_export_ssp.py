@@ -322,13 +322,16 @@ def test_a_small_error_needs_no_shorter_step(scenario: Path) -> None:
 @pytest.mark.slow
 def test_the_step_that_is_told_keeps_the_error_of_a_closed_loop(loop: Path) -> None:
     file = loop.with_suffix(".toml")
-    for one in expect(load_scenario(file), run_quietly):
-        given = {"run.step": one.step, "run.algorithm": one.algorithm}
+    found = expect(load_scenario(file), run_quietly)
+    # With Jacobi the base acceleration jumps a step late, at however short a step.
+    assert [one.algorithm for one in found if one.step is not None] == ["gauss-seidel"]
+    for one in found:
+        given = {"run.step": one.tried, "run.algorithm": one.algorithm}
         frame, exact = run(file, given), run(file, given, engine="compiled")
         wrong = (frame - exact).abs().max() / exact.abs().max()
-        assert wrong["damper.force"] <= 0.005
         assert one.tried_error is not None
         assert wrong["damper.force"] <= 1.001 * one.tried_error
+        assert one.step is None or wrong["damper.force"] <= 0.005
 
 
 def test_an_error_that_does_not_fall_is_told(scenario: Path) -> None:
