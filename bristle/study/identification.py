@@ -1,5 +1,7 @@
 """Identify the model of a study: fit it to the training runs, judge it on those held out."""
 
+# Longer than 300 lines: what a study's model is to a fit, and a fit to it, stand beside the fit.
+
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
@@ -7,11 +9,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..data.checks.clipping import saturated_share
 from ..data.measurement import Measurement
 from ..data.model import StudyModel, new_model
 from ..errors import StudyError
-from ..identify.begin import under_load_text
 from ..identify.bench import compile_ahead
 from ..identify.fit import Fit, Model
 from ..identify.residuals import robust_z
@@ -22,8 +22,8 @@ from ..physics.effect import EFFECTS
 from ..physics.forms import shown_law
 from ..physics.laws import base_and_variant, law_names
 from ..progress import tell
-from ..quantity import plain
 from ..units import convert
+from .fit_notes import by_site, doubts, under_load, weighing, why
 from .forms import FormError, form_of, forms_asked, in_form
 from .identified import Identified
 from .joining import refuse_left_out
@@ -38,8 +38,6 @@ Show = Callable[[int], None]
 STAGES = 4
 """How many stages `identify_study` reports to `show`."""
 
-_MISFIT = 1.15  # z above which an error is more than noise
-_SATURATED = 0.05  # share of samples at one and the same extreme of the force
 _TABLE_STARTS = 3
 _LONGEST_TABLE = 4_000_000  # samples of all training runs beyond which the other laws are left out
 
@@ -96,7 +94,7 @@ def identify_study(
         return found
     step = study.add_step(
         f"identify {shown_law(found.model.law)}" + "".join(f" + {e}" for e in found.model.effects),
-        _why(found), found.model, found.before, found.after,
+        why(found), found.model, found.before, found.after,
     )  # fmt: skip
     return replace(found, step=step)
 
@@ -191,7 +189,7 @@ def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Iden
     """Fit a model at all sites of a rig, then judge it there."""
     start = as_model(model)
     rig.prepare(start)
-    notes = [*runs.notes, *_doubts([run for run in runs.all if run.has("force")])]
+    notes = [*runs.notes, *doubts([run for run in runs.all if run.has("force")])]
     task.show(1)
     fits = fit_rig(rig, start, task.starts, task.begin)
     task.show(2)
@@ -205,22 +203,9 @@ def _in_own_form(rig: Rig, runs: Runs, model: StudyModel, task: FitTask) -> Iden
     rows = _table(at, task) if task.table else []
     task.show(4)
     own = error_rms(at.site.train, at.model, task.cutoff)
-    notes += [*fits.notes(), *_by_site(models), *_weighing(rows, model, own, after), *rig.notes]
-    notes += _under_load(at)
+    notes += [*fits.notes(), *by_site(models), *weighing(rows, model, own, after), *rig.notes]
+    notes += under_load(at)
     return Identified(fit, fitted, rows, task.cutoff, before, after, tuple(notes), None, at)
-
-
-def _under_load(at: SiteModel) -> list[str]:
-    """Return the sentence that tells which runs begin under a load that the model carries."""
-    problems = (at.site.train, at.site.holdout)
-    loads = {
-        run.name: float(np.mean(run.force[: run.rest]))
-        for problem in problems
-        if problem is not None
-        for run in problem.runs
-        if problem.carrying(at.model, run)
-    }
-    return [under_load_text(loads)] if loads else []
 
 
 def _worst(models: SiteModels) -> SiteModel:
@@ -253,21 +238,6 @@ def _tabled(own: str) -> tuple[str, ...]:
     named = {name: base_and_variant(name)[0] for name in law_names()}
     names = tuple(n for n, law in named.items() if law.exact() or law.name == own)
     return names if own in names else (*names, own)
-
-
-def _by_site(models: SiteModels) -> list[str]:
-    """Return the sentence that tells z by site.
-
-    None where the one site goes without saying, or no run is held out.
-    """
-    problems = {at.site.shown: at.site.holdout for at in models.values()}
-    if "" in problems:
-        return []
-    z = {n: robust_z(p, models[n].model) for n, p in problems.items() if p is not None}
-    if not z:
-        return []
-    text = ", ".join(f"{site} {plain(z[site])}" for site in sorted(z, key=lambda site: -z[site]))
-    return [f"z on held-out runs by site: {text}; the z of the errors is that of the worst site."]
 
 
 def _with_choices(model: StudyModel, begin: Mapping[str, float]) -> StudyModel:
@@ -308,34 +278,6 @@ def _of_law(model: StudyModel, law: str | None) -> StudyModel:
     return replace(other, effects=dict(model.effects))
 
 
-def _weighing(
-    rows: list[LawError], model: StudyModel, own: float, after: Mapping[str, float]
-) -> list[str]:
-    """Say what a model that errs by more than noise does to intervals and to the fit.
-
-    Parameters
-    ----------
-    rows : the table of laws at a site
-    model : the study's model
-    own : its RMS error at that site [N], low-passed as in the table
-    after : errors of the whole rig
-    """
-    if after["z_train"] <= _MISFIT:
-        return []
-    notes = [
-        "The error exceeds the noise. The intervals come from the error itself: they describe "
-        "the best values of this model, not the constants of a damper."
-    ]
-    same = [row for row in rows if row.law == model.law and not model.effects]
-    if same and same[0].train < 0.95 * own:
-        notes.append(
-            f"The fit weighs each sample by its noise and counts outliers less. Least squares of "
-            f"the force alone, as in the table, would leave {plain(same[0].train, 4)} N instead "
-            f"of {plain(own, 4)} N."
-        )
-    return notes
-
-
 def as_model(model: StudyModel) -> Model:
     """Return a study's model as the fit takes it: values, fixed parameters and bounds in SI."""
     fixed, limits = [], {}
@@ -370,40 +312,3 @@ def _inside(model: StudyModel, name: str, value: float) -> float:
     own, unit = model.flat()[name], model.declared(name).unit
     low, high = (convert(bound, own.unit, unit) for bound in (own.low, own.high))
     return float(np.clip(value, low, high))
-
-
-def _doubts(runs: list[Measurement]) -> list[str]:
-    """Refuse a saturated force; say what weakens an identification."""
-    notes = []
-    for run in runs:
-        share = saturated_share(run["force"])
-        if share > _SATURATED:
-            raise StudyError(
-                f"{run.name}: {share:.0%} of the force's samples are at its extremes: the load "
-                "cell or its amplifier is saturated. Measure with a wider range, or leave the run "
-                "out in study.toml."
-            )
-        if share > 0.0:
-            notes.append(f"{run.name}: {share:.1%} of the force's samples are at its extremes.")
-    doubtful: dict[str, int] = {}
-    for run in runs:
-        for channel, fact in run.noise_facts.items():
-            if fact is not None and fact.colour in ("hidden", "rough", "blue"):
-                doubtful[channel] = doubtful.get(channel, 0) + 1
-    if doubtful:
-        where = ", ".join(f"{c} ({n} of {len(runs)} runs)" for c, n in doubtful.items())
-        notes.append(
-            f"The noise is hard to separate from the signal: {where}. Give it in study.toml: z and "
-            "intervals depend on it."
-        )
-    return notes
-
-
-def _why(found: Identified) -> str:
-    runs, held_out = len(found.train.runs), len(found.holdout.runs) if found.holdout else 0
-    lost = ", ".join(found.unidentified)
-    return (
-        f"fit to {runs} training run{'s' * (runs != 1)}, tested on {held_out} held out; "
-        f"{found.fit.agreed} of {found.fit.starts} starts agree"
-        + (f"; the data do not identify {lost}" if lost else "")
-    )
