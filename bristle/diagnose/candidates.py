@@ -164,6 +164,20 @@ def short_search(
     return Candidate(best, float(np.mean(loss(residuals(context.train, best, context.expected)))))
 
 
+def _starts(
+    names: Sequence[str], context: SearchContext, most: int | None
+) -> dict[str, list[Candidate]]:
+    """Return the starts of effects in their order; with `most` of those that promise most alone."""
+    looked = in_threads(lambda name: ranked_guesses(name, context), names)
+    guesses = dict(zip(names, looked, strict=True))
+    if most is None:
+        return guesses
+    looked = in_threads(lambda name: screened(name, context, guesses[name]), names)
+    guesses = dict(zip(names, looked, strict=True))
+    best = sorted(names, key=lambda name: guesses[name][0].cost)[:most]
+    return {name: guesses[name] for name in names if name in best}
+
+
 def try_all(
     base: Model,
     train: Problem,
@@ -187,14 +201,8 @@ def try_all(
     context = SearchContext(base, train)
     there = held_out.expectation(base)
     names = joinable(base, shown, train)
-    looked = in_threads(lambda name: ranked_guesses(name, context), names)
-    guesses = dict(zip(names, looked, strict=True))
-    if most is not None:
-        looked = in_threads(lambda name: screened(name, context, guesses[name]), names)
-        guesses = dict(zip(names, looked, strict=True))
-        best = sorted(names, key=lambda name: guesses[name][0].cost)[:most]
-        names = [name for name in names if name in best]
-    fewer = most is not None
+    guesses = _starts(names, context, most)
+    names, fewer = [*guesses], most is not None
     ends: dict[str, float] = {}
     count = Count("effect", len(names))
 

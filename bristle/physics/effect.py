@@ -12,6 +12,8 @@ test bench, which has one site, the plain name does.
 
 # Longer than 400 lines: the class data of an effect are described one by one.
 
+# Longer than 300 lines: a docstring says of every attribute and hook what it means.
+
 from __future__ import annotations
 
 from collections.abc import Mapping

@@ -171,9 +171,10 @@ def _smooth_in_parameters(effect: type[Effect], values: dict[str, float]) -> Non
         within.setdefault(field_of[name], []).append((name, low, high))
     for field in [field for field, moved in moving.items() if not moved]:
         # Of a table some knots may lie where no signal of any rig comes: all at once, then each.
+        alone = [[one] for one in within[field]]
         moving[field] = any(
             _moved_far_out(effect, some, values) or _moved_between(effect, some, values)
-            for some in (within[field], *([one] for one in within[field]))
+            for some in (alone if len(alone) == 1 else [within[field], *alone])
         )
     for field, moved in moving.items():
         if not moved:

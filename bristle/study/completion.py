@@ -105,8 +105,7 @@ def complete(
     while True:
         found = diagnose_study(study, law=ALL if free else study.model().law, say=say)
         if free:
-            found = _with_law_taken(study, found, stepped)
-        free = False
+            found, free = _with_law_taken(study, found, stepped), False
         names, abreast = _named(found), list[Trial]()
         if greedy and found.kind == "unknown" and found.before is not None:
             abreast = gaining(found.before, found.trials)
