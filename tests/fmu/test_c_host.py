@@ -21,7 +21,7 @@ from bristle.fmu.description import Description, extract, read_description
 
 SOURCE = Path(__file__).with_name("host.c")
 COMPILER = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
-RUNS, STEPS, STEP = 8, 40, 0.002
+STEPS, STEP = 40, 0.002
 MOTION = {"V": (4.0, 3.0), "m": (0.0, 5e-3), "m/s": (0.0, 0.1), "m/s2": (0.0, 2.0), "N": (0.0, 1.0)}
 
 
@@ -97,9 +97,10 @@ def _in_python(about: Description, folder: Path) -> list[float]:
     return last
 
 
+@pytest.mark.parametrize("count", [8, pytest.param(20, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", catalogue.component_names())
 def test_c_host_runs_the_fmu_and_ends_cleanly_every_time(
-    name: str, host: Path, tmp_path: Path
+    name: str, count: int, host: Path, tmp_path: Path
 ) -> None:
     path = build.ensure(name)
     about = read_description(path)
@@ -126,8 +127,8 @@ def test_c_host_runs_the_fmu_and_ends_cleanly_every_time(
         )
 
     with ThreadPoolExecutor(2) as pool:
-        runs = list(pool.map(run, range(RUNS)))
-    assert [(done.returncode, done.stderr) for done in runs] == [(0, "")] * RUNS
+        runs = list(pool.map(run, range(count)))
+    assert [(done.returncode, done.stderr) for done in runs] == [(0, "")] * count
     assert len({done.stdout for done in runs}) == 1
     assert [float(line) for line in runs[0].stdout.split()] == pytest.approx(
         _in_python(about, copies[0]), rel=1e-12, abs=1e-300

@@ -85,6 +85,43 @@ def test_dampers(law: str, effects: list[str]) -> None:
             assert (np.abs(other - one) <= 1e-12 * np.maximum(scale, 1e-9)).all()
 
 
+def held_run(step: Any, law: str, effects: list[str], to: Any) -> np.ndarray:
+    """Return force, friction and states of 150 steps whose rod friction may hold."""
+    model = damper.DamperModel(law, {"exponent": 1.0}, effects)
+    setup = damper.setup_of(law, {"exponent": 1.0}, effects, to, to)._replace(active=True)
+    z, work, found = to(model.z), to([0.0] * damper.work_size()), []
+    last = (0.0, 0.0, 0.0, 4.0)
+    for k in range(1, 151):
+        dt, t = (0.002, 0.01, 0.0005)[k % 3], 0.002 * k
+        v = float(0.18 * np.cos(15.0 * t))
+        now = (
+            float(0.012 * np.sin(15.0 * t)), v, float(-2.7 * np.sin(15.0 * t)),
+            float(4.0 + 3.9 * np.sin(7.0 * t)),
+        )  # fmt: skip
+        z1 = to([0.0] * len(model.z))
+        begin, end = (Inputs(*at, dt, 0.0, 6.0 * v, True) for at in (last, now))
+        pair = step(setup, begin, end, z, z1, work)
+        z, last = z1, now
+        found.append([*pair, *z])
+    return np.array(found)
+
+
+@pytest.fixture(scope="module")
+def fast_step(cache: Any) -> Any:
+    return compiled(damper.step)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("law", "effects"), DAMPER_CASES, ids=lambda v: v if isinstance(v, str) else "+".join(v)
+)
+def test_friction_that_may_hold(fast_step: Any, law: str, effects: list[str]) -> None:
+    plain = held_run(damper.step, law, effects, list)
+    fast = held_run(fast_step, law, effects, np.array)
+    scale = np.abs(plain).max(axis=0)
+    assert (np.abs(fast - plain).max(axis=0) <= 1e-12 * np.maximum(scale, 1e-9)).all()
+
+
 VALUES = {
     "storey_softening.d_half": 0.003,
     "storey_softening.yields": 0.4,
