@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 from ..diagnose.candidates import LONG, joinable, short_search
-from ..diagnose.effect_limits import EffectLimit, limit_of
+from ..diagnose.effect_limits import NO_AMOUNT, EffectLimit, limit_of
 from ..diagnose.effect_size import Known as Fitted
 from ..diagnose.effect_size import Sized
 from ..diagnose.learned.along import ALONG
@@ -113,6 +113,10 @@ def refuse_unable(name: str, able: Sequence[str], model: Model) -> None:
         raise StudyError(unknown("effect", name, sorted(EFFECTS)))
     if name in model.effects:
         raise StudyError(f"{name} is in the model already; --sharpen {name} sharpens it.")
+    if not EFFECTS[name].amount:
+        raise StudyError(
+            f"{name} cannot be planned for: {NO_AMOUNT}. These can: {', '.join(able)}."
+        )
     if name not in able:
         raise StudyError(
             f"{name} cannot be seen beside the law {model.law}: the law holds it already, or it "

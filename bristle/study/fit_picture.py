@@ -9,6 +9,7 @@ from ..compare.panels import draw_error, draw_history, worst_window
 from ..compare.picture import LOOPS, loop_panels
 from ..compare.prediction import run_predictions
 from ..draw.style import Page, look, percent, png, short_z
+from ..identify.rig import DAMPER
 
 if TYPE_CHECKING:
     from .identified import Identified
@@ -56,6 +57,7 @@ def _headings(found: Identified, role: str) -> tuple[str, str]:
     law = " + ".join([found.model.law, *found.model.effects])
     site = found.at.site
     what = site.quantity[:1].upper() + site.quantity[1:]
+    what += " of the damper" if site.shown == DAMPER else ""
     worst = " at the worst site" if site.shown else ""
     runs = "runs held out" if role == "held out" else "training runs"
     return (
