@@ -45,7 +45,8 @@ def ask(
     jobs = ((kind, k) for kind in kinds for k in range(getattr(chosen, kind)))
     for row in rows(Answers(name, also).complete(jobs, answer)):
         goal = f" (goal {row.goal})" if row.goal else ""
-        print(f"{row.name}: {row.measured}{goal}")
+        note = f"; {row.note}" if row.note else ""
+        print(f"{row.name}: {row.measured}{goal}{note}")
     return 0
 
 

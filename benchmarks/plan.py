@@ -60,6 +60,9 @@ SEEN = (
 OF_EACH = 4
 """Effects in a case."""
 
+APART = 0.02
+"""Relative difference of two z below which they are alike: about what the noise of runs makes."""
+
 ALSO = ("plan", "example")
 
 
@@ -259,7 +262,10 @@ def _learn_rows(answers: Sequence[Answer]) -> list[Row]:
         return []
     out = []
     for name in ORDINARY:
-        lower = sum(one["plan"]["z"] < one[name]["z"] for one in answers)
+        ratios = np.array([one["plan"]["z"] / one[name]["z"] for one in answers])
+        lower = int(np.sum(ratios < 1.0))
+        clearly = int(np.sum(ratios < 1.0 - APART))
+        apart = clearly + int(np.sum(ratios > 1.0 + APART))
         z = ", ".join(
             f"{kind} {float(np.median([one[kind]['z'] for one in answers])):.2f}"
             for kind in (name, "plan")
@@ -267,7 +273,8 @@ def _learn_rows(answers: Sequence[Answer]) -> list[Row]:
         out.append(
             Row(
                 f"learned from a plan, lower z than from {name}", f"{lower} of {len(answers)}",
-                ">= 75 %", 0.75 * len(answers) / max(lower, 1e-3), f"median z: {z}",
+                ">= 75 %", 0.75 * len(answers) / max(lower, 1e-3),
+                f"of those apart by more than {APART:.0%}: {clearly} of {apart}; median z: {z}",
             )
         )  # fmt: skip
     return out

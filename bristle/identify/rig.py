@@ -17,10 +17,11 @@ from ..errors import StudyError
 from ..physics.building import Building, with_damper
 from ..physics.effect import AT, EFFECTS, effects_of, plain_name
 from .assigned import corrected_for_delay, lateness, linear_storeys, unassigned
-from .model import Model, Problem
+from .model import Model, Problem, Run
 from .prepare import prepare
 from .response import Response, responses
 from .structure import StructureProblem, blind_at_rest, problems_of
+from .threads import in_threads
 
 ROLES = ("train", "holdout")
 DAMPER = "damper"
@@ -184,8 +185,11 @@ def bench_rig(
 
     def problem(role: str) -> Problem | None:
         measured, first = runs[role]
-        prepared = [prepare(one, seed=seeds.apart * k + first) for k, one in enumerate(measured)]
-        return Problem(prepared) if prepared else None
+
+        def prepared(k: int) -> Run:
+            return prepare(measured[k], seed=seeds.apart * k + first)
+
+        return Problem(in_threads(prepared, range(len(measured)))) if measured else None
 
     site = Site(DAMPER, problem)
     notes: tuple[str, ...] = ()

@@ -171,13 +171,15 @@ def _law_error(
         model = without(model, base.driven())
     few = _thinned(train, cutoff) if base.exact() else train
     whole = None if few is train else train
-    ends = [_fit_filtered(few, one, cutoff, whole) for one in start_models(few, model, starts)]
+    begins = start_models(few, model, starts)
+    ends = in_threads(lambda one: _fit_filtered(few, one, cutoff, whole), begins)
     ends = sorted(ends, key=lambda end: end[1])
     tried, cost = len(ends), ends[0][1]
     agreed = sum(end[1] <= cost * (1.0 + _ALIKE) for end in ends)
     if few is not train:
         # Of those that agree the first stands for all; the next one may still overtake it.
-        ends = [_fit_filtered(train, end[0], cutoff) for end in (ends[0], *ends[agreed:][:1])]
+        leading = (ends[0], *ends[agreed:][:1])
+        ends = in_threads(lambda end: _fit_filtered(train, end[0], cutoff), leading)
     best, _ = min(ends, key=lambda end: end[1])
     deciding = holdout if holdout is not None and holdout.runs else train
     errors = filtered_errors(deciding, best, cutoff)
