@@ -31,6 +31,10 @@ _BYTECODE = "" if "PYTHONPYCACHEPREFIX" in os.environ else tempfile.mkdtemp(pref
 os.environ.setdefault("PYTHONPYCACHEPREFIX", _BYTECODE)
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# Instances of the same FMU share its unpacked files, over all tests and workers.
+_UNPACKED = "" if "BRISTLE_TEST_UNPACKED" in os.environ else tempfile.mkdtemp(prefix="bristle-fmus-")
+os.environ.setdefault("BRISTLE_TEST_UNPACKED", _UNPACKED)
+
 
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Where the whole suite runs on several workers, compile once what each would compile."""
@@ -68,8 +72,8 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 
     Some of these FMUs are broken on purpose, and some were left as they answered Fatal.
     """
-    if _BYTECODE:
-        shutil.rmtree(_BYTECODE, ignore_errors=True)
+    for folder in filter(None, (_BYTECODE, _UNPACKED)):
+        shutil.rmtree(folder, ignore_errors=True)
     if _STATUS in config.stash:
         sys.stdout.flush()
         sys.stderr.flush()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import atexit
 import ctypes
+import hashlib
+import os
 import shutil
 import tempfile
 from collections.abc import Iterable, Mapping
@@ -30,13 +33,31 @@ _CALLBACKS.freeMemory = fmi2.defaultCallbacks.freeMemory
 fmi2.addLoggerProxy(ctypes.byref(_CALLBACKS))
 
 
+if "BRISTLE_TEST_UNPACKED" not in os.environ:
+    _OWN = os.environ["BRISTLE_TEST_UNPACKED"] = tempfile.mkdtemp()
+    atexit.register(shutil.rmtree, _OWN, ignore_errors=True)
+
+
+def unpacked(path: str | Path) -> Path:
+    """Return the folder of an FMU's files: unpacked once, as hosts do it, for all instances."""
+    root = Path(os.environ["BRISTLE_TEST_UNPACKED"])
+    folder = root / hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    if not folder.is_dir():
+        own = tempfile.mkdtemp(dir=root)
+        fmpy.extract(str(path), own)
+        try:
+            os.rename(own, folder)
+        except OSError:  # another process was first
+            shutil.rmtree(own)
+    return folder
+
+
 class Fmu:
     """One instance of an FMU, by the names of its variables. Calls answer their status."""
 
     def __init__(self, path: str | Path, name: str = "one") -> None:
         self.name = name
-        self.folder = Path(tempfile.mkdtemp())
-        fmpy.extract(str(path), str(self.folder))
+        self.folder = unpacked(path)
         self.description = fmpy.read_model_description(str(self.folder))
         self.variables = {v.name: v for v in self.description.modelVariables}
         assert self.description.coSimulation is not None
@@ -54,7 +75,6 @@ class Fmu:
 
     def __exit__(self, *_: object) -> None:
         self.slave.freeInstance()
-        shutil.rmtree(self.folder)
 
     @property
     def said(self) -> list[str]:
