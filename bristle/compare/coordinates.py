@@ -157,18 +157,10 @@ def cut(values: Array, bins: int = BINS) -> Bins | None:
     levels = np.round((values - values.min()) / (_TIED * span)).astype(np.int64)
     present, counts = np.unique(levels, return_counts=True)
     share = len(values) / bins
-    group = np.zeros(len(present), dtype=np.int64)
-    number, filled = 0, 0
-    for i, count in enumerate(counts):
-        alone = count >= share
-        if filled and (alone or filled + 0.5 * count > share):
-            number, filled = number + 1, 0
-        group[i] = number
-        filled += int(count)
-        if alone:
-            number, filled = number + 1, 0
-    if number and 0 < filled < 0.4 * share:  # a few samples at the end are no bin
-        group[group == number] = number - 1
+    begins = _begins(counts, share)
+    if len(begins) > 1 and 0 < counts[begins[-1] :].sum() < 0.4 * share:
+        begins = begins[:-1]  # a few samples at the end are no bin
+    group = np.searchsorted(begins, np.arange(len(present)), side="right") - 1
     label = group[np.searchsorted(present, levels)]
     label = np.unique(label, return_inverse=True)[1].astype(np.int64)
     count = np.bincount(label)
@@ -183,3 +175,24 @@ def cut(values: Array, bins: int = BINS) -> Bins | None:
         np.array([part.min() for part in parts]),
         np.array([part.max() for part in parts]),
     )
+
+
+def _begins(counts: NDArray[np.int64], share: float) -> NDArray[np.int64]:
+    """Return at which of the levels, by how often they occur (n,), a bin begins (b,).
+
+    A level that holds a `share` of the samples by itself is a bin; of the others a bin takes so
+    many that the middle of its last level is no further than that.
+    """
+    before = np.cumsum(counts) - counts
+    middle = before + 0.5 * counts
+    alone = counts >= share
+    large = np.flatnonzero(alone)
+    begins = [0]
+    while True:
+        at = begins[-1]
+        full = at + 1 if alone[at] else int(np.searchsorted(middle, before[at] + share, "right"))
+        later = large[np.searchsorted(large, at, "right") :]
+        end = min([max(full, at + 1), *later[:1].tolist()])
+        if end >= len(counts):
+            return np.array(begins)
+        begins.append(end)
