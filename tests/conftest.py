@@ -32,7 +32,7 @@ os.environ.setdefault("PYTHONPYCACHEPREFIX", _BYTECODE)
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 # Instances of the same FMU share its unpacked files, over all tests and workers.
-_UNPACKED = "" if "BRISTLE_TEST_UNPACKED" in os.environ else tempfile.mkdtemp(prefix="bristle-fmus-")
+_UNPACKED = "" if "BRISTLE_TEST_UNPACKED" in os.environ else tempfile.mkdtemp(prefix="bristle-fmu-")
 os.environ.setdefault("BRISTLE_TEST_UNPACKED", _UNPACKED)
 
 

@@ -46,7 +46,7 @@ def unpacked(path: str | Path) -> Path:
         own = tempfile.mkdtemp(dir=root)
         fmpy.extract(str(path), own)
         try:
-            os.rename(own, folder)
+            Path(own).rename(folder)
         except OSError:  # another process was first
             shutil.rmtree(own)
     return folder
