@@ -31,6 +31,10 @@ _BYTECODE = "" if "PYTHONPYCACHEPREFIX" in os.environ else tempfile.mkdtemp(pref
 os.environ.setdefault("PYTHONPYCACHEPREFIX", _BYTECODE)
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+# Workers of a run are as many as cores: threads of BLAS beside them wait for each other, at work.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
+
 # Instances of the same FMU share its unpacked files, over all tests and workers.
 _UNPACKED = "" if "BRISTLE_TEST_UNPACKED" in os.environ else tempfile.mkdtemp(prefix="bristle-fmu-")
 os.environ.setdefault("BRISTLE_TEST_UNPACKED", _UNPACKED)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -21,6 +22,7 @@ SECTION = re.compile(r"^Parameters\n-{10}$", re.MULTILINE)
 Function = tuple[str, ast.ClassDef | None, ast.FunctionDef | ast.AsyncFunctionDef]
 
 
+@cache
 def modules() -> dict[str, ast.Module]:
     """Return the parsed files of the package by their path."""
     return {
@@ -44,6 +46,7 @@ def public_functions(
             yield name, inside, part
 
 
+@cache
 def of_package() -> list[Function]:
     found = [
         function

@@ -6,6 +6,7 @@ import ast
 import re
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -86,6 +87,7 @@ def unit_of(name: str) -> str | None:
     return parts[1] if parts[0] == PACKAGE.name and len(parts) > 1 else None
 
 
+@cache
 def modules(folder: Path = PACKAGE) -> dict[str, set[str]]:
     """Return which module of a package imports which others of it, by full names."""
     edges: dict[str, set[str]] = {}

@@ -54,8 +54,9 @@ class RunsTable:
             raise EnsembleError(f"{path}: cannot be written ({error.strerror or error}).") from None
 
     def forget_failures(self) -> None:
-        """Take failed runs as not yet run."""
-        self.outcomes = {run: found for run, found in self.outcomes.items() if not found.reason}
+        """Take runs that failed, alone or with an effect, as not yet run."""
+        done = {run: one for run, one in self.outcomes.items() if not (one.reason or one.lost)}
+        self.outcomes = done
         self._rewrite()
 
     def add(self, outcome: Outcome) -> None:

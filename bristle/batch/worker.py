@@ -74,6 +74,8 @@ def _with_effect(
         lost = f"{wrong[0]} is not finite" if wrong else ""
     except BristleError as error:
         lost = in_short(error)
+    except Exception as error:  # what a user's effect raises costs the second run, not the first
+        lost = f"{type(error).__name__}: {_one_line(error)}"
     return (found, "") if not lost else ((nan,) * len(plan.outputs), lost)
 
 

@@ -36,7 +36,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "results/NAME/",
     )
     parser.add_argument("--fresh", action="store_true", help="start again and replace earlier runs")
-    parser.add_argument("--retry", action="store_true", help="repeat failed runs")
+    parser.add_argument(
+        "--retry", action="store_true", help="repeat runs that failed, alone or with an effect"
+    )
     parser.add_argument(
         "--with-limits", action="store_true",
         help="widen the quantiles by the effects that the verdict of [identified] does not "

@@ -37,9 +37,10 @@ Again = Callable[["Scenario", str], "pd.DataFrame"]
 class Expected:
     """What to expect of an algorithm: `error` [1] along the run of the worst output, and a step.
 
-    `step` [s] is the scenario's divided by a power of two at which a run was within the tolerance.
-    `tried` [s] is the shortest step that was run, and `tried_error` [1] the error there: where
-    `step` is None it is not within. All are None where nothing can be told, and `why` says so.
+    `output` is that output. `step` [s] is the scenario's divided by a power of two at which a run
+    was within the tolerance. `tried` [s] is the shortest step that was run, and `tried_error` [1]
+    the largest error there: where `step` is None it is not within. All are None where nothing can
+    be told, and `why` says so.
     """
 
     algorithm: str
@@ -48,11 +49,12 @@ class Expected:
     tried: float | None = None
     tried_error: float | None = None
     why: str = ""
+    output: str | None = None
 
     def __str__(self) -> str:
         if self.error is None or self.tried is None or self.tried_error is None:
             return f"{self.algorithm}: the coupling error cannot be told: {self.why}"
-        told = f"{self.algorithm}: {100 * self.error:.2g} % along the run"
+        told = f"{self.algorithm}: {100 * self.error:.2g} % along the run of {self.output}"
         if self.error <= TOLERANCE:
             return told
         there = f"{100 * self.tried_error:.2g} %"
@@ -93,10 +95,12 @@ def expect(scenario: Scenario, again: Again) -> tuple[Expected, ...]:
 def _expected(scenario: Scenario, kept: Again, again: Again) -> Expected:
     frame = kept(scenario, "fmu")
     errors = estimate(scenario, frame, kept)[1]
-    error = worst(errors, frame)
+    output = worst(errors, frame)
+    error = errors[output].along
+    found = Expected(scenario.algorithm, error, scenario.step, scenario.step, error, output=output)
     judged = {n: errors[n] for n in judged_by(frame) if errors[n].worth and errors[n].some}
     if error <= TOLERANCE:
-        return Expected(scenario.algorithm, error, scenario.step, scenario.step, error)
+        return found
     halvings = max(_halvings(one) for one in judged.values())
     most = int(log2(max(1.0, MOST_STEPS / scenario.steps)))
     tried, there = scenario, error
@@ -104,8 +108,8 @@ def _expected(scenario: Scenario, kept: Again, again: Again) -> Expected:
         tried = finer(scenario, 2**parts)
         there = _error_at(tried, judged, again)
         if there <= TOLERANCE:
-            return Expected(scenario.algorithm, error, tried.step, tried.step, there)
-    return Expected(scenario.algorithm, error, None, tried.step, there)
+            return replace(found, step=tried.step, tried=tried.step, tried_error=there)
+    return replace(found, step=None, tried=tried.step, tried_error=there)
 
 
 def _halvings(error: CouplingError) -> int:

@@ -48,7 +48,8 @@ def find_step(
     good: Scenario | None = None
     tried = scenario
     for _ in range(MOST_TRIALS):
-        if worst(estimate(tried, frame := kept(tried, "fmu"), kept)[1], frame) <= tolerance:
+        errors = estimate(tried, frame := kept(tried, "fmu"), kept)[1]
+        if errors[worst(errors, frame)].along <= tolerance:
             good, coarser = tried, finer(tried, 0.5)
             if tried.step < scenario.step or not _fits(coarser):
                 return good
@@ -63,8 +64,8 @@ def find_step(
     )
 
 
-def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> float:
-    """Return the largest error along a run [1] of the outputs that it is judged by.
+def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> str:
+    """Return which of the outputs that a run is judged by has the largest error along it.
 
     Parameters
     ----------
@@ -76,14 +77,13 @@ def worst(errors: Mapping[str, CouplingError], frame: pd.DataFrame) -> float:
     RunError
         If none of them has an estimate that is worth something.
     """
-    judged = [errors[name] for name in judged_by(frame)]
-    worth = [error.along for error in judged if error.worth]
+    worth = {name: errors[name].along for name in judged_by(frame) if errors[name].worth}
     if not worth:
         raise RunError(
             "no output's coupling error falls with the step: there is nothing to hold a tolerance "
             "against. Dry friction without holding_force and switches behave so."
         )
-    return max(worth)
+    return max(worth, key=worth.__getitem__)
 
 
 def _fits(scenario: Scenario) -> bool:

@@ -211,6 +211,27 @@ def test_why_an_effect_could_not_be_simulated_is_kept(
         assert found.parts[PEAK] == {VARIES: 1.0}
         assert "(it stops)" in found.notes[0]
         assert found.notes[0] in repr(found)
+    monkeypatch.setattr(worker, "_numbers", made)
+    found = bristle.ensemble(path, runs=8, retry=True, **asked)
+    assert 0 < found.continued < 8
+    assert set(found.runs["reason"]) == {""}
+
+
+def test_what_an_effect_raises_costs_only_the_run_with_it(
+    write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a_study(tmp_path, None, SPRING)
+    made = worker._numbers
+
+    def numbers(plan: Plan, scenario: Scenario) -> tuple[float, ...]:
+        if scenario.component("damper").parameters.get("gas_spring.k", 0.0) > 0.0:
+            raise ZeroDivisionError("somebody's effect")
+        return made(plan, scenario)
+
+    monkeypatch.setattr(worker, "_numbers", numbers)
+    plan = read_ensemble(with_study(write, (MASSES, ""), (STEADY, "")), 4, with_limits=True)
+    found = worker.run_one(plan, 1)
+    assert (found.reason, found.lost) == ("", "ZeroDivisionError: somebody's effect")
 
 
 def test_the_command_tells_the_parts_and_continues(

@@ -36,7 +36,7 @@ from bristle.paper.comparison.experiment import (
     motions,
     scenario,
 )
-from bristle.paper.comparison.identification import NOISE, errors, gain
+from bristle.paper.comparison.identification import NOISE, gain
 from bristle.paper.comparison.make import Report
 from bristle.paper.comparison.tables import MARK, beyond_stroke
 from bristle.paper.runs import Runs
@@ -184,13 +184,14 @@ def test_a_design_that_fails_is_said_with_its_words(
     monkeypatch.setattr(experiment, "_PLANTS", {HINF: experiment._PLANTS[HINF]})
     monkeypatch.setattr(experiment, "LAWS", (HINF,))
     monkeypatch.setattr(experiment, "OTHERS", ())
+    monkeypatch.setattr(make.identification, "errors", lambda runs: pd.DataFrame())
     assert main(["controllers", "--out", str(tmp_path / "out")]) == 2
     assert "a design failed: DesignError: no controller" in capsys.readouterr().err
     assert not list((tmp_path / "out").glob("*.html"))
 
 
-def test_lugre_fits_a_lugre_damper_to_the_noise_and_bingham_does_not() -> None:
-    found = errors(Runs())
+def test_lugre_fits_a_lugre_damper_to_the_noise_and_bingham_does_not(report: Report) -> None:
+    found = report.numbers.fits
     for specimen, part in found.groupby("specimen"):
         share = part.set_index("law")["share"]
         # The low-pass at 18 Hz lets 18/250 of the noise's power through.

@@ -252,7 +252,8 @@ def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
 
 
 def test_the_same_seed_gives_the_same_plan(sheet: Path) -> None:
-    first, again = (bristle.plan(sheet, sharpen="f_c", seed=5).runs() for _ in range(2))
+    few = {"runs": 1, "duration": "4 s", "seed": 5}
+    first, again = (bristle.plan(sheet, sharpen="f_c", **few).runs() for _ in range(2))
     assert [run.about for run in first] == [run.about for run in again]
 
 
