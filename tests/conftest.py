@@ -35,6 +35,9 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
+# numba paints the errors of overloads that do not fit, which nobody reads: a twentieth of its time.
+os.environ.setdefault("NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING", "1")
+
 # Instances of the same FMU share its unpacked files, over all tests and workers.
 _UNPACKED = "" if "BRISTLE_TEST_UNPACKED" in os.environ else tempfile.mkdtemp(prefix="bristle-fmu-")
 os.environ.setdefault("BRISTLE_TEST_UNPACKED", _UNPACKED)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -14,6 +15,7 @@ from typing import Any
 import pytest
 
 import bristle
+from bristle import jit
 from bristle.jit import digest
 
 PACKAGE = Path(bristle.__file__).resolve().parent
@@ -95,3 +97,34 @@ def test_the_same_code_in_another_module_has_machine_code_of_its_own() -> None:
         exec(text, module.__dict__)
         found.append(digest(module.twice))
     assert found[0] == found[2] != found[1]
+
+
+def twice(x: float, n: int) -> float:
+    total = 0.0
+    for k in range(n):
+        if k % 2:
+            total += x * k
+        else:
+            total -= x
+    return total
+
+
+def both(x: float, n: int) -> float:
+    return twice(x, n) + twice(-x, n + 1) if x > 0.0 else twice(2.0 * x, n)
+
+
+def test_callees_become_part_of_their_caller_as_numba_puts_them_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    from numba.core import ir
+    from numba.core.untyped_passes import InlineInlinables
+
+    def text() -> str:
+        found, name = jit.library_text(both, (1.0, 3), ("test_jit.twice",))
+        return re.sub(r"\d+", "#", found.replace(name, "both"))
+
+    ours = text()
+    assert not hasattr(ir.Scope, "__deepcopy__")
+    monkeypatch.setattr(jit, "_Inline", InlineInlinables)
+    assert text() == ours
+    assert "twice" not in "".join(line for line in ours.splitlines() if "call" in line)
