@@ -26,12 +26,15 @@ def mean_share(steep: float) -> float:
     return 1.0 / (1.0 - exp(-steep)) - 1.0 / steep
 
 
-def excess(u, q, z, p):
-    """Return by how much the inner element carries more than the dashpot at its velocity u [N]."""
+def excess(u, spring_share, q, z, p):
+    """Return by how much the inner element carries more than the dashpot at its velocity u [N].
+
+    `spring_share` is at which share of a step's change the mean of the spring's deflection lies.
+    """
     c_0, slip = p.viscosity * p.viscous_factor, p.rho / p.slip_length
     end = yielded(z.deflection, u, slip, p.sigma, q.dt)
     bent = z.deflection + mean_share(2.0 * slip * abs(u) * q.dt) * (end - z.deflection)
-    spring = z.inner + mean_share(p.k_0 * q.dt / (c_0 + p.series_damping)) * u * q.dt
+    spring = z.inner + spring_share * u * q.dt
     held = p.yield_force * p.yield_factor * p.rho * bent + p.k_0 * spring
     return held + (c_0 + p.series_damping) * u - p.series_damping * q.v
 
@@ -42,18 +45,21 @@ def inner_velocity(q, z, p):
     The excess grows with the velocity, at least as the dashpots alone make it: that brackets the
     one root, which regula falsi with the Illinois rule then finds.
     """
-    at_low = excess(0.0, q, z, p)
-    low, high = 0.0, -at_low / (p.viscosity * p.viscous_factor + p.series_damping)
+    damping = p.viscosity * p.viscous_factor + p.series_damping
+    spring_share = mean_share(p.k_0 * q.dt / damping)
+    at_rest = p.yield_force * p.yield_factor * p.rho * z.deflection + p.k_0 * z.inner
+    at_low = at_rest - p.series_damping * q.v
+    low, high = 0.0, -at_low / damping
     width = abs(high)
     if width == 0.0:
         return 0.0
-    at_high = excess(high, q, z, p)
+    at_high = excess(high, spring_share, q, z, p)
     u, last = high, 0
     for _ in range(MOST_TRIALS):
         if at_high == at_low or abs(high - low) <= CLOSE * width:
             break
         u = (low * at_high - high * at_low) / (at_high - at_low)
-        found = excess(u, q, z, p)
+        found = excess(u, spring_share, q, z, p)
         if abs(found) <= CLOSE * width * p.series_damping:
             break
         if (found > 0.0) == (at_high > 0.0):
