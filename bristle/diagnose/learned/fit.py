@@ -21,8 +21,10 @@ from .effect_file import effect_text
 from .normal import Normal
 from .promise import Promise, distinct
 from .residual import residual_of
+from .ring import RING
 from .rule import LEARN, LearnRule
-from .screen import promises
+from .screen import FINE, promises
+from .slip import SLIP
 from .surface import continued, surfaces
 
 TRIED = 4
@@ -110,6 +112,7 @@ def learn(
             tried += _not_yet(surfaces(again, parts, along, learning), fitted, SURFACES, learning)
         more = _fitted(tried, name, model, train, held_out)
         fitted = _best_first([*fitted, *more], learning)
+    fitted = [*_finer(fitted[0], name, opened, learning), *fitted[1:]]
     refusals = [_refusal(before, one, rule, learning) for one in fitted]
     place = refusals.index("") if "" in refusals else 0
     kept = fitted[place]
@@ -130,6 +133,21 @@ def with_law_of(base: Model, best: Fitted) -> Model:
     """
     values = {key: best.trial.model.value(key) for key in base.values}
     return replace(base, values=values)
+
+
+def _finer(best: Fitted, name: str, opened: Opening, learning: LearnRule) -> tuple[Fitted]:
+    """Return a curve with twice the knots where it does better with them, else as it is.
+
+    How many it has is what the scan makes of it; what depends steeply on a signal may need more.
+    """
+    curve = best.curve
+    is_table = not curve.across and curve.part not in (SLIP, RING) and len(curve.knots) <= FINE
+    if best.trial.train <= learning.coarse or not is_table:
+        return (best,)
+    again = Promise(curve.finer(), best.loss)
+    model = with_law_of(opened.before.model, best)
+    (found,) = _fitted([again], name, model, opened.searched, opened.held_out)
+    return (found if found.loss <= learning.finer * best.loss else best,)
 
 
 def _not_yet(
