@@ -29,6 +29,7 @@ with deferred():  # an import of numba that Ctrl-C breaks off is never made good
     import numba
     from numba.core import event, ir, types
     from numba.core.compiler import CompilerBase, DefaultPassBuilder
+    from numba.core.compiler_lock import global_compiler_lock
     from numba.core.compiler_machinery import register_pass
     from numba.core.errors import NumbaError
     from numba.core.registry import cpu_target
@@ -149,8 +150,11 @@ def compiled(
 
 @cache
 def _import_the_rest() -> None:
-    """Import what numba imports as it first compiles or reads machine code, two hundred modules."""
-    with deferred():
+    """Import what numba imports as it first compiles or reads machine code, two hundred modules.
+
+    One thread at a time, and none beside one that compiles: both take from the same generators.
+    """
+    with deferred(), global_compiler_lock:
         cpu_target.typing_context.refresh()
         cpu_target.target_context.refresh()
 

@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -128,3 +129,15 @@ def test_callees_become_part_of_their_caller_as_numba_puts_them_there(
     monkeypatch.setattr(jit, "_Inline", InlineInlinables)
     assert text() == ours
     assert "twice" not in "".join(line for line in ours.splitlines() if "call" in line)
+
+
+def test_what_numba_imports_first_is_not_imported_beside_a_thread_that_compiles() -> None:
+    from numba.core.compiler_lock import global_compiler_lock
+
+    thread = threading.Thread(target=jit._import_the_rest.__wrapped__)
+    with global_compiler_lock:
+        thread.start()
+        thread.join(0.3)
+        assert thread.is_alive()
+    thread.join(60.0)
+    assert not thread.is_alive()

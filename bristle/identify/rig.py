@@ -189,7 +189,10 @@ def bench_rig(
         def prepared(k: int) -> Run:
             return prepare(measured[k], seed=seeds.apart * k + first)
 
-        return Problem(in_threads(prepared, range(len(measured)))) if measured else None
+        if not measured:
+            return None
+        # The first by itself: it compiles what the others need, or reads it from disk.
+        return Problem([prepared(0), *in_threads(prepared, range(1, len(measured)))])
 
     site = Site(DAMPER, problem)
     notes: tuple[str, ...] = ()
