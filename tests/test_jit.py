@@ -134,10 +134,11 @@ def test_callees_become_part_of_their_caller_as_numba_puts_them_there(
 def test_what_numba_imports_first_is_not_imported_beside_a_thread_that_compiles() -> None:
     from numba.core.compiler_lock import global_compiler_lock
 
+    jit._import_the_rest()  # a second time takes a moment
     thread = threading.Thread(target=jit._import_the_rest.__wrapped__)
     with global_compiler_lock:
         thread.start()
-        thread.join(0.3)
+        thread.join(0.5)
         assert thread.is_alive()
     thread.join(60.0)
     assert not thread.is_alive()
