@@ -11,7 +11,9 @@ import pytest
 from PIL import Image
 
 import bristle
+from bristle.batch import read_ensemble
 from bristle.batch.picture import correlations, draw_ensemble, varying_numbers
+from bristle.batch.worker import prepare
 from bristle.cli import main
 from bristle.draw.style import look
 
@@ -25,6 +27,7 @@ def test_tables_and_figure_are_written(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     path = write()
+    prepare(read_ensemble(path))  # compiling for the first time is told
     monkeypatch.chdir(tmp_path)
     assert main(["ensemble", str(path)]) == 0
     out, err = capsys.readouterr()
