@@ -55,8 +55,8 @@ class RunsTable:
 
     def forget_failures(self) -> None:
         """Take runs that failed, alone or with an effect, as not yet run."""
-        done = {run: one for run, one in self.outcomes.items() if not (one.reason or one.lost)}
-        self.outcomes = done
+        kept = (one for one in self.outcomes.values() if not (one.reason or one.lost))
+        self.outcomes = {one.run: one for one in kept}
         self._rewrite()
 
     def add(self, outcome: Outcome) -> None:

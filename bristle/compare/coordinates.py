@@ -26,6 +26,7 @@ FINE = {"displacement": 40}
 SLOW = ("time", "dissipated_energy")
 """Coordinates that only grow over a run: few blocks of samples fall into each of their bins."""
 _TIED = 1e-4  # share of the range below which two values are one level
+_FEW = 0.4  # share of an equal count below which the last samples are no bin of their own
 
 # (factor from SI, unit) in which an engineer reads a coordinate
 SHOWN: dict[str, tuple[float, str]] = {
@@ -158,7 +159,7 @@ def cut(values: Array, bins: int = BINS) -> Bins | None:
     present, counts = np.unique(levels, return_counts=True)
     share = len(values) / bins
     begins = _begins(counts, share)
-    if len(begins) > 1 and 0 < counts[begins[-1] :].sum() < 0.4 * share:
+    if len(begins) > 1 and 0 < counts[begins[-1] :].sum() < _FEW * share:
         begins = begins[:-1]  # a few samples at the end are no bin
     group = np.searchsorted(begins, np.arange(len(present)), side="right") - 1
     label = group[np.searchsorted(present, levels)]

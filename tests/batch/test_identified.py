@@ -189,19 +189,25 @@ def test_a_limit_of_the_sampling_joins_no_run(
     assert "--see" not in said
 
 
+def failing(monkeypatch: pytest.MonkeyPatch, above: float, error: Exception) -> None:
+    """Let runs with a gas spring stiffer than `above` [N/m] fail."""
+    made = worker._numbers
+
+    def numbers(plan: Plan, scenario: Scenario) -> tuple[float, ...]:
+        if scenario.component("damper").parameters.get("gas_spring.k", 0.0) > above:
+            raise error
+        return made(plan, scenario)
+
+    monkeypatch.setattr(worker, "_numbers", numbers)
+
+
 def test_why_an_effect_could_not_be_simulated_is_kept(
     write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     a_study(tmp_path, None, SPRING)
     path = with_study(write, (MASSES, ""), (STEADY, ""))
     made = worker._numbers
-
-    def numbers(plan: Plan, scenario: Scenario) -> tuple[float, ...]:
-        if scenario.component("damper").parameters.get("gas_spring.k", 0.0) > 80.0:
-            raise RunError("it stops.\n  A shorter step would be right.")
-        return made(plan, scenario)
-
-    monkeypatch.setattr(worker, "_numbers", numbers)
+    failing(monkeypatch, 80.0, RunError("it stops.\n  A shorter step would be right."))
     asked: dict[str, Any] = {"out": tmp_path / "out", "workers": 1, "with_limits": True}
     for _ in range(2):  # the second time from the table
         found = bristle.ensemble(path, runs=8, **asked)
@@ -221,14 +227,7 @@ def test_what_an_effect_raises_costs_only_the_run_with_it(
     write: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     a_study(tmp_path, None, SPRING)
-    made = worker._numbers
-
-    def numbers(plan: Plan, scenario: Scenario) -> tuple[float, ...]:
-        if scenario.component("damper").parameters.get("gas_spring.k", 0.0) > 0.0:
-            raise ZeroDivisionError("somebody's effect")
-        return made(plan, scenario)
-
-    monkeypatch.setattr(worker, "_numbers", numbers)
+    failing(monkeypatch, 0.0, ZeroDivisionError("somebody's effect"))
     plan = read_ensemble(with_study(write, (MASSES, ""), (STEADY, "")), 4, with_limits=True)
     found = worker.run_one(plan, 1)
     assert (found.reason, found.lost) == ("", "ZeroDivisionError: somebody's effect")

@@ -20,7 +20,7 @@ from .curve import Curve
 from .effect_file import effect_text
 from .normal import Normal
 from .promise import Promise, distinct
-from .residual import residual_of
+from .residual import Residual, residual_of
 from .ring import RING
 from .rule import LEARN, LearnRule
 from .screen import FINE, promises
@@ -106,13 +106,11 @@ def learn(
     fitted = _best_first(_fitted(chosen, name, before.model, train, held_out), learning)
     if fitted[0].trial.train > rule.clean:
         model = with_law_of(before.model, fitted[0])
-        again = residual_of(train, model)
-        tried = _not_yet(promises(again, parts, along, learning), fitted, TRIED, learning)
-        if _explained(before, fitted[0], rule) < learning.enough:
-            tried += _not_yet(surfaces(again, parts, along, learning), fitted, SURFACES, learning)
+        surface = _explained(before, fitted[0], rule) < learning.enough
+        tried = _second_look(residual_of(train, model), fitted, (parts, along), surface, learning)
         more = _fitted(tried, name, model, train, held_out)
         fitted = _best_first([*fitted, *more], learning)
-    fitted = [*_finer(fitted[0], name, opened, learning), *fitted[1:]]
+    fitted[0] = _finer(fitted[0], name, opened, learning)
     refusals = [_refusal(before, one, rule, learning) for one in fitted]
     place = refusals.index("") if "" in refusals else 0
     kept = fitted[place]
@@ -135,7 +133,27 @@ def with_law_of(base: Model, best: Fitted) -> Model:
     return replace(base, values=values)
 
 
-def _finer(best: Fitted, name: str, opened: Opening, learning: LearnRule) -> tuple[Fitted]:
+def _second_look(
+    residual: Residual, fitted: Sequence[Fitted], asked: tuple[Sequence[str], Sequence[str]],
+    surface: bool, learning: LearnRule,
+) -> list[Promise]:  # fmt: skip
+    """Return what promises most beside a law that was fitted together with a curve.
+
+    Parameters
+    ----------
+    residual : of the model with that law
+    fitted : the curves that were fitted before; their parts and signals are not tried again
+    asked : names of the parts and signals that are tried
+    surface : whether surfaces over two signals are tried as well
+    learning : the numbers that decide
+    """
+    found = _not_yet(promises(residual, *asked, learning), fitted, TRIED, learning)
+    if surface:
+        found += _not_yet(surfaces(residual, *asked, learning), fitted, SURFACES, learning)
+    return found
+
+
+def _finer(best: Fitted, name: str, opened: Opening, learning: LearnRule) -> Fitted:
     """Return a curve with twice the knots where it does better with them, else as it is.
 
     How many it has is what the scan makes of it; what depends steeply on a signal may need more.
@@ -143,11 +161,11 @@ def _finer(best: Fitted, name: str, opened: Opening, learning: LearnRule) -> tup
     curve = best.curve
     is_table = not curve.across and curve.part not in (SLIP, RING) and len(curve.knots) <= FINE
     if best.trial.train <= learning.coarse or not is_table:
-        return (best,)
+        return best
     again = Promise(curve.finer(), best.loss)
     model = with_law_of(opened.before.model, best)
     (found,) = _fitted([again], name, model, opened.searched, opened.held_out)
-    return (found if found.loss <= learning.finer * best.loss else best,)
+    return found if found.loss <= learning.finer * best.loss else best
 
 
 def _not_yet(
