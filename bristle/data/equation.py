@@ -13,6 +13,9 @@ from ..quantity import with_interval
 from ..units import convert
 from .study_model import StudyModel
 
+_COMMAND = re.compile(r"\bV(?=_felt\b|\b)")
+"""The command in formulas, which are declared for a voltage; `V_felt` is what reaches the fluid."""
+
 _APART = re.compile(r"[,;]\s{2,}")
 """What stands between two formulas in a line."""
 
@@ -79,14 +82,23 @@ def equations(model: StudyModel) -> list[Equation]:
         begin = f"{effect}."
         own = {n.removeprefix(begin): t for n, t in texts.items() if n.startswith(begin)}
         out += _with(effect, known.__doc__ or "", own)
-    return out
+    symbol = drive_named(model.drive).symbol
+    return [
+        Equation(one.of, *(_COMMAND.sub(symbol, formula) for formula in one[1:])) for one in out
+    ]
 
 
 def symbols(model: StudyModel, told: Sequence[Equation]) -> str:
-    """Return the sentence about units: formulas call the command V, whatever it is."""
+    """Return the sentence about units; it says what the command's symbol is, but for a voltage."""
     drive = drive_named(model.drive)
-    named = drive != VOLTAGE and any(re.search(r"\bV\b", one.formula) for one in told)
-    return f"In SI units; V is the {drive.name} [{drive.unit}]." if named else "In SI units."
+    named = drive != VOLTAGE and any(
+        re.search(rf"\b{drive.symbol}(_felt)?\b", one.formula) for one in told
+    )
+    return (
+        f"In SI units; {drive.symbol} is the {drive.name} [{drive.unit}]."
+        if named
+        else "In SI units."
+    )
 
 
 def _with(of: str, docstring: str, texts: Mapping[str, tuple[str, str]]) -> list[Equation]:

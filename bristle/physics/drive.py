@@ -28,6 +28,8 @@ class Drive(NamedTuple):
         The FMU's parameter for the largest value.
     largest : float
         Its default.
+    symbol : str
+        In equations.
     """
 
     name: str
@@ -35,17 +37,18 @@ class Drive(NamedTuple):
     word: str
     limit: str
     largest: float
+    symbol: str
 
 
-VOLTAGE = Drive("voltage", "V", "volt", "v_max", 8.0)
+VOLTAGE = Drive("voltage", "V", "volt", "v_max", 8.0, "V")
 
 DRIVES = {
     one.name: one
     for one in (
         VOLTAGE,
-        Drive("current", "A", "ampere", "current_max", 8.0),
-        Drive("duty", "%", "per cent of duty", "duty_max", 100.0),
-        Drive("field", "T", "tesla", "field_max", 8.0),
+        Drive("current", "A", "ampere", "current_max", 8.0, "I"),
+        Drive("duty", "%", "per cent of duty", "duty_max", 100.0, "D"),
+        Drive("field", "T", "tesla", "field_max", 8.0, "B"),
     )
 }
 """All kinds of commands by name; the first is that for which laws are declared."""

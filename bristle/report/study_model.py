@@ -29,9 +29,9 @@ def _equations(content: Content) -> list[str]:
         parts.append(f"<h3>{html.escape(of)}</h3>")
         parts += [html.formula(one.intervals) for one in found if one.of == of]
     note = (
-        f"In SI units; V is the {drive.name} [{drive.unit}], x and v are displacement and velocity "
-        "of the rod. The numbers are those of the present model with half of their 95 % intervals; "
-        "a number without one was held, or these data do not identify it."
+        f"In SI units; {drive.symbol} is the {drive.name} [{drive.unit}], x and v are displacement "
+        "and velocity of the rod. The numbers are those of the present model with half of their "
+        "95 % intervals; a number without one was held, or these data do not identify it."
     )
     return [*parts, html.paragraphs(note, kind="soft")]
 

@@ -1,5 +1,7 @@
 """The equations of a model: what laws and effects state of themselves, with the model's numbers."""
 
+import re
+
 import pytest
 
 from bristle.data.equation import equations, formulas, symbols
@@ -29,11 +31,13 @@ def test_numbers_stand_in_place_of_names_in_si_with_their_intervals():
     assert "/(0.0200 ± 0.0020)" in found.intervals  # mm/s in the model's file
 
 
-def test_what_v_stands_for_is_told_where_the_command_is_no_voltage():
+def test_the_command_has_its_own_symbol_which_is_told_where_it_is_no_voltage():
     assert symbols(bingham(), equations(bingham())) == "In SI units."
     driven = bingham().with_drive("current")
     told = equations(driven)
-    assert symbols(driven, told) == "In SI units; V is the current [A]."
+    assert symbols(driven, told) == "In SI units; I is the current [A]."
+    assert told[0].numbers.startswith("f = (1.500 + 0.7500 I) sgn(v) + (40 + 5.00 I) v ")
+    assert not any(re.search(r"\bV\b", text) for text in told[0])
     assert symbols(driven, [one._replace(formula="f = k x") for one in told]) == "In SI units."
 
 
