@@ -25,6 +25,6 @@ def aligned(table: Sequence[Sequence[str]], left: int = 2) -> list[str]:
         "  " + "  ".join(
             cell.ljust(width) if k < left else cell.rjust(width)
             for k, (cell, width) in enumerate(zip(cells, wide, strict=True))
-        )
+        ).rstrip()
         for cells in table
     ]  # fmt: skip

@@ -71,18 +71,22 @@ SHORT = "  (short search: it gains too little, like all others)"
 
 def text(verdict: Verdict, folder: Path) -> str:
     """Return the content of verdict.json as text, with the next command for a study's folder."""
-    from ..diagnose.verdict_text import about, drive_of, sentences, separating, untestable
+    from ..diagnose.verdict_text import (
+        FAULTS,
+        about,
+        drive_of,
+        fault_rows,
+        sentences,
+        separating,
+        untestable,
+    )
 
     first, *others = sentences(verdict)
     lines = [first, *(["", " ".join(others)] if others else [])]
     for name in verdict["effects"]:
         lines += ["", f"  {about(name, drive_of(verdict))}"]
-    if verdict["sensors"]:
-        lines += ["", "Sensors:"]
-        lines += [
-            f"  {one['channel']:14} {one['fault']:10} {one['value']:.5g}"
-            for one in verdict["sensors"]
-        ]
+    if faults := fault_rows(verdict):
+        lines += ["", *aligned([list(FAULTS), *faults], 4)]
     for note in verdict.get("notes", ()):
         lines += ["", f"Note: {note.rstrip('.')}."]
     if verdict.get("laws"):

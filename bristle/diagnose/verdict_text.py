@@ -5,14 +5,16 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..compare.names import joined, name_of, site_name
+from ..data.channels import channel_unit
 from ..identify.rig import DAMPER
 from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
 from ..physics.effect import EFFECTS
-from ..quantity import quantity
+from ..quantity import plain, quantity
 from .law_text import law_name, law_sentences
 from .rule import BENCH, DecisionRule
 
@@ -37,8 +39,7 @@ def sentences(verdict: Verdict) -> list[str]:
     else:
         out += [*law_sentences(verdict), *(reasons or []), *_besides(verdict), *_limits(verdict)]
         out += [*_remaining(verdict), *_gains(verdict)]
-    told = " ".join(out)
-    out += [text for text in map(fault_text, verdict.get("sensors") or []) if text not in told]
+    out += fault_texts(verdict, " ".join(out))
     return list(dict.fromkeys(text for text in out if text))
 
 
@@ -125,11 +126,61 @@ def _remaining(verdict: Verdict, rule: DecisionRule = BENCH) -> list[str]:
     return [f"The remaining error depends on no coordinate beyond chance; the nearest is {name}."]
 
 
-def fault_text(fault: Mapping[str, Any]) -> str:
-    """Return the sentence of a sensor's fault."""
-    return str(fault.get("words") or "") or (
-        f"Sensor: {fault.get('fault')} of {fault.get('channel')}, {fault.get('value'):.3g}."
-    )
+def fault_texts(verdict: Verdict, told: str = "") -> list[str]:
+    """Return the sentences of sensors' faults; runs with the same fault are told in one text.
+
+    Parameters
+    ----------
+    verdict : the content of verdict.json
+    told : what is said already; faults whose sentence is in it are left out
+    """
+    alike: dict[tuple[str, ...], list[Mapping[str, Any]]] = defaultdict(list)
+    faults = verdict.get("sensors") or []
+    for k, fault in enumerate(one for one in faults if _words(one) not in told):
+        alone = () if fault.get("run") else (str(k),)
+        alike[fault["channel"], fault["fault"], *alone].append(fault)
+    return [_told(*faults) for faults in alike.values()]
+
+
+def _told(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:
+    """Return the sentence of a fault, and in which other runs it is."""
+    same = joined([f"{fault['run']} ({_size(fault)})" for fault in others])
+    return f"{_words(first)} The same in {same}." if others else _words(first)
+
+
+def _words(fault: Mapping[str, Any]) -> str:
+    told = str(fault.get("words") or "")
+    return told or f"Sensor: {fault['fault']} of {fault['channel']}, {_size(fault)}."
+
+
+FAULTS = ("channel", "fault", "value", "run")
+"""Columns of the table of sensors' faults."""
+
+
+def fault_rows(verdict: Verdict) -> list[list[str]]:
+    """Return the cells of the table of sensors' faults, a row per fault; see `FAULTS`."""
+    return [
+        [str(one["channel"]), str(one["fault"]), _size(one), str(one.get("run") or "all")]
+        for one in verdict.get("sensors") or []
+    ]
+
+
+def _size(fault: Mapping[str, Any]) -> str:
+    """Return the value of a fault with its unit."""
+    kind, value = fault["fault"], float(fault["value"])
+    unit = channel_unit(str(fault["channel"]))
+    if kind == "clock":
+        return f"{plain(1e6 * value)} ppm"
+    if kind in _UNITS:
+        return quantity(value, _UNITS[kind], fine=True)
+    return quantity(value, f"{unit}/s" if kind == "slew" else unit, fine=True)
+
+
+_UNITS = {
+    "gain": "1", "sign": "1", "unrelated": "1", "delay": "s", "lag": "s", "derived": "s",
+    "high-pass": "rad/s",
+}  # fmt: skip
+"""Units of faults that do not have their channel's; `SensorFault` says what each is."""
 
 
 def drive_of(verdict: Verdict) -> Drive:

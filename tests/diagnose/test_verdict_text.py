@@ -10,7 +10,14 @@ from bristle.diagnose.conclusion import About, conclude
 from bristle.diagnose.faults import SensorFault
 from bristle.diagnose.finding import Finding
 from bristle.diagnose.verdict_file import current
-from bristle.diagnose.verdict_text import HEADINGS, headline, sentences, untestable
+from bristle.diagnose.verdict_text import (
+    HEADINGS,
+    fault_rows,
+    fault_texts,
+    headline,
+    sentences,
+    untestable,
+)
 from bristle.errors import StudyError
 from bristle.study.study import Study
 
@@ -140,3 +147,35 @@ def test_a_verdict_that_this_version_does_not_know_is_refused(change):
         current({**OLD, **change}, "rig/verdict.json")
     with pytest.raises(StudyError, match="'class'"):
         current({**OLD, "schema": 2})
+
+
+def late(run: str, value: float) -> dict:
+    return {
+        "channel": "force", "fault": "delay", "value": value, "words": f"In {run} it is late.",
+        "run": run,
+    }  # fmt: skip
+
+
+def test_runs_with_the_same_fault_are_told_in_one_text_with_the_value_of_each():
+    gain = {"channel": "velocity", "fault": "gain", "value": 1.1, "words": "A gain is off."}
+    verdict = {"sensors": [late("a", 5e-4), gain, late("b", 5.24e-4), late("c", 5.43e-4)]}
+    assert fault_texts(verdict) == [
+        "In a it is late. The same in b (0.524 ms) and c (0.543 ms).", "A gain is off.",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("channel", "fault", "value", "told"),
+    [
+        ("force", "bias", 12345.0, "12.3 kN"),
+        ("force", "delay", 2.1e-3, "2.1 ms"),
+        ("force", "clock", -3e-5, "-30 ppm"),
+        ("velocity", "gain", 1.1, "1.1"),
+        ("velocity", "high-pass", 3.0, "3 rad/s"),
+        ("current", "slew", 30.0, "30 A/s"),
+    ],
+)
+def test_the_table_of_faults_says_the_value_with_its_unit_and_the_run(channel, fault, value, told):
+    one = {"channel": channel, "fault": fault, "value": value}
+    assert fault_rows({"sensors": [one]}) == [[channel, fault, told, "all"]]
+    assert fault_rows({"sensors": [{**one, "run": "r1"}]})[0][3] == "r1"
