@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 WIDTH = 40
 """Characters of the longest bar."""
+NAME = 40
+"""Characters of the longest step's name."""
 CLOSE = 1.1
 """z up to which an error is drawn as being on the noise floor."""
 
@@ -68,14 +70,14 @@ class Staircase:
         """Return the lines as pairs of text and style."""
         if not self.history_steps:
             return [[("The history is empty.", "")]]
-        names = [f"{one.number} {one.what}" for one in self.history_steps]
-        wide = min(max(len(name) for name in [*names, "  noise floor"]), 32)
+        names = [_cut(f"{one.number} {one.what}") for one in self.history_steps]
+        wide = max(len(name) for name in [*names, "  noise floor"])
         known = [one.z for one in self.history_steps if one.z is not None]
         top = max([*known, 2.0 * self.floor])
         title = "error / noise (z) on held-out runs"
         lines = [[(f"{'':{wide}}  {title}", "dim")]]
         for name, one in zip(names, self.history_steps, strict=True):
-            lines.append([(f"{name[:wide]:{wide}}  ", "bold"), *self._line(one, top, mark)])
+            lines.append([(f"{name:{wide}}  ", "bold"), *self._line(one, top, mark)])
         lines.append([(f"{'  noise floor':{wide}}  ", "dim"), (f"| {plain(self.floor)}", "green")])
         return lines
 
@@ -133,6 +135,11 @@ def history_steps(steps: Sequence[Step]) -> list[HistoryStep]:
         numbers = [_number(errors.get(key)) for key in keys]
         out.append(HistoryStep(step.number, step.what, *numbers))
     return out
+
+
+def _cut(name: str) -> str:
+    """Return a step's name, no longer than `NAME`."""
+    return name if len(name) <= NAME else f"{name[: NAME - 3]}..."
 
 
 def _number(value: Any) -> float | None:

@@ -41,3 +41,10 @@ def test_on_a_terminal_it_is_coloured():
 
 def test_an_empty_history_says_so():
     assert str(staircase([])) == "The history is empty."
+
+
+def test_a_name_longer_than_its_column_is_cut_visibly():
+    long = [Step(0, "identify modified_bouc_wen[quadratic] + gas_spring", "", {}, {"z_holdout": 3})]
+    assert "0 identify modified_bouc_wen[quadrati...  ####" in str(staircase(long))
+    (line,) = {line for line in str(staircase(STEPS)).splitlines() if "add gas_spring" in line}
+    assert line.startswith("3 add gas_spring    #")
