@@ -22,6 +22,9 @@ OUTCOMES = "outcomes.json"
 NEAR = 0.01
 """Distance of rivals below which it is none."""
 
+UNKNOWN = 10.0
+"""Standard deviation, over a parameter's size, from which its number says nothing."""
+
 EXCITED = 1e-3
 """Standard deviations that an effect of its asked size changes where anything of it moves."""
 
@@ -59,6 +62,8 @@ class Outcome:
         if self.purpose == "separate":
             return f"{plain(value, 2) if value >= NEAR else 0} std"
         if self.purpose == "sharpen" and self.unit == "%":
+            if value >= UNKNOWN:
+                return "not identified"
             return f"{plain(100.0 * value, 2)} %"
         return quantity(value, self.unit, 2, fine=True)
 

@@ -19,6 +19,7 @@ from bristle.identify.model import Model, Problem, Run
 from bristle.plan.folder import read_plan
 from bristle.plan.knowledge import Asked, Evidence, Known, Question, Rival
 from bristle.plan.motions import Command, Waveform
+from bristle.plan.outcome import Outcome
 from bristle.plan.planned_test import Test
 from bristle.plan.purposes import LEAST, Figure, cost_of, seen
 from bristle.plan.questions import open_parts
@@ -369,3 +370,11 @@ def test_without_a_purpose_the_verdict_says_what_for(
 ) -> None:
     monkeypatch.setattr(type(rig), "verdict", lambda _self: verdict)
     assert default_wish(rig) == wish
+
+
+@pytest.mark.parametrize(
+    ("value", "told"), [(0.1, "10 %"), (9.0, "900 %"), (2.8e9, "not identified")]
+)
+def test_a_parameter_that_no_run_tells_has_no_number(value: float, told: str) -> None:
+    one = Outcome("sharpen", "c_1v", "standard deviation", "%", value, 0.01)
+    assert one.cells()[-2:] == [told, "1 %"]
