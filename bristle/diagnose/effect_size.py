@@ -39,6 +39,9 @@ SETTLED = 0.05
 TOLD = 1e-3
 """Size of a direction, over the largest, in which the runs tell the model's parameters."""
 
+IDLE = 1e-9
+"""What a parameter changes, over the one that changes most, below which it is rounding."""
+
 NEAR = 1.0
 """Change of a parameter's logarithm beyond which its sensitivity says little of what it does."""
 
@@ -89,11 +92,15 @@ class Known:
 
     @cached_property
     def _scaled(self) -> tuple[Array, Array]:
-        """What the model's own parameters change (n, p), each column of length one; its length."""
+        """What the model's own parameters change (n, p), each column of length one; its length.
+
+        A parameter that changes nothing has a column of zeros, of infinite length: it stays.
+        """
         if not self.search.names:
             return np.zeros((len(self.plain), 0)), np.zeros(0)
         columns: Array = self.counts[:, None] * self.search.sensitivities()
-        lengths = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
+        lengths = np.linalg.norm(columns, axis=0)
+        lengths[lengths <= IDLE * lengths.max()] = np.inf
         return columns / lengths, lengths
 
     @property
@@ -109,7 +116,7 @@ class Known:
     @cached_property
     def basis(self) -> Array:
         """Orthonormal columns (n, p) that span what the model's own parameters change."""
-        return np.linalg.qr(self.own)[0]
+        return np.linalg.qr(self.own[:, np.isfinite(self._scaled[1])])[0]
 
     @cached_property
     def noise(self) -> tuple[Array, Array]:
@@ -216,6 +223,10 @@ class Sized:
     def value(self, size: float) -> float:
         """Return the parameter's value [SI] at a size, within its bounds."""
         return float(np.clip(self._wanted(size), self.low, self.high))
+
+    def size_of(self, value: float) -> float:
+        """Return the size at which the parameter has a value [SI]."""
+        return self.one / value if self.falls else value / self.one
 
     def change(self, size: float) -> Array:
         """Return by how much the effect changes the normalised residuals (n,) at a size."""

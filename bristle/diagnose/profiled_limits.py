@@ -67,7 +67,7 @@ def _checked(known: Known, limit: EffectLimit) -> EffectLimit:
     sized = Sized(limit.effect, known)
     assert limit.largest is not None
     apart = (TWO_SIDED if sized.signed else ONE_SIDED) ** 2
-    first = sized.one / limit.largest if sized.falls else limit.largest / sized.one
+    first = sized.size_of(limit.largest)
     none, size = _fitted(sized, sized.without()), first
     for _ in range(TURNS):
         half, whole = (

@@ -15,6 +15,7 @@ from ..quantity import plain, quantity
 from .goal import Purposes
 from .knowledge import Asked, Known
 from .purposes import seen, separated
+from .questions import SizedRival
 
 OUTCOMES = "outcomes.json"
 """The file of a plan's folder with the table."""
@@ -116,12 +117,12 @@ def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
     for one in purposes.effects:
         sized, name = one.sized, one.sized.name
         unit = sized.unit
-        apart = one.size * (TWO_SIDED if sized.signed else ONE_SIDED)
         seen_now = one.limit is not None and not one.limit.why and isfinite(before[name])
         visible = (seen_now, isfinite(after[name]))
+        sizes = _allowed(one, *(found[name] for found in near))
         limits = [
-            sized.value(max(apart / found[name], one.least)) if shown else inf
-            for found, shown in zip(near, visible, strict=True)
+            sized.value(max(size, one.least)) if shown else inf
+            for size, shown in zip(sizes, visible, strict=True)
         ]
         found = max(one.size * after[name], one.least)
         text = f"{sized.parameter}, limit at 95 %"
@@ -135,6 +136,25 @@ def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
             )
         )  # fmt: skip
     return out
+
+
+def _allowed(one: SizedRival, now: float, then: float) -> tuple[float, float]:
+    """Return the sizes of an effect that runs allow at 95 %: those at hand, and with tests too.
+
+    What the runs at hand allow is what a verdict on them says; tests make it smaller as they see
+    more of the effect. Without runs it is what noise alone would allow.
+
+    Parameters
+    ----------
+    one : the effect at a size
+    now, then : how far that is from the model [standard deviations], both above 0 where it is seen
+    """
+    largest = one.limit.largest if one.limit else None
+    if largest is not None and now > 0.0:
+        size = one.sized.size_of(largest)
+        return size, size * now / then if then > 0.0 else inf
+    apart = one.size * (TWO_SIDED if one.sized.signed else ONE_SIDED)
+    return apart / now if now > 0.0 else inf, apart / then if then > 0.0 else inf
 
 
 def _sharpened(purposes: Purposes, asked: Asked, now: Known, then: Known) -> list[Outcome]:

@@ -87,7 +87,7 @@ def sized_rival(name: str, fitted: Fitted) -> SizedRival:
         return SizedRival(sized, TYPICAL, least)
     limit = limit_of(sized)
     at = limit.named or limit.largest
-    size = TYPICAL if not at else sized.one / at if sized.falls else at / sized.one
+    size = sized.size_of(at) if at else TYPICAL
     return SizedRival(sized, size, least, limit)
 
 

@@ -17,7 +17,7 @@ from bristle.identify.residuals import residuals
 from bristle.identify.search import HUBER
 from bristle.identify.search_context import refine
 from bristle.physics.effect import EFFECTS
-from tests.diagnose.test_limits import VALUES, problem_of, steady, steps
+from tests.diagnose.test_limits import VALUES, T, problem_of, steady, steps
 
 SPRING = "gas_spring"
 
@@ -96,6 +96,20 @@ def test_a_parameter_that_the_runs_hardly_tell_is_not_moved_beyond_its_sensitivi
     decided = limit_of(Sized("quadratic_damping", replace(known, judging=problem)))
     assert decided.named == pytest.approx(alone.named, rel=0.2)
     assert decided.named > decided.largest
+
+
+def test_a_parameter_that_changes_nothing_on_these_runs_stays():
+    problem = problem_of(lambda _: np.zeros(len(T)))
+    model = replace(refine(Model("bingham", (), VALUES, ("f_v", "c_v")), problem), fixed=())
+    known = Known(problem, model, problem.expectation(model), 6000)
+    sized = Sized("delay", known)
+    alone = limit_of(sized)
+    steps_taken = dict(zip(known.search.names, known.steps(sized.change(1.0)), strict=True))
+    assert steps_taken["f_v"] == steps_taken["c_v"] == 0.0
+    assert steps_taken["c_0"] != 0.0
+    assert known.basis.shape[1] == len(known.search.names) - 2
+    decided = limit_of(Sized("delay", replace(known, judging=problem)))
+    assert decided.named == pytest.approx(alone.named, rel=0.2)
 
 
 def test_an_effect_that_vanishes_as_its_parameter_grows_is_limited_from_below(known):

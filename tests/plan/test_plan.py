@@ -233,6 +233,19 @@ def test_a_plan_in_ampere_tells_no_volts(tmp_path: Path) -> None:
     assert "V" not in "".join(units.values())
 
 
+def test_what_the_runs_at_hand_allow_of_an_effect_is_what_the_verdict_says(
+    rig: bristle.Study,
+) -> None:
+    names = ["fluid_inertia", "saturation"]
+    told = {one.effect: one for one in bristle.diagnose(rig, write=False).limits["damper"]}
+    few = {"runs": 2, "duration": "6 s", "motions": ["sine"], "commands": ["stairs"]}
+    found = {one.name: one for one in bristle.plan(rig, see=names, **few).outcomes}
+    for name in names:
+        assert found[name].now == pytest.approx(told[name].largest, rel=1e-6)
+    assert found["fluid_inertia"].then < found["fluid_inertia"].now
+    assert found["saturation"].then > found["saturation"].now  # V_s falls as the effect grows
+
+
 def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
     rig: bristle.Study, tmp_path: Path
 ) -> None:
