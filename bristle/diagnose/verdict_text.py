@@ -13,7 +13,7 @@ from ..compare.names import joined, name_of, site_name
 from ..data.channels import channel_unit
 from ..identify.rig import DAMPER
 from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
-from ..physics.effect import EFFECTS
+from ..physics.effect import EFFECTS, instrument_of
 from ..quantity import plain, quantity
 from .law_text import law_name, law_sentences
 from .rule import BENCH, DecisionRule
@@ -40,6 +40,8 @@ def sentences(verdict: Verdict) -> list[str]:
         out += [*law_sentences(verdict), *(reasons or []), *_besides(verdict), *_limits(verdict)]
         out += [*_remaining(verdict), *_gains(verdict)]
     out += fault_texts(verdict, " ".join(out))
+    if reasons is not None and any(map(_is_set_right, verdict.get("sensors") or [])):
+        out.append("The verdict and its numbers are those with that set right.")
     return list(dict.fromkeys(text for text in out if text))
 
 
@@ -140,6 +142,13 @@ def fault_texts(verdict: Verdict, told: str = "") -> list[str]:
         alone = () if fault.get("run") else (str(k),)
         alike[fault["channel"], fault["fault"], *alone].append(fault)
     return [_told(*faults) for faults in alike.values()]
+
+
+def _is_set_right(fault: Mapping[str, Any]) -> bool:
+    """Return whether a verdict is on runs without a fault, which stays in the study's data."""
+    kind = str(fault["fault"])
+    effect = "" if fault.get("run") else instrument_of(str(fault["channel"]), kind)
+    return not effect and kind not in ("clipping", "unrelated")
 
 
 def _told(first: Mapping[str, Any], *others: Mapping[str, Any]) -> str:

@@ -121,7 +121,7 @@ def _where(content: Content) -> str:
     caption = (
         f"Above: the error along {along}; dots are samples, the line the mean with its 95 % "
         "interval, the blue band twice the expected noise. Below: its spectrum against that of "
-        "the noise; z by speed and voltage."
+        f"the noise; z by speed and {content.model.drive}."
     )
     title, say = headline(now), now.sentences
     return html.section(

@@ -179,3 +179,15 @@ def test_the_table_of_faults_says_the_value_with_its_unit_and_the_run(channel, f
     one = {"channel": channel, "fault": fault, "value": value}
     assert fault_rows({"sensors": [one]}) == [[channel, fault, told, "all"]]
     assert fault_rows({"sensors": [{**one, "run": "r1"}]})[0][3] == "r1"
+
+
+SET_RIGHT = "The verdict and its numbers are those with that set right."
+
+
+def test_a_verdict_says_that_it_is_on_runs_whose_faults_are_set_right():
+    none = {"kind": "none", "effects": [], "reasons": ["z = 1.07."], "detectable": 0.01}
+    assert sentences({**none, "sensors": [late("a", 5e-4)]})[-1] == SET_RIGHT
+    lag = {"channel": "velocity", "fault": "lag", "value": 1e-3, "words": "Velocity lags."}
+    ended = {"channel": "force", "fault": "clipping", "value": 9.0, "words": "Its range ended."}
+    for sensors in ([], [lag], [ended]):  # a model holds the lag, clipped samples are left out
+        assert SET_RIGHT not in sentences({**none, "sensors": sensors})
