@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import chain
 
+import numpy as np
+
+from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
 from ..identify.fit import Model, Problem, fit, identify
 from ..identify.model import Run
@@ -18,6 +21,9 @@ from .decision import Z
 from .finding import Finding
 from .opening import Opening
 from .rule import BENCH, DecisionRule
+
+FEWEST = 4
+"""Runs from which one that differs is told: three others must agree."""
 
 HELD_OUT_DIFFER = (
     "The model explains the training runs. The held-out runs differ from them in something that "
@@ -34,22 +40,22 @@ def contradicted(found: Finding, opened: Opening) -> Finding:
     opened : the site's runs and its model
     """
     assert found.after is not None
-    before, rule = opened.before, opened.rule
+    before, rule, at_damper = opened.before, opened.rule, found.site == DAMPER
     kind = kind_of(found.kind, before, found.after, rule)
-    if kind == found.kind == "unknown":
-        restart = opened.scope.restart
-        mixed = groups(before.model, opened.searched, opened.held_out, rule, restart)
-        return replace(found, kind="insufficient", reasons=(mixed,)) if mixed else found
+    runs = opened.searched, opened.held_out, rule
+    if found.kind == "unknown":
+        told = odd_run(before.model, *runs) if at_damper else ""
+        if kind == "unknown":
+            told = told or groups(before.model, *runs, opened.scope.restart)
+            return replace(found, kind="insufficient", reasons=(told,)) if told else found
+        if not told:
+            worst = inconsistent_runs(before.model, *runs, at_damper)
+            told = " ".join(filter(None, [*found.reasons, HELD_OUT_DIFFER, worst]))
+        return replace(found, kind=kind, reasons=(told,))
     if kind == found.kind:
         return found
-    if found.kind == "unknown":
-        reasons = (*found.reasons, HELD_OUT_DIFFER)
-    else:
-        told = inconsistent_runs(
-            found.after.model, opened.problem, opened.held_out, rule, found.site == DAMPER
-        )
-        reasons = (told,)
-    return replace(found, kind=kind, reasons=reasons)
+    told = inconsistent_runs(found.after.model, opened.problem, *runs[1:], at_damper)
+    return replace(found, kind=kind, reasons=(told,))
 
 
 def kind_of(kind: str, before: Trial, best: Trial, rule: DecisionRule = BENCH) -> str:
@@ -81,7 +87,7 @@ def inconsistent_runs(
     model : the model as fitted to `train`
     train, held_out : runs that it was fitted to, and the others
     rule : the numbers that decide
-    zeros : whether the force is a measured one, whose zero may be another one in a run
+    zeros : whether the force is a measured one, whose zero or gain may be another one in a run
 
     Returns
     -------
@@ -99,7 +105,7 @@ def inconsistent_runs(
         return ""
     worst = ", ".join(f"{name} ({z[name]:.3g})" for name in bad)
     shifted = [
-        _zero(model, problem.of([run]), rule)
+        _zero(model, problem.of([run]), rule) or _gain(model, problem.of([run]), rule)
         for problem in (train, held_out)
         for run in problem.runs
         if zeros and run.name in bad
@@ -134,6 +140,67 @@ def _zero(model: Model, one: Problem, rule: DecisionRule) -> str:
         "is wrong there: its zero is another one. Set it right in study.toml: correct = "
         f'[{{channel = "force", fault = "bias", value = {zero:.3g}}}].'
     )
+
+
+def _gain(model: Model, one: Problem, rule: DecisionRule) -> str:
+    """Return the sentence about another gain of a run's force, "" where more than that is wrong.
+
+    Parameters
+    ----------
+    model, one, rule : as in `_zero`
+    """
+    (run,), expected = one.runs, one.expectation(model)
+    predicted = (one.predict(model, run) / expected[0][1])[run.skip :]
+    left = residuals(one, model, expected)
+    gain = 1.0 + float(left @ predicted / (predicted @ predicted))
+    if gain <= 0.0 or z_scale(left - (gain - 1.0) * predicted) > rule.misfit:
+        return ""
+    return (
+        f"In {run.name} the force is {plain(gain, 3)} times what the model says throughout, and "
+        "nothing else is wrong there: another range of the load cell, or another temperature. If "
+        "the range was another one, set it right in study.toml: "
+        f'correct = [{{channel = "force", fault = "gain", value = {gain:.4g}}}].'
+    )
+
+
+def odd_run(model: Model, train: Problem, held_out: Problem, rule: DecisionRule = BENCH) -> str:
+    """Return, in words, the one run whose zero or gain is another one; "" where none is.
+
+    For a model that the runs do not agree with: fitted to all runs but one it must explain each of
+    them, and that one but for its zero or gain. Others must have moved as fast, at the same
+    command; else the run may show what the model lacks.
+
+    Parameters
+    ----------
+    model : law and effects; it is refitted without each run in question
+    train, held_out : the runs
+    rule : the numbers that decide
+    """
+    runs = [*train.runs, *held_out.runs]
+    if len(runs) < FEWEST:
+        return ""
+    apart = np.array([_gain_of(model, train.of([run])) for run in runs])
+    farthest = np.argsort(-np.abs(apart - np.median(apart)))
+    for k in farthest[: rule.most_groups].tolist():
+        run, others = runs[k], [*runs[:k], *runs[k + 1 :]]
+        if not is_covered([(one.v, one.V) for one in (run, *others)], 1):
+            continue
+        fitted = fit(train.of(others), model, with_std=False).model
+        if max(_z(fitted, train.of([one])) for one in others) > rule.misfit:
+            continue
+        one = train.of([run])
+        if _z(fitted, one) <= rule.misfit:
+            continue
+        if told := _zero(fitted, one, rule) or _gain(fitted, one, rule):
+            return f"One model explains all runs but {run.name}. {told} Else {LEFT_OUT}."
+    return ""
+
+
+def _gain_of(model: Model, one: Problem) -> float:
+    """Return by what a model's force of one run is to be multiplied to be nearest to the force."""
+    (run,) = one.runs
+    predicted, force = one.predict(model, run)[run.skip :], run.force[run.skip :]
+    return float(force @ predicted / (predicted @ predicted))
 
 
 def groups(

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.diagnose.inconsistent_runs import groups, inconsistent_runs
-from bristle.identify.fit import identify
+from bristle.diagnose.inconsistent_runs import groups, inconsistent_runs, odd_run
+from bristle.identify.fit import fit, identify
 from tests.identify.truths import hidden_case, true_case
 
 
@@ -48,7 +48,51 @@ def test_another_zero_of_the_force_in_one_run_is_told_with_its_value():
     told = inconsistent_runs(truth, first.of([higher, *others]), first.of([]))
     assert f"In {one.name} the force shows {size:.3g}"[:-1] in told
     assert "N more throughout" in told
-    stronger = replace(one, force=1.2 * one.force)
-    told = inconsistent_runs(truth, first.of([stronger, *others]), first.of([]))
+
+
+@pytest.mark.parametrize("gain", [0.8, 1.06])
+def test_another_gain_of_the_force_in_one_run_is_told_with_its_value(gain):
+    first, _, truth = true_case(3, "bingham")
+    one, *others = first.runs
+    scaled = replace(one, force=gain * one.force)
+    told = inconsistent_runs(truth, first.of([scaled, *others]), first.of([]))
+    assert f"largest in {one.name}" in told
+    assert told.count("throughout") == 1
+    value = float(told.split('fault = "gain", value = ')[1].split("}")[0])
+    assert value == pytest.approx(gain, rel=0.01)
+
+
+def test_a_run_in_which_more_is_wrong_has_neither_another_zero_nor_another_gain():
+    first, _, truth = true_case(3, "bingham")
+    one, *others = first.runs
+    sprung = replace(one, force=one.force + 5.0 * float(np.std(one.force) / np.std(one.x)) * one.x)
+    told = inconsistent_runs(truth, first.of([sprung, *others]), first.of([]))
     assert f"largest in {one.name}" in told
     assert "throughout" not in told
+
+
+@pytest.mark.parametrize(("place", "gain"), [(0, 1.06), (1, 0.93), (3, 1.06)])
+def test_the_one_run_with_another_gain_is_found_among_runs_of_either_role(place, gain):
+    first, _, truth = true_case(5, "bingham")
+    runs = list(first.runs)
+    runs[place] = replace(runs[place], force=gain * runs[place].force)
+    train, held_out = first.of(runs[:3]), first.of(runs[3:])
+    told = odd_run(fit(train, truth, with_std=False).model, train, held_out)
+    assert told.startswith(f"One model explains all runs but {runs[place].name}. ")
+    value = float(told.split('fault = "gain", value = ')[1].split("}")[0])
+    assert value == pytest.approx(gain, rel=0.01)
+
+
+def test_no_run_is_odd_where_an_effect_is_missing_or_nothing_is():
+    first, _, truth = true_case(3, "bingham")
+    assert odd_run(truth, first, first.of([])) == ""
+    train, bare = hidden_case(5, "force_ripple", None, 0.15, "bench_10N", "bingham")
+    assert odd_run(bare, train, train.of([])) == ""
+
+
+def test_a_run_beyond_all_others_is_not_called_odd():
+    first, _, truth = true_case(3, "bingham")
+    strongest, *others = sorted(first.runs, key=lambda run: -float(np.max(np.abs(run.V))))
+    alone = replace(strongest, V=strongest.V + 20.0, force=1.3 * strongest.force)
+    train = first.of([alone, *others])
+    assert odd_run(fit(train, truth, with_std=False).model, train, first.of([])) == ""

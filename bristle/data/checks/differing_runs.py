@@ -44,7 +44,7 @@ MISFIT = 0.25
 
 _SURE = 0.005  # scatter that is taken at the least, as a share
 _CELLS = 4  # of speed and of command, in which others must have moved as well
-_COVERED = 0.8  # share of a run's samples in cells of two other runs
+_COVERED = 0.8  # share of a run's samples in cells of other runs
 _LIKE = 0.35  # share of a gain's logarithm within which a channel's noise was scaled by it
 _MOTION_GAIN = 0.03  # least share by which the gain between two channels of motion must be off
 
@@ -252,16 +252,27 @@ def _scatter(values: Array) -> float:
 
 
 def _is_covered(run: Measurement, others: Sequence[Measurement]) -> bool:
-    """Return whether two other runs at least moved as fast, at the same command, as this one.
+    return is_covered([
+        (_velocity(one), one[one.drive] if one.drive else np.zeros(len(one.time)))
+        for one in (run, *others)
+    ])  # fmt: skip
+
+
+def is_covered(moves: Sequence[tuple[Array, Array]], others: int = 2) -> bool:
+    """Return whether other runs moved as fast, at the same command, as the first one.
 
     Beyond what others did no shape tells how large the force should be.
+
+    Parameters
+    ----------
+    moves : velocity (n,) [m/s] and command (n,) of each run, that of the run in question first
+    others : how many others must have done so, at the least
     """
-    every = [run, *others]
-    top = max((float(np.max(np.abs(one[one.drive]))) for one in every if one.drive), default=0.0)
-    speed = max(float(np.quantile(np.abs(_velocity(one)), 0.99)) for one in every)
-    shares = [_cells(one, speed, top) for one in every]
+    top = max(float(np.max(np.abs(level))) for _, level in moves)
+    speed = max(float(np.quantile(np.abs(velocity), 0.99)) for velocity, _ in moves)
+    shares = [_cells(np.abs(v) / speed, np.abs(level) / (top or 1.0)) for v, level in moves]
     seen = np.sum([share > 0.01 for share in shares[1:]], axis=0)
-    return bool(np.sum(shares[0][seen >= 2]) >= _COVERED)
+    return bool(np.sum(shares[0][seen >= others]) >= _COVERED)
 
 
 def _velocity(run: Measurement) -> Array:
@@ -270,10 +281,7 @@ def _velocity(run: Measurement) -> Array:
     return found
 
 
-def _cells(run: Measurement, speed: float, top: float) -> Array:
-    """Return the share of a run's samples in each cell of speed [m/s] and of command."""
-    fast = np.clip(np.abs(_velocity(run)) / speed * _CELLS, 0, _CELLS - 1).astype(np.int64)
-    if run.drive and top:
-        level = np.abs(run[run.drive]) / top
-        fast = fast * _CELLS + np.clip(level * _CELLS, 0, _CELLS - 1).astype(np.int64)
-    return np.bincount(fast, minlength=_CELLS**2) / len(run.time)
+def _cells(speed: Array, level: Array) -> Array:
+    """Return the share of a run's samples in each cell of speed and of command, both over most."""
+    fast, high = (np.clip(part * _CELLS, 0, _CELLS - 1).astype(np.int64) for part in (speed, level))
+    return np.bincount(fast * _CELLS + high, minlength=_CELLS**2) / len(speed)
