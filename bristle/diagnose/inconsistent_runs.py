@@ -25,6 +25,12 @@ from .rule import BENCH, DecisionRule
 FEWEST = 4
 """Runs from which one that differs is told: three others must agree."""
 
+TINY = 1e-300
+"""In place of a sum of squares of a model that shows no force."""
+
+SUSPECTS = 3
+"""Runs whose force is farthest from that of the others, each of which is left out of a fit."""
+
 HELD_OUT_DIFFER = (
     "The model explains the training runs. The held-out runs differ from them in something that "
     "no channel shows."
@@ -152,7 +158,7 @@ def _gain(model: Model, one: Problem, rule: DecisionRule) -> str:
     (run,), expected = one.runs, one.expectation(model)
     predicted = (one.predict(model, run) / expected[0][1])[run.skip :]
     left = residuals(one, model, expected)
-    gain = 1.0 + float(left @ predicted / (predicted @ predicted))
+    gain = 1.0 + float(left @ predicted) / max(float(predicted @ predicted), TINY)
     if gain <= 0.0 or z_scale(left - (gain - 1.0) * predicted) > rule.misfit:
         return ""
     return (
@@ -181,7 +187,7 @@ def odd_run(model: Model, train: Problem, held_out: Problem, rule: DecisionRule 
         return ""
     apart = np.array([_gain_of(model, train.of([run])) for run in runs])
     farthest = np.argsort(-np.abs(apart - np.median(apart)))
-    for k in farthest[: rule.most_groups].tolist():
+    for k in farthest[:SUSPECTS].tolist():
         run, others = runs[k], [*runs[:k], *runs[k + 1 :]]
         if not is_covered([(one.v, one.V) for one in (run, *others)], 1):
             continue
@@ -200,7 +206,7 @@ def _gain_of(model: Model, one: Problem) -> float:
     """Return by what a model's force of one run is to be multiplied to be nearest to the force."""
     (run,) = one.runs
     predicted, force = one.predict(model, run)[run.skip :], run.force[run.skip :]
-    return float(force @ predicted / (predicted @ predicted))
+    return float(force @ predicted) / max(float(predicted @ predicted), TINY)
 
 
 def groups(
