@@ -6,6 +6,8 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,9 @@ from ._blind.cases import ROOT, digest_of
 from ._rows import Row
 
 Answer = dict[str, Any]
+
+TOGETHER = 4
+"""Cases that share a process: machine code stays in it, some 36 MB for each curve that is tried."""
 
 
 def ask(
@@ -33,7 +38,7 @@ def ask(
     ----------
     name, text : of the benchmark, and what it says of itself
     kinds : of cases; `--KIND CASES` says how many there should be
-    answer : called with kind and number of a case; returns what is found
+    answer : called with kind and number of a case, in a process of its own; returns what is found
     rows : returns the figures of all answers
     given : options as typed
     also : packages of bristle that the answers rest on, beside those of a diagnosis
@@ -43,7 +48,9 @@ def ask(
         parser.add_argument(f"--{kind}", type=int, default=0, metavar="CASES")
     chosen = parser.parse_args(given)
     jobs = ((kind, k) for kind in kinds for k in range(getattr(chosen, kind)))
-    for row in rows(Answers(name, also).complete(jobs, answer)):
+    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=TOGETHER) as pool:
+        found = Answers(name, also).complete(jobs, lambda *job: pool.submit(answer, *job).result())
+    for row in rows(found):
         goal = f" (goal {row.goal})" if row.goal else ""
         note = f"; {row.note}" if row.note else ""
         print(f"{row.name}: {row.measured}{goal}{note}")
