@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from ..data.channels import channel_unit
 from ..physics.effect import instrument_of
+from ..quantity import plain, quantity
+
+UNITS = {
+    "gain": "1", "sign": "1", "unrelated": "1", "delay": "s", "lag": "s", "derived": "s",
+    "high-pass": "rad/s",
+}  # fmt: skip
+"""Units of faults that do not have their channel's."""
 
 
 @dataclass(frozen=True)
@@ -51,3 +59,17 @@ def instruments_of(sensors: Sequence[SensorFault]) -> tuple[str, ...]:
 def words_of(faults: Sequence[SensorFault]) -> list[str]:
     """Return the sentences of faults."""
     return [fault.words for fault in faults]
+
+
+def size_text(channel: str, fault: str, value: float) -> str:
+    """Return the value of a fault with its unit.
+
+    Parameters
+    ----------
+    channel, fault, value : as `SensorFault` has them
+    """
+    if fault == "clock":
+        return f"{plain(1e6 * value)} ppm"
+    own = channel_unit(channel)
+    unit = UNITS.get(fault, f"{own}/s" if fault == "slew" else own)
+    return quantity(value, unit, fine=True)

@@ -10,11 +10,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..compare.names import joined, name_of, site_name
-from ..data.channels import channel_unit
 from ..identify.rig import DAMPER
 from ..physics.drive import DRIVES, VOLTAGE, Drive, text_for
 from ..physics.effect import EFFECTS, instrument_of
-from ..quantity import plain, quantity
+from ..quantity import quantity
+from .faults import size_text
 from .law_text import law_name, law_sentences
 from .rule import BENCH, DecisionRule
 
@@ -175,21 +175,7 @@ def fault_rows(verdict: Verdict) -> list[list[str]]:
 
 
 def _size(fault: Mapping[str, Any]) -> str:
-    """Return the value of a fault with its unit."""
-    kind, value = fault["fault"], float(fault["value"])
-    unit = channel_unit(str(fault["channel"]))
-    if kind == "clock":
-        return f"{plain(1e6 * value)} ppm"
-    if kind in _UNITS:
-        return quantity(value, _UNITS[kind], fine=True)
-    return quantity(value, f"{unit}/s" if kind == "slew" else unit, fine=True)
-
-
-_UNITS = {
-    "gain": "1", "sign": "1", "unrelated": "1", "delay": "s", "lag": "s", "derived": "s",
-    "high-pass": "rad/s",
-}  # fmt: skip
-"""Units of faults that do not have their channel's; `SensorFault` says what each is."""
+    return size_text(str(fault["channel"]), str(fault["fault"]), float(fault["value"]))
 
 
 def drive_of(verdict: Verdict) -> Drive:
