@@ -150,11 +150,13 @@ def png(drawn: Page | Figure, dpi: int = 160) -> bytes:
 
 
 def _broken(text: str, width: float, per_inch: float) -> str:
-    """Return a text broken into lines that fit; characters per inch follow from the font size."""
-    return "\n".join(
-        textwrap.fill(line, max(20, int((width - 2 * MARGIN) * per_inch)))
-        for line in text.splitlines()
-    )
+    """Return a text broken into lines that fit; characters per inch follow from the font size.
+
+    A line's last two words stay together: no unit stands alone below its number.
+    """
+    fits = max(20, int((width - 2 * MARGIN) * per_inch))
+    lines = ("\N{NO-BREAK SPACE}".join(line.rsplit(" ", 1)) for line in text.splitlines())
+    return "\n".join(textwrap.fill(line, fits) for line in lines)
 
 
 def percent(share: float, digits: int = 1) -> str:

@@ -25,6 +25,7 @@ Budgets = dict[str, list[Share]]
 _RUNS = 6
 _WIDTH, _PANELS, _BAR = 9.2, 2.7, 0.27
 """Width of the figure, heights of a row of cycles and of a bar [in]."""
+_LEFT = 0.85  # in, beside the panels: -1500 and the axis label need it
 _OF_LAW = {
     "yield": BLUE, "viscous": "#7db8dc", "damping of the bristles": "#bcd9ea", "spring": GREEN,
     "rest of the law": PALE,
@@ -85,7 +86,7 @@ def draw_budget(problem: Problem, model: Model) -> Page | None:
         said = "Stacked over single cycles; the line is their sum, the model's force."
         page = Page(_WIDTH, above + bars, heading, said if cycles else "")
         if cycles:
-            grid = page.grid(1, len(cycles), top=0.4, bottom=bars + 0.5, column_gap=0.2)
+            grid = page.grid(1, len(cycles), top=0.4, bottom=bars + 0.5, left=_LEFT, column_gap=0.2)
             panels = [page.figure.add_subplot(grid[0, k]) for k in range(len(cycles))]
             _stacks(panels, cycles, found, colours)
         grid = page.grid(1, 1, top=above + 0.3, bottom=0.4, left=2.0, right=0.9)
