@@ -38,7 +38,7 @@ def ask(
     ----------
     name, text : of the benchmark, and what it says of itself
     kinds : of cases; `--KIND CASES` says how many there should be
-    answer : called with kind and number of a case, in a process of its own; returns what is found
+    answer : called with kind and number of a case in another process; returns what is found
     rows : returns the figures of all answers
     given : options as typed
     also : packages of bristle that the answers rest on, beside those of a diagnosis

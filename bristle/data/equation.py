@@ -13,7 +13,7 @@ from ..quantity import with_interval
 from ..units import convert
 from .study_model import StudyModel
 
-_COMMAND = re.compile(r"\bV(?=_felt\b|\b)")
+_COMMAND = re.compile(r"\bV(?=(_felt)?\b)")
 """The command in formulas, which are declared for a voltage; `V_felt` is what reaches the fluid."""
 
 _APART = re.compile(r"[,;]\s{2,}")

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import chain
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..data.checks.differing_runs import is_covered
 from ..data.corrections import LEFT_OUT
@@ -21,6 +22,8 @@ from .decision import Z
 from .finding import Finding
 from .opening import Opening
 from .rule import BENCH, DecisionRule
+
+Array = NDArray[np.float64]
 
 FEWEST = 4
 """Runs from which one that differs is told: three others must agree."""
@@ -125,6 +128,22 @@ def inconsistent_runs(
     ])  # fmt: skip
 
 
+def _amount(model: Model, one: Problem, shape: Array) -> tuple[float, float]:
+    """Return how much of a shape a run's force shows beyond a model, and z of what then remains.
+
+    Parameters
+    ----------
+    model : as fitted to the runs
+    one : the run
+    shape : (n,) N
+    """
+    (run,), expected = one.runs, one.expectation(model)
+    normalised = shape[run.skip :] / expected[0][1][run.skip :]
+    left = residuals(one, model, expected)
+    amount = float(left @ normalised) / max(float(normalised @ normalised), TINY)
+    return amount, z_scale(left - amount * normalised)
+
+
 def _zero(model: Model, one: Problem, rule: DecisionRule) -> str:
     """Return the sentence about another zero of a run's force, "" where more than that is wrong.
 
@@ -134,11 +153,9 @@ def _zero(model: Model, one: Problem, rule: DecisionRule) -> str:
     one : the run
     rule : the numbers that decide
     """
-    (run,), expected = one.runs, one.expectation(model)
-    per_newton = 1.0 / expected[0][1][run.skip :]
-    left = residuals(one, model, expected)
-    zero = float(left @ per_newton / (per_newton @ per_newton))
-    if z_scale(left - zero * per_newton) > rule.misfit:
+    (run,) = one.runs
+    zero, remaining = _amount(model, one, np.ones(len(run.force)))
+    if remaining > rule.misfit:
         return ""
     way = "more" if zero > 0.0 else "less"
     return (
@@ -155,11 +172,10 @@ def _gain(model: Model, one: Problem, rule: DecisionRule) -> str:
     ----------
     model, one, rule : as in `_zero`
     """
-    (run,), expected = one.runs, one.expectation(model)
-    predicted = (one.predict(model, run) / expected[0][1])[run.skip :]
-    left = residuals(one, model, expected)
-    gain = 1.0 + float(left @ predicted) / max(float(predicted @ predicted), TINY)
-    if gain <= 0.0 or z_scale(left - (gain - 1.0) * predicted) > rule.misfit:
+    (run,) = one.runs
+    more, remaining = _amount(model, one, one.predict(model, run))
+    gain = 1.0 + more
+    if gain <= 0.0 or remaining > rule.misfit:
         return ""
     return (
         f"In {run.name} the force is {plain(gain, 3)} times what the model says throughout, and "
@@ -185,7 +201,9 @@ def odd_run(model: Model, train: Problem, held_out: Problem, rule: DecisionRule 
     runs = [*train.runs, *held_out.runs]
     if len(runs) < FEWEST:
         return ""
-    apart = np.array([_gain_of(model, train.of([run])) for run in runs])
+    apart = np.array([
+        _amount(model, train.of([run]), train.predict(model, run))[0] for run in runs
+    ])  # fmt: skip
     farthest = np.argsort(-np.abs(apart - np.median(apart)))
     for k in farthest[:SUSPECTS].tolist():
         run, others = runs[k], [*runs[:k], *runs[k + 1 :]]
@@ -200,13 +218,6 @@ def odd_run(model: Model, train: Problem, held_out: Problem, rule: DecisionRule 
         if told := _zero(fitted, one, rule) or _gain(fitted, one, rule):
             return f"One model explains all runs but {run.name}. {told} Else {LEFT_OUT}."
     return ""
-
-
-def _gain_of(model: Model, one: Problem) -> float:
-    """Return by what a model's force of one run is to be multiplied to be nearest to the force."""
-    (run,) = one.runs
-    predicted, force = one.predict(model, run)[run.skip :], run.force[run.skip :]
-    return float(force @ predicted) / max(float(predicted @ predicted), TINY)
 
 
 def groups(

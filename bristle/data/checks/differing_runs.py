@@ -252,6 +252,7 @@ def _scatter(values: Array) -> float:
 
 
 def _is_covered(run: Measurement, others: Sequence[Measurement]) -> bool:
+    """Return whether `is_covered` holds for a measured run; without a command it is zero."""
     return is_covered([
         (_velocity(one), one[one.drive] if one.drive else np.zeros(len(one.time)))
         for one in (run, *others)
