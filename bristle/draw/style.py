@@ -29,6 +29,7 @@ COLOURS = (BLUE, VERMILION, GREEN, PURPLE)
 
 MINUS = "\u2212"
 
+_TOGETHER = "\0"  # a blank at which no line is broken; no heading has this character
 MARGIN = 0.16
 """Space between text and the edge of a figure [in]."""
 
@@ -155,8 +156,8 @@ def _broken(text: str, width: float, per_inch: float) -> str:
     A line's last two words stay together: no unit stands alone below its number.
     """
     fits = max(20, int((width - 2 * MARGIN) * per_inch))
-    lines = ("\N{NO-BREAK SPACE}".join(line.rsplit(" ", 1)) for line in text.splitlines())
-    return "\n".join(textwrap.fill(line, fits) for line in lines)
+    lines = (_TOGETHER.join(line.rsplit(" ", 1)) for line in text.splitlines())
+    return "\n".join(textwrap.fill(line, fits) for line in lines).replace(_TOGETHER, " ")
 
 
 def percent(share: float, digits: int = 1) -> str:
