@@ -17,7 +17,6 @@ from ..identify.search_context import is_rough
 from ..physics.effect import exclude
 from .candidates import SHOWN, joinable, judge
 from .effect_limits import EffectLimit, effect_limits
-from .effect_size import Known
 from .experiments import separating
 from .finding import Finding
 from .limits import detectable, untestable
@@ -77,10 +76,7 @@ def _limits(found: Finding, opened: Opening, profile: bool) -> tuple[EffectLimit
     if found.kind == "insufficient" or found.after is None:
         return ()
     model = (found.after if found.kind == "effect" else opened.before).model
-    problem = opened.searched
-    deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
-    expected = problem.expectation(model)
-    known = Known(problem, model, expected, deciding, opened.rule, opened.held_out)
+    known = opened.known(model)
     able = [
         name
         for name in _able(found, opened)

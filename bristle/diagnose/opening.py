@@ -21,6 +21,7 @@ from ..quantity import plain
 from .candidates import SECONDS, Trial, judge, try_all, try_members
 from .clocks import clock_faults
 from .corrected import corrected
+from .effect_size import Known
 from .faults import SensorFault, words_of
 from .limited_drive import limited_drive
 from .model_based_faults import model_based_fault
@@ -101,6 +102,12 @@ class Opening:
     def searched(self) -> Problem:
         """The training runs, or the part of them, that effects are searched on."""
         return self.part or self.problem
+
+    def known(self, model: Model) -> Known:
+        """Return what sizes of effects beside a fitted model are found with."""
+        deciding = sum(len(run.force) - run.skip for run in self.held_out.runs)
+        expected = self.searched.expectation(model)
+        return Known(self.searched, model, expected, deciding, self.rule, self.held_out)
 
 
 @dataclass(frozen=True)

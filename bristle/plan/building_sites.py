@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from ..diagnose.conclusion import lookalikes
-from ..diagnose.effect_size import Known as Fitted
 from ..diagnose.learned.along import ALONG
 from ..diagnose.learned.place import Place
 from ..diagnose.opening import Opening, of_layer
@@ -164,9 +163,7 @@ def _sized(names: Sequence[str], opened: Opening) -> list[SizedRival]:
     """Return effects, each at the size from which it would be named now."""
     if not names:
         return []
-    problem, model = opened.searched, opened.before.model
-    deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
-    fitted = Fitted(problem, model, problem.expectation(model), deciding, opened.rule)
+    fitted = opened.known(opened.before.model)
     return [sized_rival(name, fitted) for name in names]
 
 

@@ -124,7 +124,7 @@ def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
             sized.value(max(size, one.least)) if shown else inf
             for size, shown in zip(sizes, visible, strict=True)
         ]
-        found = max(one.size * after[name], one.least)
+        found = max(_named(one, before[name], after[name]), one.least)
         text = f"{sized.parameter}, limit at 95 %"
         if visible[1] and not sized.ended(found):
             side = "above" if not sized.falls else "below"
@@ -136,6 +136,21 @@ def _seen(purposes: Purposes, now: Known, then: Known) -> list[Outcome]:
             )
         )  # fmt: skip
     return out
+
+
+def _named(one: SizedRival, now: float, then: float) -> float:
+    """Return the size from which an effect is named with the tests too.
+
+    From the runs at hand it is what a verdict on them says; tests make it smaller as they see more
+    of the effect.
+
+    Parameters
+    ----------
+    one : the effect at a size
+    now, then : from what share of that it would be named if all runs showed it alike
+    """
+    told = one.limit is not None and one.limit.named is not None and isfinite(now)
+    return one.size * (then / now if told else then)
 
 
 def _allowed(one: SizedRival, now: float, then: float) -> tuple[float, float]:

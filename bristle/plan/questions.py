@@ -74,8 +74,7 @@ def effects_beside(opened: Opening, names: Sequence[str] = ()) -> list[SizedRiva
     able = able_beside(model, problem, opened.shown)
     for name in names:
         refuse_unable(name, able, model)
-    deciding = sum(len(run.force) - run.skip for run in opened.held_out.runs)
-    fitted = Fitted(problem, model, problem.expectation(model), deciding, opened.rule)
+    fitted = opened.known(model)
     return [sized_rival(name, fitted) for name in names or able]
 
 

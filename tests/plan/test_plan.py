@@ -12,21 +12,26 @@ from scipy.ndimage import uniform_filter1d
 
 import bristle
 from bristle.cli import main
+from bristle.diagnose.bench import BenchRuns
+from bristle.diagnose.opening import Opening
 from bristle.errors import StudyError
 from bristle.example.make import Choice, make_bench
 from bristle.identify.fit import intervals_of
 from bristle.identify.model import Model, Problem, Run
 from bristle.plan.folder import read_plan
+from bristle.plan.goal import Measured, Purposes, stated
 from bristle.plan.knowledge import Asked, Evidence, Known, Question, Rival
 from bristle.plan.motions import Command, Waveform
-from bristle.plan.outcome import Outcome
+from bristle.plan.outcome import Outcome, outcomes
 from bristle.plan.planned_test import Test
 from bristle.plan.purposes import LEAST, Figure, cost_of, seen
-from bristle.plan.questions import open_parts
+from bristle.plan.questions import effects_beside, open_parts
 from bristle.plan.rig_limits import RigLimits
 from bristle.plan.search import Planner
 from bristle.plan.seen import Goal, Seen, roles_of
 from bristle.plan.wish import Wish, default_wish
+from bristle.quantity import quantity
+from bristle.study.identification import as_model
 
 SHEET = """schema = 1
 [damper]
@@ -244,6 +249,22 @@ def test_what_the_runs_at_hand_allow_of_an_effect_is_what_the_verdict_says(
         assert found[name].now == pytest.approx(told[name].largest, rel=1e-6)
     assert found["fluid_inertia"].then < found["fluid_inertia"].now
     assert found["saturation"].then > found["saturation"].now  # V_s falls as the effect grows
+
+
+def test_the_size_from_which_an_effect_is_named_is_the_verdicts(rig: bristle.Study) -> None:
+    told = {one.effect: one for one in bristle.diagnose(rig, write=False).limits["damper"]}
+    runs, model = rig.runs(), as_model(rig.model())
+    opened = BenchRuns(runs.train, runs.holdout, model, True, lambda _: None).open_damper()
+    assert isinstance(opened, Opening)
+    names = ["delay", "stribeck", "saturation"]
+    purposes = Purposes(opened.before.model, tuple(effects_beside(opened, names)))
+    measured = Measured(opened.problem.runs, opened.held_out.runs)
+    found = stated(purposes, opened.searched, measured, 1.0, seed=1)
+    rows = outcomes(purposes, found.asked, found.known, found.known)  # no further test
+    for row, one in zip(rows, purposes.effects, strict=True):
+        assert one.limit is not None
+        assert one.limit.named == pytest.approx(told[row.name].named, rel=1e-6)
+        assert quantity(told[row.name].named, one.sized.unit, 2, fine=True) in row.what
 
 
 def test_a_plan_sharpens_and_is_written_as_a_controller_takes_it(
