@@ -19,7 +19,7 @@ PACKAGE = ROOT / "bristle"
 # A base, two columns that do not see each other, and a roof over both. Within each of them a layer
 # imports from those before it in its list, never from beside it or from behind it.
 BASE = (
-    {"errors", "resources", "interrupt", "progress", "snapshots"},
+    {"errors", "resources", "interrupt", "progress", "snapshots", "version"},
     {"units", "lines", "quantity", "shown"},
     {"physics", "findings"},
     {"control", "data", "jit", "trust"},

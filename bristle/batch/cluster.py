@@ -15,8 +15,8 @@ from collections import deque
 from collections.abc import Generator, Iterable
 from typing import Any
 
-from .. import __version__
 from ..errors import EnsembleError, RunError
+from ..version import __version__
 from .plan import Outcome, Plan
 from .worker import run_one
 

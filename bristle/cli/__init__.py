@@ -181,6 +181,6 @@ def run_and_exit() -> NoReturn:
 
 
 def _version() -> str:
-    from .. import __version__
+    from ..version import __version__
 
     return f"bristle {__version__}"

@@ -27,8 +27,8 @@ def line(error: Exception, command: str) -> str:
 
 def _keep(error: Exception) -> Path | None:
     """Write a traceback among those of this user; return the file, None where none can be."""
-    from .. import __version__
     from ..resources import state_folder
+    from ..version import __version__
 
     lines = [
         f"bristle {__version__}, Python {platform.python_version()}, {platform.platform()}",

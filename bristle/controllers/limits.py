@@ -8,13 +8,13 @@ import re
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from .. import __version__
 from ..batch.plan import Output
 from ..errors import ScenarioError
 from ..limit import limit
 from ..limit.case import case_of
 from ..resources import cache_folder
 from ..scenario.scenario import load_scenario
+from ..version import __version__
 from .cells import Bench, quiet
 from .entry import LIMIT, ON, Entry, constant
 from .folder import ABOVE, FILES, LIMITS, Part, plain_name

@@ -10,10 +10,10 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..errors import StudyError
 from ..findings import unknown, written
 from ..lines import KeyPath, key_lines
+from ..version import __version__
 
 LARGEST = 4 * 1024**2
 """Largest TOML or JSON file of a study [bytes]."""

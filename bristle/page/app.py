@@ -12,8 +12,8 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..errors import BristleError, StudyError
+from ..version import __version__
 from .answers import Answers, Compiling, stamp
 from .commands import COMMANDS, order_of
 from .consent import consent, waiting_texts

@@ -161,7 +161,7 @@ def prepare(folder: Path, format: str) -> None:
 
 def _write(table: pd.DataFrame, path: Path, name: str, what: str, engine: str) -> None:
     """Write a table as CSV; `# ` lines in front say how it was made."""
-    from .. import __version__
+    from ..version import __version__
 
     head = (
         f"# {what}; bristle {__version__}, engine {engine}, command: bristle figures {name}\n"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
-from .. import __version__
 from ..controllers.entry import BEST, LIMIT
 from ..controllers.folder import ENSEMBLES, SCENARIOS, plain_name
 from ..controllers.picture import draw_levels, draw_motion, draw_summary
@@ -15,6 +14,7 @@ from ..draw import html
 from ..draw.style import png
 from ..findings import command
 from ..quantity import plain, quantity
+from ..version import __version__
 
 if TYPE_CHECKING:
     from ..controllers.result import ControllerComparison

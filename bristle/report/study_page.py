@@ -7,13 +7,13 @@ import platform
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from .. import __version__
 from ..compare.names import site_name
 from ..compare.picture import headline
 from ..draw import html
 from ..draw.style import percent
 from ..quantity import quantity, short_z
 from ..study.run_file import TEST
+from ..version import __version__
 from .reproduce import commands
 from .study_content import Content, gather
 from .study_curves import curves_section

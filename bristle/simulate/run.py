@@ -12,7 +12,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .. import __version__
 from ..errors import RunError, not_usable
 from ..findings import written
 from ..fmu.description import Description, read_description
@@ -20,6 +19,7 @@ from ..interrupt import Interrupt
 from ..progress import Progress, listening, tell
 from ..scenario.scenario import Scenario, fmu_parameters, load_scenario
 from ..scenario.text import scenario_text
+from ..version import __version__
 from .coupling_error import as_data, estimate
 from .forms import ensure_of
 from .output import Output

@@ -14,9 +14,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .. import __version__
 from ..data.files import other_schema, read_json, write_json, write_whole
 from ..errors import StudyError
+from ..version import __version__
 from .set_aside import free_number, kept_folder, set_aside
 
 _NUMBER = re.compile(r"\d{3,}")

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock, Timeout
 
-from .. import __version__
 from ..data.channels import ChannelSpec
 from ..data.corrections import Correction
 from ..data.files import read_json, write_json, write_whole
@@ -25,6 +24,7 @@ from ..findings import command, written
 from ..physics.user import Loaded, waiting
 from ..shown import shown
 from ..trust import can_do_without, load
+from ..version import __version__
 from .added_runs import behind_data
 from .history import History, Step
 from .new import make_folder, parse_channel

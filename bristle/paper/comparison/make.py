@@ -14,11 +14,11 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ... import __version__
 from ...control.controller import read_controller
 from ...draw.style import Page, look
 from ...errors import DesignError, not_usable
 from ...progress import Progress, counted
+from ...version import __version__
 from .. import optimum, stiction
 from ..figures import prepare
 from ..runs import Drawing, Runs

@@ -8,8 +8,8 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ... import __version__
 from ...draw import html
+from ...version import __version__
 from .claims import Statement
 from .experiment import KAPPA, LAWS
 from .numbers import NOT, REPRODUCED, UNDECIDABLE, Verdict
