@@ -16,9 +16,10 @@ from ..identify.model import Run
 from ..identify.rig import DAMPER
 from ..identify.search import z_scale
 from ..identify.search_context import residuals
+from ..identify.structure import StructureProblem
 from ..quantity import plain
 from .candidates import Trial
-from .decision import Z
+from .decision import OTHER_FORM, Z
 from .finding import Finding
 from .opening import Opening
 from .rule import BENCH, DecisionRule
@@ -49,22 +50,52 @@ def contradicted(found: Finding, opened: Opening) -> Finding:
     opened : the site's runs and its model
     """
     assert found.after is not None
+    odd = _but_for_a_run(found, opened)
+    if odd is not found:
+        return odd
     before, rule, at_damper = opened.before, opened.rule, found.site == DAMPER
     kind = kind_of(found.kind, before, found.after, rule)
     runs = opened.searched, opened.held_out, rule
+    if found.kind == kind == "unknown":
+        told = groups(before.model, *runs, opened.scope.restart)
+        return replace(found, kind="insufficient", reasons=(told,)) if told else found
     if found.kind == "unknown":
-        told = odd_run(before.model, *runs) if at_damper else ""
-        if kind == "unknown":
-            told = told or groups(before.model, *runs, opened.scope.restart)
-            return replace(found, kind="insufficient", reasons=(told,)) if told else found
-        if not told:
-            worst = inconsistent_runs(before.model, *runs, at_damper)
-            told = " ".join(filter(None, [*found.reasons, HELD_OUT_DIFFER, worst]))
+        worst = inconsistent_runs(before.model, *runs, at_damper)
+        told = " ".join(filter(None, [*found.reasons, HELD_OUT_DIFFER, worst]))
         return replace(found, kind=kind, reasons=(told,))
     if kind == found.kind:
         return found
     told = inconsistent_runs(found.after.model, opened.problem, *runs[1:], at_damper)
     return replace(found, kind=kind, reasons=(told,))
+
+
+def _but_for_a_run(found: Finding, opened: Opening) -> Finding:
+    """Return a finding that names the run whose zero or gain is another one, if there is one.
+
+    Where a model explains all other runs, what they leave together is no other form of an effect,
+    and no further effect. If that model has fewer effects than the finding's, the run is to be set
+    right first.
+
+    Parameters
+    ----------
+    found, opened : as in `contradicted`
+    """
+    after, rule, problem = found.after, opened.rule, opened.problem
+    assert after is not None
+    by_equilibrium = isinstance(problem, StructureProblem) and problem.reconstructed
+    if found.site != DAMPER or by_equilibrium or max(after.train, after.z) <= rule.misfit:
+        return found
+    simplest_first = (opened.before, *found.trials[:1], after)
+    for effects, trial in {one.model.effects: one for one in simplest_first}.items():
+        added = [name for name in effects if name not in opened.before.model.effects]
+        called = f"The model with {' and '.join(added)}" if added else "One model"
+        told = odd_run(trial.model, opened.searched, opened.held_out, rule, called)
+        if told and effects == after.model.effects and found.effects:
+            kept = (one for one in found.reasons if one != OTHER_FORM)
+            return replace(found, reasons=(*kept, told))
+        if told:
+            return replace(found, kind="insufficient", effects=(), reasons=(told,))
+    return found
 
 
 def kind_of(kind: str, before: Trial, best: Trial, rule: DecisionRule = BENCH) -> str:
@@ -185,7 +216,13 @@ def _gain(model: Model, one: Problem, rule: DecisionRule) -> str:
     )
 
 
-def odd_run(model: Model, train: Problem, held_out: Problem, rule: DecisionRule = BENCH) -> str:
+def odd_run(
+    model: Model,
+    train: Problem,
+    held_out: Problem,
+    rule: DecisionRule = BENCH,
+    called: str = "One model",
+) -> str:
     """Return, in words, the one run whose zero or gain is another one; "" where none is.
 
     For a model that the runs do not agree with: fitted to all runs but one it must explain each of
@@ -197,6 +234,7 @@ def odd_run(model: Model, train: Problem, held_out: Problem, rule: DecisionRule 
     model : law and effects; it is refitted without each run in question
     train, held_out : the runs
     rule : the numbers that decide
+    called : what the sentence calls the model
     """
     runs = [*train.runs, *held_out.runs]
     if len(runs) < FEWEST:
@@ -216,7 +254,7 @@ def odd_run(model: Model, train: Problem, held_out: Problem, rule: DecisionRule 
         if _z(fitted, one) <= rule.misfit:
             continue
         if told := _zero(fitted, one, rule) or _gain(fitted, one, rule):
-            return f"One model explains all runs but {run.name}. {told} Else {LEFT_OUT}."
+            return f"{called} explains all runs but {run.name}. {told} Else {LEFT_OUT}."
     return ""
 
 

@@ -35,9 +35,12 @@ def law_name(row: Row) -> str:
 
 
 def law_sentences(verdict: Row) -> list[str]:
-    """Return which law the runs prefer, and what explains them as well; none of a law given."""
+    """Return which law the runs prefer, and what explains them as well.
+
+    None of a law given, or where the runs allow no verdict.
+    """
     rows = verdict.get("laws") or []
-    if not rows:
+    if not rows or verdict.get("kind") == "insufficient":
         return []
     own = (verdict["law"], verdict["command"])
     mine = next(row for row in rows if (row["law"], row["command"]) == own)

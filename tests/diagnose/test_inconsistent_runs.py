@@ -7,8 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bristle.diagnose.inconsistent_runs import groups, inconsistent_runs, odd_run
+from bristle.diagnose.candidates import judge
+from bristle.diagnose.decision import OTHER_FORM
+from bristle.diagnose.finding import Finding
+from bristle.diagnose.inconsistent_runs import contradicted, groups, inconsistent_runs, odd_run
+from bristle.diagnose.opening import Opening
 from bristle.identify.fit import fit, identify
+from bristle.identify.site_fit import joined
 from tests.identify.truths import hidden_case, true_case
 
 
@@ -96,3 +101,50 @@ def test_a_run_beyond_all_others_is_not_called_odd():
     alone = replace(strongest, V=strongest.V + 20.0, force=1.3 * strongest.force)
     train = first.of([alone, *others])
     assert odd_run(fit(train, truth, with_std=False).model, train, first.of([])) == ""
+
+
+def sprung_finding(place: int, gain: float) -> tuple[Finding, Opening]:
+    """Return what is found on a damper beside a spring, with one run whose force is scaled."""
+    first, second, truth = true_case(5, "bingham")
+    both = [*first.runs, *second.runs]
+    stiffness = 0.5 * float(np.std(both[0].force) / np.std(both[0].x))
+    runs = [replace(run, force=run.force + stiffness * run.x) for run in both]
+    runs[place] = replace(runs[place], force=gain * runs[place].force)
+    train, held_out = first.of(runs[:3]), first.of(runs[3:])
+    before = judge(fit(train, truth, with_std=False).model, train, held_out)
+    single = judge(joined("gas_spring", before.model, train), train, held_out)
+    found = Finding(
+        "damper", "effect", ("gas_spring",), before.z, single.z, 0.8, float("nan"),
+        trials=(single,), before=before, after=single, reasons=("It gains.", OTHER_FORM),
+    )  # fmt: skip
+    return found, Opening(before, train, held_out)
+
+
+@pytest.mark.parametrize("place", [1, 4])
+def test_what_an_effect_leaves_in_one_odd_run_is_no_other_form_of_it(place):
+    found, opened = sprung_finding(place, 1.1)
+    told = contradicted(found, opened)
+    assert (told.kind, told.effects) == ("effect", ("gas_spring",))
+    name = [*opened.problem.runs, *opened.held_out.runs][place].name
+    assert OTHER_FORM not in told.reasons
+    assert told.reasons[-1].startswith(f"The model with gas_spring explains all runs but {name}. ")
+
+
+def test_no_further_effect_is_named_for_one_odd_run():
+    found, opened = sprung_finding(1, 1.1)
+    single = found.after
+    assert single is not None
+    both = replace(single.model, effects=("gas_spring", "delay"))
+    pair = replace(single, model=both, z=1.0)
+    named = replace(found, effects=("gas_spring", "delay"), after=pair)
+    told = contradicted(named, opened)
+    assert (told.kind, told.effects) == ("insufficient", ())
+    assert "gain" in told.reasons[0]
+
+
+def test_a_verdict_stays_where_no_run_is_odd():
+    found, opened = sprung_finding(1, 1.0)
+    assert contradicted(found, opened) is found
+    assert found.after is not None
+    rough = replace(found, after=replace(found.after, z=2.0))
+    assert contradicted(rough, opened) is rough
