@@ -236,6 +236,16 @@ def defined(texts: Mapping[str, str]) -> Iterator[None]:
         _regenerate()
 
 
+def flaw_of(name: str, text: str) -> str:
+    """Return why a text can be no effect's file of a name, "" where it can.
+
+    It runs in a child process, as a file does that is new here.
+    """
+    path = Path(f"{name}.py")
+    flaw = _flaws({path: text}, "effect")[path]
+    return "" if flaw is None else str(flaw)
+
+
 def _regenerate() -> None:
     damper.regenerate()
     structure.regenerate()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,6 +22,9 @@ from ..quantity import scale
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+
+BESIDE = 18
+"""Characters in a line of the legend beside a surface."""
 
 FINE = 1000
 """Points at which a closed form is drawn: a ripple turns between two knots."""
@@ -120,8 +124,8 @@ def _draw_surface(axes: Axes, found: LearnedCurve) -> None:
         )  # fmt: skip
     _name_axes(axes, curve, along, unit)
     axes.legend(
-        frameon=False, labelcolor=GREY, fontsize=9, title=curve.second.words, title_fontsize=9,
-        loc="center left", bbox_to_anchor=(1.0, 0.5),
+        frameon=False, labelcolor=GREY, fontsize=9, title_fontsize=9,
+        title=fill(curve.second.words, BESIDE), loc="center left", bbox_to_anchor=(1.0, 0.5),
     )  # fmt: skip
 
 

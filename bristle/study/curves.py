@@ -28,6 +28,7 @@ from ..diagnose.learned.surface import continues, separated
 from ..diagnose.opening import Insufficient, Opening
 from ..errors import StudyError
 from ..physics.effect import EFFECTS
+from ..physics.user import flaw_of
 from ..progress import tell
 from ..quantity import plain, quantity
 from ..shown import shown
@@ -222,24 +223,36 @@ def learn_effect(
     if closed is not None:  # the name that the effect's formula has
         forms = (closed.form, *(one for one in forms if one is not closed.form))
     learned = LearnedEffect(found, forms, closed, site=told)
-    return _written(study, learned, found.curve) if write else learned
+    flaw = ""
+    for one in [learned, replace(learned, closed=None)] if closed is not None else [learned]:
+        text = _text(study, one, found.curve)
+        flaw = flaw_of(name, text)
+        if not flaw:
+            return _written(study, one, text) if write else one
+    why = f"{found.curve.words().capitalize()} can be no effect: {flaw}"
+    return replace(learned, closed=None, found=replace(found, refused=why))
 
 
-def _written(study: Study, learned: LearnedEffect, curve: Curve) -> LearnedEffect:
-    """Write a learned effect's file, its picture, and what the report says of it."""
+def _text(study: Study, learned: LearnedEffect, curve: Curve) -> str:
+    """Return the text of a learned effect's file."""
     name, closed = learned.name, learned.closed
-    origin = f"{LEARNED} {study.name}, {date.today().year}"
     if closed is not None:
         values = closed.trial.model.values  # of an effect that has no file yet
         memory = tuple((n, values[f"{name}.{n}"]) for n, _ in curve.memory)
         curve = replace(curve, memory=memory)
-    text = effect_text(name, curve, origin, closed.formula if closed else None)
+    origin = f"{LEARNED} {study.name}, {date.today().year}"
+    return effect_text(name, curve, origin, closed.formula if closed else None)
+
+
+def _written(study: Study, learned: LearnedEffect, text: str) -> LearnedEffect:
+    """Write a learned effect's file, its picture, and what the report says of it."""
+    name = learned.name
     file = study.effects_folder / f"{name}.py"
     with study.writing():
         file.parent.mkdir(exist_ok=True)
         file.write_text(text, encoding="utf-8")
         remember_made(file, text)
-    drawn = curve_png(learned.found, learned.forms, closed)
+    drawn = curve_png(learned.found, learned.forms, learned.closed)
     picture = study.write_report(f"{name}.png", drawn)
     told = json.dumps(learned.as_dict(), indent=2, ensure_ascii=False)
     study.write_report(f"{name}.json", told)

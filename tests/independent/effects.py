@@ -648,7 +648,7 @@ def _(s, rng, rig, size):
 # --- outside the library too, with plans of their own: on a bench alone ----------------------------
 
 
-def _bumper(kind: int, s: float, rng: np.random.Generator, rig: Rig, size: Size) -> Fields:
+def _one_side(kind: int, s: float, rng: np.random.Generator, rig: Rig, size: Size) -> Fields:
     gap = size["travel"] * rng.uniform(0.2, 0.6)
     deep = size["travel"] - gap
     k = 3.0 * s * rig.force / (deep if kind == 1 else deep**1.5)
@@ -658,13 +658,13 @@ def _bumper(kind: int, s: float, rng: np.random.Generator, rig: Rig, size: Size)
 @form("one_sided_contact", "bumper", beds=("bench",), outside="displacement")
 def _(s, rng, rig, size):
     """k max(x - d, 0) on one side of the stroke: a bumper of rubber. Dixon (2007), ch. 5."""
-    return _bumper(1, s, rng, rig, size)
+    return _one_side(1, s, rng, rig, size)
 
 
 @form("one_sided_contact", "rounded", beds=("bench",), outside="displacement")
 def _(s, rng, rig, size):
     """k max(x - d, 0)^1.5 on one side: a rounded bumper. Hertz (1882), J. reine angew. Math. 92."""
-    return _bumper(2, s, rng, rig, size)
+    return _one_side(2, s, rng, rig, size)
 
 
 def _after_reversal(kind: int, s: float, rng: np.random.Generator, rig: Rig) -> Fields:

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.independent.effects import CROSSED, FORMS, FURTHER
+from tests.independent.effects import BOTH, CROSSED, FORMS, FURTHER, forms
 from tests.independent.generate import make_case
 from tests.independent.kernel import _accumulator
+from tests.independent.rigs import draw_rig
 from tests.independent.specimen import Specimen
 
 HERE = Path(__file__).parent
@@ -35,6 +36,18 @@ def test_a_seed_gives_the_same_case_again():
     first, second = (make_case(3, "none", None, 0.15, 0.01, "bench_10N", "lugre") for _ in "ab")
     for one, other in zip(first.runs, second.runs, strict=True):
         assert np.array_equal(one["force"], other["force"])
+
+
+@pytest.mark.parametrize("bed", ["bench_10N", "structure_10N"])
+@pytest.mark.parametrize("name", [name for name in FORMS if name != "none"])
+def test_every_form_gives_its_parameters_on_every_rig_that_carries_it(name, bed):
+    size = {"travel": 0.01, "drift": 0.002}
+    for law in BOTH:
+        rig = draw_rig(bed, law, np.random.default_rng(1))
+        for one in forms(name, rig):
+            fields = one.fields(0.3, np.random.default_rng(2), rig, size)
+            assert fields
+            assert all(np.all(np.isfinite(value)) for value in fields.values())
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -38,14 +37,6 @@ EQUAL = 1e-12
 STEP = 0.002  # s
 
 
-def damper_curve_of(part: str, along: str) -> Curve:
-    """Return a curve of a damper; where the signal jumps with direction, an even one."""
-    curve = curve_of(part, along)
-    if along != "slowing":
-        return curve
-    return replace(curve, knots=(-4.0, -2.0, 0.0, 2.0, 4.0), values=(0.3, 0.1, 0.0, 0.1, 0.3))
-
-
 def covering(place: Place) -> list[tuple[str, str]]:
     """Return pairs of a part of the model and a signal, each part and each signal among them."""
     pairs = [
@@ -74,7 +65,7 @@ def written(curves: list[Curve], where: Path) -> list[Path]:
 
 
 def test_every_part_and_every_signal_gives_the_same_numbers(tmp_path: Path) -> None:
-    curves = [damper_curve_of(part, along) for part, along in covering(AT_DAMPER)] + [slip_of()]
+    curves = [curve_of(part, along) for part, along in covering(AT_DAMPER)] + [slip_of()]
     assert {curve.part for curve in curves} == {*PARTS} - {RING}  # that acts on what is shown
     assert {curve.along for curve in curves} >= {*ALONG}
     files = written(curves, tmp_path)

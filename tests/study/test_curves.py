@@ -73,6 +73,18 @@ def learned(monkeypatch):
     return given
 
 
+def test_a_curve_that_no_study_could_read_is_refused_and_nothing_is_written(
+    study, learned, monkeypatch
+):
+    learned()
+    monkeypatch.setattr(curves, "flaw_of", lambda name, text: "force jumps by 3 with q.v.")
+    found = learn_effect(study)
+    assert found.file is None
+    assert found.sentences()[0].startswith("Nothing was learned. An added force along ")
+    assert found.sentences()[0].endswith(" can be no effect: force jumps by 3 with q.v.")
+    assert not list(study.effects_folder.glob("learned_*.py"))
+
+
 def test_a_learned_curve_is_an_effect_of_the_study(study, learned):
     learned()
     found = learn_effect(study)

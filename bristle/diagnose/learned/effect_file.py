@@ -154,7 +154,7 @@ def _imports(
     unit = drive_named(curve.drive).unit
     return [
         *lines,
-        *_constant("SLOW", curve, curve.slow, "Speed [m/s] over which friction turns round."),
+        *_constant("SLOW", curve, curve.slow, "Speed [m/s] over which the direction changes."),
         *_constant("TOP", curve, curve.top, f"Largest command of the runs [{unit}]."),
         "",
         "",

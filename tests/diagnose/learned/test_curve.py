@@ -19,6 +19,7 @@ from bristle.diagnose.learned.slip import SLIP, slips
 from bristle.errors import PhysicsError
 from bristle.identify.fit import Problem, Run
 from bristle.physics.effect import EFFECTS, Q
+from bristle.physics.probe import probe
 from bristle.physics.user import defined
 
 STEP = 0.002  # s
@@ -65,6 +66,7 @@ def test_every_part_along_every_signal_is_an_effect(part, along):
         assert np.isfinite(hook(signals(run(), 700, STEP), z, p))
         assert effect.parameters["curve[2]"].value == pytest.approx(0.08)
         assert effect.assumed[0] == "curve[1]"
+        probe(effect)  # as it is when a study reads the file
     assert "learned_9" not in EFFECTS
 
 
