@@ -144,7 +144,7 @@ def _limits(verdict: Verdict) -> list[str]:
 
 def _next(verdict: Verdict, folder: Path) -> str:
     """Return the command that follows from a verdict; two where it asks for another law."""
-    if not verdict.get("laws"):
+    if not verdict.get("laws") or verdict["kind"] == "insufficient":
         return _then(verdict, folder)
     from ..physics.forms import joined_form
     from ..study.laws import law_command
@@ -170,6 +170,11 @@ def _then(verdict: Verdict, folder: Path) -> str:
             f"{_gaining(verdict, folder)}"
             f"{command('compare', folder)} , which shows where the residual is;  "
             "bristle effects new NAME  starts your own effect."
+        )
+    if verdict["kind"] == "insufficient":
+        return (
+            f"set right in {folder / 'study.toml'} what the text names, or measure it again,  then "
+            f"{command('diagnose', folder)}"
         )
     hidden = _not_excited(verdict)
     if verdict["kind"] == "none" and hidden:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bristle.cli.diagnose import _next
 from bristle.diagnose.candidates import judge
 from bristle.diagnose.decision import OTHER_FORM
 from bristle.diagnose.finding import Finding
@@ -148,3 +150,8 @@ def test_a_verdict_stays_where_no_run_is_odd():
     assert found.after is not None
     rough = replace(found, after=replace(found.after, z=2.0))
     assert contradicted(rough, opened) is rough
+
+
+def test_after_runs_that_allow_no_verdict_comes_another_diagnosis():
+    verdict = {"kind": "insufficient", "effects": [], "laws": [{"law": "dahl"}], "findings": []}
+    assert _next(verdict, Path("rig")).endswith("measure it again,  then bristle diagnose rig")
