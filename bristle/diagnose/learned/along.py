@@ -212,7 +212,7 @@ ALONG = {
         Along("voltage", "V", "the command", ("V",), "q.V", lambda run, _: run.V),
         Along(
             "slowing", "m/s2", "acceleration along the motion", ("v", "a"),
-            "q.a * tanh(q.v / SLOW)",
+            "(q.a * tanh(q.v / SLOW))",  # in brackets, for a formula may take its square
             lambda run, _: np.where(run.v > 0.0, run.a, -run.a),
         ),
         Along(

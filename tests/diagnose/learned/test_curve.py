@@ -104,6 +104,23 @@ def test_a_curve_for_each_direction_is_that_of_the_scan():
     assert found[moving] == pytest.approx(expected[moving], abs=0.003)
 
 
+@pytest.mark.parametrize("along", [n for n, one in ALONG.items() if not (one.memory or one.states)])
+def test_a_formula_is_its_form_of_the_signal(along):
+    now = run()
+    s = ALONG[along].history(now, {})
+    knots = np.linspace(s.min(), s.max(), 7)
+    curve = Curve("force", along, (), tuple(knots), tuple(0.4 * (knots / s.max()) ** 2), (), 0.001)
+    best = next(one for one in closed_forms(curve, [0.001] * 7) if one.name == "parabola")
+    text = effect_text("learned_9", curve, "made for a test, 2026", formula_of(best, curve))
+    with defined({"learned_9": text}):
+        effect = EFFECTS["learned_9"]
+        probe(effect)
+        p, force = effect.values_of({}), effect.hooks()["force"]
+        found = np.array([force(signals(now, k, STEP), (), p) for k in range(len(T))])
+    moving = np.abs(now.v) > 5.0 * curve.slow
+    assert found[moving] == pytest.approx(np.asarray(best.at(s))[moving], abs=0.003)
+
+
 @pytest.mark.parametrize("closed", [False, True])
 def test_a_learned_effect_conforms_as_any_other(closed):
     curve = curve_of("fluid", "displacement", 0.5)
