@@ -44,12 +44,16 @@ def grouped(findings: Iterable[Finding]) -> list[tuple[Finding, list[str]]]:
     groups: dict[tuple[str, ...], list[Finding]] = defaultdict(list)
     for finding in findings:
         run = finding.run if finding.kind in _OF_ONE_RUN else ""
-        groups[finding.level, finding.kind, finding.channel, run].append(finding)
+        groups[finding.kind, finding.channel, run].append(finding)
     out = [
-        (max(group, key=lambda one: one.value), [one.run for one in group if one.run])
+        (min(group, key=_worst_first), [one.run for one in group if one.run])
         for group in groups.values()
     ]
     return sorted(out, key=lambda pair: _ORDER[pair[0].level])
+
+
+def _worst_first(finding: Finding) -> tuple[int, float]:
+    return _ORDER[finding.level], -finding.value
 
 
 def sentence(finding: Finding, runs: list[str]) -> str:
